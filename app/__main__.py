@@ -8,7 +8,7 @@ from importlib import metadata
 import tyro
 from rich.console import Console
 
-from app.cli import bench, evaluate, export, index, info, init, new, relink, restore, simulate, track
+from app.cli import acquire, bench, evaluate, export, index, info, init, new, relink, restore, simulate, track
 from app.cli import open as open_
 from app.runtime import process_exit
 from app.runtime.malloc_trim import give_back_freed_memory
@@ -21,6 +21,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "relink": relink.command,
     "index": index.command,
     "init": init.command,
+    "acquire": acquire.command,
     "track": track.command,
     "evaluate": evaluate.command,
     "export": export.command,

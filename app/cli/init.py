@@ -41,7 +41,7 @@ class InitArguments:
     person: OptionalName = None
     """name; needed in a session of several people."""
     fit_sizes: bool = False
-    """measure the body's segment lengths from the joints of all frames too."""
+    """acquire the body's sizes too, from the joints and the contours of several frames."""
     joint_map: OptionalPath = None
     """TOML file with a line such as left_shoulder = "LSHO" for each joint, if the file has other names."""
     axes: str = "x,y,z"
@@ -70,7 +70,8 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
         joints = read_joints(path, at.session.fps, arguments.joint_map, arguments.axes)
         found = init_from_joints(at, frame, joints, arguments.fit_sizes)
         residual = f"{found['mean_mm']:.1f} mm from {len(found['residual_mm'])} joints on average"
-        text = f"{found['person']}, frame {frame}: {residual}"
+        text = f"{found['person']}, {found['height_m']:.2f} m tall, frame {frame}: {residual}"
+        text += "" if found["sizes"] is None else f"\n{found['sizes']}"
         if found["mean_mm"] > _MISFIT_MM:
             height_m = at.session.people[at.people[0]].model.height_m
             text += (
@@ -102,9 +103,10 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     """
     import numpy as np
 
-    from tracker.acquisition.from_joints import fit_sizes
+    from tracker.acquisition.from_joints import height_from_joints
     from tracker.fitting.gauss_newton import fit_to_points
     from tracker.formats.joint_maps import LIMB_JOINTS
+    from tracker.pipeline.body_acquisition import has_preset_sizes
     from tracker.session.lock import SessionLock
     from tracker.session.session import save_session
 
@@ -116,19 +118,60 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     points = dict(zip(joints.names, joints.points[row[0]], strict=True))
     # Conventions disagree about neck and head; the limbs alone determine the trunk too.
     limbs = {n: p for n, p in points.items() if n in LIMB_JOINTS and np.all(np.isfinite(p))}
-    if sizes:
-        person = replace(person, model=fit_sizes(person.model, joints))
-    fit = fit_to_points(person.model, limbs)
-    where = _where(session, person, fit.pose, frame)
+    note = None
+    if sizes or (has_preset_sizes(person.model) and set(joints.names).issuperset(LIMB_JOINTS)):
+        height_m = height_from_joints(person.model, joints)
+        _check_height(height_m)
+        person = replace(person, model=person.model.with_height(height_m))
     with SessionLock(session.folder):
         if sizes:
+            person, note = _with_acquired_sizes(session, person, joints)
+        fit = fit_to_points(person.model, limbs)
+        where = _where(session, person, fit.pose, frame)
+        if person is not session.people[index]:
             people = tuple(person if i == index else p for i, p in enumerate(session.people))
             save_session(replace(session, people=people))
-        _store_keyframe(session, person, frame, fit.pose, "joints")
+        known = {n: [float(x) for x in p] for n, p in limbs.items()}
+        _store_keyframe(session, person, frame, fit.pose, {"method": "joints", "joints": known})
     fitted = dict(zip(person.model.point_names, person.model.points_world(fit.pose), strict=True))
     residuals = {n: float(1000 * np.linalg.norm(fitted[n] - p)) for n, p in limbs.items()}
     mean = float(np.mean(list(residuals.values())))
-    return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean, **where}
+    return {
+        "person": person.name, "frame": frame, "height_m": person.model.height_m, "residual_mm": residuals,
+        "mean_mm": mean, "sizes": note, **where,
+    }  # fmt: skip
+
+
+def _check_height(height_m: float) -> None:
+    from tracker.body.dimensions import HEIGHT_LIMITS_M
+
+    lowest, highest = HEIGHT_LIMITS_M
+    if not lowest <= height_m <= highest:
+        raise TrackerError(
+            f"expected joints of a body {lowest} to {highest} m tall, found one of {height_m:.3g} m; "
+            "check the units of the file, and --joint-map"
+        )
+
+
+def _with_acquired_sizes(session: "Session", person: "Person", joints: "MarkerTable") -> tuple["Person", str]:
+    """Acquire a person's sizes from known joints and contours; return the person and a sentence on the outcome."""
+    from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
+    from tracker.acquisition.from_joints import pose_at_joints
+    from tracker.evidence.observer import Observer
+    from tracker.footage.recording import Recording
+
+    settings, n = AcquisitionSettings(), session.n_frames
+    spread = {round(i * (n - 1) / max(1, settings.candidates - 1)) for i in range(settings.candidates)}
+    known = pose_at_joints(person.model, joints, sorted(k for k in spread if k < n))
+    if not known.bodies:
+        raise TrackerError("fitting sizes needs a frame with at least 4 joints of the limbs, found none")
+    with Recording(session.cameras) as recording:
+        observer = Observer(session.cameras, recording)
+        found = acquire_from_contours(observer, known.bodies, 0, known.placed, settings)
+    costs = f"cost {found.cost_before_px:.2f} px before, {found.cost_after_px:.2f} px after"
+    if found.cost_after_px >= found.cost_before_px:
+        return person, f"sizes not applied: the body would fit the contours worse ({costs})"
+    return replace(person, model=found.body), f"sizes from frames {', '.join(map(str, found.frames))}: {costs}"
 
 
 def init_from_poses(at: Target, frame: int, table: "PoseTable") -> dict[str, Any]:
@@ -160,7 +203,7 @@ def init_from_poses(at: Target, frame: int, table: "PoseTable") -> dict[str, Any
         raise TrackerError(f"expected a pose of frame {frame}, found frames {table.frames.tolist()[:8]} in the table")
     where = _where(session, person, values[row[0]], frame)
     with SessionLock(session.folder):
-        _store_keyframe(session, person, frame, values[row[0]], "poses")
+        _store_keyframe(session, person, frame, values[row[0]], {"method": "poses"})
     return {"person": person.name, "frame": frame, **where}
 
 
@@ -192,7 +235,9 @@ def _differences(found: Sequence[str], expected: Sequence[str]) -> str:
     return ", ".join(listed)
 
 
-def _store_keyframe(session: "Session", person: "Person", frame: int, values: "Array", method: str) -> None:
+def _store_keyframe(
+    session: "Session", person: "Person", frame: int, values: "Array", settings: dict[str, Any]
+) -> None:
     from tracker.formats.model_toml import format_model
     from tracker.store.annotation_store import AnnotationStore
     from tracker.store.records import PoseChange, PoseRecord
@@ -202,5 +247,5 @@ def _store_keyframe(session: "Session", person: "Person", frame: int, values: "A
             print(store.backup_error, file=sys.stderr)
         revision = store.add_model_revision(person.name, format_model(person.model))
         sources = ("imported",) * len(values)
-        record = PoseRecord(values, sources, revision, keyframe=True, settings={"method": method})
-        store.commit(f"init from {method}, frame {frame}", [PoseChange(person.name, frame, record)])
+        record = PoseRecord(values, sources, revision, keyframe=True, settings=settings)
+        store.commit(f"init from {settings['method']}, frame {frame}", [PoseChange(person.name, frame, record)])

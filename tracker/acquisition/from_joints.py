@@ -1,114 +1,107 @@
-"""Measure a body's dimensions from known joints: segment lengths over a recording, shapes stretched along with them."""
+"""Prepare an acquisition from known joints of a recording: the height that they imply, and poses fitted to them."""
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.model import BodyModel
-from tracker.body.parts import Joint, Landmark, Part
+from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
+from tracker.fitting.gauss_newton import PointTargets, fit_to_points
+from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 
-_SIDES = ("left", "right")
-_SEGMENTS = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+JOINT_M = 0.01
+"""Standard deviation of a known joint, metres: conventions and measurements differ by about that."""
+_LENGTHS: Mapping[str, Sequence[tuple[Sequence[str], Sequence[str]]]] = {
+    **{
+        f"{a}-{b}": [([f"left_{a}"], [f"left_{b}"]), ([f"right_{a}"], [f"right_{b}"])]
+        for a, b in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+    },
+    **{f"{g} width": [([f"left_{g}"], [f"right_{g}"])] for g in ("shoulder", "hip")},
+    "trunk": [(["left_shoulder", "right_shoulder"], ["left_hip", "right_hip"])],
+}
+"""Pairs of ends, the middles of some joints, whose distance is a length; left and right are one."""
 _CREDIBLE = (0.6, 1.6)
 """A measured segment outside this range of the model's length is an error in the joints."""
+_MISFIT = 3.0
+"""Frames whose joints fit the body worse than this many times the median are left out."""
 
 
-def fit_sizes(model: BodyModel, joints: MarkerTable) -> BodyModel:
-    """Give a body the segment lengths of measured joints; girths stay, and both sides become equal.
+class JointFrames(NamedTuple):
+    """A body posed at known joints on several frames."""
 
-    The length of a limb's segment is the median over the frames and both sides. So are the widths of shoulders and
-    hips, and the distance between their middles, which sets the length of the trunk. Parts stretch along their segment.
+    bodies: dict[int, tuple[PosedBody, ...]]
+    """The body on each frame."""
+    placed: dict[int, PointTargets]
+    """The known joints of each frame."""
+
+
+def place_joints(model: BodyModel, places_world: Mapping[str, Array], sigma_m: float = JOINT_M) -> PointTargets:
+    """Return the limb joints of a body that are known, as targets.
 
     Args:
-        model: the body to start from.
+        model: the body.
+        places_world: position of each joint by name, (3,), metres; NaN and other points are ignored.
+        sigma_m: standard deviation of a position, metres.
+    """
+    names = [n for n in LIMB_JOINTS if n in model.point_names and n in places_world]
+    known = [n for n in names if np.all(np.isfinite(places_world[n]))]
+    points = np.array([model.point_names.index(n) for n in known], dtype=np.int64)
+    targets = np.array([places_world[n] for n in known], dtype=np.float64).reshape(-1, 3)
+    return PointTargets(points, targets, np.full(len(known), 1 / sigma_m))
+
+
+def height_from_joints(model: BodyModel, joints: MarkerTable) -> float:
+    """Return the height, metres, at which the body's segments are on average as long as those of measured joints.
+
+    Args:
+        model: the body, of any height.
         joints: joints under the project's names, metres.
 
     Raises:
-        TrackerError: the joints lack a segment, or give one an impossible length.
+        TrackerError: the joints lack a segment, or give one a length that no body of this kind has.
     """
-    part_of = {m.name: m.part for m in model.landmarks} | {j.name: j.parent for j in model.joints}
-    ends = _rest_points(model)
-    stretch: dict[str, float] = {}  # of each limb part, along z
-    for start, end in _SEGMENTS:
-        measured = _median(
-            [_distances(joints, f"{side}_{start}", f"{side}_{end}") for side in _SIDES], f"{start}-{end}"
-        )
-        own = float(np.linalg.norm(ends[f"left_{end}"] - ends[f"left_{start}"]))
-        for side in _SIDES:
-            stretch[part_of[f"{side}_{end}"]] = _credible(measured / own, f"{start}-{end}")
-    trunk = {
-        girdle: _credible(
-            _median([_distances(joints, f"left_{girdle}", f"right_{girdle}")], f"{girdle} width")
-            / float(np.linalg.norm(ends[f"left_{girdle}"] - ends[f"right_{girdle}"])),
-            f"{girdle} width",
-        )
-        for girdle in ("shoulder", "hip")
-    }
-    spine = _median([_spine(joints)], "trunk")
-    own_spine = float(np.linalg.norm(_middle(ends, "shoulder") - _middle(ends, "hip")))
-    stretch[model.parts[0].name] = _credible(spine / own_spine, "trunk")
-    return replace(
-        model,
-        joints=tuple(_moved_joint(j, stretch.get(j.parent, 1.0), trunk) for j in model.joints),
-        parts=tuple(_stretched_part(p, stretch.get(p.name, 1.0)) for p in model.parts),
-        landmarks=tuple(_moved_landmark(m, stretch.get(m.part, 1.0)) for m in model.landmarks),
-    )
+    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    measured = {n: joints.points[:, i] for i, n in enumerate(joints.names)}
+    logs = {n: np.log(_length(measured, n, pairs) / _length(own, n, pairs)) for n, pairs in _LENGTHS.items()}
+    middle = float(np.median(list(logs.values())))
+    for name, log in logs.items():
+        ratio = float(np.exp(log - middle))
+        if not _CREDIBLE[0] <= ratio <= _CREDIBLE[1]:
+            raise TrackerError(
+                f"fitting sizes: {name} came out {ratio:.2f} times as long as in a body of these joints' size; "
+                f"expected {_CREDIBLE[0]} to {_CREDIBLE[1]}; check --joint-map"
+            )
+    return model.height_m * float(np.exp(np.mean(list(logs.values()))))
 
 
-def _rest_points(model: BodyModel) -> dict[str, Array]:
-    return dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+def pose_at_joints(model: BodyModel, joints: MarkerTable, frames: Sequence[int]) -> JointFrames:
+    """Fit a body to the joints of some frames. Frames with fewer than four joints, or odd ones, are left out."""
+    poses, misfits, placed = dict[int, Array](), dict[int, float](), dict[int, PointTargets]()
+    for frame, row in zip(joints.frames.tolist(), joints.points, strict=True):
+        targets = place_joints(model, dict(zip(joints.names, row, strict=True)))
+        if frame not in frames or len(targets.points) < 4:
+            continue
+        names = [model.point_names[i] for i in targets.points]
+        poses[frame] = fit_to_points(model, dict(zip(names, targets.targets_world, strict=True))).pose
+        found = model.points_world(poses[frame])[targets.points]
+        misfits[frame] = float(np.linalg.norm(found - targets.targets_world, axis=1).mean())
+        placed[frame] = targets
+    most = _MISFIT * float(np.median(list(misfits.values()) or [0.0]))
+    usual = [k for k, misfit in misfits.items() if misfit <= most]
+    return JointFrames({k: (PosedBody(model, poses[k]),) for k in usual}, {k: placed[k] for k in usual})
 
 
-def _middle(points: dict[str, Array], girdle: str) -> Array:
-    return (points[f"left_{girdle}"] + points[f"right_{girdle}"]) / 2
-
-
-def _column(joints: MarkerTable, name: str) -> Array:
-    if name not in joints.names:
-        raise TrackerError(f"fitting sizes needs the joint '{name}', found {', '.join(joints.names)}")
-    return joints.points[:, joints.names.index(name)]
-
-
-def _distances(joints: MarkerTable, a: str, b: str) -> Array:
-    return np.linalg.norm(_column(joints, a) - _column(joints, b), axis=1)
-
-
-def _spine(joints: MarkerTable) -> Array:
-    shoulders, hips = ((_column(joints, f"left_{g}") + _column(joints, f"right_{g}")) / 2 for g in ("shoulder", "hip"))
-    return np.linalg.norm(shoulders - hips, axis=1)
-
-
-def _median(lengths: list[Array], what: str) -> float:
-    known = np.concatenate(lengths)
-    known = known[np.isfinite(known)]
+def _length(places: Mapping[str, Array], name: str, pairs: Sequence[tuple[Sequence[str], Sequence[str]]]) -> float:
+    """Return the median length between pairs of ends, each the middle of some joints, over frames and sides, metres."""
+    missing = [j for pair in pairs for end in pair for j in end if j not in places]
+    if missing:
+        raise TrackerError(f"fitting sizes needs the joint '{missing[0]}', found {', '.join(places)}")
+    gaps = [np.mean([places[j] for j in a], axis=0) - np.mean([places[j] for j in b], axis=0) for a, b in pairs]
+    lengths = np.linalg.norm(np.concatenate([np.atleast_2d(g) for g in gaps]), axis=1)
+    known = lengths[np.isfinite(lengths)]
     if not len(known):
-        raise TrackerError(f"fitting sizes needs a frame in which both ends of {what} are known, found none")
+        raise TrackerError(f"fitting sizes needs a frame in which both ends of {name} are known, found none")
     return float(np.median(known))
-
-
-def _credible(ratio: float, what: str) -> float:
-    if not _CREDIBLE[0] <= ratio <= _CREDIBLE[1]:
-        raise TrackerError(
-            f"fitting sizes: {what} came out {ratio:.2f} times as long as the model's; expected {_CREDIBLE[0]} to "
-            f"{_CREDIBLE[1]}; check the joints' units and --joint-map, or give the body's --height"
-        )
-    return ratio
-
-
-def _moved_joint(joint: Joint, stretch: float, trunk: dict[str, float]) -> Joint:
-    x, y, z = joint.position
-    width = next((ratio for girdle, ratio in trunk.items() if joint.name.endswith(f"_{girdle}")), 1.0)
-    return replace(joint, position=(x, y * width, z * stretch))
-
-
-def _moved_landmark(landmark: Landmark, stretch: float) -> Landmark:
-    x, y, z = landmark.position
-    return replace(landmark, position=(x, y, z * stretch))
-
-
-def _stretched_part(part: Part, stretch: float) -> Part:
-    (a1, a2, a3), (x, y, z) = part.half_axes, part.center
-    return replace(part, half_axes=(a1, a2, a3 * stretch), center=(x, y, z * stretch))

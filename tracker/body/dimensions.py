@@ -49,7 +49,7 @@ def dimensions_of(model: BodyModel) -> BodyDimensions:
     """Measure the dimensions of a body."""
     parts = {}
     for index, part in enumerate(model.parts):
-        axis = _main_axis(model, index)
+        axis = main_axis(model, index)
         across = [a for a in range(3) if a != axis]
         girths = (part.half_axes[across[0]] * model.height_m, part.half_axes[across[1]] * model.height_m)
         parts[part.name] = PartDimensions(_length(model, index) * model.height_m, girths)
@@ -76,7 +76,7 @@ def with_dimensions(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
         )
     stretch = np.ones((len(model.parts), 3))  # of each part along its axes
     for index, part in enumerate(model.parts):
-        wanted, axis = sizes.parts[part.name], _main_axis(model, index)
+        wanted, axis = sizes.parts[part.name], main_axis(model, index)
         own = _length(model, index)
         across = [a for a in range(3) if a != axis]
         for name, size_m in (("length", wanted.length_m), ("girth", wanted.girths_m[0]), ("girth", wanted.girths_m[1])):
@@ -90,7 +90,7 @@ def with_dimensions(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
         widths[name] = width_m / sizes.height_m / (2 * _half_width(model, name))
     along = np.ones_like(stretch)  # joints and landmarks follow the length of their part, not its girth
     for index in range(len(model.parts)):
-        along[index, _main_axis(model, index)] = stretch[index, _main_axis(model, index)]
+        along[index, main_axis(model, index)] = stretch[index, main_axis(model, index)]
     at = model.part_index
     return replace(
         model,
@@ -146,7 +146,8 @@ def _ends(model: BodyModel, part: int) -> Array:
     return np.array([np.zeros(3), *((p + places.get(mirror_part(n) or n, p)) / 2 for n, p in places.items())])
 
 
-def _main_axis(model: BodyModel, part: int) -> int:
+def main_axis(model: BodyModel, part: int) -> int:
+    """Return the axis of a part, given by index, along which its length is measured: 0, 1 or 2."""
     extents = np.ptp(_ends(model, part), axis=0)
     # A part without further points is as long as its shape.
     return int(np.argmax(extents if extents.max() > 1e-6 else model.parts[part].half_axes))
@@ -154,7 +155,7 @@ def _main_axis(model: BodyModel, part: int) -> int:
 
 def _length(model: BodyModel, part: int) -> float:
     """Return the length of a part, fraction of height."""
-    axis = _main_axis(model, part)
+    axis = main_axis(model, part)
     extent = float(np.ptp(_ends(model, part)[:, axis]))
     return extent if extent > 1e-6 else 2 * model.parts[part].half_axes[axis]
 
@@ -167,7 +168,7 @@ def _girdles(model: BodyModel) -> list[str]:
         pair = [by_name[f"{side}{width}"] for side in _SIDES if f"{side}{width}" in by_name]
         if len(pair) == 2 and pair[0].parent == pair[1].parent and _half_width(model, width) > 1e-6:
             out.append(width)
-    return [w for w in out if _main_axis(model, model.part_index[by_name[f"left_{w}"].parent]) != 1]
+    return [w for w in out if main_axis(model, model.part_index[by_name[f"left_{w}"].parent]) != 1]
 
 
 def _half_width(model: BodyModel, width: str) -> float:

@@ -1,80 +1,69 @@
-"""Body sizes from joints: recovered from a body of other lengths, and refused where they cannot be a body's."""
+"""Height and poses from known joints: recovered from a body of other lengths, refused where no body has them."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tracker.acquisition.from_joints import fit_sizes
+from tracker.acquisition.from_joints import height_from_joints, place_joints, pose_at_joints
 from tracker.errors import TrackerError
 from tracker.evaluation.metrics import joints_of_poses
+from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 
-LONGER = {"elbow": 1.1, "wrist": 0.93, "knee": 1.07, "ankle": 0.95}
+MODEL = load_model("gavrila34", 1.75)
+N_FRAMES = 9
 
 
 @pytest.fixture
-def other():
-    """A body of other lengths than the preset's: limbs, shoulder width and trunk."""
-    model = load_model("gavrila22", 1.8)
-
-    def scaled(item):
-        x, y, z = item.position
-        factor = next((f for name, f in LONGER.items() if item.name.endswith(name)), 1.0)
-        if item.name.endswith("_shoulder"):
-            return replace(item, position=(x, 1.08 * y, 1.06 * z))
-        return replace(item, position=(x, y, (1.06 if item.name.endswith("_hip") else factor) * z))
-
-    return replace(model, joints=tuple(map(scaled, model.joints)), landmarks=tuple(map(scaled, model.landmarks)))
+def joints():
+    """Joints of a child of the model's proportions, in poses of any kind."""
+    child, rng = MODEL.with_height(1.27), np.random.default_rng(3)
+    poses = {k: child.clip(rng.normal(0, 0.3, child.n_dofs)) for k in range(N_FRAMES)}
+    return joints_of_poses(child, poses, 30.0)
 
 
-@pytest.fixture
-def joints(other):
-    rng = np.random.default_rng(3)
-    poses = {k: other.clip(rng.normal(0, 0.4, other.n_dofs)) for k in range(9)}  # lengths do not depend on the pose
-    return joints_of_poses(other, poses, 30.0)
+def test_the_height_is_found(joints):
+    assert height_from_joints(MODEL, joints) == pytest.approx(1.27, rel=0.02)
+    # It does not matter how tall the body was before.
+    assert height_from_joints(MODEL.with_height(0.9), joints) == pytest.approx(height_from_joints(MODEL, joints))
 
 
-def lengths(model):
-    p = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
-    pairs = [
-        ("left_shoulder", "left_elbow"), ("right_elbow", "right_wrist"), ("left_hip", "left_knee"),
-        ("right_knee", "right_ankle"), ("left_shoulder", "right_shoulder"), ("left_hip", "right_hip"),
-        ("left_shoulder", "left_hip"),
-    ]  # fmt: skip
-    return [float(np.linalg.norm(p[a] - p[b])) for a, b in pairs]
-
-
-def test_lengths_are_recovered(other, joints):
-    found = fit_sizes(load_model("gavrila22", 1.7), joints)
-    np.testing.assert_allclose(lengths(found), lengths(other), rtol=1e-6)
-
-
-def test_one_bad_frame_does_not_matter(other, joints):
+def test_one_bad_frame_does_not_matter(joints):
+    expected = height_from_joints(MODEL, joints)
     joints.points[4] *= 3
     joints.points[5, 2:5] = np.nan
-    found = fit_sizes(load_model("gavrila22", 1.7), joints)
-    np.testing.assert_allclose(lengths(found), lengths(other), rtol=1e-6)
+    assert height_from_joints(MODEL, joints) == pytest.approx(expected, rel=0.01)
 
 
-def test_shapes_stretch_along_their_segments(joints):
-    model = load_model("gavrila22", 1.7)
-    found = fit_sizes(model, joints)
-    before, after = model.parts[2], found.parts[2]
-    ratio = lengths(found)[0] / lengths(model)[0]
-    assert after.name == "left_upper_arm"
-    assert after.half_axes[:2] == before.half_axes[:2]
-    assert after.half_axes[2] == pytest.approx(before.half_axes[2] * ratio)
-    assert after.center[2] == pytest.approx(before.center[2] * ratio)
+def test_a_bad_frame_is_left_out(joints):
+    joints.points[4, :6] += (0.5, 0, 0)
+    joints.points[5, 3:] = np.nan
+    child = MODEL.with_height(1.27)
+    found = pose_at_joints(child, joints, range(N_FRAMES))
+    assert sorted(found.bodies) == sorted(found.placed) == [0, 1, 2, 3, 6, 7, 8]
+    for k, (body,) in found.bodies.items():
+        points = body.points_world[found.placed[k].points]
+        np.testing.assert_allclose(points, found.placed[k].targets_world, atol=0.02)
 
 
 def test_lengths_that_no_body_has_are_refused(joints):
-    with pytest.raises(TrackerError, match="times as long as the model's"):
-        fit_sizes(load_model("gavrila22", 1.7), replace(joints, points=joints.points * 10))
+    knee = joints.names.index("left_knee"), joints.names.index("right_knee")
+    joints.points[:, knee] *= 4
+    with pytest.raises(TrackerError, match="times as long as"):
+        height_from_joints(MODEL, joints)
 
 
 def test_missing_joints_are_named(joints):
     without = [i for i, n in enumerate(joints.names) if n != "left_knee"]
     fewer = replace(joints, names=tuple(joints.names[i] for i in without), points=joints.points[:, without])
     with pytest.raises(TrackerError, match="left_knee"):
-        fit_sizes(load_model("gavrila22", 1.7), fewer)
+        height_from_joints(MODEL, fewer)
+
+
+def test_only_known_limb_joints_are_placed(joints):
+    row = dict(zip(joints.names, joints.points[0], strict=True)) | {"left_wrist": np.full(3, np.nan)}
+    placed = place_joints(MODEL, row, 0.02)
+    names = {MODEL.point_names[i] for i in placed.points}
+    assert names == set(LIMB_JOINTS) - {"left_wrist"}
+    assert set(placed.weights) == {50.0}

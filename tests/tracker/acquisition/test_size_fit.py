@@ -1,0 +1,162 @@
+"""Sizes from contours: a body of other proportions is found again, and what is not seen stays."""
+
+import numpy as np
+import pytest
+from staging import cameras_around, own_evidence, posed, shaken
+
+from tracker.acquisition.frame_choice import choose_frames
+from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
+from tracker.acquisition.size_fit import Round, SightedPerson, SizeFitSettings, fit_sizes_to_contours
+from tracker.acquisition.size_parameters import SizeParameters
+from tracker.acquisition.size_report import size_changes
+from tracker.body.dimensions import dimensions_of
+from tracker.body.model import PosedBody
+from tracker.errors import TrackerError
+from tracker.fitting.gauss_newton import PointTargets
+from tracker.formats.model_toml import load_model
+
+CAMERAS = cameras_around(4)
+
+
+def other_body(name="gavrila22", seed=3, share=1.0):
+    """A person whose sizes differ from the preset's as people differ."""
+    parameters = SizeParameters(load_model(name, 1.7))
+    sizes = share * np.random.default_rng(seed).normal(size=len(parameters.names)) * parameters.sigmas
+    sizes[parameters.of_kinds("taper", "exponent")] = 0.0
+    return parameters.body(sizes)
+
+
+def sighted(person, model, seeds, off_rad=0.05, off_m=0.02, placed=False):
+    """Frames on which a person is seen, and the preset stands nearly in their place."""
+    out = []
+    for seed in seeds:
+        pose = posed(person, seed)
+        views = own_evidence([PosedBody(person, pose)], CAMERAS)
+        start = shaken(model, pose, np.random.default_rng(seed), off_rad, off_m)
+        points = np.arange(len(model.point_names))
+        targets = PointTargets(points, person.points_world(pose), np.full(len(points), 1 / 0.01)) if placed else None
+        out.append(SightedPerson(seed, views, (PosedBody(model, start),), 0, targets))
+    return out
+
+
+def thicknesses(body):
+    sizes = dimensions_of(body).parts
+    return np.array([sizes[p].girths_m for p in ("left_upper_arm", "left_thigh", "left_calf", "head")])
+
+
+def lengths(body):
+    sizes = dimensions_of(body).parts
+    return np.array([sizes[p].length_m for p in ("left_upper_arm", "left_thigh", "left_forearm", "left_calf")])
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_lengths_and_girths_of_another_body_are_found(seed):
+    person = other_body(seed=seed)
+    model = load_model("gavrila22", 1.7)
+    parameters = SizeParameters(model)
+    frames = sighted(person, model, range(5), placed=True)
+    found = fit_sizes_to_contours(parameters, frames, SizeFitSettings())
+    for measure in (thicknesses, lengths):
+        was, now = (np.abs(measure(b) / measure(person) - 1).mean() for b in (model, found.body))
+        assert now < 0.05 < was
+    off = [
+        np.linalg.norm(found.body.points_world(p) - f.placed.targets_world, axis=1).mean()
+        for p, f in zip(found.poses, frames, strict=True)
+    ]
+    assert np.mean(off) < 0.012
+
+
+def test_an_own_body_stays_as_it_is():
+    """Contours of the very body, from poses that are off: nothing makes the sizes differ."""
+    model = load_model("gavrila22", 1.7)
+    found = fit_sizes_to_contours(SizeParameters(model), sighted(model, model, range(4)), SizeFitSettings())
+    assert found.body.height_m == pytest.approx(1.7, rel=0.01)
+    assert np.abs(thicknesses(found.body) / thicknesses(model) - 1).max() < 0.03
+
+
+def test_what_is_not_seen_stays_as_uncertain_as_before():
+    model = load_model("gavrila22", 1.7)
+    parameters = SizeParameters(model)
+    nothing = [f._replace(views=()) for f in sighted(model, model, range(2))]
+    found = fit_sizes_to_contours(parameters, nothing, SizeFitSettings())
+    np.testing.assert_allclose(found.sizes, 0, atol=1e-6)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), parameters.sigmas, rtol=1e-6)
+
+
+def test_only_the_kinds_of_a_round_change():
+    person, model = other_body(), load_model("gavrila22", 1.7)
+    parameters = SizeParameters(model)
+    settings = SizeFitSettings(rounds=(Round(("height",), 1.0),))
+    found = fit_sizes_to_contours(parameters, sighted(person, model, range(2)), settings)
+    assert np.flatnonzero(found.sizes).tolist() == [parameters.names.index("height")]
+
+
+def test_the_fit_can_be_stopped():
+    model = load_model("gavrila22", 1.7)
+
+    def stop(share):
+        if share > 0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fit_sizes_to_contours(
+            SizeParameters(model), sighted(other_body(), model, [0]), SizeFitSettings(), report=stop
+        )  # fmt: skip
+
+
+def test_frames_that_differ_are_chosen():
+    """Of nine frames alike and three unlike them, the three and one of the others."""
+    model = load_model("gavrila34", 1.7)
+    still = PosedBody(model, model.neutral())
+    bodies = {k: (still,) for k in range(12)} | {k: (PosedBody(model, posed(model, k)),) for k in (3, 7, 9)}
+    parameters = SizeParameters(model)
+    assert choose_frames(parameters, CAMERAS, bodies, 0, 4) == [0, 3, 7, 9]
+    assert choose_frames(parameters, CAMERAS, bodies, 0, 3, fixed=[0])[0] == 0
+    assert len(choose_frames(parameters, CAMERAS, {0: (still,)}, 0, 3)) == 1
+
+
+class _Staged:
+    """An observer of one person whom all views show."""
+
+    def __init__(self, person, poses):
+        self._views = {k: own_evidence([PosedBody(person, p)], CAMERAS) for k, p in poses.items()}
+        self.working_cameras, self.cameras = CAMERAS, []
+
+    def evidence(self, k, regions=None, predicted_px=None, static_edges=None):
+        return self._views[k]
+
+
+@pytest.fixture(scope="module")
+def acquisition():
+    person, model = other_body("gavrila34"), load_model("gavrila34", 1.7)
+    poses = {k: posed(person, k) for k in range(4)}
+    rng = np.random.default_rng(0)
+    bodies = {k: (PosedBody(model, shaken(model, p, rng, 0.05, 0.02)),) for k, p in poses.items()}
+    settings = AcquisitionSettings(n_frames=3)
+    return acquire_from_contours(_Staged(person, poses), bodies, 0, {}, settings)
+
+
+def test_an_acquisition_fits_better_than_the_body_before(acquisition):
+    assert len(acquisition.frames) == len(acquisition.poses) == 3
+    assert acquisition.cost_after_px < 0.7 * acquisition.cost_before_px
+
+
+def test_sizes_are_reported_with_their_uncertainty(acquisition):
+    rows = {r.name: r for r in size_changes(acquisition)}
+    assert rows["height"].after_m == pytest.approx(acquisition.body.height_m)
+    assert rows["height"].before_m == pytest.approx(1.7)
+    thigh = rows["thigh, thickness side to side"]
+    assert 0 < thigh.sigma_m < 0.2 * thigh.after_m
+    changes = [abs(np.log(r.after_m / r.before_m)) for r in size_changes(acquisition)]
+    assert changes == sorted(changes, reverse=True)
+
+
+def test_a_body_where_nobody_is_gets_no_sizes():
+    person, model = other_body(), load_model("gavrila22", 1.7)
+    elsewhere = model.neutral()
+    elsewhere[:3] += 50.0
+    staged = _Staged(person, {0: elsewhere})
+    with pytest.raises(TrackerError, match="no edges near the body"):
+        acquire_from_contours(staged, {0: (PosedBody(model, elsewhere),)}, 0, {}, AcquisitionSettings())
+    with pytest.raises(TrackerError, match="place the body"):
+        acquire_from_contours(staged, {}, 0, {}, AcquisitionSettings())

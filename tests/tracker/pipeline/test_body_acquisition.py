@@ -1,0 +1,138 @@
+"""A body acquired in a session: which frames count, what is stored, and that keyframes follow."""
+
+import shutil
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tracker.acquisition.from_contours import AcquisitionSettings
+from tracker.acquisition.size_parameters import SizeParameters
+from tracker.errors import TrackerError
+from tracker.evidence.observer import Observer
+from tracker.footage.recording import Recording
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.formats.model_toml import format_model, load_model
+from tracker.pipeline.body_acquisition import (
+    PLACED_M,
+    SIZES_EDITS,
+    acquire_body,
+    has_preset_sizes,
+    posed_frames,
+    store_body,
+)
+from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
+
+
+@pytest.fixture
+def session(tmp_path, sample_folder):
+    session = load_session(shutil.copytree(sample_folder, tmp_path / "session"))
+    session.annotations_path.unlink(missing_ok=True)
+    return session
+
+
+@pytest.fixture
+def store(session):
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        yield store
+
+
+def record(session, store, **changes):
+    person = session.people[0]
+    revision = store.add_model_revision(person.name, format_model(person.model))
+    values = person.model.neutral()
+    return replace(PoseRecord(values, ("manual",) * len(values), revision), **changes)
+
+
+def put(session, store, **records):
+    """Store poses by frame: `f3=...`."""
+    name = session.people[0].name
+    store.commit("put", [PoseChange(name, int(k[1:]), r) for k, r in records.items()])
+
+
+def test_keyframes_and_good_frames_count(session, store):
+    tracked = ("tracked",) * len(session.people[0].model.neutral())
+    put(
+        session, store,
+        f0=record(session, store, keyframe=True),
+        f1=record(session, store, sources=tracked, status="good"),
+        f2=record(session, store, sources=tracked, status="doubtful"),
+        f3=record(session, store, sources=tracked, status="lost"),
+        f4=record(session, store, sources=tracked, keyframe=True, status="good"),
+    )  # fmt: skip
+    found = posed_frames(session, 0, range(10))
+    assert sorted(found.bodies) == [0, 1, 4]
+    # A tracked pose that somebody has confirmed shows where the flesh is, not where the joints are.
+    assert sorted(found.placed) == [0]
+    assert found.placed[0].weights[0] == pytest.approx(1 / PLACED_M)
+
+
+def test_doubtful_frames_count_where_there_is_nothing_better(session, store):
+    put(session, store, f2=record(session, store, status="doubtful"), f3=record(session, store, status="lost"))
+    assert sorted(posed_frames(session, 0, range(10)).bodies) == [2]
+    with pytest.raises(TrackerError, match="from 3 to 9"):
+        posed_frames(session, 0, range(3, 10))
+
+
+def test_known_joints_count_more_than_the_pose_fitted_to_them(session, store):
+    joints = {n: [0.1 * i, 0.0, 1.0] for i, n in enumerate(LIMB_JOINTS)}
+    put(session, store, f0=record(session, store, keyframe=True, settings={"method": "joints", "joints": joints}))
+    placed = posed_frames(session, 0, range(10)).placed[0]
+    names = [session.people[0].model.point_names[i] for i in placed.points]
+    np.testing.assert_allclose(placed.targets_world, [joints[n] for n in names])
+
+
+def larger(model):
+    parameters = SizeParameters(model)
+    sizes = np.zeros(len(parameters.names))
+    sizes[0] = 0.05
+    return parameters.body(sizes)
+
+
+def test_keyframes_are_fitted_to_the_new_body_and_undone_with_it(session, store):
+    first, second = record(session, store, keyframe=True), record(session, store, keyframe=True)
+    put(session, store, f0=first, f5=second, f6=record(session, store, status="good"))
+    name, body = session.people[0].name, larger(session.people[0].model)
+    acquired = body.neutral() + 0.01
+    store_body(session, store, 0, body, {5: acquired}, "acquire")
+    changed = load_session(session.folder)
+    assert format_model(changed.people[0].model) == format_model(body)
+    np.testing.assert_allclose(store.pose(name, 5).values, acquired)
+    joints = [m.points_world(store.pose(name, 0).values) for m in (body,)][0]
+    assert np.abs(joints - session.people[0].model.points_world(first.values)).max() < 0.06
+    revision = store.pose(name, 0).model_revision
+    assert revision == store.pose(name, 5).model_revision != first.model_revision
+    assert store.pose(name, 6).model_revision == first.model_revision  # not a keyframe: it keeps its body
+    ((edit, (who, before, after)),) = store.setting(SIZES_EDITS).items()
+    assert (who, before, after) == (name, first.model_revision, revision)
+    assert int(edit) == store.history(1)[0].edit
+    store.undo()
+    np.testing.assert_allclose(store.pose(name, 0).values, first.values)
+
+
+def test_a_preset_is_told_from_sizes_that_somebody_chose():
+    assert has_preset_sizes(load_model("gavrila34"))
+    assert not has_preset_sizes(load_model("gavrila34", 1.6))
+    assert not has_preset_sizes(larger(load_model("gavrila34")))
+
+
+def test_too_few_poses_are_completed_by_tracking(session, store):
+    """The sample's person, from the first frame alone: other frames are tracked, and nothing is stored."""
+    start = np.array(load_session(session.folder).people[0].model.neutral())
+    put(session, store, f0=record(session, store, values=start, keyframe=True))
+    shares = []
+    with Recording(session.cameras) as recording:
+        observer = Observer(session.cameras, recording)
+
+        def report(stage, share):
+            shares.append(share)
+            if stage != "tracking":
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            acquire_body(session, observer, 0, range(6), AcquisitionSettings(n_frames=3), report)
+    assert 0 < max(shares) <= 1
+    assert [row.frame for row in store.frames(session.people[0].name)] == [0]

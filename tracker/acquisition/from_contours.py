@@ -1,0 +1,157 @@
+"""Acquire a person's body from the contours of a recording (GD96 Sect. 3), over several frames and all views at once.
+
+GD96 fits each part to its contours in a frontal and a side view. Here all parts, joints and poses are fitted together,
+so that any poses will do and joints are found where the flesh turns about them.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.acquisition.frame_choice import choose_frames
+from tracker.acquisition.size_fit import SightedPerson, SizeFit, SizeFitSettings, fit_sizes_to_contours
+from tracker.acquisition.size_parameters import SizeParameters, SizePriors
+from tracker.body.model import BodyModel, PosedBody
+from tracker.contours import occluding_contours
+from tracker.errors import TrackerError
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
+from tracker.fitting.gauss_newton import PointTargets
+from tracker.images.static_edges import StaticEdgeModel
+from tracker.tracking.chamfer.frame_problem import FrameProblem, PersonPrior
+from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
+from tracker.tracking.view_regions import regions, visible_pieces_px
+
+Report = Callable[[str, float], None]
+"""Is given a stage and the share of all work that is done, 0 to 1. What it raises ends the acquisition."""
+_CHOOSING, _OBSERVING = 0.1, 0.25
+"""Shares of the work up to the ends of the stages before the fit."""
+
+
+@dataclass(frozen=True)
+class AcquisitionSettings:
+    """Settings of an acquisition."""
+
+    n_frames: int = 6
+    """Number of frames that are fitted at once."""
+    candidates: int = 24
+    """Number of frames, evenly spread, from which they are chosen."""
+    coupled: bool = True
+    """Whether left and right have the same sizes."""
+    priors: SizePriors = field(default_factory=SizePriors)
+    fit: SizeFitSettings = field(default_factory=SizeFitSettings)
+
+
+class Acquisition(NamedTuple):
+    """An acquired body."""
+
+    body: BodyModel
+    frames: tuple[int, ...]
+    """The frames that it was fitted to."""
+    poses: tuple[np.ndarray, ...]
+    """The pose of each of them with this body, (n_values,)."""
+    cost_before_px: float
+    """Mean cost over these frames with the body and the poses before, px."""
+    cost_after_px: float
+    """The same with the acquired body and its poses, px."""
+    parameters: SizeParameters
+    """What was fitted, from the body before."""
+    fit: SizeFit
+
+
+def acquire_from_contours(
+    observer: Observer,
+    bodies: Mapping[int, tuple[PosedBody, ...]],
+    person: int,
+    placed: Mapping[int, PointTargets],
+    settings: AcquisitionSettings,
+    report: Report = lambda stage, share: None,
+) -> Acquisition:
+    """Acquire the body of one person.
+
+    Args:
+        observer: of the recording.
+        bodies: all people on each frame that may be used, in their present bodies.
+        person: index of the person among them.
+        placed: by frame, points of the person that somebody has placed.
+        settings: of the acquisition.
+        report: shows progress.
+
+    Raises:
+        TrackerError: there is no frame, or the views show nothing of the person.
+    """
+    if not bodies:
+        raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
+    parameters = SizeParameters(next(iter(bodies.values()))[person].model, settings.coupled, settings.priors)
+    report("choosing frames", 0.0)
+    # Placed joints are used wherever there are few of them; of many, the frames that show most.
+    few = 0 < len(placed) <= settings.n_frames
+    source = sorted(bodies) if few or not placed else sorted(k for k in bodies if k in placed)
+    fixed = sorted(k for k in placed if k in bodies) if few else []
+    candidates = _spread(source, settings.candidates, keep=fixed)
+    frames = choose_frames(
+        parameters, observer.working_cameras, {k: bodies[k] for k in candidates}, person, settings.n_frames, fixed
+    )
+    report("reading contours", _CHOOSING)
+    static_edges = _static_edges(observer, {k: bodies[k] for k in candidates})
+    sighted, before = [], []
+    for i, k in enumerate(frames):
+        views = _views(observer, k, bodies[k], static_edges)
+        before.append(chamfer_cost(views, bodies[k], TrackSettings()).at_prediction().total_px)
+        sighted.append(SightedPerson(k, _own_views(views, bodies[k], person), bodies[k], person, placed.get(k)))
+        report("reading contours", _CHOOSING + (_OBSERVING - _CHOOSING) * (i + 1) / len(frames))
+    if not any(len(v.points_px) for s in sighted for v in s.views):
+        raise TrackerError(
+            f"expected contours of the person on frames {', '.join(map(str, frames))}, found no edges near the body; "
+            "place it where the person is"
+        )
+    found = fit_sizes_to_contours(
+        parameters, sighted, settings.fit,
+        report=lambda share: report("fitting sizes", _OBSERVING + (1 - _OBSERVING) * share),
+    )  # fmt: skip
+    after = [
+        chamfer_cost(s.views, s.moved(found.body, p).bodies, TrackSettings()).at_prediction().total_px
+        for s, p in zip(sighted, found.poses, strict=True)
+    ]
+    report("done", 1.0)
+    return Acquisition(
+        found.body, tuple(frames), found.poses, float(np.mean(before)), float(np.mean(after)), parameters, found
+    )
+
+
+def _spread(frames: Sequence[int], n: int, keep: Sequence[int]) -> list[int]:
+    """Return frames evenly spread over all, with those to keep."""
+    at = np.unique(np.linspace(0, len(frames) - 1, min(n, len(frames))).round().astype(int))
+    return sorted({frames[i] for i in at} | (set(keep) & set(frames)))
+
+
+def _views(
+    observer: Observer, frame: int, bodies: Sequence[PosedBody], static_edges: Sequence[StaticEdgeModel] | None
+) -> tuple[ViewEvidence, ...]:
+    """Return the evidence of a frame around all people."""
+    cameras = observer.working_cameras
+    visible = [visible_pieces_px(occluding_contours.trace(bodies, c)) for c in cameras]
+    return observer.evidence(frame, regions(cameras, bodies), visible, static_edges)
+
+
+def _own_views(views: Sequence[ViewEvidence], bodies: tuple[PosedBody, ...], person: int) -> Sequence[ViewEvidence]:
+    """Return the evidence of a frame without what other people explain."""
+    people = [PersonPrior(b.model, b.values) for b in bodies]
+    return FrameProblem(views, people, TrackSettings()).own_evidence([person], bodies)[0]
+
+
+def _static_edges(observer: Observer, bodies: Mapping[int, tuple[PosedBody, ...]]) -> list[StaticEdgeModel] | None:
+    """Learn the static edges of views without masks and background; None if no view needs it."""
+    if all(c.masks is not None or c.background is not None for c in observer.cameras):
+        return None
+    models = [StaticEdgeModel(c.size) for c in observer.working_cameras]
+    for k, people in bodies.items():
+        views = _views(observer, k, people, models)
+        for view, camera, model in zip(views, observer.working_cameras, models, strict=True):
+            if view.segments is not None and view.silhouette is None:
+                pieces = visible_pieces_px(occluding_contours.trace(people, camera))
+                pieces = pieces - np.array([*view.corner_px, *view.corner_px], np.float32)
+                model.update(view.segments, view.corner_px, view.camera.size, pieces, ACCEPTED_SHARE * view.theta_px)
+    return models

@@ -1,0 +1,167 @@
+"""Derivatives of points on the surface of a posed body by its sizes and its pose.
+
+The occluding contour moves across its tangent as the surface point under it does (KRH08 Sect. 4). So the derivative of
+a contour by a size is that of the surface point with the same unit coordinates.
+
+Whatever the parameter, a point of a part moves by the part's twist, and within the part by its half-axes and shape.
+These are the part's `N_MOTIONS` motions: a spatial rotation and translation, the half-axes, the tapers, the exponents.
+Residuals are summed by the motions of each part first, and then converted to all unknowns.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tracker.acquisition.size_parameters import SizeArrays
+from tracker.body.kinematics import Kinematics
+from tracker.body.model import BodyModel
+from tracker.fitting.contour_residuals import PieceSums
+from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera, project_with_jacobian
+from tracker.geometry.shapes import EllipticalCone, Shape, TaperedSuperquadric
+
+N_MOTIONS = 13
+_STEP = 1e-4
+
+
+def sum_motions(
+    views: Sequence[tuple[Camera, PieceSums]], body: BodyModel, kinematics: Kinematics, with_shapes: bool = True
+) -> tuple[Array, Array]:
+    """Sum the residuals of pieces by the motions of the parts.
+
+    Args:
+        views: camera of each view, in the pixels of its residuals, and these.
+        body: the body at its present sizes.
+        kinematics: of its pose.
+        with_shapes: whether tapers and exponents are among the motions; else those columns stay 0.
+
+    Returns:
+        Gradients, (n_parts, N_MOTIONS), and normal matrices, (n_parts, N_MOTIONS, N_MOTIONS).
+    """
+    n_parts = len(body.parts)
+    b, M = np.zeros((n_parts, N_MOTIONS)), np.zeros((n_parts, N_MOTIONS, N_MOTIONS))
+    sums = [s.pulled for _, s in views]
+    parts, _, unit_points, gradients, hessians = (np.concatenate(fields) for fields in zip(*sums, strict=True))
+    half_axes, Ts = np.array([s.half_axes for s in body.shapes]), kinematics.Ts_world_part[parts]
+    local = body.centers_part[parts] + unit_points * half_axes[parts]
+    points = np.einsum("nij,nj->ni", Ts[:, :3, :3], local) + Ts[:, :3, 3]
+    firsts = np.cumsum([0] + [len(s.parts) for s in sums])
+    px_by_point = np.concatenate(
+        [
+            project_with_jacobian(camera.T_camera_world, camera.K, points[i:k])[1]
+            for (camera, _), i, k in zip(views, firsts[:-1], firsts[1:], strict=True)
+        ]
+    )
+    for part in range(n_parts):
+        at = np.flatnonzero(parts == part)
+        if len(at):
+            T = kinematics.Ts_world_part[part]
+            moved = _motions_of_points(body.shapes[part], T, points[at], unit_points[at], with_shapes)
+            rows = px_by_point[at] @ moved  # (N, 2, N_MOTIONS)
+            b[part] = np.einsum("ni,nik->k", gradients[at], rows)
+            M[part] = rows.reshape(-1, N_MOTIONS).T @ (hessians[at] @ rows).reshape(-1, N_MOTIONS)
+    return b, M
+
+
+def to_unknowns(J: Array, b: Array, M: Array) -> tuple[Array, Array]:
+    """Convert sums over the motions of all parts, by the derivatives (n_parts, N_MOTIONS, n), to n unknowns.
+
+    Returns:
+        Gradient, (n,), and normal matrix, (n, n).
+    """
+    return np.einsum("pik,pi->k", J, b), np.sum(J.transpose(0, 2, 1) @ M @ J, axis=0)
+
+
+def points_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
+    """Differentiate the body's points (`BodyModel.point_names`) by the sizes, (n_points, 3, n_sizes), metres."""
+    origins, carriers = _origins_by_sizes(model, kinematics, by_sizes), model.point_parts[len(model.joints) :]
+    landmarks = origins[carriers] + kinematics.Ts_world_part[carriers, :3, :3] @ by_sizes.landmarks
+    return np.concatenate([origins, landmarks])
+
+
+def motions_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
+    """Differentiate the motions of all parts by the sizes, (n_parts, N_MOTIONS, n_sizes)."""
+    Rs, origins = kinematics.Ts_world_part[:, :3, :3], _origins_by_sizes(model, kinematics, by_sizes)
+    still = np.zeros_like(origins)
+    parts = [still, origins + Rs @ by_sizes.centers, by_sizes.half_axes, by_sizes.tapers, by_sizes.exponents]
+    return np.concatenate(parts, axis=1)
+
+
+def motions_by_pose(model: BodyModel, kinematics: Kinematics) -> Array:
+    """Differentiate the motions of all parts by the degrees of freedom, (n_parts, N_MOTIONS, n_dofs)."""
+    axes, origins = kinematics.axes_world, kinematics.origins_world
+    turns = ~model.dof_is_length[:, None]
+    twists = np.concatenate([turns * axes, np.where(turns, np.cross(origins, axes), axes)], axis=1)  # (n_dofs, 6)
+    out = np.zeros((len(model.parts), N_MOTIONS, model.n_dofs))
+    out[:, :6] = twists.T * model.moves.T[:, None, :]
+    return out
+
+
+def _motions_of_points(
+    shape: Shape, T_world_part: Array, points_world: Array, unit_points: Array, with_shapes: bool = True
+) -> Array:
+    """Differentiate points on the surface of a part by its motions.
+
+    Args:
+        shape: of the part.
+        T_world_part: its pose, (4, 4).
+        points_world: the points, (N, 3), metres.
+        unit_points: the same in the unit coordinates of the part, (N, 3).
+        with_shapes: whether to differentiate by tapers and exponents; else these are 0.
+
+    Returns:
+        (N, 3, N_MOTIONS), metres per radian, metre, or 1.
+    """
+    out, R = np.zeros((len(points_world), 3, N_MOTIONS)), T_world_part[:3, :3]
+    x, y, z = points_world.T
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = z, -y, x  # omega x X
+    out[:, 1, 0], out[:, 2, 0], out[:, 2, 1] = -z, y, -x
+    out[:, :, 3:6] = np.eye(3)
+    out[:, :, 6:9] = R * unit_points[:, None, :]
+    if with_shapes:
+        out[:, :, 9:] = R @ _shape_derivatives(shape, unit_points)
+    return out
+
+
+def _origins_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
+    """Differentiate the joints by the sizes, (n_parts, 3, n_sizes), metres."""
+    Rs, out = kinematics.Ts_world_part[:, :3, :3], np.zeros_like(by_sizes.joints)
+    for part, parent in enumerate(model.parents):
+        if parent >= 0:
+            out[part] = out[parent] + Rs[parent] @ by_sizes.joints[part]
+    return out
+
+
+def _shape_derivatives(shape: Shape, points: Array) -> Array:
+    """Differentiate points (N, 3) in unit coordinates by k_x, k_y, e1 and e2, (N, 3, 4), metres."""
+    out = np.zeros((len(points), 3, 4))
+    half_axes, z = np.array(shape.half_axes), points[:, 2]
+    if isinstance(shape, EllipticalCone):
+        shrunk = 1 + shape.taper * z
+        out[:, 0, 0], out[:, 1, 1] = (half_axes[:2] * points[:, :2] * (z / shrunk)[:, None]).T
+    if isinstance(shape, TaperedSuperquadric):
+        shrunk = 1 + np.outer(z, shape.taper)
+        out[:, 0, 0], out[:, 1, 1] = (half_axes[:2] * points[:, :2] * z[:, None] / shrunk).T
+        out[:, :, 2:] = _by_exponents(shape, points)
+    return out
+
+
+def _by_exponents(shape: TaperedSuperquadric, points: Array) -> Array:
+    """Differentiate surface points (N, 3) in unit coordinates by the exponents, across the surface, (N, 3, 2), metres.
+
+    The implicit function of the shape stays 1 where a point moves along its gradient.
+    """
+    unit = TaperedSuperquadric((1.0, 1.0, 1.0), shape.exponents, shape.taper)
+    gradient = np.stack(
+        [unit.inside_outside(points + s) - unit.inside_outside(points - s) for s in _STEP * np.eye(3)], axis=1
+    ) / (2 * _STEP * np.array(shape.half_axes))  # fmt: skip
+    steepness = np.maximum(np.sum(gradient**2, axis=1), 1e-12)
+    out = np.empty((*points.shape, 2))
+    for k, (s1, s2) in enumerate(_STEP * np.eye(2)):
+        e1, e2 = shape.exponents
+        after, before = (
+            TaperedSuperquadric((1.0, 1.0, 1.0), (e1 + s * s1, e2 + s * s2), shape.taper).inside_outside(points)
+            for s in (1, -1)
+        )
+        out[:, :, k] = -gradient * ((after - before) / (2 * _STEP) / steepness)[:, None]
+    return out

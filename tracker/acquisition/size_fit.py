@@ -1,0 +1,308 @@
+"""Fit the sizes of a body and its poses on several frames to contours, all at once, by Gauss-Newton.
+
+The unknowns are the sizes, which all frames share, and the pose of each frame. The residuals are those of the tracker
+(`contour_residuals`), with the sizes as further columns of the Jacobian. Priors keep what the frames do not show.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.acquisition.part_motions import (
+    motions_by_pose,
+    motions_by_sizes,
+    points_by_sizes,
+    sum_motions,
+    to_unknowns,
+)
+from tracker.acquisition.size_parameters import SizeArrays, SizeParameters
+from tracker.body.kinematics import Kinematics
+from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.threads import map_parallel
+from tracker.contours.surfaces import Surfaces
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.contour_residuals import ContourResiduals, MatchSettings
+from tracker.fitting.gauss_newton import (
+    AT_LIMIT,
+    INITIAL_DAMPING,
+    MIN_RETRY_DAMPING,
+    NormalEquations,
+    PointTargets,
+    PosePrior,
+    damped_step,
+    normal_equations,
+)
+from tracker.geometry.arrays import Array
+
+_MIN_DAMPING, _MAX_DAMPING = 1e-6, 1e6
+_TOLERANCE = 1e-4
+"""Smallest relative decrease of the cost for another iteration."""
+
+
+class SightedPerson(NamedTuple):
+    """A person on one frame, with what the views show."""
+
+    frame: int
+    views: Sequence[ViewEvidence]
+    """Evidence of each view that is the person's."""
+    bodies: tuple[PosedBody, ...]
+    """All people; the others occlude."""
+    person: int
+    """Index of the person among them."""
+    placed: PointTargets | None = None
+    """Where somebody has placed points of the body; None in a frame that was only tracked."""
+
+    def moved(self, model: BodyModel, pose: Array) -> "SightedPerson":
+        """Return the person with another body and pose."""
+        bodies = tuple(PosedBody(model, pose) if i == self.person else b for i, b in enumerate(self.bodies))
+        return self._replace(bodies=bodies)
+
+    @property
+    def pose(self) -> Array:
+        """The person's pose, (n_values,)."""
+        return self.bodies[self.person].values
+
+
+@dataclass(frozen=True)
+class Round:
+    """A round of the fit, from coarse to fine."""
+
+    kinds: tuple[str, ...]
+    """Kinds of parameters that are free, see `SizePriors`."""
+    reach: float
+    """Outlier distance, in that of the views."""
+    iterations: int = 12
+    """Largest number of steps."""
+
+
+ROUNDS = (
+    Round(("height", "build"), 1.5, 8),
+    Round(("height", "build", "length", "girth", "end", "free_end", "side", "joint"), 1.0),
+    Round(("height", "build", "length", "girth", "end", "free_end", "side", "joint", "taper", "exponent"), 0.6, 20),
+)
+"""First the body as a whole, then its parts, then their shapes."""
+
+
+@dataclass(frozen=True)
+class SizeFitSettings:
+    """Settings of the fit."""
+
+    match: MatchSettings = field(default_factory=MatchSettings)
+    """Weights of the contour residuals."""
+    rounds: tuple[Round, ...] = ROUNDS
+    trust_rad: float = 0.3
+    """Standard deviation of the initial angles, rad."""
+    trust_m: float = 0.1
+    """Standard deviation of the initial position, metres."""
+
+
+class SizeFit(NamedTuple):
+    """Sizes and poses that fit the frames."""
+
+    sizes: Array
+    """Parameters, (n_sizes,), see `SizeParameters`."""
+    body: BodyModel
+    """The body with these sizes."""
+    poses: tuple[Array, ...]
+    """Pose of each frame, (n_values,)."""
+    cost: float
+    """Half the weighted sum of squares, of evidence and priors."""
+    covariance: Array
+    """Of the sizes, (n_sizes, n_sizes), whatever the poses are."""
+
+
+class _Bundle(NamedTuple):
+    """Normal equations of all unknowns: the sizes, then the degrees of freedom of each frame."""
+
+    cost: float
+    gradient: Array
+    hessian: Array
+
+
+def fit_sizes_to_contours(
+    parameters: SizeParameters,
+    frames: Sequence[SightedPerson],
+    settings: SizeFitSettings,
+    sizes: Array | None = None,
+    report: Callable[[float], None] = lambda share: None,
+) -> SizeFit:
+    """Fit sizes and poses to the contours of several frames.
+
+    Args:
+        parameters: the sizes; their prior has the mean 0.
+        frames: the frames, with the initial poses.
+        settings: of the fit.
+        sizes: initial parameters, (n_sizes,); 0 by default.
+        report: is given the share of the work that is done, 0 to 1. What it raises ends the fit.
+    """
+    sizes = np.zeros(len(parameters.names)) if sizes is None else sizes
+    poses = [f.pose for f in frames]
+    cost, hessian = np.inf, np.eye(len(sizes))
+    planned, done = sum(step.iterations for step in settings.rounds), 0
+    for step in settings.rounds:
+        body = parameters.body(sizes)
+        problem = _Problem(
+            parameters, [f.moved(body, p) for f, p in zip(frames, poses, strict=True)], settings, step, sizes
+        )
+        for i in range(step.iterations):
+            report((done + i) / planned)
+            if not problem.advance():
+                break
+        done += step.iterations
+        sizes, poses, cost, hessian = problem.sizes, problem.poses, problem.cost, problem.hessian
+    n = len(sizes)
+    covariance: Array = np.asarray(np.linalg.inv(hessian)[:n, :n], dtype=np.float64)
+    return SizeFit(sizes, parameters.body(sizes), tuple(poses), cost, covariance)
+
+
+class _Resized(NamedTuple):
+    """A body at the sizes of a step."""
+
+    body: BodyModel
+    by_sizes: SizeArrays
+    """Derivatives of its sizes."""
+    surfaces: Surfaces | None
+    """Its shapes, and those of the other people on a frame; None without views."""
+
+
+class _Problem:
+    """The least-squares problem of one round."""
+
+    def __init__(
+        self,
+        parameters: SizeParameters,
+        frames: Sequence[SightedPerson],
+        settings: SizeFitSettings,
+        step: Round,
+        sizes: Array,
+    ) -> None:
+        """Begin at sizes, (n_sizes,), and at the poses of the frames."""
+        self._parameters, self._frames, self._step = parameters, frames, step
+        self._free = parameters.of_kinds(*step.kinds)
+        self._residuals = map_parallel(lambda f: _residuals(f, settings, step), frames)
+        self._others = [tuple(b.model for k, b in enumerate(f.bodies) if k != f.person) for f in frames]
+        self._with_shapes = bool({"taper", "exponent"} & set(step.kinds))
+        model = parameters.base
+        sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
+        usual = PosePrior(model.neutral(), 1 / model.spreads)
+        self._priors = [[PosePrior(f.pose, 1 / sigma), usual] for f in frames]
+        self.sizes, self.poses, self._damping = sizes, [f.pose for f in frames], INITIAL_DAMPING
+        self._here = self._linearize(self.sizes, self.poses)
+
+    @property
+    def cost(self) -> float:
+        """Cost of the present sizes and poses."""
+        return self._here.cost
+
+    @property
+    def hessian(self) -> Array:
+        """Second derivative of the cost there, by the sizes and then the degrees of freedom of each frame."""
+        return self._here.hessian
+
+    def advance(self) -> bool:
+        """Move one step; return whether another one is worth it."""
+        here = self._here
+        active = self._active(here.gradient)
+        g, H = here.gradient[active], here.hessian[np.ix_(active, active)]
+        while True:
+            step = np.zeros(len(here.gradient))
+            step[active] = damped_step(H, g, self._damping * np.diag(H))
+            sizes, poses = self._moved(step)
+            there = self._linearize(sizes, poses)
+            if there.cost < here.cost:
+                break
+            if self._damping > _MAX_DAMPING:
+                return False
+            self._damping = max(10 * self._damping, MIN_RETRY_DAMPING)
+        self.sizes, self.poses, self._here = sizes, poses, there
+        self._damping = max(_MIN_DAMPING, self._damping / 10)
+        return here.cost - there.cost > _TOLERANCE * here.cost
+
+    def _moved(self, step: Array) -> tuple[Array, list[Array]]:
+        model, n = self._parameters.base, len(self.sizes)
+        steps = step[n:].reshape(len(self.poses), -1)
+        moved = [model.clip(model.retract(p, s)) for p, s in zip(self.poses, steps, strict=True)]
+        return self.sizes + step[:n], moved
+
+    def _active(self, gradient: Array) -> NDArray[np.int64]:
+        """Return the unknowns that may change: free sizes, and degrees of freedom that no limit holds."""
+        model, n = self._parameters.base, len(self._free)
+        low, high = model.limits.T
+        out = [self._free]
+        for pose, g in zip(self.poses, gradient[n:].reshape(len(self.poses), -1), strict=True):
+            at = pose[model.dof_value]
+            out.append(~((at <= low + AT_LIMIT) & (g > 0)) & ~((at >= high - AT_LIMIT) & (g < 0)))
+        return np.flatnonzero(np.concatenate(out))
+
+    def _linearize(self, sizes: Array, poses: Sequence[Array]) -> _Bundle:
+        body, by_sizes = self._parameters.body(sizes), self._parameters.derivatives(sizes)
+        n, m = len(sizes), body.n_dofs
+        # Frames with the same people share the arrays of their shapes.
+        representatives = {o: r[0] for o, r in zip(self._others, self._residuals, strict=True) if r}
+        surfaces = {others: residuals.resized(body) for others, residuals in representatives.items()}
+        own = map_parallel(
+            lambda i: self._linearize_frame(i, _Resized(body, by_sizes, surfaces.get(self._others[i])), poses[i]),
+            range(len(poses)),
+        )
+        prior = sizes / self._parameters.sigmas**2
+        cost, gradient = 0.5 * float(prior @ sizes), np.zeros(n + m * len(poses))
+        hessian = np.zeros((len(gradient), len(gradient)))
+        gradient[:n] = prior
+        hessian[:n, :n] = np.diag(1 / self._parameters.sigmas**2)
+        for i, found in enumerate(own):
+            at = np.concatenate([np.arange(n), n + m * i + np.arange(m)])
+            cost += found.cost
+            gradient[at] += found.gradient
+            hessian[np.ix_(at, at)] += found.hessian
+        return _Bundle(cost, gradient, hessian)
+
+    def _linearize_frame(self, i: int, resized: _Resized, pose: Array) -> NormalEquations:
+        """Return the normal equations of a frame by the sizes, then by its pose."""
+        body, by_sizes, surfaces = resized
+        kinematics, n = body.kinematics(pose), by_sizes.joints.shape[-1]
+        cost, pieces = 0.0, []
+        for residuals, view in zip(self._residuals[i], self._frames[i].views, strict=True):
+            assert surfaces is not None
+            own_cost, sums = residuals.with_surfaces(body, surfaces).piece_sums(pose)
+            cost += own_cost
+            pieces.append((view.camera, sums))
+        gradient, hessian = np.zeros(n + body.n_dofs), np.zeros((n + body.n_dofs, n + body.n_dofs))
+        if pieces:
+            by_sizes_and_pose = motions_by_sizes(body, kinematics, by_sizes), motions_by_pose(body, kinematics)
+            sums_of_motions = sum_motions(pieces, body, kinematics, self._with_shapes)
+            gradient, hessian = to_unknowns(np.concatenate(by_sizes_and_pose, axis=2), *sums_of_motions)
+        placed = self._frames[i].placed
+        if placed is not None:
+            own = _linearize_placed(placed, body, kinematics, by_sizes)
+            cost, gradient, hessian = cost + own.cost, gradient + own.gradient, hessian + own.hessian
+        for block in self._priors[i]:
+            prior = block.linearize(body, pose, kinematics)
+            cost += prior.cost
+            gradient[n:] += prior.gradient
+            hessian[n:, n:] += prior.hessian
+        return NormalEquations(cost, gradient, hessian)
+
+
+def _linearize_placed(
+    placed: PointTargets, body: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays
+) -> NormalEquations:
+    """Return the normal equations of placed points by the sizes, then by the pose."""
+    parts, points_world = body.point_parts[placed.points], body.points_at(kinematics, placed.points)
+    sides = (
+        points_by_sizes(body, kinematics, by_sizes)[placed.points],
+        body.point_jacobian(kinematics, parts, points_world),
+    )
+    rows = np.concatenate(sides, axis=2) * placed.weights[:, None, None]
+    r = (points_world - placed.targets_world) * placed.weights[:, None]
+    return normal_equations(r.ravel(), rows.reshape(-1, rows.shape[2]))
+
+
+def _residuals(person: SightedPerson, settings: SizeFitSettings, step: Round) -> list[ContourResiduals]:
+    """Return the residuals of each view by itself."""
+    return [
+        ContourResiduals([v], person.bodies, person.person, settings.match, step.reach * v.theta_px / v.scale)
+        for v in person.views
+    ]

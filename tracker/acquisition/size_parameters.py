@@ -1,0 +1,239 @@
+"""The sizes of a body as a vector of parameters: lengths, girths, shapes, and where flesh and joints lie on a part.
+
+All parameters are 0 for the body that they belong to. Scales are logarithms, so that no size can become negative.
+
+The prior says how people differ from a body of their height. Lengths: the segments of the ANSUR II survey (Gordon et
+al. 2014) differ from those of people of equal stature by 3 to 5%. Girths: its breadths and depths differ by 7 to 15%,
+mostly together (`build`). Places: the centre of a joint is known to 1 to 2 cm from the skin around it (Leardini et al.
+1999 for the hip). Shapes: GD96 Sect. 3 lists no ranges; ours are those of the built-in bodies' parts.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body.dimensions import main_axis, mirror_part
+from tracker.body.model import BodyModel
+from tracker.geometry.arrays import Array
+
+_LENGTH, _GIRTHS, _CENTER, _HALF, _TAPER, _EXPONENTS, _JOINT = (
+    0, slice(1, 3), slice(3, 6), slice(6, 9), slice(9, 11), slice(11, 13), slice(13, 16)
+)  # fmt: skip
+"""Columns of what differs on a part: the logarithm of its length, which stretches flesh and joints along its main axis,
+and of its girths across; shifts of the flesh's centre and half-axes, fractions of height; changes of its shape; and the
+shift of its own joint on the parent, fraction of height."""
+_N_COLUMNS = 16
+_EXPONENT_LIMITS, _TAPER_LIMIT = (0.15, 1.0), 0.8
+"""Limits of shapes: convex, with finite derivatives."""
+
+
+@dataclass(frozen=True)
+class SizePriors:
+    """Standard deviations of the sizes of people, from a body of typical proportions."""
+
+    height: float = 0.15
+    """Of the logarithm of the body's height."""
+    build: float = 0.15
+    """Of the logarithm of all girths together."""
+    length: float = 0.05
+    """Of the logarithm of a part's length."""
+    girth: float = 0.12
+    """Of the logarithm of a part's girth, front to back or side to side."""
+    joint: float = 0.012
+    """Of the place of a joint on its parent along each axis, fraction of height."""
+    side: float = 0.012
+    """Of the flesh across a part, fraction of height."""
+    end: float = 0.015
+    """Of an end of the flesh along a part, fraction of height."""
+    free_end: float = 0.05
+    """Of an end without a joint: hands, feet and hair belong to the parts before them."""
+    taper: float = 0.10
+    """Of a taper."""
+    exponent: float = 0.12
+    """Of an exponent."""
+
+
+class SizeArrays(NamedTuple):
+    """The sizes of a body as arrays, or their derivatives by the parameters, with a last axis of n_sizes."""
+
+    joints: Array
+    """Position of each joint in its parent's frame, (n_parts, 3), metres."""
+    centers: Array
+    """Centre of each shape in its part's frame, (n_parts, 3), metres."""
+    half_axes: Array
+    """Half-axes of each shape, (n_parts, 3), metres."""
+    tapers: Array
+    """k_x, k_y of each shape, (n_parts, 2)."""
+    exponents: Array
+    """e1, e2 of each shape, (n_parts, 2)."""
+    landmarks: Array
+    """Position of each landmark in its part's frame, (n_landmarks, 3), metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class SizeParameters:
+    """The sizes of a body as a vector, (n_sizes,), zero for the body itself."""
+
+    base: BodyModel
+    """The body that they belong to."""
+    coupled: bool = True
+    """Whether left and right have the same sizes, and the middle of the body is symmetric."""
+    priors: SizePriors = SizePriors()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each parameter: `height`, `build`, `forearm.length`; `left_forearm.length` if not coupled."""
+        return self._layout[0]
+
+    @cached_property
+    def sigmas(self) -> Array:
+        """Standard deviation of each parameter in the prior, (n_sizes,)."""
+        return np.array([getattr(self.priors, kind_of(n)) for n in self.names])
+
+    def of_kinds(self, *kinds: str) -> NDArray[np.bool_]:
+        """Return which parameters are of some kinds, the names of `SizePriors`, (n_sizes,)."""
+        return np.array([kind_of(n) in kinds for n in self.names])
+
+    def arrays(self, sizes: Array) -> SizeArrays:
+        """Return the sizes of the body at a vector of parameters."""
+        return self._both(sizes)[0]
+
+    def derivatives(self, sizes: Array) -> SizeArrays:
+        """Return the derivatives of the arrays by the parameters."""
+        return self._both(sizes)[1]
+
+    def body(self, sizes: Array) -> BodyModel:
+        """Return the body at a vector of parameters."""
+        found, base = self.arrays(sizes), self.base
+        height_m = float(base.height_m * np.exp(sizes[0]))
+        places = [[_triple(row) for row in a / height_m] for a in (found.joints, found.centers, found.half_axes)]
+        return replace(
+            base,
+            height_m=height_m,
+            joints=tuple(
+                replace(j, position=p) if j.parent else j for j, p in zip(base.joints, places[0], strict=True)
+            ),
+            parts=tuple(
+                replace(
+                    p, center=c, half_axes=a, taper=(float(t[0]), float(t[1])), exponents=(float(e[0]), float(e[1]))
+                )
+                for p, c, a, t, e in zip(base.parts, *places[1:], found.tapers, found.exponents, strict=True)
+            ),
+            landmarks=tuple(
+                replace(m, position=_triple(row / height_m))
+                for m, row in zip(base.landmarks, found.landmarks, strict=True)
+            ),
+        )
+
+    def _both(self, sizes: Array) -> tuple[SizeArrays, SizeArrays]:
+        """Return the arrays and their derivatives."""
+        base, C = self._base, self._layout[1]
+        raw = (C @ sizes).reshape(len(self.base.parts), -1)
+        C = C.reshape(*raw.shape, -1)
+        height = self.base.height_m * np.exp(sizes[0])
+        by_height, by_build = np.eye(len(sizes))[:2]
+        along, across = self._axes  # (n_parts, 3), and which girth each axis across is
+
+        def scaled(values: Array, logs: Array, logs_by: Array) -> tuple[Array, Array]:
+            out = height * values * np.exp(logs)
+            return out, out[..., None] * (by_height + logs_by)
+
+        def shifted(
+            values: Array, stretch: Array, stretch_by: Array, shift: Array, shift_by: Array
+        ) -> tuple[Array, Array]:
+            out, out_by = scaled(values, stretch, stretch_by)
+            return out + height * shift, out_by + height * (shift_by + shift[..., None] * by_height)
+
+        length, length_by = along * raw[:, :1], along[..., None] * C[:, :1]
+        girth = np.take_along_axis(raw[:, _GIRTHS], across, axis=1) + sizes[1]
+        girth_by = np.take_along_axis(C[:, _GIRTHS], across[..., None], axis=1) + by_build
+        stretch = np.where(along, length, girth), np.where(along[..., None], length_by, girth_by)
+        parents, carriers = np.array(self.base.parents), [self.base.part_index[m.part] for m in self.base.landmarks]
+        found = [
+            shifted(base.joints, length[parents], length_by[parents], raw[:, _JOINT], C[:, _JOINT]),
+            shifted(base.centers, length, length_by, raw[:, _CENTER], C[:, _CENTER]),
+            shifted(base.half_axes, *stretch, raw[:, _HALF], C[:, _HALF]),
+            _limited(base.tapers + raw[:, _TAPER], C[:, _TAPER], -_TAPER_LIMIT, _TAPER_LIMIT),
+            _limited(base.exponents + raw[:, _EXPONENTS], C[:, _EXPONENTS], *_EXPONENT_LIMITS),
+            scaled(base.landmarks, length[carriers], length_by[carriers]),
+        ]
+        return SizeArrays(*(f[0] for f in found)), SizeArrays(*(f[1] for f in found))
+
+    @cached_property
+    def _base(self) -> SizeArrays:
+        parts = self.base.parts
+        return SizeArrays(
+            np.array([j.position for j in self.base.joints]),
+            np.array([p.center for p in parts]),
+            np.array([p.half_axes for p in parts]),
+            np.array([p.taper for p in parts]),
+            np.array([p.exponents for p in parts]),
+            np.array([m.position for m in self.base.landmarks]).reshape(-1, 3),
+        )
+
+    @cached_property
+    def _axes(self) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        """Whether each axis of a part is its main one, and else which of the girths it is, (n_parts, 3) each."""
+        main = np.array([main_axis(self.base, i) for i in range(len(self.base.parts))])
+        along = np.arange(3) == main[:, None]
+        return along, np.where(along, 0, np.cumsum(~along, axis=1) - 1)
+
+    @cached_property
+    def _layout(self) -> tuple[tuple[str, ...], Array]:
+        """Names of the parameters, and the matrix from them to the columns of all parts, (n_parts * 16, n_sizes)."""
+        index, entries = {"height": 0, "build": 1}, []
+        for i, (part, joint) in enumerate(zip(self.base.parts, self.base.joints, strict=True)):
+            effects = [(part.name, name, column, sign) for name, column, sign in self._effects(i)]
+            if joint.parent:
+                effects += [(joint.name, f"joint_{a}", _JOINT.start + k, 1.0) for k, a in enumerate("xyz")]
+            for owner, name, column, sign in effects:
+                mirrored = mirror_part(owner) is not None
+                if self.coupled and name.endswith("_y"):
+                    if not mirrored:
+                        continue  # the middle of the body is symmetric
+                    sign = sign if owner.startswith("left") else -sign
+                shared = owner.split("_", 1)[1] if self.coupled and mirrored else owner
+                at = index.setdefault(f"{shared}.{name}", len(index))
+                entries.append((i * _N_COLUMNS + column, at, sign))
+        C = np.zeros((len(self.base.parts) * _N_COLUMNS, len(index)))
+        for row, at, sign in entries:
+            C[row, at] = sign
+        return tuple(index), C
+
+    def _effects(self, i: int) -> list[tuple[str, int, float]]:
+        """Return what each parameter of a part's flesh changes: its name, a column and a factor."""
+        part, main = self.base.parts[i], main_axis(self.base, i)
+        outward = -1.0 if part.center[main] < 0 else 1.0  # from the joint to the far end
+        is_leaf = i not in self.base.parents
+        far = "free_end" if is_leaf else "end_far"
+        out = [("length", _LENGTH, 1.0), ("girth_a", _GIRTHS.start, 1.0), ("girth_b", _GIRTHS.start + 1, 1.0)]
+        for name, half in ((far, 0.5), ("end_near", -0.5)):
+            out += [(name, _CENTER.start + main, 0.5 * outward), (name, _HALF.start + main, half)]
+        out += [(f"side_{a}", _CENTER.start + k, 1.0) for k, a in enumerate("xyz") if k != main]
+        if part.kind != "ellipsoid":  # one taper for both axes keeps a solid of revolution
+            names = ("taper", "taper") if part.taper[0] == part.taper[1] else ("taper_x", "taper_y")
+            out += [(n, _TAPER.start + k, 1.0) for k, n in enumerate(names)]
+        if part.kind == "superquadric":
+            out.append(("exponent_along", _EXPONENTS.start, 1.0))
+            out += [("exponent_around", _EXPONENTS.start + 1, 1.0)] if part.exponents[1] != 1.0 else []
+        return out
+
+
+def kind_of(name: str) -> str:
+    """Return the kind of a parameter, a name of `SizePriors`."""
+    last = name.rsplit(".", 1)[-1]
+    return last if last == "free_end" else last.split("_", 1)[0]
+
+
+def _limited(values: Array, by: Array, low: float, high: float) -> tuple[Array, Array]:
+    """Clip values; what is clipped has no derivative."""
+    inside = (values >= low) & (values <= high)
+    return np.clip(values, low, high), np.where(inside[..., None], by, 0.0)
+
+
+def _triple(row: Array) -> tuple[float, float, float]:
+    x, y, z = (float(v) for v in row)
+    return x, y, z

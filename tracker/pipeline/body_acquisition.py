@@ -1,0 +1,200 @@
+"""Acquire a person's body from what a session stores, and make it the person's present body."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, Report, acquire_from_contours
+from tracker.acquisition.from_joints import JOINT_M, place_joints
+from tracker.body.model import BodyModel, PosedBody
+from tracker.errors import TrackerError
+from tracker.evidence.observer import Observer
+from tracker.fitting.gauss_newton import PointTargets
+from tracker.formats.model_toml import PRESETS, format_model, load_model
+from tracker.geometry.arrays import Array
+from tracker.posing.retarget import retarget_pose
+from tracker.session.session import Session, save_model
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import Change, PoseChange, PoseRecord
+from tracker.store.stored_poses import StoredPose, read_stored_poses
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import TrackingRun
+
+SIZES_EDITS = "sizes_edits"
+"""Setting of the session: for each entry of the history that changed sizes, the name of the person and the revisions
+before and after it."""
+PLACED_M = 0.02
+"""Standard deviation of a joint that a user has placed in the images, metres."""
+_MOST_TRACKED = 90
+"""Number of frames that are tracked for an acquisition where too few poses are stored."""
+_TRACKING = 0.4
+"""Share of the work up to the end of that tracking."""
+
+
+class PosedFrames(NamedTuple):
+    """Frames with known poses of a person."""
+
+    bodies: Mapping[int, tuple[PosedBody, ...]]
+    """On each frame the person in the present body, then the other people who have a pose there."""
+    placed: Mapping[int, PointTargets]
+    """By frame, joints of the person that somebody has placed."""
+
+
+def acquire_body(
+    session: Session,
+    observer: Observer,
+    person: int,
+    frames: Sequence[int],
+    settings: AcquisitionSettings,
+    report: Report = lambda stage, share: None,
+) -> Acquisition:
+    """Acquire the body of a person from stored poses; where they are too few, from frames tracked for it.
+
+    Nothing is stored; see `store_body`.
+
+    Args:
+        session: the session.
+        observer: of its recording.
+        person: index of the person.
+        frames: the frames that may be used, ascending.
+        settings: of the acquisition.
+        report: shows progress. What it raises ends the acquisition.
+
+    Raises:
+        TrackerError: the person has no pose on these frames, or the views show nothing of them.
+    """
+    known = posed_frames(session, person, frames)
+    begun = 0.0
+    if len(known.bodies) < settings.n_frames < len(frames):
+        begun = _TRACKING
+        known = _with_tracked(session, observer, person, frames, known, lambda share: report("tracking", begun * share))
+    return acquire_from_contours(
+        observer, known.bodies, 0, known.placed, settings,
+        lambda stage, share: report(stage, begun + (1 - begun) * share),
+    )  # fmt: skip
+
+
+def has_preset_sizes(model: BodyModel) -> bool:
+    """Return whether a body still has all sizes of its preset, so that nobody has said how tall the person is."""
+    return model.name in PRESETS and format_model(model) == format_model(load_model(model.name))
+
+
+def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedFrames:
+    """Return the frames on which a person has a credible pose, with the joints that somebody has placed.
+
+    Keyframes and good frames are used. If there are none, doubtful ones are.
+
+    Raises:
+        TrackerError: the person has no pose on these frames.
+    """
+    within = range(frames[0], frames[-1] + 1)
+    stored = [read_stored_poses(session.annotations_path, p.name, p.model, within) for p in session.people]
+    own, model = {k: s for k, s in stored[person].items() if k in frames}, session.people[person].model
+    own = {k: s for k, s in own.items() if len(s.record.values) == len(model.value_names)}
+    usable = {k: s for k, s in own.items() if s.record.keyframe or s.record.status in ("", "good")}
+    usable = usable or {k: s for k, s in own.items() if s.record.status != "lost"}
+    if not usable:
+        raise TrackerError(
+            f"expected a pose of '{session.people[person].name}' on a frame from {frames[0]} to {frames[-1]}, found "
+            "none that is not lost; place the body in the page, or use quadrille init"
+        )
+    bodies = {
+        k: (
+            PosedBody(model, retarget_pose(s.body.values, s.body.model, model)),
+            *(other[k].body for i, other in enumerate(stored) if i != person and k in other),
+        )
+        for k, s in usable.items()
+    }
+    placed = {k: targets for k, s in usable.items() if (targets := _placed(s)) is not None}
+    return PosedFrames(bodies, placed)
+
+
+def store_body(
+    session: Session, store: AnnotationStore, person: int, body: BodyModel, poses: Mapping[int, Array], label: str
+) -> Session:
+    """Make a body the present one of a person: a new model revision, and keyframes fitted to it, as one undoable edit.
+
+    Other stored poses keep the body that they were made with until they are tracked again.
+
+    Args:
+        session: the session, which this process has locked.
+        store: its annotations.
+        person: index of the person.
+        body: the new body.
+        poses: by frame, poses of the new body; they replace those of keyframes. Other keyframes are retargeted.
+        label: of the entry of the history.
+    """
+    name, before = (
+        session.people[person].name,
+        store.add_model_revision(session.people[person].name, format_model(session.people[person].model)),
+    )
+    changed = save_model(session, person, body)
+    revision = store.add_model_revision(name, format_model(body))
+    stored = read_stored_poses(session.annotations_path, name, session.people[person].model)
+    changes: list[Change] = [
+        PoseChange(name, k, refitted_record(s.record, poses.get(k, None), s.body.model, body, revision))
+        for k, s in stored.items()
+        if s.record.keyframe and len(s.record.values) == len(body.value_names)
+    ]
+    edit = store.commit(label, changes).edit
+    store.set_setting(SIZES_EDITS, {**store.setting(SIZES_EDITS, {}), str(edit): [name, before, revision]})
+    return changed
+
+
+def refitted_record(
+    record: PoseRecord, pose: Array | None, was: BodyModel, becomes: BodyModel, revision: int
+) -> PoseRecord:
+    """Return the record of a keyframe in another body of the same degrees of freedom.
+
+    Args:
+        record: the keyframe.
+        pose: its pose in the new body, (n_values,); None retargets it by its joints.
+        was: the body before.
+        becomes: the new body.
+        revision: of the new body.
+    """
+    values = retarget_pose(record.values, was, becomes) if pose is None else pose
+    kept = {k: v for k, v in record.settings.items() if k == "joints"}
+    return replace(
+        record, values=values, model_revision=revision, status="", cost_px=None,
+        settings={"method": "refit", "model_revision": record.model_revision, **kept}, view_costs_px=(),
+        part_costs_px=(), limbs_lost=(), remark="refitted to other sizes",
+    )  # fmt: skip
+
+
+def _placed(stored: StoredPose) -> PointTargets | None:
+    """Return the joints that somebody has placed on a frame: known joints, or those of a keyframe set by hand."""
+    record, model = stored.record, stored.body.model
+    if not record.keyframe:
+        return None
+    joints = record.settings.get("joints")
+    if joints:
+        return place_joints(model, {n: np.array(p, dtype=np.float64) for n, p in joints.items()}, JOINT_M)
+    if not {"manual", "pinned", "imported"} & set(record.sources):
+        return None  # a tracked pose that was confirmed shows where the flesh is, not the joints
+    return place_joints(model, dict(zip(model.point_names, stored.body.points_world, strict=True)), PLACED_M)
+
+
+def _with_tracked(
+    session: Session, observer: Observer, person: int, frames: Sequence[int], known: PosedFrames,
+    report: Callable[[float], None],
+) -> PosedFrames:  # fmt: skip
+    """Track the person on from the first known frame, and add the good frames."""
+    first = min(known.bodies)
+    ahead, behind = [k for k in frames if k >= first], [k for k in frames if k <= first][::-1]
+    run_frames = (ahead if len(ahead) >= len(behind) else behind)[:_MOST_TRACKED]
+    own, model = known.bodies[first], session.people[person].model
+    subjects = Subjects.of([b.model for b in own], keyframes={k: {0: known.bodies[k][0].values} for k in known.placed})
+    run = TrackingRun(observer, subjects, [b.values for b in own], run_frames)
+    bodies = dict(known.bodies)
+    for i, found in enumerate(ChamferTracker(TrackSettings()).estimates(run)):
+        report((i + 1) / len(run_frames))
+        if found.statuses[0] == "good":
+            people = zip(subjects.models, found.poses, strict=True)
+            bodies.setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))
+    assert all(b[0].model is model for b in bodies.values())
+    return PosedFrames(bodies, known.placed)
