@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from app.control.navigation import Navigation
 from app.control.posing.alternatives import Alternatives
+from app.control.posing.body_acquisition import BodyAcquisition
 from app.control.posing.body_sizes import BodySizeEditing
 from app.control.posing.dof_locks import DofLocks
 from app.control.posing.dragging import Dragging
@@ -96,6 +97,8 @@ class Controller:
         """Replaces poses by their alternatives."""
         self.body_sizes = BodySizeEditing(session_state, runs, activities)
         """Edits the sizes of bodies."""
+        self.body_acquisition = BodyAcquisition(session_state)
+        """Acquires the sizes of bodies from the footage."""
         self.history = History(session_state, activities, self.body_sizes.follow)
         """Moves along the history."""
         self.cost_landscape = CostLandscapes(session_state, activities)
@@ -146,6 +149,7 @@ class Controller:
 
     def close(self) -> None:
         """Stop all work and save; the controller must not be used afterwards."""
+        self.body_acquisition.stop()
         self._save_retry.close()
         with self.activities.editing():
             self.history.save()

@@ -12,6 +12,7 @@ from msgspec import Meta
 
 from app.drawing.curves import CurveGroup
 from app.page.inspector_messages import (
+    AcquireSizes,
     ApplySizes,
     CoupleSides,
     DraftSizes,
@@ -215,6 +216,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     TakeCandidate, ShowLandscape, SetLandscapeDof,
     StartTracking, ControlTracking, EditRange, StopRange, ToggleMark, FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, DraftSizes,
+    AcquireSizes,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

@@ -48,8 +48,16 @@ def _width(controller: Controller, _: int, message: wire.SetGirdleWidth) -> None
 def _draft(controller: Controller, _: int, message: wire.DraftSizes) -> None:
     if message.action == "discard":
         controller.body_sizes.discard()
+        controller.body_acquisition.forget()
     else:
         controller.body_sizes.recall(message.person)
+
+
+def _acquire(controller: Controller, _: int, message: wire.AcquireSizes) -> None:
+    if message.action == "start":
+        controller.body_acquisition.start(message.person)
+    else:
+        controller.body_acquisition.stop()
 
 
 INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
@@ -61,4 +69,5 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.CoupleSides: lambda controller, _, m: controller.body_sizes.couple(m.on),
     wire.ApplySizes: lambda controller, _, m: controller.body_sizes.apply(m.person, m.refit),
     wire.DraftSizes: _draft,
+    wire.AcquireSizes: _acquire,
 }

@@ -7,6 +7,7 @@ from app.page import inspector_messages as wire
 from app.page.message_types import Message
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
+from app.state.people import AcquisitionState
 from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
 from tracker.posing.grab import minor_points
@@ -28,7 +29,10 @@ class InspectorFeed:
     def updates(self, controller: Controller, state: State) -> list[Message]:
         """Return the messages that bring the page up to date."""
         self._made_from = _ingredients(state)
-        now: list[Message] = [settings(state.settings), view_3d(controller, state), body_sizes(controller, state)]
+        now: list[Message] = [
+            settings(state.settings), view_3d(controller, state), body_sizes(controller, state),
+            acquisition(state.acquisition),
+        ]  # fmt: skip
         changed = [message for message in now if message not in self._sent]
         self._sent = now
         return changed
@@ -38,7 +42,7 @@ def _ingredients(state: State) -> tuple[Identity, ...]:
     """Return what the messages are made from, for comparison."""
     made_from = (
         state.settings, state.view_3d, state.floor, state.prediction_note, state.person, state.draft, state.present,
-        state.sides_alike, state.sizes_message,
+        state.sides_alike, state.sizes_message, state.acquisition,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
 
@@ -99,6 +103,22 @@ def body_sizes(controller: Controller, state: State) -> wire.BodySizesMessage:
         height_limits_m=HEIGHT_LIMITS_M,
         size_limits_m=size_limits_m(sizes.height_m),
     )
+
+
+def acquisition(found: AcquisitionState) -> wire.AcquisitionMessage:
+    """Describe an acquisition of sizes."""
+    result, outlines = None, found.outlines
+    if outlines is not None:
+        result = wire.AcquisitionResult(
+            frames=found.frames,
+            cost_before_px=found.cost_before_px,
+            cost_after_px=found.cost_after_px,
+            sizes=tuple(wire.AcquiredSizeRow(*row) for row in found.sizes),
+            size_px=outlines.size_px,
+            front=wire.OutlinePair(outlines.front.before, outlines.front.after),
+            side=wire.OutlinePair(outlines.side.before, outlines.side.after),
+        )
+    return wire.AcquisitionMessage(found.person, found.running, found.stage, found.share, found.message, result)
 
 
 def _floor(floor: FloorState) -> wire.FloorInfo:

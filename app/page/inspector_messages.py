@@ -112,6 +112,13 @@ class DraftSizes(Command, frozen=True, tag="body_sizes"):
     person: Index
 
 
+class AcquireSizes(Command, frozen=True, tag="acquire"):
+    """Acquire the sizes of a person from the footage, or stop that."""
+
+    action: Literal["start", "stop"]
+    person: Index
+
+
 # --- to the page ----------------------------------------------------------------------------------------------------
 
 
@@ -216,3 +223,49 @@ class BodySizesMessage(Message, frozen=True, tag="body_sizes"):
     height_limits_m: tuple[float, float]
     size_limits_m: tuple[float, float]
     """Least and largest length, distance, half depth or half width."""
+
+
+class AcquiredSizeRow(Part, frozen=True):
+    """One size of a body before and after an acquisition."""
+
+    name: str
+    before_m: float
+    after_m: float
+    sigma_m: float
+    """Standard deviation after the acquisition."""
+
+
+class OutlinePair(Part, frozen=True):
+    """Outlines of two bodies from one side, as short lines x0, y0, x1, y1 in pixels of a picture."""
+
+    before: tuple[tuple[float, float, float, float], ...]
+    after: tuple[tuple[float, float, float, float], ...]
+
+
+class AcquisitionResult(Part, frozen=True):
+    """An acquired body; its sizes are those being edited."""
+
+    frames: tuple[int, ...]
+    """Frames that the sizes were fitted to."""
+    cost_before_px: float
+    cost_after_px: float
+    sizes: tuple[AcquiredSizeRow, ...]
+    """All sizes, those that changed most first."""
+    size_px: tuple[int, int]
+    """Width and height of the pictures."""
+    front: OutlinePair
+    side: OutlinePair
+
+
+class AcquisitionMessage(Message, frozen=True, tag="acquisition"):
+    """An acquisition of sizes from the footage: its progress, or its result."""
+
+    person: int
+    running: bool
+    stage: str
+    """The kind of work."""
+    share: float
+    """Share of the work that is done, 0 to 1."""
+    message: str
+    """Why there is no result, or empty."""
+    result: AcquisitionResult | None

@@ -1,6 +1,7 @@
 """How people are shown and handled: their poses, a drag, a draft of sizes, who is visible."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from tracker.body.model import BodyModel
@@ -73,6 +74,66 @@ class SizeDraft:
     person: int
     model: BodyModel
     """The body with these sizes."""
+    poses: Mapping[int, Array] = field(default_factory=dict)
+    """By frame, known poses of this body, (n_values,); empty for sizes that were typed."""
+
+
+Line = tuple[float, float, float, float]
+"""x0, y0, x1, y1."""
+
+
+@dataclass(frozen=True)
+class SideOutlines:
+    """Outlines of two bodies from one side, pixels of a picture of `size_px`: x0, y0, x1, y1 of short lines."""
+
+    before: tuple[Line, ...]
+    after: tuple[Line, ...]
+
+
+@dataclass(frozen=True)
+class BodyOutlines:
+    """Outlines of two bodies."""
+
+    size_px: tuple[int, int]
+    """Width and height of each picture."""
+    front: SideOutlines
+    side: SideOutlines
+
+
+class AcquiredSize(NamedTuple):
+    """One size of a body before and after an acquisition, metres."""
+
+    name: str
+    """As text for the user."""
+    before_m: float
+    after_m: float
+    sigma_m: float
+    """Standard deviation of the size after the acquisition, metres."""
+
+
+@dataclass(frozen=True)
+class AcquisitionState:
+    """An acquisition of sizes from the footage: its progress, or its result."""
+
+    running: bool = False
+    person: int = 0
+    """Index of the person whose sizes are acquired."""
+    stage: str = ""
+    """The kind of work, as text for the user."""
+    share: float = 0.0
+    """Share of the work that is done, 0 to 1."""
+    message: str = ""
+    """Why there is no result, or empty."""
+    frames: tuple[int, ...] = ()
+    """Frames that the sizes were fitted to; empty without a result."""
+    cost_before_px: float = 0.0
+    """Mean cost over these frames with the body before, px."""
+    cost_after_px: float = 0.0
+    """The same with the acquired body, px."""
+    sizes: tuple[AcquiredSize, ...] = ()
+    """All sizes, those that changed most first."""
+    outlines: BodyOutlines | None = None
+    """Both bodies from the front and from the side; None without a result."""
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 
 from app.state.comparison import PoseComparison
 from app.state.floor_picking import FloorState
-from app.state.people import DragState, HeldPoint, ShownPose, SizeDraft, Visibility
+from app.state.people import AcquisitionState, DragState, HeldPoint, ShownPose, SizeDraft, Visibility
 from app.state.progress import FootageState, RangeState, TrackState
 from app.state.search import CostLandscape, SearchState, SearchView
 from app.state.view_3d import View3d
@@ -36,6 +36,8 @@ class State:
     """Whether sizes are edited on both sides at once."""
     sizes_message: str = ""
     """Result of the last change of sizes."""
+    acquisition: AcquisitionState = field(default_factory=AcquisitionState)
+    """Acquisition of sizes from the footage."""
     person: int = 0
     """Index of the selected person."""
     point: str | None = None
@@ -178,6 +180,7 @@ class StateChanges(TypedDict, total=False):
     draft: SizeDraft | None
     sides_alike: bool
     sizes_message: str
+    acquisition: AcquisitionState
     person: int
     point: str | None
     visibility: Visibility

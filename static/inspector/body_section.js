@@ -1,6 +1,7 @@
 /** Body sizes of the active person: first a draft that the views outline, then the body, as an entry of the history. */
 
 import { capital, displayName } from "../widgets/text.js";
+import { acquisitionView } from "./acquisition_view.js";
 import { boundedField, checkRow, choiceRow, numberRow, textButton } from "./rows.js";
 
 /**
@@ -35,12 +36,15 @@ export class BodySection {
   #discard;
   #former;
   #note = document.createElement("p");
+  #acquisition;
   /** @type {{field: Field, read: (sizes: BodySizes) => number | undefined, factor: number}[]} */
   #fields = [];
   #built = "";
 
   /** @param {import("../model/index.js").Context} context */
-  constructor({ store, send, notify }) {
+  constructor(context) {
+    const { store, send, notify } = context;
+    this.#acquisition = acquisitionView(context);
     this.#store = store;
     this.#send = send;
     this.#refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
@@ -88,12 +92,15 @@ export class BodySection {
     const foot = document.createElement("div");
     foot.className = "section-foot";
     foot.append(this.#keyframes.element, this.#note, buttons);
-    this.body.append(this.#person, this.#height.element, this.#alike.element, this.#table, foot);
+    this.body.append(this.#person, this.#acquisition.element, this.#height.element, this.#alike.element, this.#table, foot);
   }
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
   update(changed) {
     if (changed.has("bodySizes") || changed.has("state") || changed.has("session")) this.#show();
+    if (changed.has("acquisition") || changed.has("bodySizes") || changed.has("session")) {
+      this.#acquisition.update(this.#store.facts.bodySizes?.person ?? 0);
+    }
   }
 
   /** @param {Record<string, unknown> & {action: string}} change */

@@ -78,6 +78,7 @@
  * @typedef {{type: "body_sizes", action: "couple", on: boolean}} CoupleSides
  * @typedef {{type: "body_sizes", action: "apply", person: number, refit: boolean}} ApplySizes
  * @typedef {{type: "body_sizes", action: "discard" | "previous", person: number}} DraftSizes
+ * @typedef {{type: "acquire", action: "start" | "stop", person: number}} AcquireSizes
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo
@@ -148,6 +149,12 @@
  * @typedef {{type: "body_sizes", person: number, height_m: number, parts: PartSizes[], widths: GirdleWidth[],
  *   sides_alike: boolean, edited: boolean, has_former: boolean, outcome: string, height_limits_m: [number, number],
  *   size_limits_m: [number, number]}} BodySizesMessage
+ * @typedef {{name: string, before_m: number, after_m: number, sigma_m: number}} AcquiredSizeRow
+ * @typedef {{before: [number, number, number, number][], after: [number, number, number, number][]}} OutlinePair
+ * @typedef {{frames: number[], cost_before_px: number, cost_after_px: number, sizes: AcquiredSizeRow[], size_px:
+ *   [number, number], front: OutlinePair, side: OutlinePair}} AcquisitionResult
+ * @typedef {{type: "acquisition", person: number, running: boolean, stage: string, share: number, message: string,
+ *   result: AcquisitionResult | null}} AcquisitionMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
@@ -181,10 +188,11 @@
  *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed |
  *   SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof |
  *   StartTracking | ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | SetTrackSettings |
- *   SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes | EditFloor |
- *   MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ *   SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes | AcquireSizes |
+ *   EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
- *   SearchSetupMessage | SearchRunsMessage | SettingsMessage | View3dMessage | BodySizesMessage} TextMessage
+ *   SearchSetupMessage | SearchRunsMessage | SettingsMessage | View3dMessage | BodySizesMessage | AcquisitionMessage}
+ *   TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

@@ -136,7 +136,7 @@ def store_body(
     revision = store.add_model_revision(name, format_model(body))
     stored = read_stored_poses(session.annotations_path, name, session.people[person].model)
     changes: list[Change] = [
-        PoseChange(name, k, refitted_record(s.record, poses.get(k, None), s.body.model, body, revision))
+        PoseChange(name, k, refitted_record(s.record, _pose_in(body, s, poses.get(k)), revision))
         for k, s in stored.items()
         if s.record.keyframe and len(s.record.values) == len(body.value_names)
     ]
@@ -145,25 +145,25 @@ def store_body(
     return changed
 
 
-def refitted_record(
-    record: PoseRecord, pose: Array | None, was: BodyModel, becomes: BodyModel, revision: int
-) -> PoseRecord:
+def refitted_record(record: PoseRecord, pose: Array, revision: int) -> PoseRecord:
     """Return the record of a keyframe in another body of the same degrees of freedom.
 
     Args:
         record: the keyframe.
-        pose: its pose in the new body, (n_values,); None retargets it by its joints.
-        was: the body before.
-        becomes: the new body.
-        revision: of the new body.
+        pose: its pose in the other body, (n_values,).
+        revision: of the other body.
     """
-    values = retarget_pose(record.values, was, becomes) if pose is None else pose
     kept = {k: v for k, v in record.settings.items() if k == "joints"}
     return replace(
-        record, values=values, model_revision=revision, status="", cost_px=None,
+        record, values=pose, model_revision=revision, status="", cost_px=None,
         settings={"method": "refit", "model_revision": record.model_revision, **kept}, view_costs_px=(),
         part_costs_px=(), limbs_lost=(), remark="refitted to other sizes",
     )  # fmt: skip
+
+
+def _pose_in(body: BodyModel, stored: StoredPose, known: Array | None) -> Array:
+    """Return a stored pose in another body: a known one, or the stored one retargeted by its joints."""
+    return retarget_pose(stored.body.values, stored.body.model, body) if known is None else known
 
 
 def _placed(stored: StoredPose) -> PointTargets | None:

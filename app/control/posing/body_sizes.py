@@ -1,6 +1,6 @@
 """Edit body sizes: first a draft that the views show, then a new model revision, as an entry of the history."""
 
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -12,13 +12,11 @@ from app.state.people import SizeDraft
 from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
+from tracker.geometry.arrays import Array
+from tracker.pipeline.body_acquisition import SIZES_EDITS, refitted_record
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
-
-_KEY = "sizes_edits"
-"""Setting of the session: for each entry of the history that changed sizes, the name of the person and the revisions
-before and after it."""
 
 
 class _Refitted(NamedTuple):
@@ -126,7 +124,9 @@ class BodySizeEditing:
             )
             if not same:
                 session_state.set_body_models(save_model(session_state.session, person, model))
-            refitted = self._refit(person) if refit else _Refitted([], 0.0)
+            draft = session_state.state.draft
+            known = draft.poses if draft is not None and draft.person == person else {}
+            refitted = self._refit(person, known) if refit else _Refitted([], 0.0)
             if same and not refitted.changes:
                 raise TrackerError(
                     f"expected other sizes of {name}, or keyframes made with others, found neither; "
@@ -141,7 +141,7 @@ class BodySizeEditing:
             if edit is not None and session_state.saver.error is None:
                 saver = session_state.saver
                 change = {str(edit): [name, before, saver.revisions.current(person)]}
-                saver.store_setting(_KEY, {**saver.setting(_KEY, {}), **change})
+                saver.store_setting(SIZES_EDITS, {**saver.setting(SIZES_EDITS, {}), **change})
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
             message = f"Applied{outcome}{off}." + ("" if same or not refit else self._rest(person))
             self._runs.clear()
@@ -155,7 +155,7 @@ class BodySizeEditing:
             TrackerError: a body cannot be written.
         """
         session_state, saver = self._session_state, self._session_state.saver
-        edits = saver.setting(_KEY, {})
+        edits = saver.setting(SIZES_EDITS, {})
         latest = next((e for e in saver.history(1) if not e.undone), None)
         for edit in saver.moved_edits:
             name, before, after = edits.get(str(edit), (None, 0, 0))
@@ -185,8 +185,9 @@ class BodySizeEditing:
         n = sum(not row.keyframe for row in rows)
         return f" {n} other pose{' keeps' if n == 1 else 's keep'} the earlier sizes until tracked again." if n else ""
 
-    def _refit(self, person: int) -> _Refitted:
-        """Return the keyframes of a person that were made with another body, retargeted to the present one."""
+    def _refit(self, person: int, known: Mapping[int, Array]) -> _Refitted:
+        """Return the keyframes of a person that were made with another body, in the known poses of the present one, by
+        frame, or else retargeted to it."""
         session_state, saver = self._session_state, self._session_state.saver
         cameras = [c.camera for c in session_state.session.cameras]
         becomes, revision, name = (
@@ -205,13 +206,10 @@ class BodySizeEditing:
             ):
                 continue
             was, pins = saver.revisions.body(record.model_revision), saver.pins(person, row.frame)
-            values = retarget_pose(record.values, was, becomes, pins, cameras, session_state.active_dofs(person))
-            settings = {"method": "refit", "model_revision": record.model_revision}
-            pose = replace(
-                record, values=values, model_revision=revision, status="", cost_px=None, settings=settings,
-                view_costs_px=(), part_costs_px=(), limbs_lost=(), remark="refitted to other sizes",
-            )  # fmt: skip
-            changes.append(PoseChange(name, row.frame, pose))
+            values = known.get(row.frame)
+            if values is None:
+                values = retarget_pose(record.values, was, becomes, pins, cameras, session_state.active_dofs(person))
+            changes.append(PoseChange(name, row.frame, refitted_record(record, values, revision)))
             moved = becomes.points_world(values) - was.points_world(record.values)
             off_m.append(float(np.linalg.norm(moved, axis=1).mean()))
         return _Refitted(changes, float(np.mean(off_m)) if off_m else 0.0)

@@ -1,0 +1,121 @@
+/** Sizes from the footage: start and stop an acquisition, its progress, and the body before and after. */
+
+import { capital } from "../widgets/text.js";
+import { textButton } from "./rows.js";
+
+/**
+ * @typedef {import("../model/protocol.js").AcquisitionMessage} Acquisition
+ * @typedef {import("../model/protocol.js").AcquisitionResult} Result
+ * @typedef {import("../model/protocol.js").OutlinePair} OutlinePair
+ */
+
+const SVG = "http://www.w3.org/2000/svg";
+/** Number of sizes that are listed: those that changed most. */
+const LISTED = 8;
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @returns {{element: HTMLElement, update: (person: number) => void}}
+ */
+export function acquisitionView({ store, send }) {
+  const element = document.createElement("div");
+  element.className = "acquisition";
+  let person = 0;
+  const start = textButton("Acquire from footage", "Fit all sizes to the contours of several frames; nothing changes until you apply them", () =>
+    send({ type: "acquire", action: "start", person }),
+  );
+  const stop = textButton("Stop", "Stop the acquisition; the sizes stay as they are", () => send({ type: "acquire", action: "stop", person }));
+  const progress = document.createElement("progress");
+  const status = document.createElement("span");
+  status.className = "acquisition-status";
+  status.setAttribute("role", "status");
+  const work = document.createElement("div");
+  work.className = "acquisition-work";
+  work.append(progress, stop);
+  const result = document.createElement("div");
+  element.append(start, work, status, result);
+  /** @type {Result | null} */
+  let drawn = null;
+
+  return {
+    element,
+    update(active) {
+      person = active;
+      const { acquisition, people } = { acquisition: store.facts.acquisition, people: store.facts.session?.people ?? [] };
+      const running = acquisition?.running ?? false;
+      start.hidden = running;
+      work.hidden = !running;
+      progress.value = acquisition?.share ?? 0;
+      const name = people[acquisition?.person ?? 0]?.name ?? "";
+      status.textContent = !acquisition ? "" : running ? `${name}: ${acquisition.stage}` : acquisition.person === person ? acquisition.message : "";
+      status.hidden = !status.textContent;
+      const found = acquisition && acquisition.person === person && !running ? acquisition.result : null;
+      result.hidden = !found;
+      if (found && found !== drawn) result.replaceChildren(...describe(found));
+      drawn = found ?? drawn;
+      element.style.setProperty("--person", people[person]?.color ?? "");
+    },
+  };
+}
+
+/** @param {Result} result */
+function describe(result) {
+  const { frames, cost_before_px: before, cost_after_px: after } = result;
+  const summary = document.createElement("p");
+  summary.className = "section-note";
+  summary.textContent = `Frames ${frames.join(", ")}: ${before.toFixed(2)} → ${after.toFixed(2)} px`;
+  summary.title = "Frames that the sizes were fitted to, and their mean cost with the body before and after";
+  const pictures = document.createElement("div");
+  pictures.className = "acquisition-pictures";
+  pictures.append(picture(result, result.front, "Front"), picture(result, result.side, "Side"));
+  const legend = document.createElement("p");
+  legend.className = "section-note acquisition-legend";
+  for (const kind of ["before", "after"]) {
+    legend.append(Object.assign(document.createElement("span"), { textContent: kind, className: `is-${kind}` }));
+  }
+  return [summary, pictures, legend, table(result)];
+}
+
+/**
+ * @param {Result} result
+ * @param {OutlinePair} outlines
+ * @param {string} name
+ */
+function picture({ size_px: [width, height] }, { before, after }, name) {
+  const svg = document.createElementNS(SVG, "svg");
+  svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+  svg.setAttribute("role", "img");
+  svg.setAttribute("aria-label", `${name}: the body before and after`);
+  for (const [lines, kind] of /** @type {const} */ ([
+    [before, "is-before"],
+    [after, "is-after"],
+  ])) {
+    const path = document.createElementNS(SVG, "path");
+    path.setAttribute("class", kind);
+    path.setAttribute("d", lines.map(([x0, y0, x1, y1]) => `M${x0} ${y0}L${x1} ${y1}`).join(""));
+    svg.append(path);
+  }
+  const figure = document.createElement("figure");
+  const caption = document.createElement("figcaption");
+  caption.textContent = name;
+  figure.append(svg, caption);
+  return figure;
+}
+
+/** @param {Result} result */
+function table({ sizes }) {
+  const element = document.createElement("table");
+  element.className = "acquisition-sizes";
+  const head = element.createTHead().insertRow();
+  for (const text of ["Changed most, cm", "before", "after", "±"]) {
+    head.append(Object.assign(document.createElement("th"), { textContent: text, scope: "col" }));
+  }
+  const body = element.createTBody();
+  for (const { name, before_m, after_m, sigma_m } of sizes.slice(0, LISTED)) {
+    const row = body.insertRow();
+    row.append(Object.assign(document.createElement("th"), { textContent: capital(name), scope: "row", title: capital(name) }));
+    for (const metres of [before_m, after_m, sigma_m]) row.insertCell().textContent = (100 * metres).toFixed(1);
+    row.cells[3].title = "Standard deviation of the size after the acquisition";
+  }
+  return element;
+}
