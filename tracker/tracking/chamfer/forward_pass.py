@@ -38,8 +38,10 @@ def track_forward(run: TrackingRun, settings: TrackSettings, lead_in: int = 0) -
         PersonMemory(m, start, active, alone=not several)
         for m, start, active in zip(models, run.start, subjects.active_dofs, strict=True)
     ]
-    static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if settings.segments else None
+    learns_static, edges = settings.segments and settings.edges.static, settings.edges
+    static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if learns_static else None
     cameras, ahead = observer.working_cameras, list[Region | None]()
+    everywhere: list[Region | None] | None = [None] * len(cameras) if edges.whole_images else None
 
     def placed(frame: int, predict: Callable[[PersonMemory, PredictSettings], Array]) -> tuple[PosedBody, ...]:
         """Return all people on a frame, in their keyframes or as predicted."""
@@ -53,17 +55,17 @@ def track_forward(run: TrackingRun, settings: TrackSettings, lead_in: int = 0) -
     for i, frame in enumerate(frames):
         if i == 0:  # a run that goes on from known poses uses the regions that one without a break would use
             if several and all(len(m.history) > 1 for m in memories):
-                ahead = regions_ahead(cameras, placed(frame, PersonMemory.predict_before_last))
-            observer.prefetch(frame, ahead or None, with_static_edges=static_edges is not None)
+                ahead = everywhere or regions_ahead(cameras, placed(frame, PersonMemory.predict_before_last))
+            observer.prefetch(frame, ahead or None, learns_static, edges)
         keyframes, predicted = subjects.keyframes_at(frame), placed(frame, PersonMemory.predict)
-        where = confirmed_regions(ahead, cameras, predicted) if ahead else regions(cameras, predicted)
+        where = everywhere or (confirmed_regions(ahead, cameras, predicted) if ahead else regions(cameras, predicted))
         following = frames[i + 1 : i + 2]
         for k in following if several else ():
-            ahead = regions_ahead(cameras, placed(k, PersonMemory.predict_two_ahead))
-            observer.prefetch(k, ahead, with_static_edges=static_edges is not None)
+            ahead = everywhere or regions_ahead(cameras, placed(k, PersonMemory.predict_two_ahead))
+            observer.prefetch(k, ahead, learns_static, edges)
         contours = [occluding_contours.trace(predicted, c) for c in cameras]
         visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
-        views = observer.evidence(frame, where, visible, static_edges)
+        views = observer.evidence(frame, where, visible, static_edges, edges)
         for k in () if several else following:  # for one person later: this frame has kept all cores busy
             observer.prefetch(k)
         estimator = FrameEstimator(views, memories, predicted, settings, contours)
