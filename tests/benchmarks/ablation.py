@@ -123,7 +123,7 @@ def section(clips: Sequence[Clip], rows: Mapping[str, Sequence[tuple[float, int,
         "the row says, and without the backward pass.",
         "",
     ]
-    told = {name: [f"{mm:.0f} / {lost} / {fps:.0f}" for mm, lost, fps in cells] for name, cells in rows.items()}
+    told = {name: [f"{mm:.0f} / {lost} / {fps:.2g}" for mm, lost, fps in cells] for name, cells in rows.items()}
     return "\n".join([*lines, table([c.name for c in clips], told)])
 
 
@@ -132,7 +132,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, help="folder with walk, balance_real and fast_arms")
     parser.add_argument("--frames", type=int, default=90, help="frames of each simulated scene")
-    parser.add_argument("--only", nargs="+", default=[*VARIANTS], choices=[*VARIANTS], help="variants to print alone")
+    parser.add_argument(
+        "--only", nargs="+", default=[*VARIANTS], choices=[*VARIANTS], help="variants to print; the table stays"
+    )
     parser.add_argument("--out", type=Path, default=OUT)
     words = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
