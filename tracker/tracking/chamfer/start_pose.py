@@ -23,7 +23,7 @@ from tracker.tracking.chamfer.assessment import PersonEstimate, estimate_at
 from tracker.tracking.chamfer.frame_problem import Bodies, FrameProblem, PersonPrior, moved_m, with_body
 from tracker.tracking.chamfer.limb_recovery import PoseScorer, search_limbs
 from tracker.tracking.chamfer.settings import MAX_ITERATIONS, TrackSettings
-from tracker.tracking.confidence import worst
+from tracker.tracking.confidence import Status, worst
 from tracker.tracking.person_memory import PersonMemory
 
 _START_RAD, _START_M = 0.35, 0.15
@@ -52,8 +52,9 @@ def settle_starts(
 ) -> dict[int, PosedBody]:
     """Search the start poses that the first frame contradicts.
 
-    Limbs are searched together with those of the other side, and exchanged with them. Nobody is searched who was
-    tracked before: a motion is known of them, and the pose is a prediction.
+    The start of a single person is searched unless it is good, and that of one of several where it is lost. Limbs are
+    searched together with those of the other side, and exchanged with them. Nobody is searched who was tracked before:
+    a motion is known of them, and the pose is a prediction.
 
     Args:
         frame: the first frame.
@@ -70,7 +71,9 @@ def settle_starts(
     known = [PersonPrior(m.model, b.values, m.active_dofs) for m, b in zip(memories, start, strict=True)]
     first = FrameProblem(frame.views, known, settings, (start, frame.contours))
     before = {p: estimate_at(first, p, start) for p in people if len(memories[p].history) == 1}
-    doubted = [p for p, e in before.items() if e.status != "good"]
+    # In a close hold a right start is doubtful, and a search may take the other's limb.
+    refuted: tuple[Status, ...] = ("doubtful", "lost") if len(memories) == 1 else ("lost",)
+    doubted = [p for p, e in before.items() if e.status in refuted]
     if not doubted or not any(len(v.points_px) for v in first.views):
         return {}
     wide, bodies = replace(settings, trust_rad=_START_RAD, trust_m=_START_M), start

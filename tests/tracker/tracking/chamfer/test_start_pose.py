@@ -1,4 +1,5 @@
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.assemble import NewSession, assemble
+from tracker.tracking.chamfer import start_pose
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.start_pose import StartFrame, _exchanged, settle_starts
 from tracker.tracking.person_memory import PersonMemory
@@ -90,6 +92,20 @@ def test_who_was_tracked_before_or_may_not_be_searched_stays(gavrila, truth, vie
     assert settle(gavrila, start, views, PersonMemory(gavrila, [truth, start])) is None
     assert settle(gavrila, start, views, recover=None) is None
     assert settle(gavrila, start, views, estimate="search") is None
+
+
+@pytest.mark.parametrize(("n_people", "status", "searched"), [
+    (1, "good", False), (1, "doubtful", True), (1, "lost", True),
+    (2, "good", False), (2, "doubtful", False), (2, "lost", True),
+])  # fmt: skip
+def test_whose_start_is_searched(gavrila, truth, views, monkeypatch, n_people, status, searched):
+    bodies, asked = (PosedBody(gavrila, truth),) * n_people, []
+    monkeypatch.setattr(start_pose, "estimate_at", lambda *_: SimpleNamespace(status=status))
+    monkeypatch.setattr(start_pose, "_searched", lambda _, person, at, __: asked.append(person) or at[person])
+    contours = [occluding_contours.trace(bodies, v.camera) for v in views]
+    memories = [PersonMemory(gavrila, truth) for _ in bodies]
+    settle_starts(StartFrame(bodies, contours, views, lambda _: views), memories, range(n_people), TrackSettings())
+    assert asked == ([*range(n_people)] if searched else [])
 
 
 def test_locked_degrees_of_freedom_keep_their_values(gavrila, truth, views):
