@@ -40,8 +40,7 @@ class TrackArguments:
     window: OptionalCount = None
     """past frames that the motion is estimated from; 3 by default, 8 with --paper."""
     paper: bool = False
-    """as Gavrila and Davis 1996, for a session made with --model gavrila22: prediction by a parabola, best-first search
-    alone in one pass, outliers rejected, whole edges in whole images."""
+    """as Gavrila and Davis 1996, in a session made with --model gavrila22; see docs/accuracy.md."""
     backward_pass: bool = True
     """at the end, track lost people backward from the first trusted poses after the loss."""
     json: bool = False
