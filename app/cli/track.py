@@ -3,12 +3,12 @@
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import OptionalName, OptionalNumber, OptionalRange, SessionArg
+from app.cli.arguments import OptionalCount, OptionalName, OptionalNumber, OptionalRange, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import Target, load_target, parse_frames
 from app.runtime.progress import Reporter
@@ -35,12 +35,12 @@ class TrackArguments:
     """from the last frame of the range to the first."""
     theta: OptionalNumber = None
     """outlier distance in pixels; 3% of the longer side of the image by default."""
-    order: int = 1
-    """degree of the motion model: 0 stays, 1 constant velocity, 2 constant acceleration."""
-    window: int = 3
-    """past frames that the motion is estimated from."""
+    order: OptionalCount = None
+    """degree of the motion model: 0 stays, 1 constant velocity (default), 2 constant acceleration (with --paper)."""
+    window: OptionalCount = None
+    """past frames that the motion is estimated from; 3 by default, 8 with --paper."""
     paper: bool = False
-    """as Gavrila and Davis 1996: best-first search alone, in one pass, outliers rejected."""
+    """as Gavrila and Davis 1996, in a session made with --model gavrila22; see docs/accuracy.md."""
     backward_pass: bool = True
     """at the end, track lost people backward from the first trusted poses after the loss."""
     json: bool = False
@@ -56,6 +56,8 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     frames: Sequence[int] = parse_frames(arguments.frames, at.session)
     frames = frames[::-1] if arguments.backward else frames
     settings = _SETTINGS[arguments.method](arguments)
+    if arguments.paper:
+        _require_paper_body(at)
     found = track(at, frames, settings, Reporter(silent=arguments.json))
     print(format_json(found) if arguments.json else _format(found))
     if found["stopped_at"] is not None:
@@ -63,19 +65,22 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
 
 
 def _chamfer_settings(arguments: TrackArguments) -> "TrackSettings":
-    from tracker.motion.prediction import PredictSettings
-    from tracker.search.best_first import SearchSettings
+    from tracker.tracking.chamfer.paper import paper_settings
     from tracker.tracking.chamfer.settings import TrackSettings
 
-    paper = arguments.paper
-    return TrackSettings(
-        estimate="search" if paper else "refine",
-        predict=PredictSettings(arguments.order, arguments.window),
-        search=SearchSettings(passes=(1.0,) if paper else SearchSettings().passes),
-        theta_px=arguments.theta,
-        outliers="paper" if paper else "truncated",
-        backward_pass=arguments.backward_pass and not paper,
+    settings = paper_settings() if arguments.paper else TrackSettings(backward_pass=arguments.backward_pass)
+    motion, order, window = settings.predict, arguments.order, arguments.window
+    motion = replace(
+        motion, order=motion.order if order is None else order, window=motion.window if window is None else window
     )
+    return replace(settings, predict=motion, theta_px=arguments.theta)
+
+
+def _require_paper_body(at: Target) -> None:
+    from tracker.tracking.chamfer.paper import require_paper_body
+
+    people = [at.session.people[i] for i in at.people]
+    require_paper_body({p.name: p.model for p in people})
 
 
 _SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {"chamfer": _chamfer_settings}

@@ -191,10 +191,10 @@ class Shown:
         self.views, self.asked = views, []
         self.working_cameras = [v.camera for v in views[0]]
 
-    def prefetch(self, k, regions=None, with_static_edges=False):
+    def prefetch(self, k, regions=None, with_static_edges=False, edges=None):
         pass
 
-    def evidence(self, k, regions, outlines=None, static_edges=None):
+    def evidence(self, k, regions, outlines=None, static_edges=None, edges=None):
         assert len(regions) == len(self.working_cameras)
         self.asked.append(k)
         return self.views[k]

@@ -15,6 +15,8 @@ import numpy as np
 
 from tracker.evidence.foreground import Foreground, Prepared
 from tracker.evidence.view_evidence import (
+    DEFAULT_EDGES,
+    EdgeSettings,
     RegionFeatures,
     ViewEvidence,
     default_theta_px,
@@ -46,6 +48,8 @@ class _Ahead(NamedTuple):
     """Features of a region of each view; None while no regions are known."""
     with_static_edges: bool = False
     """Whether static edges will be refused, which lowers the edge thresholds."""
+    edges: EdgeSettings = DEFAULT_EDGES
+    """Which edges are found."""
 
 
 class Observer:
@@ -79,7 +83,13 @@ class Observer:
         """Cameras of the whole views in working pixels: without lens distortion, at working scale."""
         return tuple(v.view.camera for v in self._views)
 
-    def prefetch(self, k: int, regions: Sequence[Region | None] | None = None, with_static_edges: bool = False) -> None:
+    def prefetch(
+        self,
+        k: int,
+        regions: Sequence[Region | None] | None = None,
+        with_static_edges: bool = False,
+        edges: EdgeSettings = DEFAULT_EDGES,
+    ) -> None:
         """Begin to decode frame k and to extract its features; `evidence` uses the result.
 
         At most two frames are prefetched. Call again once the regions are known. A frame that cannot be read raises in
@@ -90,13 +100,17 @@ class Observer:
             regions: regions that `evidence` will be asked for, if known. Other regions are processed again, so that the
                 result never depends on this hint.
             with_static_edges: whether `evidence` will be given static edges.
+            edges: settings that `evidence` will be given.
         """
         with self._lock:
             ahead = self._ahead.get(k) or _Ahead(self._reader.submit(self._prepare, k))
             if regions is not None and ahead.features is None:
                 ahead = ahead._replace(
-                    features=self._finder.submit(self._find_ahead, ahead.prepared, list(regions), with_static_edges),
+                    features=self._finder.submit(
+                        self._find_ahead, ahead.prepared, list(regions), with_static_edges, edges
+                    ),
                     with_static_edges=with_static_edges,
+                    edges=edges,
                 )
             self._ahead[k] = ahead
             while len(self._ahead) > _FRAMES_AHEAD:
@@ -108,6 +122,7 @@ class Observer:
         regions: Sequence[Region | None] | None = None,
         predicted_px: Sequence[FloatArray | None] | None = None,
         static_edges: Sequence[StaticEdgeModel] | None = None,
+        edges: EdgeSettings = DEFAULT_EDGES,
     ) -> tuple[ViewEvidence, ...]:
         """Return the evidence of frame k in each view, restricted to the foreground where masks or a background exist.
 
@@ -119,6 +134,7 @@ class Observer:
             predicted_px: visible pieces of the predicted contours in each view, (M, 4), px of `working_cameras`, by
                 which segments are accepted; None keeps all edges.
             static_edges: static edges of each view, refused where neither masks nor a background exist.
+            edges: which edges are found and accepted. `regions` says where, also for whole images.
         """
         with self._lock:
             ahead = self._ahead.pop(k, None)
@@ -128,17 +144,19 @@ class Observer:
             static_edges is not None,
             list[RegionFeatures](),
         )
-        if ahead is not None and ahead.features is not None and ahead.with_static_edges == with_static_edges:
+        asked = (with_static_edges, edges)
+        if ahead is not None and ahead.features is not None and (ahead.with_static_edges, ahead.edges) == asked:
             features = ahead.features.result()
 
         def observe(
             i: int, region: Region | None, predicted_px: FloatArray | None, model: StaticEdgeModel | None
         ) -> ViewEvidence:
             known = features and features[i].box == self._box(i, region)
-            seen = features[i] if known else self._find_features(i, prepared[i], region, with_static_edges)
+            seen = features[i] if known else self._find_features(i, prepared[i], region, with_static_edges, edges)
             if predicted_px is not None:
                 predicted_px = predicted_px - np.array([*seen.corner_px, *seen.corner_px], np.float32)
-            return select_evidence(seen, predicted_px, model if seen.silhouette is None else None)
+            model = model if seen.silhouette is None else None
+            return select_evidence(seen, predicted_px, model, edges.max_angle_rad)
 
         return tuple(
             self._pool.map(
@@ -152,12 +170,16 @@ class Observer:
         return [None if f is None else view.prepare(f, k) for view, f in zip(self._views, frames, strict=True)]
 
     def _find_ahead(
-        self, prepared: Future[list[Prepared | None]], regions: Sequence[Region | None], with_static_edges: bool
+        self,
+        prepared: Future[list[Prepared | None]],
+        regions: Sequence[Region | None],
+        with_static_edges: bool,
+        edges: EdgeSettings,
     ) -> list[RegionFeatures]:
-        views = range(len(self._views))
+        n = len(self._views)
         return list(
             self._pool_ahead.map(
-                self._find_features, views, prepared.result(), regions, [with_static_edges] * len(views)
+                self._find_features, range(n), prepared.result(), regions, [with_static_edges] * n, [edges] * n
             )
         )
 
@@ -166,7 +188,7 @@ class Observer:
         return view.whole if region is None else fit_region(region, view.camera.size)
 
     def _find_features(
-        self, i: int, prepared: Prepared | None, region: Region | None, with_static_edges: bool
+        self, i: int, prepared: Prepared | None, region: Region | None, with_static_edges: bool, settings: EdgeSettings
     ) -> RegionFeatures:
         view, box = self._views[i], self._box(i, region)
         working = view.view.camera
@@ -175,14 +197,14 @@ class Observer:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
             return RegionFeatures(camera, scale, box[:2], working.size, nothing)
         smooth = view.smooth_region(prepared, box)
-        changes = view.changes(prepared, smooth, box)
+        changes = view.changes(prepared, smooth, box) if settings.foreground else None
         margin_px = FOREGROUND_MARGIN * max(working.size)
         foreground = None if changes is None else background_subtraction.dilate(changes.anything, margin_px)
         # The model of static edges refuses texture, so low thresholds can keep the weaker edges of bodies.
         edges = detect_edges(
             smooth, levels(prepared.strengths, restricted=changes is not None or with_static_edges), foreground
         )
-        segments = link_edges(edges.found, edges.gradients)
+        segments = link_edges(edges.found, edges.gradients, settings.max_segment_px)
         silhouette = (
             None if changes is None else silhouette_evidence(changes.inside, edges, 2 * default_theta_px(working))
         )

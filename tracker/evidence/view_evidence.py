@@ -18,7 +18,14 @@ from tracker.geometry.cameras import Camera, Region
 from tracker.images.background_subtraction import Mask
 from tracker.images.color_histogram import BINS, count_colors
 from tracker.images.distance_transform import distance_image
-from tracker.images.edge_segments import EdgeSegments, Samples, accept_segments, sample_segments
+from tracker.images.edge_segments import (
+    MAX_ANGLE_RAD,
+    MAX_LENGTH,
+    EdgeSegments,
+    Samples,
+    accept_segments,
+    sample_segments,
+)
 from tracker.images.edges import Edges
 from tracker.images.silhouette_contour import SilhouetteContour, contour_trust, trace_silhouette
 from tracker.images.static_edges import StaticEdgeModel
@@ -28,6 +35,25 @@ SCENE_SPACING_PX = 4
 
 ACCEPTED_SHARE = 0.5
 """Largest mean distance of an accepted segment to the predicted contours, as a share of theta."""
+
+
+@dataclass(frozen=True)
+class EdgeSettings:
+    """Settings that decide which edges of a frame are evidence."""
+
+    whole_images: bool = False
+    """Whether edges are found in whole images; else in the region around the prediction."""
+    foreground: bool = True
+    """Whether edges are restricted to the foreground, where masks or a background exist, and its contour is used."""
+    static: bool = True
+    """Whether edges that stay where they are while people move are refused, where nothing tells the foreground."""
+    max_segment_px: int | None = MAX_LENGTH
+    """Largest number of pixels of a segment; None: no limit."""
+    max_angle_rad: float = MAX_ANGLE_RAD
+    """Largest angle between an edge of an accepted segment and the predicted contour, rad."""
+
+
+DEFAULT_EDGES = EdgeSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +177,10 @@ class RegionFeatures(NamedTuple):
 
 
 def select_evidence(
-    features: RegionFeatures, predicted_px: FloatArray | None, static_edges: StaticEdgeModel | None
+    features: RegionFeatures,
+    predicted_px: FloatArray | None,
+    static_edges: StaticEdgeModel | None,
+    max_angle_rad: float = MAX_ANGLE_RAD,
 ) -> ViewEvidence:
     """Select the edges of a region that the prediction accepts and that are not static.
 
@@ -160,6 +189,7 @@ def select_evidence(
         predicted_px: visible pieces of the predicted contours, x0, y0, x1, y1, (M, 4), px of the region; None accepts
             all edges. Without segments all edges are accepted.
         static_edges: static edges of the view, which are refused; None if unknown.
+        max_angle_rad: largest angle between an edge of an accepted segment and a contour, rad.
     """
     segments, samples, theta = (
         features.segments,
@@ -170,7 +200,7 @@ def select_evidence(
     if segments is not None:
         samples = samples or sample_segments(segments)
         if predicted_px is not None:
-            chosen = accept_segments(samples, predicted_px, ACCEPTED_SHARE * theta)
+            chosen = accept_segments(samples, predicted_px, ACCEPTED_SHARE * theta, max_angle_rad)
         if static_edges is not None:
             is_static = static_edges.contains(segments, features.corner_px)
             chosen = ~is_static if chosen is None else chosen & ~is_static

@@ -22,7 +22,7 @@ BEND_RAD = 0.35
 """Largest deviation of an edge's direction from one that turns evenly within a segment, rad."""
 STRAYS = 3
 """Number of consecutive deviating pixels that end a segment; single ones are noise."""
-MAX_ANGLE_RAD = np.radians(45.0)
+MAX_ANGLE_RAD = float(np.radians(45.0))
 """Largest angle between an edge and a contour that it may belong to, rad."""
 _STRIDE = 2  # pixels from one sample to the next
 _NONE_LEFT = -10
@@ -42,12 +42,15 @@ class EdgeSegments(NamedTuple):
     """Index of the first pixel of each segment, then N, (S + 1,)."""
 
 
-def link_edges(found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> EdgeSegments:
+def link_edges(
+    found: NDArray[np.uint8], gradients: NDArray[np.int16], max_length: int | None = MAX_LENGTH
+) -> EdgeSegments:
     """Link the pixels of edges into segments of constant curvature.
 
     Args:
         found: thin edges, not 0, (H, W).
         gradients: image gradient along u and v, (2, H, W); not zero on edges.
+        max_length: largest number of pixels of a segment; None: no limit.
     """
     pixels = cv2.findNonZero(found)
     n = 0 if pixels is None else len(pixels)
@@ -57,11 +60,13 @@ def link_edges(found: NDArray[np.uint8], gradients: NDArray[np.int16]) -> EdgeSe
         return EdgeSegments(points, normals, firsts)
     begins = np.zeros(n, np.bool_)
     _chain(found, np.asarray(pixels, np.int32).reshape(-1, 2), gradients, points, normals, begins)
-    count = _cut(points, normals, begins, firsts)
+    count = _cut(points, normals, begins, n + 1 if max_length is None else max_length, firsts)
     return EdgeSegments(points, normals, firsts[: count + 1].copy())
 
 
-def accept_segments(samples: "Samples", pieces_px: FloatArray, threshold_px: float) -> NDArray[np.bool_]:
+def accept_segments(
+    samples: "Samples", pieces_px: FloatArray, threshold_px: float, max_angle_rad: float = MAX_ANGLE_RAD
+) -> NDArray[np.bool_]:
     """Return which segments are accepted by their directed chamfer distance to predicted contours, (S,) bool.
 
     Each pixel counts with its distance to the nearest piece of contour of similar direction, at most twice the
@@ -71,8 +76,10 @@ def accept_segments(samples: "Samples", pieces_px: FloatArray, threshold_px: flo
         samples: samples of the segments of a view.
         pieces_px: end points x0, y0, x1, y1 of the visible pieces of predicted contours, (M, 4), px of the view.
         threshold_px: largest mean distance of an accepted segment, px.
+        max_angle_rad: largest angle between a pixel's edge and a piece, rad.
     """
-    return np.asarray(samples.means(samples.distances(pieces_px, 2.0 * threshold_px)) <= threshold_px)
+    distances = samples.distances(pieces_px, 2.0 * threshold_px, max_angle_rad)
+    return np.asarray(samples.means(distances) <= threshold_px)
 
 
 class Samples(NamedTuple):
@@ -83,16 +90,17 @@ class Samples(NamedTuple):
     counts: IntArray
     """Number of samples of each segment, (S,)."""
 
-    def distances(self, pieces_px: FloatArray, reach_px: float) -> FloatArray:
+    def distances(self, pieces_px: FloatArray, reach_px: float, max_angle_rad: float = MAX_ANGLE_RAD) -> FloatArray:
         """Return the distance of each sample to the nearest piece of similar direction, (n,), px, at most the reach.
 
         Args:
             pieces_px: end points of pieces of contour, (M, 4), px.
             reach_px: largest distance, px.
+            max_angle_rad: largest angle between a pixel's edge and a piece, rad.
         """
         out = np.empty(self.pixels.points.shape[1], np.float32)
         pieces = np.ascontiguousarray(pieces_px, np.float32)
-        nearest_parallel_segment(self.pixels.points, self.pixels.rows, pieces, reach_px, MAX_ANGLE_RAD, out)
+        nearest_parallel_segment(self.pixels.points, self.pixels.rows, pieces, reach_px, max_angle_rad, out)
         return out[: self.pixels.n_points]
 
     def means(self, distances: FloatArray) -> NDArray[np.float64]:
@@ -191,7 +199,7 @@ def _neighbours(left: NDArray[np.uint8], u: int, v: int) -> int:
 
 
 @njit(nogil=True, cache=True, error_model="numpy")
-def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], firsts: IntArray) -> int:
+def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], max_length: int, firsts: IntArray) -> int:
     """Cut chains where they stop turning evenly; fill the first pixels of segments and return the number of segments.
 
     Along a circular arc the unwrapped gradient direction is a straight line over arc length. That line is fitted to the
@@ -205,7 +213,7 @@ def _cut(points: FloatArray, normals: FloatArray, begins: NDArray[np.bool_], fir
         count += 1
         n, sum_x, sum_y, sum_xx, sum_xy, x, y, strays = 1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0
         j = i + 1
-        while j < n_points and not begins[j] and j - i < MAX_LENGTH:
+        while j < n_points and not begins[j] and j - i < max_length:
             cross = normals[j - 1, 0] * normals[j, 1] - normals[j - 1, 1] * normals[j, 0]
             dot = normals[j - 1, 0] * normals[j, 0] + normals[j - 1, 1] * normals[j, 1]
             if dot < 0.5:

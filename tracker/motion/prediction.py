@@ -21,6 +21,8 @@ class PredictSettings:
     poses a parabola overshoots and tracks worse than constant velocity."""
     window: int = 3
     """Number of past poses it is fitted to."""
+    full_window: bool = False
+    """Whether the pose stays until there are as many past poses; else fewer are fitted, with a lower degree."""
     bound_rad: float = float(np.radians(25))
     """Largest predicted change of an angle from one frame to the next, rad."""
     bound_m: float = 0.10
@@ -50,7 +52,8 @@ def predict(model: BodyModel, past: Sequence[Array], settings: PredictSettings) 
         The predicted pose within the joint limits, (n_values,).
     """
     last, recent = past[-1], past[-settings.window :]
-    order = min(settings.order, len(recent) - 1)
+    short = settings.full_window and len(recent) < settings.window
+    order = 0 if short else min(settings.order, len(recent) - 1)
     if order == 0:
         return model.clip(last)
     steps = np.array([unwrapped(model, model.difference(p, last)) for p in recent])

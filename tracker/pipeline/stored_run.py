@@ -23,7 +23,7 @@ from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
 _SAVE_FRAMES = 10
 """Frames after which a run is saved."""
-_MOTION_FRAMES = 4
+_MOTION_FRAMES = 8
 """Frames before the first one from which its motion, and that of the frame before, is predicted."""
 _RENAMED = {"second_pass": "backward_pass"}
 """Settings whose names have changed since sessions store them."""

@@ -9,11 +9,17 @@ from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.errors import RecordingError
 from tracker.evidence.observer import FOREGROUND_MARGIN, Observer
-from tracker.evidence.view_evidence import ACCEPTED_SHARE, SCENE_SPACING_PX, default_theta_px, with_segments
+from tracker.evidence.view_evidence import (
+    ACCEPTED_SHARE,
+    SCENE_SPACING_PX,
+    EdgeSettings,
+    default_theta_px,
+    with_segments,
+)
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
 from tracker.geometry.cameras import Camera
-from tracker.images.edge_segments import accept_segments, link_edges
+from tracker.images.edge_segments import MAX_LENGTH, accept_segments, link_edges
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.images.working_view import WorkingView, region_around, working_scale
 from tracker.session.session import load_session
@@ -245,6 +251,20 @@ def test_views_can_be_looked_at_in_part_or_whole(sample):
     views = observer.evidence(3, [(100, 50, 300, 400), None, (-500, -500, -400, -400), (600, 440, 900, 900)])
     assert [v.camera.size for v in views] == [(200, 350), (640, 480), (16, 16), (40, 40)]
     assert [v.corner_px for v in views] == [(100, 50), (0, 0), (0, 0), (600, 440)]
+
+
+def test_settings_say_which_edges_are_found(sample):
+    session, recording = sample
+    observer = Observer(session.cameras, recording)
+    for settings in (EdgeSettings(foreground=False), EdgeSettings(max_segment_px=None)):
+        observer.prefetch(7, [None] * 4, edges=EdgeSettings())  # features of other settings are not used
+        for found, usual in zip(observer.evidence(7, edges=settings), observer.evidence(7), strict=True):
+            assert (found.silhouette is None) == (not settings.foreground)
+            longest = np.diff(found.segments.firsts).max()
+            assert longest > MAX_LENGTH if settings.max_segment_px is None else longest <= MAX_LENGTH
+            assert (usual.silhouette is None, np.diff(usual.segments.firsts).max() > MAX_LENGTH) == (False, False)
+            if not settings.foreground:
+                assert np.count_nonzero(found.distance == 0) > 1.5 * np.count_nonzero(usual.distance == 0)
 
 
 def test_a_frame_read_ahead_is_the_same(sample):

@@ -124,6 +124,14 @@ def test_segments_are_taken_or_left_as_a_whole():
     assert accept_segments(sample_segments(segments), PIECES, 11.5).tolist() == [True, True, True]
 
 
+def test_segments_without_a_limit_are_as_long_as_the_edge_turns_evenly():
+    edges, cut = linked(disc_picture())
+    whole = link_edges(edges.found, edges.gradients, None)
+    assert np.diff(whole.firsts).max() > 100
+    assert len(whole.firsts) < len(cut.firsts)
+    np.testing.assert_array_equal(whole.points_px, cut.points_px)
+
+
 def test_the_distance_is_the_mean_over_the_segment():
     points, normals = line(10, 54, (1, 0), n=10)
     further, _ = line(20, 57, (1, 0), n=10)
@@ -135,6 +143,7 @@ def test_the_distance_is_the_mean_over_the_segment():
 def test_an_edge_across_the_contour_does_not_belong_to_it():
     points, normals = line(20, 45, (0, 1), n=10)
     assert not accept_segments(sample_segments(of_points(points, normals, [0, 10])), PIECES, 5.0).any()
+    assert accept_segments(sample_segments(of_points(points, normals, [0, 10])), PIECES, 5.0, np.pi / 2).all()
     turned = of_points(points, np.tile((0.0, 1.0), (10, 1)), [0, 10])
     assert accept_segments(sample_segments(turned), PIECES, 5.0).all()
     # Which side is darker does not matter.

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bodies import BALLS
@@ -58,6 +60,12 @@ def test_fewer_poses_than_the_order_needs_lower_it(order):
     np.testing.assert_allclose(predict(GAVRILA, list(poses[:2]), unbounded(order)), poses[2], atol=1e-12)
     # A window does the same.
     np.testing.assert_allclose(predict(GAVRILA, list(poses[:-1]), unbounded(order, 1)), poses[-2], atol=1e-12)
+
+
+def test_a_window_that_must_be_full_predicts_no_motion_before():
+    poses, settings = list(motion(2, 5, 1)), replace(unbounded(2, 5), full_window=True)
+    np.testing.assert_allclose(predict(GAVRILA, poses[:4], settings), poses[3], atol=1e-12)
+    np.testing.assert_allclose(predict(GAVRILA, poses[:5], settings), poses[5], atol=1e-9)
 
 
 @pytest.mark.parametrize("order", [1, 2])

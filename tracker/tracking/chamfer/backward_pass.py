@@ -215,7 +215,8 @@ class _PathSelection:
             np.concatenate([visible_pieces_px(occluding_contours.trace(g, c)) for g in guesses]) for c in cameras
         ]
         where = regions(cameras, [body for g in guesses for body in g])
-        return self._observer.evidence(self._forward[i].frame, where, visible if self._settings.segments else None)
+        accepting = visible if self._settings.segments else None
+        return self._observer.evidence(self._forward[i].frame, where, accepting, edges=self._settings.edges)
 
     def _estimate(self, i: int, chosen: int) -> PoseEstimate:
         """Return the estimate of a frame with a candidate that was propagated there."""

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from tracker.body.model import PosedBody
 from tracker.compute.threads import map_parallel
 from tracker.contours import occluding_contours
+from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Region
@@ -13,7 +14,9 @@ from tracker.motion.prediction import PredictSettings
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.tracking.chamfer.assessment import PersonEstimate
 from tracker.tracking.chamfer.frame_estimator import FrameEstimator
+from tracker.tracking.chamfer.frame_problem import Bodies
 from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
+from tracker.tracking.chamfer.start_pose import StartFrame, settle_starts
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import AlternativePose, PoseEstimate
 from tracker.tracking.person_memory import PersonMemory
@@ -38,10 +41,12 @@ def track_forward(run: TrackingRun, settings: TrackSettings, lead_in: int = 0) -
         PersonMemory(m, start, active, alone=not several)
         for m, start, active in zip(models, run.start, subjects.active_dofs, strict=True)
     ]
-    static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if settings.segments else None
+    learns_static, edges = settings.segments and settings.edges.static, settings.edges
+    static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if learns_static else None
     cameras, ahead = observer.working_cameras, list[Region | None]()
+    everywhere: list[Region | None] | None = [None] * len(cameras) if edges.whole_images else None
 
-    def placed(frame: int, predict: Callable[[PersonMemory, PredictSettings], Array]) -> tuple[PosedBody, ...]:
+    def placed(frame: int, predict: Callable[[PersonMemory, PredictSettings], Array]) -> Bodies:
         """Return all people on a frame, in their keyframes or as predicted."""
         keyframes = subjects.keyframes_at(frame)
         poses = [
@@ -50,29 +55,50 @@ def track_forward(run: TrackingRun, settings: TrackSettings, lead_in: int = 0) -
         ]
         return tuple(PosedBody(m, v) for m, v in zip(models, poses, strict=True))
 
+    def observe(
+        frame: int, bodies: Bodies, where: Sequence[Region | None]
+    ) -> tuple[list[Contour], tuple[ViewEvidence, ...]]:
+        """Return the contours of all people in each view, and the evidence around them."""
+        contours = [occluding_contours.trace(bodies, c) for c in cameras]
+        visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
+        return contours, observer.evidence(frame, where, visible, static_edges, edges)
+
+    def around(bodies: Bodies) -> list[Region | None]:
+        return everywhere or regions(cameras, bodies)
+
     for i, frame in enumerate(frames):
         if i == 0:  # a run that goes on from known poses uses the regions that one without a break would use
             if several and all(len(m.history) > 1 for m in memories):
-                ahead = regions_ahead(cameras, placed(frame, PersonMemory.predict_before_last))
-            observer.prefetch(frame, ahead or None, with_static_edges=static_edges is not None)
+                ahead = everywhere or regions_ahead(cameras, placed(frame, PersonMemory.predict_before_last))
+            observer.prefetch(frame, ahead or None, learns_static, edges)
         keyframes, predicted = subjects.keyframes_at(frame), placed(frame, PersonMemory.predict)
-        where = confirmed_regions(ahead, cameras, predicted) if ahead else regions(cameras, predicted)
+        where = confirmed_regions(ahead, cameras, predicted) if ahead and not everywhere else around(predicted)
         following = frames[i + 1 : i + 2]
         for k in following if several else ():
-            ahead = regions_ahead(cameras, placed(k, PersonMemory.predict_two_ahead))
-            observer.prefetch(k, ahead, with_static_edges=static_edges is not None)
-        contours = [occluding_contours.trace(predicted, c) for c in cameras]
-        visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
-        views = observer.evidence(frame, where, visible, static_edges)
+            ahead = everywhere or regions_ahead(cameras, placed(k, PersonMemory.predict_two_ahead))
+            observer.prefetch(k, ahead, learns_static, edges)
+        contours, views = observe(frame, predicted, where)
+        settled: Mapping[int, PosedBody] = {}
+        if i == 0 and not lead_in:
+            begun = StartFrame(predicted, contours, views, lambda bodies: observe(frames[0], bodies, around(bodies))[1])
+            settled = settle_starts(begun, memories, subjects.tracked, settings)
+            for p, body in settled.items():
+                memories[p] = PersonMemory(models[p], body.values, subjects.active_dofs[p], alone=not several)
+            if not settled.keys() <= keyframes.keys():
+                predicted = tuple(b if p in keyframes else settled.get(p, b) for p, b in enumerate(predicted))
+                contours, views = observe(frame, predicted, around(predicted))
         for k in () if several else following:  # for one person later: this frame has kept all cores busy
             observer.prefetch(k)
         estimator = FrameEstimator(views, memories, predicted, settings, contours)
         estimates = estimator.estimate([p for p in subjects.tracked if p not in keyframes])
         statuses: list[Status] = [estimates[p].status if p in estimates else "good" for p in range(len(models))]
-        _remember(memories, estimator, statuses, keyframes)
+        # What is learnt of a keyframe that its frame contradicts is learnt from the settled pose.
+        learnt = tuple(settled.get(p, b) if p in keyframes else b for p, b in enumerate(estimator.bodies))
+        _remember(memories, estimator, learnt, statuses, keyframes)
         cost_of = chamfer_cost(views, estimator.bodies, settings)
         if static_edges is not None:
-            _update_static_edges(static_edges, views, cost_of.predicted_pieces_px)
+            there = cost_of if learnt == estimator.bodies else chamfer_cost(views, learnt, settings)
+            _update_static_edges(static_edges, views, there.predicted_pieces_px)
         if i >= lead_in:
             found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in range(len(models))]
             yield make_estimate(frame, cost_of, estimator.bodies, found, settings)
@@ -107,13 +133,13 @@ def make_estimate(
 
 
 def _remember(
-    memories: Sequence[PersonMemory], estimator: FrameEstimator, statuses: Sequence[Status],
+    memories: Sequence[PersonMemory], estimator: FrameEstimator, bodies: Bodies, statuses: Sequence[Status],
     keyframes: Mapping[int, Array],
 ) -> None:  # fmt: skip
-    """Update the memory of each person with the result of a frame."""
+    """Update the memory of each person with the result of a frame: all people in some poses."""
 
     def remember(p: int) -> None:
-        memories[p].update(estimator.bodies[p].values, estimator.colors(p), statuses[p], keyframe=p in keyframes)
+        memories[p].update(bodies[p].values, estimator.colors(p, bodies), statuses[p], keyframe=p in keyframes)
 
     map_parallel(remember, range(len(memories)))
 

@@ -73,9 +73,9 @@ class FrameEstimator:
         self._problem = FrameProblem(views, people, settings, predicted)
         self._memories, self._settings = memories, settings
 
-    def colors(self, person: int) -> Colors:
-        """Return the colours of the frame under a person."""
-        return self._problem.colors(person, self.bodies)
+    def colors(self, person: int, bodies: Bodies) -> Colors:
+        """Return the colours of the frame under a person, with all people in some poses."""
+        return self._problem.colors(person, bodies)
 
     def estimate_fixed(self, person: int) -> PersonEstimate:
         """Return the estimate of a person whose pose is a keyframe; it is not assessed."""

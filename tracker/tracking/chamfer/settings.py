@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.evidence.view_evidence import ViewEvidence
+from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
 from tracker.fitting.contour_residuals import MatchSettings
 from tracker.fitting.gauss_newton import PosePrior, ResidualBlock
 from tracker.fitting.interpenetration import SelfPenetration
@@ -84,6 +84,8 @@ class TrackSettings:
     """Treatment of outliers in the search, see `ChamferCost`."""
     segments: bool = True
     """Whether edges are accepted or refused in whole segments (GD96 Sect. 4.2), and static ones are refused."""
+    edges: EdgeSettings = field(default_factory=EdgeSettings)
+    """Which edges are found and accepted."""
     trust_rad: float = 0.15
     """Standard deviation of the prediction of an angle, rad."""
     trust_m: float = 0.05
