@@ -96,10 +96,11 @@ def acquire_from_contours(
     )
     report("reading contours", _CHOOSING)
     static_edges = _static_edges(observer, {k: bodies[k] for k in candidates})
-    sighted, before = [], []
+    sighted, observed, before = [], [], []
     for i, k in enumerate(frames):
         views = _views(observer, k, bodies[k], static_edges)
-        before.append(chamfer_cost(views, bodies[k], TrackSettings()).at_prediction().total_px)
+        observed.append(views)
+        before.append(_cost_px(views, bodies[k]))
         sighted.append(SightedPerson(k, _own_views(views, bodies[k], person), bodies[k], person, placed.get(k)))
         report("reading contours", _CHOOSING + (_OBSERVING - _CHOOSING) * (i + 1) / len(frames))
     if not any(len(v.points_px) for s in sighted for v in s.views):
@@ -112,13 +113,17 @@ def acquire_from_contours(
         report=lambda share: report("fitting sizes", _OBSERVING + (1 - _OBSERVING) * share),
     )  # fmt: skip
     after = [
-        chamfer_cost(s.views, s.moved(found.body, p).bodies, TrackSettings()).at_prediction().total_px
-        for s, p in zip(sighted, found.poses, strict=True)
+        _cost_px(views, s.moved(found.body, p).bodies)
+        for views, s, p in zip(observed, sighted, found.poses, strict=True)
     ]
     report("done", 1.0)
     return Acquisition(
         found.body, tuple(frames), found.poses, float(np.mean(before)), float(np.mean(after)), parameters, found
     )
+
+
+def _cost_px(views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> float:
+    return chamfer_cost(views, bodies, TrackSettings()).at_prediction().total_px
 
 
 def _spread(frames: Sequence[int], n: int, keep: Sequence[int]) -> list[int]:
