@@ -118,14 +118,14 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     limbs = {n: p for n, p in points.items() if n in LIMB_JOINTS and np.all(np.isfinite(p))}
     if sizes:
         person = replace(person, model=fit_sizes(person.model, joints))
-    fit = fit_to_points(person.model, limbs)
+    fit = fit_to_points(person.model, limbs, centers=True)
     where = _where(session, person, fit.pose, frame)
     with SessionLock(session.folder):
         if sizes:
             people = tuple(person if i == index else p for i, p in enumerate(session.people))
             save_session(replace(session, people=people))
         _store_keyframe(session, person, frame, fit.pose, "joints")
-    fitted = dict(zip(person.model.point_names, person.model.points_world(fit.pose), strict=True))
+    fitted = dict(zip(person.model.point_names, person.model.joint_centers_world(fit.pose), strict=True))
     residuals = {n: float(1000 * np.linalg.norm(fitted[n] - p)) for n, p in limbs.items()}
     mean = float(np.mean(list(residuals.values())))
     return {"person": person.name, "frame": frame, "residual_mm": residuals, "mean_mm": mean, **where}

@@ -164,7 +164,7 @@ def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: 
 
 
 def joints_of_poses(model: BodyModel, poses: Mapping[int, Array], rate: float) -> MarkerTable:
-    """Return the joints of a person's poses under the project's names, one row per frame.
+    """Return the joint centres of a person's poses under the project's names, one row per frame.
 
     Args:
         model: body model of all poses.
@@ -174,8 +174,8 @@ def joints_of_poses(model: BodyModel, poses: Mapping[int, Array], rate: float) -
     names = tuple(j for j in JOINTS if j in model.point_names)
     columns = [model.point_names.index(n) for n in names]
     frames = np.array(sorted(poses), dtype=np.int64)
-    points = np.array([model.points_world(poses[f])[columns] for f in frames.tolist()]).reshape(-1, len(names), 3)
-    return MarkerTable(names, frames, frames / rate, points, rate)
+    points = [model.joint_centers_world(poses[f])[columns] for f in frames.tolist()]
+    return MarkerTable(names, frames, frames / rate, np.array(points).reshape(-1, len(names), 3), rate)
 
 
 def remap_axes(table: MarkerTable, axes: str) -> MarkerTable:
