@@ -43,6 +43,8 @@ class TrackArguments:
     """as Gavrila and Davis 1996: best-first search alone, in one pass, outliers rejected."""
     backward_pass: bool = True
     """at the end, track lost people backward from the first trusted poses after the loss."""
+    smooth: bool = True
+    """at the end, smooth the poses over time; keyframes stay."""
     json: bool = False
     """print one JSON object."""
 
@@ -75,6 +77,7 @@ def _chamfer_settings(arguments: TrackArguments) -> "TrackSettings":
         theta_px=arguments.theta,
         outliers="paper" if paper else "truncated",
         backward_pass=arguments.backward_pass and not paper,
+        smooth=arguments.smooth and not paper,
     )
 
 
@@ -143,7 +146,7 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
 
 
 def _work(run: "TrackSession", progress: Reporter) -> None:
-    """Do both passes and show the progress of each."""
+    """Do both passes, show the progress of each, and smooth the poses."""
     if run.run.frames:
         with progress.over(len(run.run.frames), "tracking") as tick:
             for estimate in run.first_pass():
@@ -152,14 +155,15 @@ def _work(run: "TrackSession", progress: Reporter) -> None:
     run.save()
     steps = run.backward_pass()
     first = next(steps, None)
-    if first is None:
-        return
-    with progress.over(first.total, "tracking back") as tick:
-        run.take(first)
-        tick()
-        for step in steps:
-            run.take(step)
+    if first is not None:
+        with progress.over(first.total, "tracking back") as tick:
+            run.take(first)
             tick()
+            for step in steps:
+                run.take(step)
+                tick()
+    for smoothed in run.smoothing():
+        run.take(smoothed)
 
 
 def _format(found: dict[str, Any]) -> str:

@@ -5,9 +5,9 @@ Unlimited angles and ball joints are unwrapped first, so that a turn goes on thr
 measurement with the covariance of its estimate.
 
 The acceleration is white noise. It is isotropic in the accelerations of the body's points, not in its angles, because
-heavy parts turn slowly: its covariance is `q M^-1`, where M sums the squared Jacobians of the points. A thigh that swings
-a foot then accelerates less than a forearm. One number q remains. It is estimated from the run itself by expectation
-maximization (R. H. Shumway, D. S. Stoffer 1982, J. Time Series Anal. 3:253).
+heavy parts turn slowly: its covariance is `q M^-1`, where M sums the squared Jacobians of the points. A thigh that
+swings a foot then accelerates less than a forearm. One number q remains. It is estimated from the run itself by
+expectation maximization (R. H. Shumway, D. S. Stoffer 1982, J. Time Series Anal. 3:253).
 """
 
 from dataclasses import dataclass

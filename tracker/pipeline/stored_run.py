@@ -10,12 +10,13 @@ from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.pipeline.methods import make_tracker
+from tracker.pipeline.smoothing import TrackedRows, resumed_rows
 from tracker.pipeline.track_session import StoreSink, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson, keyframes_of, recorded_method, settings_record
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Person, Session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseRecord
+from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import TrackedFrame
 from tracker.tracking.subjects import Subjects
@@ -70,20 +71,24 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, tas
     subjects = Subjects.of(
         [p.model for p in people], task.people, active, keyframes_of(store, people, frozenset(frames))
     )
+    before = frames[: len(frames) - len(left)]
     run = TrackSession(
         make_tracker(task.settings),
-        TrackingRun(observer, subjects, start, left),
+        TrackingRun(observer, subjects, start, left, session.fps),
         [StoredPerson(p.name, store.add_model_revision(p.name, format_model(p.model))) for p in people],
         StoreSink(store),
         f"track frames {min(frames)}:{max(frames) + 1}",
         _SAVE_FRAMES,
-        _tracked_before(session, store, frames[: len(frames) - len(left)], start, subjects),
+        _tracked_before(session, store, before, start, subjects),
+        _rows_before(session, store, before, subjects),
     )
     try:
         yield run
     finally:
         run.save()
-        unfinished = None if run.finished else {"task": task.record(), "next": run.next_frame}
+        unfinished = None
+        if not run.finished:
+            unfinished = {"task": task.record(), "next": run.next_frame, "rows": run.rows_record()}
         store.set_setting(_UNFINISHED, unfinished)
 
 
@@ -123,6 +128,21 @@ def _tracked_before(
         else:
             out.append(TrackedFrame(frame, tuple(poses), statuses))
     return out
+
+
+def _rows_before(
+    session: Session, store: AnnotationStore, frames: Sequence[int], subjects: Subjects
+) -> dict[int, TrackedRows]:
+    """Return the rows of an interrupted run by person."""
+    unfinished = store.setting(_UNFINISHED)
+    if not frames or unfinished is None:
+        return {}
+    rows = {}
+    for i in subjects.tracked:
+        name = session.people[i].name
+        records = ((f, store.pose(name, f)) for f in frames)
+        rows[i] = tuple(PoseChange(name, f, r, tuple(store.alternatives(name, f))) for f, r in records if r is not None)
+    return resumed_rows(rows, unfinished.get("rows", {}))
 
 
 def _status(record: PoseRecord | None) -> Status:
