@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import OptionalName, OptionalNumber, OptionalRange, SessionArg
+from app.cli.arguments import Names, OptionalName, OptionalNumber, OptionalRange, SessionArg
 from app.cli.json_output import format_json
-from app.cli.target import Target, load_target, parse_frames
+from app.cli.target import Target, check_stride, load_target, parse_frames
 from app.runtime.progress import Reporter
 
 if TYPE_CHECKING:
@@ -29,6 +29,10 @@ class TrackArguments:
     """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice."""
     frames: OptionalRange = None
     """A:B, half open; all by default."""
+    stride: int = 1
+    """track every Nth frame alone; the frames between get no pose, and the page can interpolate them."""
+    cameras: Names = ()
+    """names of the cameras to track with; all by default."""
     person: OptionalName = None
     """name of the person to track; all people by default."""
     backward: bool = False
@@ -55,10 +59,10 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     Ctrl+C stops it and keeps the poses found so far; run it again to resume.
     """
     at = load_target(arguments.session, arguments.person, several=True)
-    frames: Sequence[int] = parse_frames(arguments.frames, at.session)
+    frames: Sequence[int] = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
     frames = frames[::-1] if arguments.backward else frames
     settings = _SETTINGS[arguments.method](arguments)
-    found = track(at, frames, settings, Reporter(silent=arguments.json))
+    found = track(at, frames, settings, Reporter(silent=arguments.json), arguments.cameras)
     print(format_json(found) if arguments.json else _format(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
@@ -69,10 +73,15 @@ def _chamfer_settings(arguments: TrackArguments) -> "TrackSettings":
     from tracker.search.best_first import SearchSettings
     from tracker.tracking.chamfer.settings import TrackSettings
 
-    paper = arguments.paper
+    # Bodies move farther between frames that are farther apart.
+    paper, stride, default = arguments.paper, arguments.stride, PredictSettings()
     return TrackSettings(
         estimate="search" if paper else "refine",
-        predict=PredictSettings(arguments.order, arguments.window),
+        predict=PredictSettings(
+            arguments.order, arguments.window, stride * default.bound_rad, stride * default.bound_m
+        ),
+        trust_rad=stride * TrackSettings.trust_rad,
+        trust_m=stride * TrackSettings.trust_m,
         search=SearchSettings(passes=(1.0,) if paper else SearchSettings().passes),
         theta_px=arguments.theta,
         outliers="paper" if paper else "truncated",
@@ -85,7 +94,13 @@ _SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {"chamf
 """Makes the settings of each method (`METHODS`) from the arguments."""
 
 
-def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progress: Reporter) -> dict[str, Any]:
+def track(
+    at: Target,
+    frames: Sequence[int],
+    settings: "TrackerSettings",
+    progress: Reporter,
+    cameras: Sequence[str] = (),
+) -> dict[str, Any]:
     """Track people and store their poses as one entry of the history.
 
     Keyframes and locked degrees of freedom keep their values. An interrupted run keeps its poses; run it again
@@ -96,13 +111,14 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
         frames: in the order of tracking.
         settings: of the tracker, which name its method.
         progress: shows how far it is.
+        cameras: names of those to track with; all if empty.
 
     Returns:
         A summary. `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of
         poses that the backward pass improved.
 
     Raises:
-        SessionError: a person has no pose at or before the first frame.
+        SessionError: a person has no pose at or before the first frame, or a camera is unknown.
     """
     import numpy as np
 
@@ -111,16 +127,20 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
     from tracker.footage.recording import Recording
     from tracker.pipeline.stored_run import TrackTask, stored_run
     from tracker.session.lock import SessionLock
+    from tracker.session.matching import check_names
     from tracker.session.relink import require_files
     from tracker.store.annotation_store import AnnotationStore
 
     session, stopped = at.session, False
+    check_names(cameras, [c.camera.name for c in session.cameras], "camera", "--cameras")
+    task = TrackTask(frames, at.people, settings, tuple(cameras))
+    sources = task.sources(session)
     require_files(session)
     with (
         SessionLock(session.folder),
         closing(AnnotationStore(session.annotations_path)) as store,
-        Recording(session.cameras) as recording,
-        stored_run(session, store, Observer(session.cameras, recording), TrackTask(frames, at.people, settings)) as run,
+        Recording(sources) as recording,
+        stored_run(session, store, Observer(sources, recording), task) as run,
     ):
         if store.backup_error is not None:
             progress.say(store.backup_error)

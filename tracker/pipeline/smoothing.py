@@ -55,7 +55,7 @@ class TrackedRows:
         rows = {f: c.pose for f, c in self._changes.items() if f not in keyframes and c.pose is not None}
         if not rows:
             return []
-        at = sorted({*rows, *(f for f in keyframes if min(rows) <= f <= max(rows))})
+        at = sorted({*rows, *keyframes})
         n = model.n_dofs
         track = PoseTrack(
             model,

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 from tracker.pipeline.smoothing import TrackedRows
@@ -43,9 +44,15 @@ class Sink(Protocol):
 class StoreSink:
     """Writes the poses of a run to a store at once."""
 
-    def __init__(self, store: AnnotationStore) -> None:
-        """Write to a store that is open."""
-        self._store = store
+    def __init__(self, store: AnnotationStore, views: Sequence[int | None] = ()) -> None:
+        """Write to a store that is open.
+
+        Args:
+            store: annotations of the session.
+            views: for each camera of the session its index among those that are tracked with; empty for all.
+        """
+        self._store, self._views = store, views
+        self._n_used = sum(v is not None for v in views)
 
     def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int:
         """See `Sink.write`.
@@ -53,10 +60,20 @@ class StoreSink:
         Raises:
             SessionError: the store cannot be written.
         """
+        if self._n_used < len(self._views):
+            changes = [self._with_all_views(change) for change in changes]
         if edit is None:
             return self._store.commit(label, changes, by_program=True).edit
         self._store.amend(edit, changes, by_program=True)
         return edit
+
+    def _with_all_views(self, change: PoseChange) -> PoseChange:
+        """Return a row whose costs by view are those of all cameras; a row that was read from the store has them."""
+        pose = change.pose
+        if pose is None or len(pose.view_costs_px) != self._n_used:
+            return change
+        costs = tuple(None if v is None else pose.view_costs_px[v] for v in self._views)
+        return replace(change, pose=replace(pose, view_costs_px=costs))
 
 
 class TrackSession:

@@ -184,14 +184,14 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
             yield estimate
 
     monkeypatch.setattr(ChamferTracker, "estimates", interrupted)
-    status, out, _ = run("track", session, "--frames", "0:6", "--json")
+    status, out, _ = run("track", session, "--no-smooth", "--frames", "0:6", "--json")
     assert status == 130
     assert (json.loads(out)["frames"], json.loads(out)["stopped_at"]) == (3, 3)
     assert sorted(stored(session)) == [0, 1, 2]
     assert not (session / "lock.json").exists()
     monkeypatch.undo()
     done = {k: stored(session)[k].time for k in (1, 2)}
-    status, out, _ = run("track", session, "--frames", "0:6")  # run again to resume
+    status, out, _ = run("track", session, "--no-smooth", "--frames", "0:6")  # run again to resume
     assert status == 0
     assert "tracked person over 3 frames, resumed at frame 3" in out
     found = stored(session)
@@ -199,7 +199,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert {k: found[k].time for k in (1, 2)} == done
     assert {found[k].status for k in range(1, 6)} <= {"good", "doubtful"}
     assert len(found[3].view_costs_px) == 4
-    status, out, _ = run("track", session, "--frames", "0:6", "--json")  # a finished run starts over
+    status, out, _ = run("track", session, "--no-smooth", "--frames", "0:6", "--json")  # a finished run starts over
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
 
 
@@ -229,7 +229,7 @@ def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(r
 
     monkeypatch.setattr(ChamferTracker, "estimates", tracked)
     monkeypatch.setattr("tracker.tracking.chamfer.tracker.track_lost_backward", ways_back)
-    words = ("track", session, "--frames", "0:5", "--json")
+    words = ("track", session, "--no-smooth", "--frames", "0:5", "--json")
     status, out, _ = run(*words)
     summary = json.loads(out)
     assert (status, summary["frames"], summary["stopped_at"], summary["improved_backward"]) == (130, 5, 1, 1)
@@ -266,10 +266,10 @@ def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(r
 
 def test_going_on_is_as_if_never_stopped(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
-    run("track", session, "--frames", "0:4")
-    run("track", session, "--frames", "4:5")  # the motion before is known
+    run("track", session, "--no-smooth", "--frames", "0:4")
+    run("track", session, "--no-smooth", "--frames", "4:5")  # the motion before is known
     stepwise = stored(session)[4].values
-    run("track", session, "--frames", "0:5")
+    run("track", session, "--no-smooth", "--frames", "0:5")
     np.testing.assert_allclose(stored(session)[4].values, stepwise, atol=2e-3)
 
 
