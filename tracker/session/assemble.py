@@ -1,7 +1,7 @@
 """Make a session from a calibration and loose footage: match them, and check that they fit together."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tracker.errors import RecordingError, SessionError
@@ -76,6 +76,7 @@ def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None
         CalibrationError: the calibration is malformed.
         ModelError: a body model is unknown or malformed.
     """
+    request = replace(request, videos=tuple(request.videos))
     calibrated = {c.name: c for c in read_cameras(request.calibration, request.units)}
     check_names(request.cameras, list(calibrated), "camera", "--cameras")
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:

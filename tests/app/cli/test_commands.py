@@ -382,3 +382,32 @@ def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):
     summary = json.loads(run("evaluate", session, "--reference", other, "--json")[1])
     assert summary["mpjpe_mm"] == pytest.approx(50)
     assert summary["axis_error_deg"] == pytest.approx(0, abs=1e-6)
+
+
+def test_every_second_frame_with_some_cameras(run, session):
+    """Frames between get no pose; costs stand at the places of the session's cameras."""
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    names = [c.camera.name for c in load_session(session).cameras]
+    status, out, _ = run("track", session, "--frames", "0:7", "--stride", "2", "--cameras", *names[1:], "--json")
+    assert (status, json.loads(out)["frames"]) == (0, 4)
+    found = stored(session)
+    assert sorted(found) == [0, 2, 4, 6]
+    for k in (2, 4, 6):
+        costs = found[k].view_costs_px
+        assert [c is None for c in costs] == [i == 0 for i in range(len(names))]
+        assert found[k].status != ""
+    status, out, _ = run("evaluate", session, "--reference", SAMPLE / "truth.trc", "--json")
+    errors = json.loads(out)
+    assert (errors["frames"], errors["missing_frames"], errors["fps"]) == (4, 0, load_session(session).fps / 2)
+    assert [f["frame"] for f in errors["per_frame"]] == [0, 2, 4, 6]
+    assert errors["per_frame"][0]["status"] == "keyframe"
+    assert errors["mpjpe_mm"] < 60
+    text = run("evaluate", session, "--reference", SAMPLE / "truth.trc")[1]
+    assert "acceleration error" in text
+    assert "without offset" in text
+
+
+def test_strides_and_cameras_that_are_none(run, session):
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    assert_refused(run("track", session, "--stride", "0"), ["--stride as a whole number from 1, found 0"])
+    assert_refused(run("track", session, "--cameras", "attic"), ["--cameras names an unknown camera 'attic'"])
