@@ -1,14 +1,15 @@
 """`quadrille evaluate`: compare stored poses with a reference."""
 
 from dataclasses import asdict, dataclass
+from math import gcd
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import OptionalName, OptionalPath, OptionalRange, SessionArg
+from app.cli.arguments import OptionalName, OptionalPath, OptionalRange, OptionalWhole, SessionArg
 from app.cli.json_output import format_json
-from app.cli.target import Target, load_target, parse_frames
+from app.cli.target import Target, check_stride, load_target, parse_frames
 from tracker.errors import SessionError
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ class EvaluateArguments:
     """TRC file, pose table (CSV; its body in NAME_model.toml beside it) or session folder."""
     frames: OptionalRange = None
     """A:B, half open; from the first to the last pose by default."""
+    stride: OptionalWhole = None
+    """compare every Nth frame; by default the distance at which the poses are stored."""
     person: OptionalName = None
     """name; needed in a session of several people."""
     joint_map: OptionalPath = None
@@ -39,22 +42,31 @@ class EvaluateArguments:
 
 
 def command(arguments: Annotated[EvaluateArguments, tyro.conf.arg(name="")]) -> None:
-    """Compare stored poses with a reference: mean errors of the limb joints, lost frames, angles.
+    """Compare stored poses with a reference: mean errors of the limb joints, lost frames, acceleration error, angles.
 
-    Joints and parts are compared by name, so that the reference may be of another body model.
+    Joints and parts are compared by name, so that the reference may be of another body model. The second column is the
+    error without each joint's constant offset. The offset is printed in the frame of the part above the joint.
     """
     from tracker.evaluation.references import read_reference
 
     at = load_target(arguments.session, arguments.person, several=False)
     reference = read_reference(arguments.reference, at.session, at.people[0], arguments.joint_map, arguments.axes)
-    found = evaluate(at, reference, arguments.frames, arguments.align, arguments.axes)
+    found = evaluate(at, reference, arguments.frames, arguments.align, arguments.axes, arguments.stride)
     print(format_json(found) if arguments.json else _format(found))
 
 
 def evaluate(
-    at: Target, reference: "Reference", frames: str | None, align: "Alignment", axes: str = "x,y,z"
+    at: Target,
+    reference: "Reference",
+    frames: str | None,
+    align: "Alignment",
+    axes: str = "x,y,z",
+    stride: int | None = None,
 ) -> dict[str, Any]:
     """Compare the stored poses of one person with a reference, over the given frames or all that have poses.
+
+    Without a stride, frames are as far apart as the stored poses, so that frames skipped by `track --stride` do not
+    count as missing.
 
     Returns:
         The errors; `notes` has a sentence if the two differ in length or lie metres apart.
@@ -62,18 +74,24 @@ def evaluate(
     Raises:
         SessionError: the person has no pose.
     """
+    import numpy as np
+
     from tracker.evaluation.comparability import distance_note, length_note
+    from tracker.evaluation.joint_offsets import evaluate_offsets
     from tracker.evaluation.metrics import evaluate_joints, evaluate_poses
     from tracker.evaluation.references import stored_motion
 
     session, (index,) = at
     person = session.people[index]
-    joints, motion, _ = stored_motion(session, index)
+    stored = stored_motion(session, index)
+    joints, motion = stored.joints, stored.motion
     if motion is None or not motion.poses:
         raise SessionError(f"'{person.name}' has no poses yet; place the body in the page, or use init and track")
     poses = motion.poses
     wanted = range(min(poses), max(poses) + 1) if frames is None else parse_frames(frames, session)
-    result = evaluate_joints(joints, reference.joints, wanted, align)
+    wanted = wanted[:: check_stride(stride) if stride is not None else gcd(*np.diff(sorted(poses)).tolist()) or 1]
+    result = evaluate_joints(joints, reference.joints, wanted, align, stored.statuses)
+    result = evaluate_offsets(result, motion, (joints, reference.joints), wanted, align)
     if reference.motion is not None:
         result = evaluate_poses(result, motion, reference.motion, wanted)
     apart = distance_note(joints, reference.joints, wanted, axes) if align == "none" else None
@@ -87,7 +105,15 @@ def _format(found: dict[str, Any]) -> str:
         f"{found['person']}: {counts}",
         f"  MPJPE {found['mpjpe_mm']:.1f} mm, median {found['median_mm']:.1f}, 95% {found['p95_mm']:.1f}",
     ]
-    lines += [f"  {joint.replace('_', ' '):16} {error:6.1f} mm" for joint, error in found["per_joint_mm"].items()]
+    lines[1] += f"; without offsets MPJPE {found['mpjpe_without_offsets_mm']:.1f} mm"
+    if found["acceleration_error_m_s2"] is not None:
+        rate = f"at {found['fps']:g} frames per second"
+        lines.append(f"  acceleration error {found['acceleration_error_m_s2']:.1f} m/s2 {rate}")
+    lines.append(f"  {'':16}    raw      without offset  offset: forward, left, up")
+    for joint, error in found["per_joint_mm"].items():
+        rest, offset = found["per_joint_without_offsets_mm"][joint], found["offsets_mm"][joint]
+        x, y, z = offset
+        lines.append(f"  {joint.replace('_', ' '):16} {error:6.1f} mm {rest:10.1f} mm {x:10.0f} {y:5.0f} {z:5.0f} mm")
     if found["axis_error_deg"] is not None:
         worst = f"{found['worst_axis_error_deg']:.2f} in frame {found['worst_axis_frame']}"
         lines.append(f"  part axes {found['axis_error_deg']:.2f} deg, worst frame's mean {worst}")

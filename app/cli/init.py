@@ -126,14 +126,14 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     with SessionLock(session.folder):
         if sizes:
             person, note = _with_acquired_sizes(session, person, joints)
-        fit = fit_to_points(person.model, limbs)
+        fit = fit_to_points(person.model, limbs, centers=True)
         where = _where(session, person, fit.pose, frame)
         if person is not session.people[index]:
             people = tuple(person if i == index else p for i, p in enumerate(session.people))
             save_session(replace(session, people=people))
         known = {n: [float(x) for x in p] for n, p in limbs.items()}
         _store_keyframe(session, person, frame, fit.pose, {"method": "joints", "joints": known})
-    fitted = dict(zip(person.model.point_names, person.model.points_world(fit.pose), strict=True))
+    fitted = dict(zip(person.model.point_names, person.model.joint_centers_world(fit.pose), strict=True))
     residuals = {n: float(1000 * np.linalg.norm(fitted[n] - p)) for n, p in limbs.items()}
     mean = float(np.mean(list(residuals.values())))
     return {

@@ -33,7 +33,7 @@ class NewArguments:
     camera: NamedPaths = ()
     """NAME=PATH: footage of a camera, under any file name."""
     cameras: Names = ()
-    """names of the calibrated cameras to use, in this order; all by default."""
+    """names of the calibrated cameras to use, in this order; all that have footage by default."""
     background: OptionalPath = None
     """folder of CAM.png or CAM.mp4 of the empty scene."""
     masks: OptionalPath = None
@@ -57,27 +57,29 @@ class NewArguments:
 def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
     """Make a session from videos and a calibration."""
     from app.session.camera_check import exchange_note
-    from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble
+    from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble, unfilmed_cameras
 
-    made = assemble(
-        NewSession(
-            arguments.session,
-            calibration=arguments.calibration,
-            videos=arguments.videos,
-            camera_paths=parse_pairs(arguments.camera, "--camera", Path),
-            cameras=arguments.cameras,
-            background=arguments.background,
-            masks=arguments.masks,
-            offsets=parse_pairs(arguments.offset, "--offset", int),
-            people=arguments.people,
-            models=parse_common_or_pairs(arguments.model, "--model", str) or DEFAULT_MODEL,
-            heights=parse_common_or_pairs(arguments.height, "--height", float),
-            fps=arguments.fps,
-            up=arguments.up,
-            units=arguments.units,
-        )
+    request = NewSession(
+        arguments.session,
+        calibration=arguments.calibration,
+        videos=arguments.videos,
+        camera_paths=parse_pairs(arguments.camera, "--camera", Path),
+        cameras=arguments.cameras,
+        background=arguments.background,
+        masks=arguments.masks,
+        offsets=parse_pairs(arguments.offset, "--offset", int),
+        people=arguments.people,
+        models=parse_common_or_pairs(arguments.model, "--model", str) or DEFAULT_MODEL,
+        heights=parse_common_or_pairs(arguments.height, "--height", float),
+        fps=arguments.fps,
+        up=arguments.up,
+        units=arguments.units,
     )
+    made = assemble(request)
     print(f"made {made.folder}: {len(made.cameras)} cameras, {made.n_frames} frames at {made.fps:g} per second")
+    if not request.cameras and (without := unfilmed_cameras(request)):
+        used = ", ".join(c.camera.name for c in made.cameras)
+        print(f"used: {used}; calibrated cameras without footage are left out: {', '.join(without)}")
     if declared := {f"{c.declared_fps:g}" for c in made.cameras if c.declared_fps is not None}:
         print(f"the videos declare {' or '.join(sorted(declared))} frames per second")
     if note := exchange_note(made):

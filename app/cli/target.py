@@ -57,3 +57,14 @@ def parse_frames(text: str | None, session: "Session") -> range:
     if not colon or not found or found.start < 0 or found.stop > session.n_frames:
         raise TrackerError(f"expected --frames as A:B within 0:{session.n_frames} (A included, B not), found '{text}'")
     return found
+
+
+def check_stride(stride: int) -> int:
+    """Return a stride.
+
+    Raises:
+        TrackerError: it is below 1.
+    """
+    if stride < 1:
+        raise TrackerError(f"expected --stride as a whole number from 1, found {stride}; 2 takes every second frame")
+    return stride

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import OptionalCount, OptionalName, OptionalNumber, OptionalRange, SessionArg
+from app.cli.arguments import Names, OptionalName, OptionalNumber, OptionalRange, OptionalWhole, SessionArg
 from app.cli.json_output import format_json
-from app.cli.target import Target, load_target, parse_frames
+from app.cli.target import Target, check_stride, load_target, parse_frames
 from app.runtime.progress import Reporter
 
 if TYPE_CHECKING:
@@ -29,20 +29,26 @@ class TrackArguments:
     """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice."""
     frames: OptionalRange = None
     """A:B, half open; all by default."""
+    stride: int = 1
+    """track every Nth frame alone; the frames between get no pose, and the page can interpolate them."""
+    cameras: Names = ()
+    """names of the cameras to track with; all by default."""
     person: OptionalName = None
     """name of the person to track; all people by default."""
     backward: bool = False
     """from the last frame of the range to the first."""
     theta: OptionalNumber = None
     """outlier distance in pixels; 3% of the longer side of the image by default."""
-    order: OptionalCount = None
+    order: OptionalWhole = None
     """degree of the motion model: 0 stays, 1 constant velocity (default), 2 constant acceleration (with --paper)."""
-    window: OptionalCount = None
+    window: OptionalWhole = None
     """past frames that the motion is estimated from; 3 by default, 8 with --paper."""
     paper: bool = False
     """as Gavrila and Davis 1996, in a session made with --model gavrila22; see docs/accuracy.md."""
     backward_pass: bool = True
     """at the end, track lost people backward from the first trusted poses after the loss."""
+    smooth: bool = True
+    """at the end, smooth the poses over time; keyframes stay."""
     json: bool = False
     """print one JSON object."""
 
@@ -53,12 +59,12 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     Ctrl+C stops it and keeps the poses found so far; run it again to resume.
     """
     at = load_target(arguments.session, arguments.person, several=True)
-    frames: Sequence[int] = parse_frames(arguments.frames, at.session)
+    frames: Sequence[int] = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
     frames = frames[::-1] if arguments.backward else frames
     settings = _SETTINGS[arguments.method](arguments)
     if arguments.paper:
         _require_paper_body(at)
-    found = track(at, frames, settings, Reporter(silent=arguments.json))
+    found = track(at, frames, settings, Reporter(silent=arguments.json), arguments.cameras)
     print(format_json(found) if arguments.json else _format(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
@@ -68,12 +74,18 @@ def _chamfer_settings(arguments: TrackArguments) -> "TrackSettings":
     from tracker.tracking.chamfer.paper import paper_settings
     from tracker.tracking.chamfer.settings import TrackSettings
 
-    settings = paper_settings() if arguments.paper else TrackSettings(backward_pass=arguments.backward_pass)
+    paper, stride = arguments.paper, arguments.stride
+    settings = paper_settings() if paper else TrackSettings(backward_pass=arguments.backward_pass)
     motion, order, window = settings.predict, arguments.order, arguments.window
+    # Bodies move farther between frames that are farther apart.
     motion = replace(
-        motion, order=motion.order if order is None else order, window=motion.window if window is None else window
-    )
-    return replace(settings, predict=motion, theta_px=arguments.theta)
+        motion, order=motion.order if order is None else order, window=motion.window if window is None else window,
+        bound_rad=stride * motion.bound_rad, bound_m=stride * motion.bound_m,
+    )  # fmt: skip
+    return replace(
+        settings, predict=motion, theta_px=arguments.theta, trust_rad=stride * settings.trust_rad,
+        trust_m=stride * settings.trust_m, smooth=arguments.smooth and not paper,
+    )  # fmt: skip
 
 
 def _require_paper_body(at: Target) -> None:
@@ -87,7 +99,13 @@ _SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {"chamf
 """Makes the settings of each method (`METHODS`) from the arguments."""
 
 
-def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progress: Reporter) -> dict[str, Any]:
+def track(
+    at: Target,
+    frames: Sequence[int],
+    settings: "TrackerSettings",
+    progress: Reporter,
+    cameras: Sequence[str] = (),
+) -> dict[str, Any]:
     """Track people and store their poses as one entry of the history.
 
     Keyframes and locked degrees of freedom keep their values. An interrupted run keeps its poses; run it again
@@ -98,13 +116,14 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
         frames: in the order of tracking.
         settings: of the tracker, which name its method.
         progress: shows how far it is.
+        cameras: names of those to track with; all if empty.
 
     Returns:
         A summary. `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of
         poses that the backward pass improved.
 
     Raises:
-        SessionError: a person has no pose at or before the first frame.
+        SessionError: a person has no pose at or before the first frame, or a camera is unknown.
     """
     import numpy as np
 
@@ -113,16 +132,20 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
     from tracker.footage.recording import Recording
     from tracker.pipeline.stored_run import TrackTask, stored_run
     from tracker.session.lock import SessionLock
+    from tracker.session.matching import check_names
     from tracker.session.relink import require_files
     from tracker.store.annotation_store import AnnotationStore
 
     session, stopped = at.session, False
+    check_names(cameras, [c.camera.name for c in session.cameras], "camera", "--cameras")
+    task = TrackTask(frames, at.people, settings, tuple(cameras))
+    sources = task.sources(session)
     require_files(session)
     with (
         SessionLock(session.folder),
         closing(AnnotationStore(session.annotations_path)) as store,
-        Recording(session.cameras) as recording,
-        stored_run(session, store, Observer(session.cameras, recording), TrackTask(frames, at.people, settings)) as run,
+        Recording(sources) as recording,
+        stored_run(session, store, Observer(sources, recording), task) as run,
     ):
         if store.backup_error is not None:
             progress.say(store.backup_error)
@@ -148,7 +171,7 @@ def track(at: Target, frames: Sequence[int], settings: "TrackerSettings", progre
 
 
 def _work(run: "TrackSession", progress: Reporter) -> None:
-    """Do both passes and show the progress of each."""
+    """Do both passes, show the progress of each, and smooth the poses."""
     if run.run.frames:
         with progress.over(len(run.run.frames), "tracking") as tick:
             for estimate in run.first_pass():
@@ -157,14 +180,15 @@ def _work(run: "TrackSession", progress: Reporter) -> None:
     run.save()
     steps = run.backward_pass()
     first = next(steps, None)
-    if first is None:
-        return
-    with progress.over(first.total, "tracking back") as tick:
-        run.take(first)
-        tick()
-        for step in steps:
-            run.take(step)
+    if first is not None:
+        with progress.over(first.total, "tracking back") as tick:
+            run.take(first)
             tick()
+            for step in steps:
+                run.take(step)
+                tick()
+    for smoothed in run.smoothing():
+        run.take(smoothed)
 
 
 def _format(found: dict[str, Any]) -> str:

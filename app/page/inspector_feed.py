@@ -58,8 +58,9 @@ def settings(found: TrackSettings) -> wire.SettingsMessage:
 def track_values(found: TrackSettings) -> wire.TrackValues:
     """Describe the settings of the tracker."""
     return wire.TrackValues(
-        found.estimate, found.predict.order, found.predict.window, found.recover is not None, found.backward_pass
-    )
+        found.estimate, found.predict.order, found.predict.window, found.recover is not None, found.backward_pass,
+        found.smooth,
+    )  # fmt: skip
 
 
 def search_values(found: TrackSettings) -> wire.SearchValues:

@@ -32,6 +32,8 @@ class TrackChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     recover: bool | UnsetType = UNSET
     """Whether lost limbs are searched."""
     backward_pass: bool | UnsetType = UNSET
+    smooth: bool | UnsetType = UNSET
+    """Whether the poses are smoothed at the end of a run."""
 
 
 class SetTrackSettings(Command, frozen=True, tag="track_settings"):
@@ -134,6 +136,8 @@ class TrackValues(Part, frozen=True):
     recover: bool
     """Whether lost limbs are searched."""
     backward_pass: bool
+    smooth: bool
+    """Whether the poses are smoothed at the end of a run."""
 
 
 class SearchValues(Part, frozen=True):

@@ -52,12 +52,17 @@ export function trackSection({ store, send, notify }) {
     title: "At the end of a run, track lost people backward from the frame where they were found again",
     change: (on) => set({ backward_pass: on }),
   });
+  const smooth = checkRow({
+    label: "Smooth",
+    title: "At the end of a run, smooth the poses over time. Keyframes stay, lost limbs are not trusted",
+    change: (on) => set({ smooth: on }),
+  });
   const reset = textButton("Reset", "Restore the default track settings", () => {
     const { settings } = store.facts;
     if (settings) set(settings.track_default);
   });
   const body = document.createElement("div");
-  body.append(estimate.element, order.element, past.element, recover.element, backward.element, reset);
+  body.append(estimate.element, order.element, past.element, recover.element, backward.element, smooth.element, reset);
 
   const show = () => {
     const { settings } = store.facts;
@@ -68,6 +73,7 @@ export function trackSection({ store, send, notify }) {
     past.show(track.past_poses, track.past_poses !== initial.past_poses);
     recover.show(track.recover, track.recover !== initial.recover);
     backward.show(track.backward_pass, track.backward_pass !== initial.backward_pass);
+    smooth.show(track.smooth, track.smooth !== initial.smooth);
     reset.disabled = JSON.stringify(track) === JSON.stringify(initial);
   };
   return {

@@ -1,5 +1,8 @@
 """Bodies with every kind of joint, for tests that must hold for more than people."""
 
+from dataclasses import replace
+
+from tracker.body.model import BodyModel
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 
 BALLS = """
@@ -42,3 +45,12 @@ ARM = parse_model(
     """,
     "arm",
 )
+
+
+def with_center(model: BodyModel, point: str, offset: tuple[float, float, float]) -> BodyModel:
+    """Return a model of which the anatomical centre of a joint or landmark is off its pivot, fractions of height."""
+
+    def moved(points):
+        return tuple(replace(p, center_offset=offset, center_source="a test") if p.name == point else p for p in points)
+
+    return replace(model, joints=moved(model.joints), landmarks=moved(model.landmarks))

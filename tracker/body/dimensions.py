@@ -95,9 +95,21 @@ def with_dimensions(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
     return replace(
         model,
         height_m=sizes.height_m,
-        joints=tuple(_moved(j, along[at[j.parent]], widths) if j.parent else j for j in model.joints),
+        joints=tuple(
+            _moved(j, along[at[j.parent]], stretch[at[j.parent]], widths)
+            if j.parent
+            else replace(j, center_offset=_scaled(j.center_offset, stretch[0]))
+            for j in model.joints
+        ),
         parts=tuple(_stretched(p, stretch[i], along[i]) for i, p in enumerate(model.parts)),
-        landmarks=tuple(replace(m, position=_scaled(m.position, along[at[m.part]])) for m in model.landmarks),
+        landmarks=tuple(
+            replace(
+                m,
+                position=_scaled(m.position, along[at[m.part]]),
+                center_offset=_scaled(m.center_offset, stretch[at[m.part]]),
+            )
+            for m in model.landmarks
+        ),
     )
 
 
@@ -176,10 +188,11 @@ def _half_width(model: BodyModel, width: str) -> float:
     return abs(left.position[1] - right.position[1]) / 2
 
 
-def _moved(joint: Joint, along: Array, widths: Mapping[str, float]) -> Joint:
+def _moved(joint: Joint, along: Array, stretch: Array, widths: Mapping[str, float]) -> Joint:
+    """Move a joint with its parent part; the offset of its centre follows the part's girths too."""
     x, y, z = _scaled(joint.position, along)
     width = next((by for name, by in widths.items() if joint.name in (f"left_{name}", f"right_{name}")), 1.0)
-    return replace(joint, position=(x, y * width, z))
+    return replace(joint, position=(x, y * width, z), center_offset=_scaled(joint.center_offset, stretch))
 
 
 def _stretched(part: Part, stretch: Array, along: Array) -> Part:

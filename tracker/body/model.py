@@ -163,6 +163,22 @@ class BodyModel:
         return np.array([(0.0, 0.0, 0.0)] * len(self.joints) + landmarks) * self.height_m
 
     @cached_property
+    def proximal_parts(self) -> IntArray:
+        """Index of the part at whose distal end each point lies, (n_points,): a joint's parent, a landmark's own part.
+
+        Anatomical joint centres are stated there, as regression equations do: the hip in the pelvis, the knee in the
+        thigh.
+        """
+        joints = [max(parent, 0) for parent in self.parents]
+        return np.array([*joints, *(self.part_index[m.part] for m in self.landmarks)], dtype=np.int64)
+
+    @cached_property
+    def center_offsets(self) -> Array:
+        """From each point to its anatomical joint centre in its proximal part's frame, (n_points, 3), metres."""
+        offsets = [j.center_offset for j in self.joints] + [m.center_offset for m in self.landmarks]
+        return np.array(offsets) * self.height_m
+
+    @cached_property
     def bones(self) -> tuple[tuple[str, str], ...]:
         """Pairs of points that a stick figure connects: each point and the joint that carries its part."""
         pairs = []
@@ -219,6 +235,18 @@ class BodyModel:
         """Return the positions of some points, given by index (N,), from known kinematics, (N, 3), metres."""
         T = kinematics.Ts_world_part[self.point_parts[points]]
         return np.einsum("nij,nj->ni", T[:, :3, :3], self.points_part[points]) + T[:, :3, 3]
+
+    def joint_centers_at(self, kinematics: Kinematics, points: IntArray) -> Array:
+        """Return the anatomical joint centres of some points, given by index (N,), (N, 3), metres."""
+        offsets, R = self.center_offsets[points], kinematics.Ts_world_part[self.proximal_parts[points], :3, :3]
+        return self.points_at(kinematics, points) + np.einsum("nij,nj->ni", R, offsets)
+
+    def joint_centers_world(self, values: Array) -> Array:
+        """Return the anatomical joint centres of a pose in the order of `point_names`, (n_points, 3), metres.
+
+        They are what other programs call joints. A point without an offset is its own joint centre.
+        """
+        return PosedBody(self, values).joint_centers_world
 
     def point_jacobian(self, kinematics: Kinematics, parts: IntArray, points_world: Array) -> Array:
         """Differentiate points fixed to parts by the degrees of freedom.
@@ -319,6 +347,11 @@ class PosedBody:
     def points_world(self) -> Array:
         """Positions of its points, (n_points, 3), metres."""
         return self.model.points_at(self.kinematics, np.arange(len(self.model.point_parts)))
+
+    @cached_property
+    def joint_centers_world(self) -> Array:
+        """Its anatomical joint centres, (n_points, 3), metres; see `BodyModel.joint_centers_world`."""
+        return self.model.joint_centers_at(self.kinematics, np.arange(len(self.model.point_parts)))
 
 
 def parts_of(models: Sequence[BodyModel], person: int) -> slice:

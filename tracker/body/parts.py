@@ -43,6 +43,10 @@ class Joint:
     """Ball joints: largest tilt of the child's z axis from the parent's, rad."""
     twist: float = np.pi
     """Ball joints: largest rotation about the child's z axis either way, rad."""
+    center_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """From the pivot to the anatomical joint centre in the parent's frame (the root's own), fraction of body height."""
+    center_source: str = ""
+    """Source of this offset; empty without one."""
 
     @property
     def dof_names(self) -> tuple[str, ...]:
@@ -88,6 +92,10 @@ class Landmark:
     part: str
     position: tuple[float, float, float]
     """Position in the part's frame, fraction of body height."""
+    center_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """From this position to the anatomical joint centre in the part's frame, fraction of body height."""
+    center_source: str = ""
+    """Source of this offset; empty without one."""
 
 
 @dataclass(frozen=True)

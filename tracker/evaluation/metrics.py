@@ -48,6 +48,20 @@ class Evaluation:
     """95th percentile of the distance over frames and limb joints."""
     per_joint_mm: Mapping[str, float]
     """Mean distance of each joint that both have, including head and neck."""
+    fps: float
+    """Frames per second of those compared, 1/s; the acceleration error depends on it."""
+    acceleration_error_m_s2: float | None
+    """Mean norm of the second difference of the error over frames and limb joints, m/s^2, as the human-mesh literature
+    has it (A. Kanazawa et al. 2019); None without three frames in a row."""
+    per_frame: tuple["FrameError", ...]
+    """The error of each frame."""
+    offsets_mm: Mapping[str, tuple[float, ...]] | None = None
+    """Mean difference of each joint from the reference in the frame of its proximal part, (3,), see `joint_offsets`;
+    None without poses of the estimate."""
+    mpjpe_without_offsets_mm: float | None = None
+    """`mpjpe_mm` after each joint's offset is taken away."""
+    per_joint_without_offsets_mm: Mapping[str, float] | None = None
+    """`per_joint_mm` after each joint's offset is taken away."""
     axis_error_deg: float | None = None
     """Mean angle between true and estimated part axes, over frames and parts. It includes the twist where the truth
     determines it. None without true poses."""
@@ -63,6 +77,40 @@ class Evaluation:
     """Mean absolute error of each angle by degree of freedom; None without true poses of the same model."""
 
 
+class FrameError(NamedTuple):
+    """The error of one frame."""
+
+    frame: int
+    status: str | None
+    """Status that the tracker gave the pose, `keyframe` for one that a person set; None without a pose or status."""
+    mean_mm: float | None
+    """Mean distance over the limb joints; None where there is none to compare."""
+    worst_mm: float | None
+    """Largest distance of a limb joint."""
+    worst_joint: str | None
+    """The joint with this distance."""
+
+
+class JointErrors(NamedTuple):
+    """Joints of an estimate and a reference compared."""
+
+    joints: tuple[str, ...]
+    """The joints that both have."""
+    is_limb: NDArray[np.bool_]
+    """Whether each is one of `LIMB_JOINTS`, (m,)."""
+    estimate: Array
+    """Estimated positions after the alignment, (n, m, 3), metres; NaN where missing."""
+    truth: Array
+    """Reference positions, likewise."""
+    R_align: Array
+    """Rotation by which the estimate was aligned, (3, 3)."""
+
+    @property
+    def vectors(self) -> Array:
+        """Estimate less reference, (n, m, 3), metres."""
+        return self.estimate - self.truth
+
+
 class Motion(NamedTuple):
     """Poses of one body over time."""
 
@@ -73,7 +121,11 @@ class Motion(NamedTuple):
 
 
 def evaluate_joints(
-    estimated: MarkerTable, reference: MarkerTable, frames: Sequence[int], align: Alignment = "none"
+    estimated: MarkerTable,
+    reference: MarkerTable,
+    frames: Sequence[int],
+    align: Alignment = "none",
+    statuses: Mapping[int, str] | None = None,
 ) -> Evaluation:
     """Compare joints frame by frame. Both tables have the project's names (`joint_maps.joints_of`) and frame numbers.
 
@@ -82,6 +134,47 @@ def evaluate_joints(
         reference: the truth; a frame or a position may be missing.
         frames: the frames to compare.
         align: `rigid-all` first moves the estimate as a whole by the best rotation and translation over all frames.
+        statuses: of the estimated poses by frame, for `Evaluation.per_frame`.
+
+    Raises:
+        FormatError: there is nothing to compare.
+    """
+    found = joint_errors(estimated, reference, frames, align)
+    joints, is_limb, estimate, truth = found.joints, found.is_limb, found.estimate, found.truth
+    both: NDArray[np.bool_] = np.all(np.isfinite(found.vectors), axis=-1)  # (n, m)
+    error = np.linalg.norm(found.vectors, axis=-1)  # (n, m), NaN where not comparable
+    limb_error = error[:, is_limb]
+    missing = np.isin(frames, estimated.frames, invert=True)
+    lost = missing | (np.nan_to_num(limb_error) > LOST_M).any(axis=1)
+    aligned = np.concatenate(
+        [_procrustes_error(e[b], t[b]) for e, t, b in zip(estimate, truth, both & is_limb, strict=True)]
+    )
+    limb_mm = limb_error[np.isfinite(limb_error)] * 1000
+    fps = estimated.rate / (frames[1] - frames[0] if len(frames) > 1 else 1)
+    limb_joints = [j for j, of_limb in zip(joints, is_limb, strict=True) if of_limb]
+    return Evaluation(
+        frames=len(frames),
+        missing_frames=int(missing.sum()),
+        missing_reference_values=int(np.isnan(truth[:, is_limb]).any(axis=-1).sum()),
+        lost_frames=int(lost.sum()),
+        mpjpe_mm=float(limb_mm.mean()),
+        pa_mpjpe_mm=float(aligned.mean()) * 1000 if len(aligned) else None,
+        median_mm=float(np.median(limb_mm)),
+        p95_mm=float(np.percentile(limb_mm, 95)),
+        per_joint_mm={j: float(np.nanmean(error[:, i])) * 1000 for i, j in enumerate(joints) if both[:, i].any()},
+        fps=fps,
+        acceleration_error_m_s2=_acceleration_error(found.vectors[:, is_limb], fps),
+        per_frame=tuple(
+            _frame_error(frame, limb_joints, 1000 * errors, statuses or {})
+            for frame, errors in zip(frames, limb_error, strict=True)
+        ),
+    )
+
+
+def joint_errors(
+    estimated: MarkerTable, reference: MarkerTable, frames: Sequence[int], align: Alignment = "none"
+) -> JointErrors:
+    """Collect the joints that both tables have; see `evaluate_joints`.
 
     Raises:
         FormatError: there is nothing to compare.
@@ -98,28 +191,29 @@ def evaluate_joints(
             "the estimate and the reference have no limb joint of the same frame in common; "
             "check --frames, --person and the reference's frame numbers"
         )
+    R_align = np.eye(3)
     if align == "rigid-all":
         used = both & is_limb
-        estimate = rigid.apply(best_rigid(estimate[used], truth[used]), estimate)
-    error = np.linalg.norm(estimate - truth, axis=-1)  # (n, m), NaN where not comparable
-    limb_error = error[:, is_limb]
-    missing = np.isin(frames, estimated.frames, invert=True)
-    lost = missing | (np.nan_to_num(limb_error) > LOST_M).any(axis=1)
-    aligned = np.concatenate(
-        [_procrustes_error(e[b], t[b]) for e, t, b in zip(estimate, truth, both & is_limb, strict=True)]
-    )
-    found = limb_error[np.isfinite(limb_error)] * 1000
-    return Evaluation(
-        frames=len(frames),
-        missing_frames=int(missing.sum()),
-        missing_reference_values=int(np.isnan(truth[:, is_limb]).any(axis=-1).sum()),
-        lost_frames=int(lost.sum()),
-        mpjpe_mm=float(found.mean()),
-        pa_mpjpe_mm=float(aligned.mean()) * 1000 if len(aligned) else None,
-        median_mm=float(np.median(found)),
-        p95_mm=float(np.percentile(found, 95)),
-        per_joint_mm={j: float(np.nanmean(error[:, i])) * 1000 for i, j in enumerate(joints) if both[:, i].any()},
-    )
+        T = best_rigid(estimate[used], truth[used])
+        estimate, R_align = rigid.apply(T, estimate), T[:3, :3]
+    return JointErrors(joints, is_limb, estimate, truth, R_align)
+
+
+def _acceleration_error(vectors: Array, fps: float) -> float | None:
+    """Return the mean norm of the second difference of errors, (n, m, 3), over the square of the frame time, m/s^2."""
+    if len(vectors) < 3:
+        return None
+    norms = np.linalg.norm(np.diff(vectors, n=2, axis=0), axis=-1)
+    norms = norms[np.isfinite(norms)]
+    return float(norms.mean()) * fps**2 if len(norms) else None
+
+
+def _frame_error(frame: int, joints: Sequence[str], errors_mm: Array, statuses: Mapping[int, str]) -> FrameError:
+    status = statuses.get(frame) or None
+    if not np.isfinite(errors_mm).any():
+        return FrameError(frame, status, None, None, None)
+    worst = int(np.nanargmax(errors_mm))
+    return FrameError(frame, status, float(np.nanmean(errors_mm)), float(errors_mm[worst]), joints[worst])
 
 
 def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: Sequence[int]) -> Evaluation:
@@ -164,7 +258,7 @@ def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: 
 
 
 def joints_of_poses(model: BodyModel, poses: Mapping[int, Array], rate: float) -> MarkerTable:
-    """Return the joints of a person's poses under the project's names, one row per frame.
+    """Return the joint centres of a person's poses under the project's names, one row per frame.
 
     Args:
         model: body model of all poses.
@@ -174,8 +268,8 @@ def joints_of_poses(model: BodyModel, poses: Mapping[int, Array], rate: float) -
     names = tuple(j for j in JOINTS if j in model.point_names)
     columns = [model.point_names.index(n) for n in names]
     frames = np.array(sorted(poses), dtype=np.int64)
-    points = np.array([model.points_world(poses[f])[columns] for f in frames.tolist()]).reshape(-1, len(names), 3)
-    return MarkerTable(names, frames, frames / rate, points, rate)
+    points = [model.joint_centers_world(poses[f])[columns] for f in frames.tolist()]
+    return MarkerTable(names, frames, frames / rate, np.array(points).reshape(-1, len(names), 3), rate)
 
 
 def remap_axes(table: MarkerTable, axes: str) -> MarkerTable:

@@ -1,7 +1,8 @@
 """References for an evaluation: joints of a TRC file, poses of a CSV table, or another session."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,8 @@ class Reference(NamedTuple):
     """Poses of any body; None if unknown."""
     n_frames: int | None = None
     """Length of the recording that it is of, in the session's frames; None if unknown."""
+    statuses: Mapping[int, str] = MappingProxyType({})
+    """Status of stored poses by frame, `keyframe` for those that a person set."""
 
 
 def read_joints(path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z") -> MarkerTable:
@@ -82,12 +85,15 @@ def stored_motion(session: Session, person: int) -> Reference:
     """
     name, model = session.people[person].name, session.people[person].model
     by_model: dict[BodyModel, dict[int, Array]] = {}
+    statuses: dict[int, str] = {}
     for frame, stored in read_stored_poses(session.annotations_path, name, model).items():
+        statuses[frame] = "keyframe" if stored.record.keyframe else stored.record.status
         if len(stored.body.values) == len(model.value_names):
             by_model.setdefault(stored.body.model, {})[frame] = stored.body.values
     tables = [joints_of_poses(m, poses, session.fps) for m, poses in by_model.items()]
     poses = {frame: values for some in by_model.values() for frame, values in some.items()}
-    return Reference(_merged(tables) if tables else joints_of_poses(model, {}, session.fps), Motion(model, poses))
+    joints = _merged(tables) if tables else joints_of_poses(model, {}, session.fps)
+    return Reference(joints, Motion(model, poses), statuses=statuses)
 
 
 def _merged(tables: Sequence[MarkerTable]) -> MarkerTable:

@@ -24,7 +24,7 @@ class Keypoints(NamedTuple):
     """A body in a view."""
 
     points_px: Array
-    """Its points in the order of `BodyModel.point_names`, (n, 2), original px; NaN where the lens shows none."""
+    """Its joint centres in the order of `BodyModel.point_names`, (n, 2), original px; NaN where the lens shows none."""
     visibility: NDArray[np.int64]
     """ABSENT, OCCLUDED or VISIBLE, (n,). A point outside the image is absent."""
     box_px: tuple[float, float, float, float] | None
@@ -40,7 +40,7 @@ def keypoints_in_views(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -
         bodies: all bodies in the scene.
         cameras: the views, with their lens distortion.
     """
-    points = np.concatenate([b.points_world for b in bodies])
+    points = np.concatenate([b.joint_centers_world for b in bodies])
     occluded = points_occluded(bodies, [c.pinhole for c in cameras], points)
     ends = np.cumsum([len(b.points_world) for b in bodies])[:-1]
     out = []

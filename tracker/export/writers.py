@@ -44,7 +44,9 @@ def write_person_trc(motion: ExportedMotion, options: ExportOptions, paths: Sequ
     for i, frame in enumerate(motion.frames):
         if frame in person.poses:
             body = person.poses[frame].body
-            points[i, [names.index(n) for n in body.model.point_names]] = rigid.apply(T_file_world, body.points_world)
+            points[i, [names.index(n) for n in body.model.point_names]] = rigid.apply(
+                T_file_world, body.joint_centers_world
+            )
         tick()
     write_trc(
         paths[0], names, points, motion.session.fps, frames=motion.frames, units=options.units, from_frame_0=False
@@ -67,7 +69,7 @@ def write_tables(motion: ExportedMotion, options: ExportOptions, paths: Sequence
             angle_values: list[float] = []
             if stored is not None:
                 model, body = stored.body.model, stored.body
-                places = (per_metre * rigid.apply(T_file_world, body.points_world)).tolist()
+                places = (per_metre * rigid.apply(T_file_world, body.joint_centers_world)).tolist()
                 by_point = dict(zip(model.point_names, places, strict=True))
                 joint_values = [x for name in points for x in by_point.get(name, (np.nan,) * 3)]
                 by_value = dict(zip(model.value_names, body.values.tolist(), strict=True))

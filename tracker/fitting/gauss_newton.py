@@ -68,11 +68,15 @@ class PointTargets:
     """Known positions, (N, 3), metres."""
     weights: Array
     """Weight of each point's distance, (N,), per metre."""
+    centers: bool = False
+    """Whether the positions are those of anatomical joint centres."""
 
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
-        parts = model.point_parts[self.points]
-        points_world = model.points_at(kinematics, self.points)
+        parts, points_world = model.point_parts[self.points], model.points_at(kinematics, self.points)
+        if self.centers and model.center_offsets.any():
+            parts = np.where(model.center_offsets[self.points].any(axis=1), model.proximal_parts[self.points], parts)
+            points_world = model.joint_centers_at(kinematics, self.points)
         J = model.point_jacobian(kinematics, parts, points_world) * self.weights[:, None, None]
         r = (points_world - self.targets_world) * self.weights[:, None]
         return normal_equations(r.ravel(), J.reshape(-1, model.n_dofs))
@@ -210,7 +214,9 @@ def covariance(model: BodyModel, fit: Fit) -> Array:
     return np.asarray(np.linalg.inv(fit.hessian + np.eye(model.n_dofs) / _UNKNOWN), dtype=np.float64)
 
 
-def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array | None = None) -> Fit:
+def fit_to_points(
+    model: BodyModel, targets_world: dict[str, Array], near: Array | None = None, centers: bool = False
+) -> Fit:
     """Fit a pose to known positions of points of the body (triangulated or measured joints).
 
     Without an initial pose the body starts at the mean of the targets: upright, lying and upside down, in each of eight
@@ -220,6 +226,7 @@ def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array
         model: the body; its sizes stay.
         targets_world: position of each known point by name, (3,), metres; NaN is ignored.
         near: initial pose, (n_values,).
+        centers: whether the positions are those of anatomical joint centres.
 
     Raises:
         TrackerError: fewer than four of the body's points are known.
@@ -232,7 +239,7 @@ def fit_to_points(model: BodyModel, targets_world: dict[str, Array], near: Array
         )
     indices = np.array([model.point_names.index(n) for n in known])
     targets = np.stack(list(known.values()))
-    block = PointTargets(indices, targets, np.full(len(indices), 1 / _PLACE_M))
+    block = PointTargets(indices, targets, np.full(len(indices), 1 / _PLACE_M), centers)
     if near is not None:
         starts = [near]
     else:

@@ -53,6 +53,9 @@ _Parent: TypeAlias = Annotated[
     str,
     Meta(pattern=r"^[^\x00-\x1f\x7f]{0,200}\Z", description="the name of the parent part, or none for the root,"),
 ]
+_Source: TypeAlias = Annotated[
+    str, Meta(pattern=r"^[^\x00-\x1f\x7f]{0,500}\Z", description="a source of at most 500 characters,")
+]
 _Turn: TypeAlias = Annotated[float, Meta(ge=0, le=180, description="an angle of 0 to 180 degrees")]
 
 
@@ -84,8 +87,11 @@ class _JointRow(_Row):
     free: bool = False
     cone_deg: _Turn = 180.0
     twist_deg: _Turn = 180.0
+    center_offset: _Position = (0.0, 0.0, 0.0)
+    center_source: _Source = ""
 
     def __post_init__(self) -> None:
+        _check_center(self.center_offset, self.center_source)
         if self.kind == "ball" and self.axes:
             raise ValueError(f"expected no axes of a ball joint, found {len(self.axes)}")
 
@@ -111,6 +117,11 @@ class _LandmarkRow(_Row):
     name: Name
     part: Name
     position: _Position
+    center_offset: _Position = (0.0, 0.0, 0.0)
+    center_source: _Source = ""
+
+    def __post_init__(self) -> None:
+        _check_center(self.center_offset, self.center_source)
 
 
 class _GroupRow(_Row):
@@ -128,6 +139,16 @@ class _ModelFile(_Row):
     height_m: _Height = DEFAULT_HEIGHT_M
     landmarks: Annotated[list[_LandmarkRow], Meta(max_length=256, description="at most 256 landmarks")] = []
     search: Annotated[list[_GroupRow], Meta(max_length=32, description="at most 32 search groups")] = []
+
+
+def _check_center(offset: Sequence[float], source: str) -> None:
+    """Check that the offset of a joint centre has a source.
+
+    Raises:
+        ValueError: it has none.
+    """
+    if any(offset) and not source:
+        raise ValueError("expected the source of 'center_offset' as 'center_source', found none; name it")
 
 
 def load_model(name_or_path: str | Path, height_m: float | None = None) -> BodyModel:
@@ -171,7 +192,7 @@ def parse_model(text: str, source: str, height_m: float | None = None) -> BodyMo
         odd = set(children) ^ set(parts) or _doubles(children) | _doubles(p.name for p in row.parts)
         raise ModelError(f"{where}: expected exactly one joint for each part, but see: {', '.join(sorted(odd))}")
     joints = _order([_joint(j) for j in row.joints], source)
-    landmarks = tuple(Landmark(m.name, m.part, m.position) for m in row.landmarks)
+    landmarks = tuple(Landmark(m.name, m.part, m.position, m.center_offset, m.center_source) for m in row.landmarks)
     for m in landmarks:
         if m.part not in parts:
             raise ModelError(f"{where}: landmark '{m.name}' is on a missing part '{m.part}'")
@@ -207,9 +228,11 @@ def format_model(model: BodyModel) -> str:
                 | ({"spread_deg": float(np.degrees(a.spread))} if np.isfinite(a.spread) else {})
                 for a in j.axes
             ]
-        joints.append(row)
+        joints.append(row | _center_row(j))
     parts = [_part_row(p) for p in model.parts]
-    landmarks = [{"name": m.name, "part": m.part, "position": list(m.position)} for m in model.landmarks]
+    landmarks = [
+        {"name": m.name, "part": m.part, "position": list(m.position)} | _center_row(m) for m in model.landmarks
+    ]
     search = [{"name": g.name, "dofs": list(g.dofs)} for g in model.search_groups]
     return tomli_w.dumps(
         {
@@ -222,6 +245,13 @@ def format_model(model: BodyModel) -> str:
             "parts": parts,
         }
     )
+
+
+def _center_row(point: Joint | Landmark) -> dict[str, Any]:
+    """Return the keys of a joint centre; none where it is the point itself, so that older programs read the file."""
+    if not any(point.center_offset):
+        return {}
+    return {"center_offset": list(point.center_offset), "center_source": point.center_source}
 
 
 def _part_row(p: Part) -> dict[str, Any]:
@@ -240,7 +270,10 @@ def _joint(row: _JointRow) -> Joint:
         low, high = (float(np.radians(v)) for v in a.limits_deg)
         axes.append(Axis(a.name, (float(x), float(y), float(z)), (low, high), float(np.radians(a.spread_deg))))
     cone, twist = float(np.radians(row.cone_deg)), float(np.radians(row.twist_deg))
-    return Joint(row.name, row.parent, row.child, row.position, row.kind, tuple(axes), row.free, cone, twist)
+    return Joint(
+        row.name, row.parent, row.child, row.position, row.kind, tuple(axes), row.free, cone, twist,
+        row.center_offset, row.center_source,
+    )  # fmt: skip
 
 
 def _part(row: _PartRow, where: str) -> Part:

@@ -103,12 +103,23 @@ def write_osim(path: str | Path, model: BodyModel, name: str, T_ground_world: Ar
     markers = _list(top, "MarkerSet", "markerset")
     for i, point in enumerate(identifiers(model.point_names)):
         marker = ET.SubElement(markers, "Marker", name=point)
-        _text(marker, "socket_parent_frame", f"/bodyset/{part_names[int(model.point_parts[i])]}")
-        _text(marker, "location", _vector(model.points_part[i]))
+        carrier, location = _marker_place(model, i)
+        _text(marker, "socket_parent_frame", f"/bodyset/{part_names[carrier]}")
+        _text(marker, "location", _vector(location))
         _text(marker, "fixed", "true")
     ET.indent(document)
     text = ET.tostring(document, encoding="unicode")
     write_text_atomic(Path(path), f'<?xml version="1.0" encoding="UTF-8" ?>\n{text}\n')
+
+
+def _marker_place(model: BodyModel, point: int) -> tuple[int, Array]:
+    """Return the part that carries a marker, and the anatomical joint centre in its frame, (3,), metres."""
+    offset, part = model.center_offsets[point], int(model.proximal_parts[point])
+    if not offset.any():
+        return int(model.point_parts[point]), model.points_part[point]
+    on_joint = point < len(model.joints) and bool(model.joints[point].parent)
+    at = np.array(model.joints[point].position) * model.height_m if on_joint else model.points_part[point]
+    return part, at + offset
 
 
 def _joint_names(model: BodyModel) -> list[list[str]]:

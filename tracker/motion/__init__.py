@@ -1,5 +1,5 @@
-"""Poses over time, without images: prediction, interpolation, frames inconsistent with their neighbours.
+"""Poses over time, without images: prediction, interpolation, smoothing, inconsistent frames.
 
-Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose` and
-`consistency.inconsistent_frames`.
+Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose`,
+`smoothing.smooth_poses` and `consistency.inconsistent_frames`.
 """

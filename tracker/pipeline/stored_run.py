@@ -7,15 +7,17 @@ from typing import Any, NamedTuple, get_args
 
 from tracker.errors import SessionError
 from tracker.evidence.observer import Observer
+from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.pipeline.methods import make_tracker
+from tracker.pipeline.smoothing import TrackedRows, resumed_rows
 from tracker.pipeline.track_session import StoreSink, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson, keyframes_of, recorded_method, settings_record
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Person, Session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseRecord
+from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import TrackedFrame
 from tracker.tracking.subjects import Subjects
@@ -39,11 +41,19 @@ class TrackTask(NamedTuple):
     people: tuple[int, ...]
     """Indices of the people to track."""
     settings: TrackerSettings
+    cameras: tuple[str, ...] = ()
+    """Names of the cameras to track with; all if empty."""
+
+    def sources(self, session: Session) -> tuple[CameraSource, ...]:
+        """Return the cameras to track with, in the order of the session."""
+        return tuple(c for c in session.cameras if not self.cameras or c.camera.name in self.cameras)
 
     def record(self) -> list[Any]:
         """Return the task as the store keeps it."""
         frames, settings = self.frames, settings_record(self.settings)
-        found: list[Any] = json.loads(json.dumps([frames[0], frames[-1], len(frames), self.people, settings]))
+        cameras = [sorted(self.cameras)] if self.cameras else []
+        what = [frames[0], frames[-1], len(frames), self.people, *cameras, settings]
+        found: list[Any] = json.loads(json.dumps(what))
         return found
 
 
@@ -70,21 +80,31 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, tas
     subjects = Subjects.of(
         [p.model for p in people], task.people, active, keyframes_of(store, people, frozenset(frames))
     )
+    before = frames[: len(frames) - len(left)]
     run = TrackSession(
         make_tracker(task.settings),
-        TrackingRun(observer, subjects, start, left),
+        TrackingRun(observer, subjects, start, left, session.fps),
         [StoredPerson(p.name, store.add_model_revision(p.name, format_model(p.model))) for p in people],
-        StoreSink(store),
+        StoreSink(store, _views(session, task)),
         f"track frames {min(frames)}:{max(frames) + 1}",
         _SAVE_FRAMES,
-        _tracked_before(session, store, frames[: len(frames) - len(left)], start, subjects),
+        _tracked_before(session, store, before, start, subjects),
+        _rows_before(session, store, before, subjects),
     )
     try:
         yield run
     finally:
         run.save()
-        unfinished = None if run.finished else {"task": task.record(), "next": run.next_frame}
+        unfinished = None
+        if not run.finished:
+            unfinished = {"task": task.record(), "next": run.next_frame, "rows": run.rows_record()}
         store.set_setting(_UNFINISHED, unfinished)
+
+
+def _views(session: Session, task: TrackTask) -> list[int | None]:
+    """Return for each camera of the session its index among those that are tracked with; None for the others."""
+    used = [c.camera.name for c in task.sources(session)]
+    return [used.index(c.camera.name) if c.camera.name in used else None for c in session.cameras]
 
 
 def _frames_left(store: AnnotationStore, task: TrackTask) -> Sequence[int]:
@@ -125,6 +145,21 @@ def _tracked_before(
     return out
 
 
+def _rows_before(
+    session: Session, store: AnnotationStore, frames: Sequence[int], subjects: Subjects
+) -> dict[int, TrackedRows]:
+    """Return the rows of an interrupted run by person."""
+    unfinished = store.setting(_UNFINISHED)
+    if not frames or unfinished is None:
+        return {}
+    rows = {}
+    for i in subjects.tracked:
+        name = session.people[i].name
+        records = ((f, store.pose(name, f)) for f in frames)
+        rows[i] = tuple(PoseChange(name, f, r, tuple(store.alternatives(name, f))) for f, r in records if r is not None)
+    return resumed_rows(rows, unfinished.get("rows", {}))
+
+
 def _status(record: PoseRecord | None) -> Status:
     """Return the status of a stored pose; "good" for a keyframe and for a pose without a status."""
     statuses: tuple[Status, ...] = get_args(Status)
@@ -145,7 +180,7 @@ def _start_poses(store: AnnotationStore, person: Person, frames: Sequence[int], 
     Raises:
         SessionError: a pose is needed and there is none.
     """
-    first, step = frames[0], 1 if len(frames) < 2 or frames[1] > frames[0] else -1
+    first, step = frames[0], 1 if len(frames) < 2 else frames[1] - frames[0]
     rows = {row.frame for row in store.frames(person.name)}
 
     def pose(frame: int) -> Array | None:

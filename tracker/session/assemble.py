@@ -1,7 +1,7 @@
 """Make a session from a calibration and loose footage: match them, and check that they fit together."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from tracker.errors import RecordingError, SessionError
@@ -14,6 +14,7 @@ from tracker.formats.camera_section import Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
 from tracker.session.matching import (
+    camera_name,
     check_image_numbers,
     check_names,
     common_length,
@@ -40,7 +41,7 @@ class NewSession:
     camera_paths: Mapping[str, Path] = field(default_factory=dict)
     """Footage by camera name, under any file name; goes before `videos`."""
     cameras: Sequence[str] = ()
-    """Names of the calibrated cameras to use, in the session's order; all if empty."""
+    """Names of the calibrated cameras to use, in the session's order; all that have footage if empty."""
     background: Path | None = None
     """Folder of CAM.png or CAM.mp4 of the empty scene."""
     masks: Path | None = None
@@ -75,12 +76,16 @@ def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None
         CalibrationError: the calibration is malformed.
         ModelError: a body model is unknown or malformed.
     """
+    request = replace(request, videos=tuple(request.videos))
     calibrated = {c.name: c for c in read_cameras(request.calibration, request.units)}
     check_names(request.cameras, list(calibrated), "camera", "--cameras")
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
         raise SessionError(f"expected each camera once as --cameras, found '{twice[0]}' twice; leave one out")
-    names = list(request.cameras) or list(calibrated)
+    without = [] if request.cameras else unfilmed_cameras(request, list(calibrated))
+    names = list(request.cameras) or [n for n in calibrated if n not in without]
     report(f"The calibration has {len(calibrated)} cameras: {', '.join(calibrated)}.")
+    if without:
+        report(f"Cameras without footage are left out: {', '.join(without)}.")
     unused = calibrated.keys() - set(names)
     check_names(request.offsets, names, "camera", "--offset")
     paths = match_footage(names, request.videos, request.camera_paths, unused)
@@ -104,6 +109,23 @@ def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None
     people = _make_people(request.people, request.models, request.heights)
     report("The body models fit: " + ", ".join(f"{p.name} {p.model.height_m:.2f} m" for p in people) + ".")
     return create_session(request.folder, cameras=sources, people=people, fps=fps, n_frames=n_frames, up=request.up)
+
+
+def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = None) -> list[str]:
+    """Return the calibrated cameras that a request gives no footage; none if it gives no calibrated camera any.
+
+    Args:
+        request: of a new session.
+        calibrated: names of the calibrated cameras; read from the request's calibration by default.
+
+    Raises:
+        CalibrationError: the calibration is malformed.
+    """
+    if calibrated is None:
+        calibrated = [c.name for c in read_cameras(request.calibration, request.units)]
+    filmed = {*request.camera_paths, *map(camera_name, request.videos)}
+    missing = [n for n in calibrated if n not in filmed]
+    return missing if len(missing) < len(calibrated) else []
 
 
 def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -> CameraSource:

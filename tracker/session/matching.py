@@ -29,12 +29,12 @@ def match_footage(
     check_names(camera_paths, names, "camera", "--camera")
     paths = dict(camera_paths)
     for video in videos:
-        name = video.name if video.is_dir() else video.stem
+        name = camera_name(video)
         if name in camera_paths or video in camera_paths.values() or name in unused:
             continue
         if name not in names:
             raise SessionError(
-                f"video {video} belongs to no calibrated camera: expected one named {', '.join(names)}; "
+                f"video {video} belongs to no calibrated camera: expected one named {', '.join([*names, *unused])}; "
                 f"rename it, leave it out or say --camera NAME={video}"
             )
         if name in paths:
@@ -47,6 +47,11 @@ def match_footage(
             f"say --camera {missing[0]}=PATH, or choose other cameras with --cameras"
         )
     return paths
+
+
+def camera_name(video: Path) -> str:
+    """Return the camera after which a video file or an image folder is named."""
+    return video.name if video.is_dir() else video.stem
 
 
 def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:

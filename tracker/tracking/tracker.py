@@ -15,6 +15,11 @@ class TrackerSettings(Protocol):
 
     method: ClassVar[str]
     """Name of the method that they belong to, such as `chamfer`."""
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the poses are smoothed at the end of a run."""
+
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
 
@@ -30,6 +35,8 @@ class TrackingRun:
     it, the last one last, (n, n_values)."""
     frames: Sequence[int]
     """The frames in the order of tracking."""
+    fps: float = 30.0
+    """Frame rate of the recording, 1/s."""
 
 
 class Tracker(Protocol):

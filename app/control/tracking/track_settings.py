@@ -12,7 +12,8 @@ def changed(before: TrackSettings, changes: Mapping[str, Any]) -> TrackSettings:
 
     Args:
         before: the present settings.
-        changes: any of `estimate`, `order` and `past_poses` (of the motion model), `recover`, `backward_pass`.
+        changes: any of `estimate`, `order` and `past_poses` (of the motion model), `recover`, `backward_pass`,
+            `smooth`.
 
     Raises:
         TrackerError: a value is invalid.
@@ -29,4 +30,5 @@ def changed(before: TrackSettings, changes: Mapping[str, Any]) -> TrackSettings:
         predict=predict,
         recover=(before.recover or RecoverSettings()) if recovers else None,
         backward_pass=changes.get("backward_pass", before.backward_pass),
+        smooth=changes.get("smooth", before.smooth),
     )

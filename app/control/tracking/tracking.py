@@ -14,7 +14,7 @@ from app.state.progress import TrackState
 from app.state.state import StateChanges, finite_or_none
 from tracker.errors import TrackerError
 from tracker.pipeline.methods import make_tracker
-from tracker.pipeline.track_session import Step, TrackSession
+from tracker.pipeline.track_session import SmoothedRows, Step, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson
 from tracker.store.records import PoseChange
 from tracker.tracking import confidence
@@ -97,6 +97,7 @@ class Tracking:
                     Subjects.of(models, people, free, saver.keyframes(frames)),
                     session_state.present_poses(),
                     frames,
+                    session_state.session.fps,
                 ),
                 [StoredPerson(p.name, saver.revisions.current(i)) for i, p in enumerate(session_state.session.people)],
                 _SaverSink(session_state),
@@ -180,11 +181,20 @@ class Tracking:
         with self._session_state.lock:
             if run is self._run:
                 run.session.take(step)
-                if isinstance(step, BackwardStep):
+                if isinstance(step, SmoothedRows):
+                    self._show_smoothed()
+                elif isinstance(step, BackwardStep):
                     self._show_improved(run, step, seconds)
                     self._session_state.refresh_saving()
                 else:
                     self._show_tracked(run, step, seconds)
+
+    def _show_smoothed(self) -> None:
+        """Show the smoothed pose of the shown frame."""
+        session_state = self._session_state
+        session_state.note_stored()
+        session_state.refresh_saving()
+        session_state.show_frame(session_state.state.frame, follow=session_state.state.follow)
 
     def _show_improved(self, run: _Run, step: BackwardStep, seconds: float) -> None:
         """Show the progress of the backward pass, and what it improved at the end of an interval."""

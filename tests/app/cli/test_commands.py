@@ -184,14 +184,14 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
             yield estimate
 
     monkeypatch.setattr(ChamferTracker, "estimates", interrupted)
-    status, out, _ = run("track", session, "--frames", "0:6", "--json")
+    status, out, _ = run("track", session, "--no-smooth", "--frames", "0:6", "--json")
     assert status == 130
     assert (json.loads(out)["frames"], json.loads(out)["stopped_at"]) == (3, 3)
     assert sorted(stored(session)) == [0, 1, 2]
     assert not (session / "lock.json").exists()
     monkeypatch.undo()
     done = {k: stored(session)[k].time for k in (1, 2)}
-    status, out, _ = run("track", session, "--frames", "0:6")  # run again to resume
+    status, out, _ = run("track", session, "--no-smooth", "--frames", "0:6")  # run again to resume
     assert status == 0
     assert "tracked person over 3 frames, resumed at frame 3" in out
     found = stored(session)
@@ -199,7 +199,7 @@ def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     assert {k: found[k].time for k in (1, 2)} == done
     assert {found[k].status for k in range(1, 6)} <= {"good", "doubtful"}
     assert len(found[3].view_costs_px) == 4
-    status, out, _ = run("track", session, "--frames", "0:6", "--json")  # a finished run starts over
+    status, out, _ = run("track", session, "--no-smooth", "--frames", "0:6", "--json")  # a finished run starts over
     assert (json.loads(out)["frames"], json.loads(out)["resumed_at"]) == (6, None)
 
 
@@ -229,7 +229,7 @@ def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(r
 
     monkeypatch.setattr(ChamferTracker, "estimates", tracked)
     monkeypatch.setattr("tracker.tracking.chamfer.tracker.track_lost_backward", ways_back)
-    words = ("track", session, "--frames", "0:5", "--json")
+    words = ("track", session, "--no-smooth", "--frames", "0:5", "--json")
     status, out, _ = run(*words)
     summary = json.loads(out)
     assert (status, summary["frames"], summary["stopped_at"], summary["improved_backward"]) == (130, 5, 1, 1)
@@ -266,10 +266,10 @@ def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(r
 
 def test_going_on_is_as_if_never_stopped(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
-    run("track", session, "--frames", "0:4")
-    run("track", session, "--frames", "4:5")  # the motion before is known
+    run("track", session, "--no-smooth", "--frames", "0:4")
+    run("track", session, "--no-smooth", "--frames", "4:5")  # the motion before is known
     stepwise = stored(session)[4].values
-    run("track", session, "--frames", "0:5")
+    run("track", session, "--no-smooth", "--frames", "0:5")
     np.testing.assert_allclose(stored(session)[4].values, stepwise, atol=2e-3)
 
 
@@ -385,3 +385,32 @@ def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):
     summary = json.loads(run("evaluate", session, "--reference", other, "--json")[1])
     assert summary["mpjpe_mm"] == pytest.approx(50)
     assert summary["axis_error_deg"] == pytest.approx(0, abs=1e-6)
+
+
+def test_every_second_frame_with_some_cameras(run, session):
+    """Frames between get no pose; costs stand at the places of the session's cameras."""
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    names = [c.camera.name for c in load_session(session).cameras]
+    status, out, _ = run("track", session, "--frames", "0:7", "--stride", "2", "--cameras", *names[1:], "--json")
+    assert (status, json.loads(out)["frames"]) == (0, 4)
+    found = stored(session)
+    assert sorted(found) == [0, 2, 4, 6]
+    for k in (2, 4, 6):
+        costs = found[k].view_costs_px
+        assert [c is None for c in costs] == [i == 0 for i in range(len(names))]
+        assert found[k].status != ""
+    status, out, _ = run("evaluate", session, "--reference", SAMPLE / "truth.trc", "--json")
+    errors = json.loads(out)
+    assert (errors["frames"], errors["missing_frames"], errors["fps"]) == (4, 0, load_session(session).fps / 2)
+    assert [f["frame"] for f in errors["per_frame"]] == [0, 2, 4, 6]
+    assert errors["per_frame"][0]["status"] == "keyframe"
+    assert errors["mpjpe_mm"] < 60
+    text = run("evaluate", session, "--reference", SAMPLE / "truth.trc")[1]
+    assert "acceleration error" in text
+    assert "without offset" in text
+
+
+def test_strides_and_cameras_that_are_none(run, session):
+    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    assert_refused(run("track", session, "--stride", "0"), ["--stride as a whole number from 1, found 0"])
+    assert_refused(run("track", session, "--cameras", "attic"), ["--cameras names an unknown camera 'attic'"])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bodies import with_center
 
 from tracker.body.dimensions import PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
 from tracker.errors import TrackerError
@@ -81,3 +82,20 @@ def test_nobody_is_that_tall(height_m):
     model = load_model("gavrila22")
     with pytest.raises(TrackerError, match="height of 30 to 300 cm"):
         with_dimensions(model, dimensions_of(model)._replace(height_m=height_m))
+
+
+def test_joint_centers_scale_with_the_dimensions_of_their_part():
+    model = with_center(load_model("gavrila34", 1.8), "left_hip", (0.01, 0.02, 0.03))
+    model = with_center(model, "left_wrist", (0.01, 0.0, 0.0))
+    sizes = dimensions_of(model)
+    pelvis, forearm = sizes.parts["pelvis"], sizes.parts["left_forearm"]
+    parts = dict(sizes.parts) | {
+        "pelvis": PartDimensions(pelvis.length_m * 1.1, (pelvis.girths_m[0] * 1.2, pelvis.girths_m[1] * 0.9)),
+        "left_forearm": PartDimensions(forearm.length_m, (forearm.girths_m[0] * 1.5, forearm.girths_m[1])),
+    }
+    found = with_dimensions(model, sizes._replace(parts=parts))
+    hip, wrist = (found.point_names.index(n) for n in ("left_hip", "left_wrist"))
+    np.testing.assert_allclose(found.center_offsets[hip], 1.8 * np.array([0.012, 0.018, 0.033]))
+    np.testing.assert_allclose(found.center_offsets[wrist], 1.8 * np.array([0.015, 0.0, 0.0]))
+    taller = with_dimensions(model, scaled(sizes, 0.9))
+    np.testing.assert_allclose(taller.center_offsets[hip], 0.9 * np.array([0.01, 0.02, 0.03]))

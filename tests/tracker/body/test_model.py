@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from bodies import MODELS
+from bodies import MODELS, with_center
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -280,3 +280,29 @@ def test_parts_of_several_bodies_follow_one_another(gavrila):
     whose = np.repeat(range(3), [len(m.parts) for m in models])
     for person in range(3):
         np.testing.assert_array_equal(np.arange(len(whose))[parts_of(models, person)], np.flatnonzero(whose == person))
+
+
+@each_model
+def test_a_point_is_its_own_joint_center_by_default(model):
+    values = random_values(model, 3)
+    np.testing.assert_array_equal(model.joint_centers_world(values), model.points_world(values))
+
+
+def test_a_joint_center_moves_with_the_part_above_the_joint():
+    """The hip's centre lies in the pelvis: no angle of the hip moves it; that of a wrist lies in the forearm."""
+    model = with_center(with_center(MODELS["gavrila34"], "left_hip", (0.01, 0.02, -0.03)), "left_wrist", (0, 0.01, 0))
+    values = random_values(model, 1, 0.3)
+    away = (model.joint_centers_world(values) - model.points_world(values)) / model.height_m
+    T = model.kinematics(values).Ts_world_part[:, :3, :3]
+    for name, part, offset in (
+        ("left_hip", "pelvis", (0.01, 0.02, -0.03)),
+        ("left_wrist", "left_forearm", (0, 0.01, 0)),
+    ):
+        found = away[model.point_names.index(name)]
+        np.testing.assert_allclose(T[model.part_index[part]].T @ found, offset, atol=1e-12)
+    assert np.count_nonzero(np.linalg.norm(away, axis=1) > 1e-9) == 2
+    bent = set_deg(model, left_hip__flexion=60)
+    hip = model.point_names.index("left_hip")
+    np.testing.assert_allclose(
+        model.joint_centers_world(bent)[hip], model.joint_centers_world(set_deg(model))[hip], atol=1e-12
+    )

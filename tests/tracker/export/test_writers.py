@@ -7,7 +7,7 @@ import bvhio
 import cv2
 import numpy as np
 import pytest
-from bodies import MODELS
+from bodies import MODELS, with_center
 from pycocotools.coco import COCO
 from staging import cameras_around
 from stored_motions import FPS, distorted_cameras, store_motion
@@ -28,6 +28,29 @@ from tracker.store.records import PoseChange, PoseRecord
 
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """From a world in which z points up."""
+
+
+@pytest.fixture
+def off_center(tmp_path):
+    """A person whose hip and wrist have joint centres beside their pivots."""
+    model = with_center(MODELS["gavrila34"], "left_hip", (0.01, 0.02, -0.03))
+    return store_motion(tmp_path / "s", [with_center(model, "left_wrist", (0.0, 0.02, 0.0))], n_frames=3)
+
+
+def test_files_of_joints_have_the_anatomical_joint_centers(tmp_path, off_center):
+    session, ((*bodies,),) = off_center[0], [off_center[1][0].values()]
+    motion, options = read_motion(session, (0,), range(3)), ExportOptions("calibration", "m")
+    centers = np.array([b.joint_centers_world for b in bodies])
+    assert np.linalg.norm(centers - [b.points_world for b in bodies], axis=-1).max() > 0.02
+    writers.write_person_trc(motion, options, [tmp_path / "a.trc"], no_tick)
+    np.testing.assert_allclose(read_trc(tmp_path / "a.trc").points, centers, atol=1e-5)
+    writers.write_tables(motion, options, [tmp_path / "joints.csv", tmp_path / "angles.csv"], no_tick)
+    rows = [r for r in csv.DictReader(x for x in (tmp_path / "joints.csv").open() if not x.startswith("#"))]
+    hip = [[float(r[f"left_hip.{axis}_m"]) for axis in "xyz"] for r in rows]
+    np.testing.assert_allclose(hip, centers[:, bodies[0].model.point_names.index("left_hip")], atol=1e-5)
+    cameras = [c.camera for c in session.cameras]
+    for camera, (found,) in zip(cameras, keypoints_in_views(bodies[:1], cameras), strict=True):
+        np.testing.assert_allclose(found.points_px, project_through_lens(camera, centers[0]))
 
 
 def one(motion, index):

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from bodies import ARM
+from bodies import ARM, with_center
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from staging import at, posed, shaken, solid
@@ -290,3 +290,16 @@ def test_too_few_points(known):
     found = ", ".join(sorted(known)) or "none"
     with pytest.raises(TrackerError, match=rf"at least 4.*found {len(known)} \({found}\).*left_ankle"):
         fit_to_points(GAVRILA, targets)
+
+
+def test_fit_to_joint_centers_puts_them_on_the_targets():
+    """A reference states anatomical joint centres, not pivots."""
+    model = GAVRILA
+    for side, y in (("left", 0.02), ("right", -0.02)):
+        model = with_center(model, f"{side}_hip", (0.0, y, -0.03))
+    pose = model.clip(model.retract(model.neutral(), np.random.default_rng(4).normal(0, 0.2, model.n_dofs)))
+    targets = dict(zip(model.point_names, model.joint_centers_world(pose), strict=True))
+    found = fit_to_points(model, targets, centers=True)
+    np.testing.assert_allclose(model.joint_centers_world(found.pose), list(targets.values()), atol=1e-4)
+    off = fit_to_points(model, targets)
+    assert np.linalg.norm(model.joint_centers_world(off.pose) - list(targets.values()), axis=1).max() > 0.01

@@ -229,3 +229,27 @@ def test_the_cones_stand_where_gavrilas_parts_do():
     for part, other in zip(cones.parts, model.parts, strict=True):
         assert (part.name, part.half_axes, part.center) == (other.name, other.half_axes, other.center)
         assert part.kind == ("ellipsoid" if part.name == "head" else "cone")
+
+
+def test_joint_centers_are_read_and_written_with_their_source():
+    text = SMALL
+    for key, offset, source in (('child = "arm"', "[0, 0.01, 0.02]", "A"), ('part = "arm"', "[0.03, 0, 0]", "B")):
+        text = text.replace(key, f'{key}\ncenter_offset = {offset}\ncenter_source = "{source}"')
+    model = parse_model(text, "x")
+    assert (model.joints[1].center_offset, model.joints[1].center_source) == ((0.0, 0.01, 0.02), "A")
+    assert (model.landmarks[0].center_offset, model.landmarks[0].center_source) == ((0.03, 0.0, 0.0), "B")
+    back = parse_model(format_model(model), "y")
+    assert (back.joints, back.landmarks) == (model.joints, model.landmarks)
+
+
+def test_a_model_without_joint_centers_is_written_as_before():
+    """An older program refuses unknown keys."""
+    model = parse_model(SMALL, "x")
+    assert not model.center_offsets.any()
+    assert "center_" not in format_model(model)
+
+
+@pytest.mark.parametrize("key", ["position = [0, 0, -0.1]", 'child = "arm"'])
+def test_a_joint_center_without_a_source_is_refused(key):
+    with pytest.raises(ModelError, match=r"expected the source of 'center_offset' as 'center_source' in .*found none"):
+        parse_model(SMALL.replace(key, f"{key}\ncenter_offset = [0, 0, 0.1]"), "x")

@@ -19,7 +19,7 @@ from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 STEP_M = 0.01
-SETTINGS = TrackSettings()
+SETTINGS = TrackSettings(smooth=False)
 
 
 @dataclass

@@ -13,7 +13,7 @@ from tracker.formats.anipose import write_calibration
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.session.assemble import NewSession, assemble
+from tracker.session.assemble import NewSession, assemble, unfilmed_cameras
 from tracker.session.session import load_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
@@ -151,7 +151,16 @@ def test_video_without_camera(room):
 
 
 def test_camera_without_video(room):
-    assert_refused(room, SessionError, r"no video for camera left.*--camera left=PATH", videos=[room / "front.mp4"])
+    """It is left out, unless it is asked for by name."""
+    said = []
+    request = NewSession(room / "s", calibration=room / "Calib.toml", videos=[room / "front.mp4"])
+    session = assemble(request, said.append)
+    assert [c.camera.name for c in session.cameras] == ["front"]
+    assert "Cameras without footage are left out: left." in said
+    assert unfilmed_cameras(request) == ["left"]
+    expected = r"no video for camera left.*--camera left=PATH"
+    assert_refused(room, SessionError, expected, videos=[room / "front.mp4"], cameras=["front", "left"])
+    assert_refused(room, SessionError, r"no video for camera front, left", videos=[])
 
 
 def test_two_videos_for_a_camera(room):

@@ -96,6 +96,8 @@ class TrackSettings:
     """Largest number of rounds in which all people are refined again with the others where they were found."""
     backward_pass: bool = True
     """Whether people are tracked backward through intervals in which they were lost, see `backward_pass`."""
+    smooth: bool = True
+    """Whether the poses are smoothed at the end of a run."""
     apart: float = 1.0
     """Weight of the term against people passing through each other; 0 leaves it out."""
 

@@ -320,6 +320,7 @@ def improved_backward(tracker, steps):
 
 def test_the_backward_pass_takes_the_place_of_what_was_lost(placed, tracker):
     offered = improved_backward(tracker, 3)
+    placed.search.set_settings(replace(placed.state.settings, smooth=False))
     placed.tracking.start(backward=False, until=9)
     tracker.let_go(7)
     wait_for(lambda: placed.state.track.message)
@@ -349,6 +350,22 @@ def test_a_frame_that_is_looked_at_shows_what_the_backward_pass_found(placed, tr
     assert placed.state.frame == 7
     assert placed.state.people[0].status == "good"
     assert {(t.done, t.total) for t in seen if t.back} == {(1, 2), (2, 2)}
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_the_poses_are_smoothed_at_the_end_of_a_run(placed, tracker, smooth):
+    """The frame that is looked at shows its smoothed pose, and one undo takes back all of the run."""
+    placed.search.set_settings(replace(placed.state.settings, smooth=smooth))
+    placed.tracking.start(backward=False, until=9)
+    tracker.let_go(7)
+    wait_for(lambda: placed.state.track.message)
+    assert (placed.state.frame, placed.state.people[0].source) == (9, "tracked")
+    is_as_tracked = np.array_equal(placed.state.poses[0], tracker.last[9].poses[0])
+    assert is_as_tracked is not smooth
+    placed.navigation.seek(5)
+    np.testing.assert_allclose(placed.state.poses[0], tracker.last[5].poses[0], atol=STEP_M)
+    placed.history.undo()
+    assert set(placed.stored_poses.timeline()) == {2}
 
 
 def test_the_backward_pass_can_be_switched_off(placed, tracker):

@@ -1,0 +1,166 @@
+"""Smoothing at the end of a stored run: rows, keyframes, undo, and a run that was interrupted."""
+
+import shutil
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from tracker.formats.model_toml import format_model
+from tracker.motion import smoothing
+from tracker.pipeline.methods import METHODS
+from tracker.pipeline.stored_run import TrackTask, stored_run
+from tracker.pipeline.track_session import SmoothedRows
+from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimate import AlternativePose, PoseEstimate
+
+N = 12
+SETTINGS = TrackSettings()
+
+
+@dataclass
+class Jittery:
+    """Stands for a tracker: walks along x, 2 cm to and fro beside the path; has alternatives on frame 4."""
+
+    settings: TrackSettings
+
+    def estimates(self, run):
+        for frame in run.frames:
+            pose = np.array(run.start[0][-1])
+            pose[0] = tracked_x(frame)
+            pose = run.subjects.keyframes_at(frame).get(0, pose)
+            n = run.subjects.models[0].n_dofs
+            alternatives = ((AlternativePose(pose + 0.1, 3.0),),) if frame == 4 else ((),)
+            yield PoseEstimate(
+                frame, (pose,), 1.0 + frame, np.ones(4), 0, ("good",), (f"note {frame}",), (np.ones(10),),
+                (1e-4 * np.eye(n),), (None,), alternatives, "chamfer",
+            )  # fmt: skip
+
+    def backward_pass(self, run, tracked):
+        return iter(())
+
+
+@pytest.fixture
+def session(tmp_path, sample_folder, monkeypatch):
+    monkeypatch.setitem(METHODS, "chamfer", Jittery)
+    monkeypatch.setattr(smoothing, "_ITERATIONS", 3)
+    return load_session(shutil.copytree(sample_folder, tmp_path / "session"))
+
+
+@pytest.fixture
+def store(session):
+    """With keyframes on frames 0 and 6."""
+    store, (person,) = AnnotationStore(session.annotations_path), session.people
+    revision = store.add_model_revision(person.name, format_model(person.model))
+    for frame in (0, 6):
+        values = person.model.neutral()
+        values[0] = 0.05 * frame
+        store.commit(
+            "init", [PoseChange(person.name, frame, PoseRecord(values, ("manual",) * len(values), revision, True))]
+        )
+    yield store
+    store.close()
+
+
+def track(session, store, settings=SETTINGS, n=None):
+    """Take so many steps, or all."""
+    with stored_run(session, store, None, TrackTask(range(N), (0,), settings)) as run:
+        for k, step in enumerate(run.steps(), start=1):
+            run.take(step)
+            if k == n:
+                break
+    return run
+
+
+def records(store):
+    return [store.pose("person", k) for k in range(N)]
+
+
+def x_of(store):
+    return np.array([r.values[0] for r in records(store)])
+
+
+def jitter(x):
+    return np.abs(np.diff(x, n=2)).mean()
+
+
+def test_a_run_is_smoothed_as_part_of_its_entry(session, store):
+    run = track(session, store)
+    assert run.finished
+    smoothed = x_of(store)
+    assert store.undo() == f"track frames 0:{N}"
+    assert [r.frame for r in store.frames("person")] == [0, 6]
+    track(session, store, replace(SETTINGS, smooth=False))
+    assert jitter(smoothed) < 0.3 * jitter(x_of(store))
+    assert np.abs(smoothed - 0.05 * np.arange(N)).max() < 0.02
+
+
+def test_everything_but_the_poses_stays(session, store):
+    track(session, store, replace(SETTINGS, smooth=False))
+    before, alternatives = records(store), store.alternatives("person", 4)
+    store.undo()
+    track(session, store)
+    for old, new in zip(before, records(store), strict=True):
+        if not old.keyframe:
+            assert not np.array_equal(new.values, old.values)
+            assert (new.status, new.cost_px, new.remark, new.sources, new.part_costs_px) == (
+                old.status, old.cost_px, old.remark, old.sources, old.part_costs_px,
+            )  # fmt: skip
+    (kept,), (expected,) = store.alternatives("person", 4), alternatives
+    np.testing.assert_array_equal(kept.values, expected.values)
+    assert kept.cost_px == expected.cost_px
+
+
+def test_keyframes_are_bit_identical(session, store):
+    before = [store.pose("person", k).values.tobytes() for k in (0, 6)]
+    track(session, store)
+    for k, values in zip((0, 6), before, strict=True):
+        record = store.pose("person", k)
+        assert record.values.tobytes() == values
+        assert record.keyframe
+        assert set(record.sources) == {"manual"}
+
+
+def test_locked_degrees_of_freedom_keep_their_values(session, store):
+    store.set_setting("locked", {"person": ["torso.x"]})
+    track(session, store, replace(SETTINGS, smooth=False))
+    before = x_of(store)
+    store.undo()
+    track(session, store)
+    np.testing.assert_array_equal(x_of(store), before)
+
+
+@pytest.mark.parametrize("n", [3, 9, N])
+def test_a_resumed_run_ends_like_one_without_a_break(session, store, n):
+    track(session, store)
+    whole = [r.values for r in records(store)]
+    store.undo()
+    run = track(session, store, n=n)
+    assert not run.finished
+    assert x_of_tracked(store, n) == pytest.approx([tracked_x(k) for k in range(n) if k not in (0, 6)])
+    run = track(session, store)
+    assert len(run.run.frames) == N - n
+    np.testing.assert_array_equal([r.values for r in records(store)], whole)
+
+
+def tracked_x(frame):
+    return 0.05 * frame + 0.02 * (-1) ** frame
+
+
+def x_of_tracked(store, n):
+    return [store.pose("person", k).values[0] for k in range(n) if k not in (0, 6)]
+
+
+def test_a_run_interrupted_before_its_smoothed_poses_are_written_is_not_smoothed_in_part(session, store):
+    with stored_run(session, store, None, TrackTask(range(N), (0,), SETTINGS)) as run:
+        for step in run.steps():
+            if isinstance(step, SmoothedRows):
+                break
+            run.take(step)
+    assert not run.finished
+    assert jitter(x_of(store)[7:]) == pytest.approx(0.08)
+    track(session, store)
+    assert jitter(x_of(store)[7:]) < 0.03
