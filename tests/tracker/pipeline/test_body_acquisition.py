@@ -101,7 +101,7 @@ def test_keyframes_are_fitted_to_the_new_body_and_undone_with_it(session, store)
     changed = load_session(session.folder)
     assert format_model(changed.people[0].model) == format_model(body)
     np.testing.assert_allclose(store.pose(name, 5).values, acquired)
-    joints = [m.points_world(store.pose(name, 0).values) for m in (body,)][0]
+    joints = body.points_world(store.pose(name, 0).values)
     assert np.abs(joints - session.people[0].model.points_world(first.values)).max() < 0.06
     revision = store.pose(name, 0).model_revision
     assert revision == store.pose(name, 5).model_revision != first.model_revision

@@ -86,7 +86,7 @@ def test_a_stopped_acquisition_changes_nothing(posed, acquiring):
 
 def test_one_at_a_time_and_not_without_a_pose(opened, posed, acquiring):
     begun(posed)
-    with pytest.raises(TrackerError, match="another|other"):
+    with pytest.raises(TrackerError, match="no other acquisition"):
         posed.body_acquisition.start(0)
     acquiring.set()
     wait_for(lambda: not posed.state.acquisition.running)
