@@ -154,7 +154,7 @@ def test_every_tracking_method_can_be_named():
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_tracking_says_that_kernels_may_have_to_be_compiled(run, session, tmp_path, monkeypatch, compiled):
-    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("tracker.compute.kernel_cache._folder", lambda: tmp_path)
     if compiled:
         compiled_mark().touch()
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")

@@ -76,6 +76,7 @@ def test_the_browser_is_opened_with_an_invitation(monkeypatch, tmp_path):
     opened = []
     monkeypatch.setattr("app.server.doorway.webbrowser.open", opened.append)
     with Doorway(Serving(port=0)) as doorway:
+        doorway.open_browser()
         wait_for(lambda: opened)
     assert doorway.access.invitation.code in opened[0]
     assert doorway.access.token not in opened[0]
