@@ -175,6 +175,12 @@ def keys_of(source):
     return {place: source.key(*place) for place in source.kernels()}
 
 
+def test_every_kernel_is_cached_here():
+    """A module that takes `njit` from numba may be loaded before the cache is registered."""
+    lines = {path: path.read_text("utf-8") for path in SOURCE.rglob("*.py")}
+    assert {path.name for path, text in lines.items() if "from numba import" in text} == {"jit.py"}
+
+
 def test_all_kernels_have_a_key_and_use_it():
     keys = kernel_cache.kernel_keys()
     assert len(keys) > 100

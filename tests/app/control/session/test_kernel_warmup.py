@@ -83,6 +83,7 @@ def test_a_drag_before_all_kernels_moves_a_skeleton_without_cost(compiling):
 
 def test_nothing_is_started_where_all_is_compiled(opened, empty_cache, monkeypatch):
     compiled_mark().touch()
+    kernel_cache._keys_file().touch()
     monkeypatch.setattr(kernel_compiler.subprocess, "Popen", pytest.fail)
     assert KernelCompiler().stages == frozenset(STAGES)
 
