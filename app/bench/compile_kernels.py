@@ -1,4 +1,4 @@
-"""Compile the kernels that are not in the cache: `python -m app.bench.compile_kernels [--background | --evidence]`.
+"""Compile the kernels that are not in the cache: `python -m app.bench.compile_kernels [--background]`.
 
 Numba compiles a kernel on its first call and holds the interpreter lock meanwhile. The first tracking run after an
 installation would wait for a minute, and the page with it. This program calls all kernels; other programs then load
@@ -6,21 +6,20 @@ them from the cache. The kernels that a new user meets first come first (`kernel
 """
 
 import gc
+import multiprocessing
 import os
-import subprocess
 import sys
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.bench.sample_frames import FRAME, BenchCrowd, read_crowd
 from app.session.samples import bundled
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.kernel_cache import compiled_mark, record_compiled, record_stage
 from tracker.contours import occluding_contours
-from tracker.contours.label_image import part_labels
 from tracker.contours.part_edges import points_occluded
 from tracker.errors import SessionError
 from tracker.evidence.observer import Observer
@@ -30,17 +29,14 @@ from tracker.geometry.arrays import Array
 from tracker.posing.default_pose import default_pose
 from tracker.posing.drag import drag
 from tracker.posing.grab import grab
+from tracker.search.chamfer_cost import ChamferCost, measure_nothing
 from tracker.session.lock import SessionLock
-from tracker.session.session import load_session
-from tracker.simulate.people.model_figure import ModelFigure
-from tracker.simulate.stage.camera_rig import make_cameras
-from tracker.simulate.stage.film import film, freeze
-from tracker.simulate.stage.room import see_room
-from tracker.tracking.chamfer.settings import TrackSettings, pose_cost
-from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
+from tracker.session.session import Session, load_session
 
+if TYPE_CHECKING:
+    from tracker.tracking.chamfer.settings import TrackSettings
+
+_FRAME = 25
 _FRAMES = 3
 """Number of tracked frames: motion and lost limbs exist from the second on."""
 _WAIT_S = 0.5
@@ -77,13 +73,16 @@ def _prepare(background: bool) -> None:
 def _call_kernels(background: bool) -> None:
     """Call the kernels stage by stage on the bundled tango: two people in four views.
 
-    In the background, a second process compiles the kernels of the evidence, which need none of the contours'.
+    In the background, a second process compiles the kernels of the evidence and those that measure contours, which need
+    none of the kernels that trace contours. It is a fork: importing the program takes as long as a tenth of its work.
     """
-    command = (sys.executable, "-m", "app.bench.compile_kernels", "--evidence")
-    beside = subprocess.Popen(command) if background else None
+    session = load_session(bundled("tango"))
+    cameras = [c.camera for c in session.cameras]
+    fork = multiprocessing.get_context("fork")
+    beside = fork.Process(target=_compile_evidence, args=(session,), daemon=True) if background else None
+    if beside is not None:
+        beside.start()
     try:
-        session = load_session(bundled("tango"))
-        cameras = [c.camera for c in session.cameras]
         bodies = [PosedBody(p.model, default_pose(p.model, cameras, np.eye(3), 0.0)) for p in session.people]
         held = grab(bodies[0].model, bodies[0].values, cameras[0], "left_wrist", np.zeros(2))
         drag(held, np.ones(2), bodies[0].values)
@@ -93,29 +92,38 @@ def _call_kernels(background: bool) -> None:
         record_stage("contours")
     finally:
         if beside is not None:
-            beside.wait()
-    crowd = read_crowd(session.folder, FRAME)
-    record_stage("evidence")
-    pose_cost(crowd.views, crowd.models, crowd.values, TrackSettings())(crowd.values)
+            beside.join()
+    if beside is None or beside.exitcode:
+        _compile_evidence(session)
+    with Recording(session.cameras) as recording:
+        ChamferCost(Observer(session.cameras, recording).evidence(_FRAME), bodies).at_prediction()
     record_stage("cost")
-    _call_tracking(crowd)
+    _call_tracking(session)
 
 
-def _compile_evidence() -> None:
-    """Compile the kernels of the evidence alone, beside the others."""
-    _prepare(background=True)
-    cameras = load_session(bundled("tango")).cameras
-    with Recording(cameras) as recording:
-        Observer(cameras, recording).evidence(FRAME)
+def _compile_evidence(session: Session) -> None:
+    """Compile the kernels of the evidence, and those that measure contours against it."""
+    with Recording(session.cameras) as recording:
+        views = Observer(session.cameras, recording).evidence(_FRAME)
     record_stage("evidence")
+    measure_nothing(views, tuple(p.model for p in session.people))
 
 
-def _call_tracking(crowd: BenchCrowd) -> None:
+def _call_tracking(session: Session) -> None:
     """Search and track on a few frames: two people, one as in GD96, one without a background.
 
     Kernels that tracking does not need follow: labels of the parts, the simulator.
     """
-    cameras, settings = crowd.session.cameras, TrackSettings()
+    # Imported here: most of the program, which the page's first kernels do not wait for.
+    from app.bench.sample_frames import read_crowd
+    from tracker.contours.label_image import part_labels
+    from tracker.simulate.people.model_figure import ModelFigure
+    from tracker.simulate.stage.camera_rig import make_cameras
+    from tracker.simulate.stage.film import film, freeze
+    from tracker.simulate.stage.room import see_room
+    from tracker.tracking.chamfer.settings import TrackSettings
+
+    crowd, cameras, settings = read_crowd(session.folder, _FRAME), session.cameras, TrackSettings()
     _track(cameras, settings, crowd.models, crowd.values)
     _track(cameras, replace(settings, estimate="search"), crowd.models[:1], crowd.values[:1])
     _track([replace(c, background=None) for c in cameras], settings, crowd.models[:1], crowd.values[:1])
@@ -124,17 +132,18 @@ def _call_tracking(crowd: BenchCrowd) -> None:
 
 
 def _track(
-    cameras: Sequence[CameraSource], settings: TrackSettings, models: Sequence[BodyModel], start: Sequence[Array]
+    cameras: Sequence[CameraSource], settings: "TrackSettings", models: Sequence[BodyModel], start: Sequence[Array]
 ) -> None:
+    from tracker.tracking.chamfer.tracker import ChamferTracker
+    from tracker.tracking.subjects import Subjects
+    from tracker.tracking.tracker import TrackingRun
+
     with Recording(cameras) as recording:
-        frames = range(FRAME, FRAME + _FRAMES)
+        frames = range(_FRAME, _FRAME + _FRAMES)
         run = TrackingRun(Observer(cameras, recording), Subjects.of(models), start, frames)
         for _ in ChamferTracker(settings).estimates(run):
             pass
 
 
 if __name__ == "__main__":
-    if "--evidence" in sys.argv[1:]:
-        _compile_evidence()
-    else:
-        main("--background" in sys.argv[1:])
+    main("--background" in sys.argv[1:])

@@ -1,5 +1,6 @@
 """`quadrille open`: open a session in the page."""
 
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -34,13 +35,13 @@ def command(
         sample: name of the sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
         start_again: discard the working copy of the sample and make a new one.
     """
+    from app.runtime.kernel_compiler import KernelCompiler
     from app.runtime.restart import restart
     from app.server.address import Serving
     from app.server.doorway import Doorway
     from app.session.samples import DEFAULT_SAMPLE, sample_copy
+    from tracker.session.folder import session_folder
     from tracker.session.lock import SessionLock
-    from tracker.session.relink import require_files
-    from tracker.session.session import load_session
 
     if session is not None and (sample is not None or start_again):
         raise TrackerError(
@@ -48,13 +49,20 @@ def command(
             "leave one of them out"
         )
     folder = sample_copy(sample or DEFAULT_SAMPLE, start_again) if session is None else session
-    found = load_session(folder)
-    require_files(found)
+    folder = session_folder(folder)
     serving = Serving(host, port, allow_host, browser, token)
-    with SessionLock(found.folder), Doorway(serving) as doorway:
-        from app.server.workbench import open_session  # takes seconds: the doorway answers meanwhile
+    with SessionLock(folder), Doorway(serving) as doorway, closing(KernelCompiler()) as compiler:
+        # These imports take seconds: the doorway answers meanwhile, and kernels are compiled.
+        from tracker.session.relink import require_files
+        from tracker.session.session import load_session
 
-        chosen = open_session(found, doorway, lambda line: print(line, flush=True))
+        found = load_session(folder)
+        require_files(found)
+        doorway.open_browser()
+
+        from app.server.workbench import open_session
+
+        chosen = open_session(found, doorway, compiler, lambda line: print(line, flush=True))
     if chosen is not None:
         words = ["open", str(chosen.folder), "--host", host, "--port", str(chosen.port), "--no-browser"]
         restart(words, chosen.listening)

@@ -45,8 +45,9 @@ def restore(folder: Path, backup: str | None) -> dict[str, Any]:
     Raises:
         SessionError: there is no session, no such backup, or none that is not damaged.
     """
+    from tracker.session.folder import SESSION_FILE
     from tracker.session.lock import SessionLock
-    from tracker.session.session import ANNOTATIONS_FILE, SESSION_FILE
+    from tracker.session.session import ANNOTATIONS_FILE
     from tracker.store import backups
 
     folder = Path(os.path.abspath(folder))

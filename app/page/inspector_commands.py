@@ -19,6 +19,7 @@ def _track_settings(controller: Controller, _: int, message: wire.SetTrackSettin
     after = track_settings.changed(before, msgspec.to_builtins(message.changes))
     if after != before:
         controller.search.set_settings(after)
+        controller.tracking.store_settings()
 
 
 def _view_3d(controller: Controller, _: int, message: wire.SetView3d) -> None:

@@ -37,7 +37,7 @@ class TrackChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SetTrackSettings(Command, frozen=True, tag="track_settings"):
-    """Change settings of the tracker."""
+    """Change settings of the tracker; kept with the session."""
 
     changes: TrackChanges
 

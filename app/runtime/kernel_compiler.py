@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
-from tracker.compute.kernel_cache import STAGES, compiled_mark, compiled_stages
+from tracker.compute.kernel_cache import STAGES, compiled_stages, is_compiled
 
 COMMAND = (sys.executable, "-m", "app.bench.compile_kernels", "--background")
 
@@ -22,7 +22,7 @@ class KernelCompiler:
             command: starts the process.
         """
         self._process: subprocess.Popen[bytes] | None = None
-        if not compiled_mark().exists():
+        if not is_compiled():
             # Ctrl+C in a terminal reaches the whole process group; only this program may end the process.
             self._process = subprocess.Popen(command, start_new_session=True)
 

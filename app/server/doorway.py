@@ -71,14 +71,17 @@ class Doorway:
         return page_address(self.access, self.serving.host, self.port)
 
     def __enter__(self) -> Self:
-        """Begin to answer, and open the page in the browser if that is wanted."""
+        """Begin to answer."""
         for thread in self._threads:
             thread.start()
+        return self
+
+    def open_browser(self) -> None:
+        """Open the page in the browser if that is wanted."""
         if self.serving.browser:
             invited = self.access if self.access.invitation is None else self._invited(self.access.invitation)
             opened = page_address(invited, self.serving.host, self.port)
             threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
-        return self
 
     def _invited(self, invitation: Invitation) -> Access:
         """Return the access whose token is the invitation: other accounts see the address of a browser."""

@@ -5,7 +5,6 @@ import getpass
 import signal
 import socket
 from collections.abc import Callable, Coroutine
-from contextlib import closing
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -52,12 +51,15 @@ class NextSession(NamedTuple):
     """Copies of the sockets of that port: connections wait there for the next program."""
 
 
-def open_session(session: Session, doorway: Doorway, say: Callable[[str], None]) -> NextSession | None:
+def open_session(
+    session: Session, doorway: Doorway, compiler: KernelCompiler, say: Callable[[str], None]
+) -> NextSession | None:
     """Serve the page of a session until the program is interrupted, or the page asks for another session.
 
     Args:
         session: to open; the caller holds its lock.
         doorway: answers at the page's address meanwhile.
+        compiler: compiles missing kernels; the caller closes it.
         say: shows a line to the user.
 
     Returns:
@@ -69,10 +71,7 @@ def open_session(session: Session, doorway: Doorway, say: Callable[[str], None])
     doorway.show("Opening the session")
     tokens, serving = user_state_path("quadrille", appauthor=False), doorway.serving
     indices = footage_indices()
-    with (
-        closing(KernelCompiler()) as compiler,
-        Recording(session.cameras, indices=indices, in_background=True) as recording,
-    ):
+    with Recording(session.cameras, indices=indices, in_background=True) as recording:
         remember(tokens, session.folder)
         store = AnnotationStore(session.annotations_path)
         if store.backup_error is not None:

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from tracker.errors import SessionError, TrackerError
 from tracker.files import write_text_atomic
-from tracker.session.session import SESSION_FILE
+from tracker.session.folder import SESSION_FILE
 from tracker.text_files import TextKind, read_json
 from tracker.validation import check
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from platformdirs import user_data_path
 
 from tracker.errors import SessionError
+from tracker.session.folder import SESSION_FILE
 from tracker.session.lock import SessionLock
-from tracker.session.session import SESSION_FILE
 
 DEFAULT_SAMPLE = "tango"
 

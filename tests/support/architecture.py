@@ -55,9 +55,6 @@ ROOMS = [
 ]
 FLOOR = {room: floor for floor, room in enumerate(ROOMS)}
 
-# Imports that `tracker` itself makes before any kernel is decorated.
-AT_IMPORT = {"tracker": {"tracker.compute.kernel_cache"}}
-
 # What a library without a screen does without.
 OF_THE_SCREEN = {"app", "viser", "aiohttp", "tyro", "webbrowser", "asyncio"}
 
@@ -95,7 +92,7 @@ def imported(tree, known):
 
 
 IMPORTS = {name: imported(ast.parse(path.read_text("utf-8")), FILES) for name, path in FILES.items()}
-OWN = {name: sorted(found & FILES.keys() - AT_IMPORT.get(name, set())) for name, found in IMPORTS.items()}
+OWN = {name: sorted(found & FILES.keys()) for name, found in IMPORTS.items()}
 
 
 PAGE_ROOMS = [

@@ -4,10 +4,10 @@ Each part is represented by an ellipsoid: fast, and accurate enough for samples 
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array
 

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tracker.appearance.axis_visibility import (
@@ -22,6 +21,7 @@ from tracker.appearance.axis_visibility import (
 )
 from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M

@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tracker.appearance.axis_visibility import (
@@ -25,6 +24,7 @@ from tracker.appearance.axis_visibility import (
 from tracker.appearance.limb_score import ColorView, LimbScorer, StaticParts
 from tracker.body.kinematics import Kinematics, chain_poses
 from tracker.body.model import BodyModel, PosedBody, parts_of
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours.occluding_contours import part_poses
 from tracker.evidence.view_evidence import ViewEvidence

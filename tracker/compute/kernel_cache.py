@@ -1,7 +1,7 @@
 """The cache of compiled kernels: one folder for all clones of the project, keyed by the kernels' own text.
 
 `use_kernel_cache` registers the cache with numba. The file `compiled_mark()` exists once all kernels are compiled, and
-`compiled_stages` names the groups that are compiled before.
+`compiled_stages` names the groups that are compiled before. Asking for either does not load numba.
 """
 
 import hashlib
@@ -12,11 +12,11 @@ import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import msgspec
-import numba
 from platformdirs import user_cache_path
 
 from tracker.compute.kernel_keys import KernelKeys, UnknownSourceError
@@ -26,6 +26,10 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 STAGES = ("posing", "contours", "evidence", "cost", "tracking")
 """Groups of kernels in the order in which a new user needs them; each needs some of the groups before it."""
 _MARK, _KEYS, _STAGE = "compiled-", "keys-", "stage-"
+_ORDINARY = _PACKAGE / "__pycache__"
+"""Where numba keeps kernels by itself."""
+_OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO")
+"""Environment variables of numba, without their prefix, that change compiled code."""
 _N_STATES = 12
 """Number of versions of the kernels, such as branches, that stay in the cache."""
 _N_KEY_FILES = 60
@@ -78,13 +82,12 @@ def use_kernel_cache() -> None:
     Must run before the first kernel is decorated. If numba offers no such hook, or the folder is not writable, numba's
     ordinary cache remains in use.
     """
+    import numba  # here, because `compiled_mark` is asked for before numba is needed
+
     if not numba.config.CACHE_DIR:
-        folder = user_cache_path("quadrille", appauthor=False) / "kernels"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError:
+        if _folder() == _ORDINARY:
             return
-        numba.config.CACHE_DIR = str(folder)
+        numba.config.CACHE_DIR = str(_folder())
     try:
         from numba.core.caching import CacheImpl
 
@@ -102,12 +105,7 @@ def kernel_keys() -> dict[str, str]:
     They are stored beside the kernels, because parsing the sources takes 0.5 s. A kernel whose source cannot be
     followed has no key.
     """
-    config = numba.config
-    environment = repr((numba.__version__, config.OPT, config.BOUNDSCHECK, config.DEBUGINFO_DEFAULT))
-    texts = hashlib.sha256(environment.encode())
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        texts.update(f"{path.relative_to(_PACKAGE)}\n".encode() + path.read_bytes())
-    stored = _folder() / f"{_KEYS}{texts.hexdigest()[:20]}.json"
+    environment, stored = _environment(), _keys_file()
     try:
         keys = msgspec.json.decode(stored.read_bytes(), type=dict[str, str])
     except (OSError, msgspec.DecodeError, RecursionError):
@@ -116,6 +114,19 @@ def kernel_keys() -> dict[str, str]:
             stored.parent.mkdir(parents=True, exist_ok=True)
             write_text_atomic(stored, json.dumps(keys))
     return keys
+
+
+def _environment() -> str:
+    """Return the version of numba and the options that change compiled code."""
+    return repr((_numba_version(), *(os.environ.get(f"NUMBA_{name}") for name in _OPTIONS)))
+
+
+def _keys_file() -> Path:
+    """Return the file of the keys of the present sources."""
+    texts = hashlib.sha256(_environment().encode())
+    for path in sorted(_PACKAGE.rglob("*.py")):
+        texts.update(f"{path.relative_to(_PACKAGE)}\n".encode() + path.read_bytes())
+    return _folder() / f"{_KEYS}{texts.hexdigest()[:20]}.json"
 
 
 def _computed_keys(environment: str) -> dict[str, str]:
@@ -137,6 +148,11 @@ def compiled_mark() -> Path:
     return _folder() / f"{_MARK}{_version()}"
 
 
+def is_compiled() -> bool:
+    """Return whether all kernels are compiled; quick also where not even their keys are known."""
+    return _keys_file().exists() and compiled_mark().exists()
+
+
 def compiled_stages() -> frozenset[str]:
     """Return which of the `STAGES` are compiled."""
     if compiled_mark().exists():
@@ -156,7 +172,7 @@ def _stage_mark(stage: str) -> Path:
 def _version() -> str:
     """Return what the compiled kernels depend on: their sources, numba and Python."""
     state = hashlib.sha256(repr(sorted(kernel_keys().items())).encode()).hexdigest()[:20]
-    return f"{state}-{numba.__version__}-{sys.implementation.cache_tag}"
+    return f"{state}-{_numba_version()}-{sys.implementation.cache_tag}"
 
 
 def record_compiled() -> None:
@@ -175,9 +191,22 @@ def record_compiled() -> None:
             kernel.unlink(missing_ok=True)
 
 
+@lru_cache(maxsize=1)
 def _folder() -> Path:
-    """Return the folder of the cache; without a writable one, the package's `__pycache__`."""
-    return Path(numba.config.CACHE_DIR or _PACKAGE / "__pycache__")
+    """Return the folder of the cache; where the user's cannot be made, the package's `__pycache__`."""
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(given)
+    folder = user_cache_path("quadrille", appauthor=False) / "kernels"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return _ORDINARY
+    return folder
+
+
+@lru_cache(maxsize=1)
+def _numba_version() -> str:
+    return metadata.version("numba")
 
 
 def _newest_first(pattern: str) -> list[Path]:

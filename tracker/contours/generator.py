@@ -7,8 +7,8 @@ surface points.
 """
 
 import numpy as np
-from numba import njit
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.surfaces import N_RINGS, N_SECTORS, Surfaces
 from tracker.geometry.arrays import Array, FloatArray

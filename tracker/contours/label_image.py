@@ -5,10 +5,10 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.occluding_contours import part_poses
 from tracker.geometry.arrays import Array

@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.generator import grid_generator, revolved_generator
 from tracker.contours.pieces import (
@@ -64,9 +64,12 @@ def trace(bodies: Sequence[PosedBody], camera: Camera, piece_px: float = PIECE_P
         piece_px: longest piece, px.
     """
     surfaces = surfaces_of(tuple(b.model for b in bodies))
-    out = contour_buffer(camera, len(bodies), piece_px)
-    n = trace_view(camera.projection, camera.center_world, part_poses(bodies), surfaces, piece_px, out)
-    return Contour(out.pieces_px[:n], out.parts[:n], out.occluded[:n], out.points_world[:n])
+    pieces = piece_buffer(surfaces, contour_room(camera, len(bodies), piece_px))
+    place_parts(part_poses(bodies), surfaces, pieces)
+    n = trace_pieces(camera.projection, camera.center_world, surfaces, float(piece_px), pieces)
+    out = contour_buffer(n)
+    store_contour(pieces, out)
+    return out
 
 
 def contour_room(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) -> int:
@@ -74,9 +77,8 @@ def contour_room(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) -> i
     return int(MAX_PIECES * max(1.0, PIECE_PX / piece_px) * max(1.0, camera.width / 640) * n_bodies)
 
 
-def contour_buffer(camera: Camera, n_bodies: int, piece_px: float = PIECE_PX) -> Contour:
-    """Return uninitialized room for the contours of a view, filled by `trace_view`."""
-    room = contour_room(camera, n_bodies, piece_px)
+def contour_buffer(room: int) -> Contour:
+    """Return uninitialized room for a number of pieces, filled by `store_contour`."""
     return Contour(
         np.empty((room, 4), np.float32), np.empty(room, np.int32), np.empty(room, np.bool_),
         np.empty((room, 3), np.float32),
@@ -165,7 +167,15 @@ def trace_part(
 
 @njit(**FAST_MATH)
 def trace_pieces(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, out: Pieces) -> int:
-    """Fill the pieces of placed parts in one view and return their number; see `trace_view`."""
+    """Fill the pieces of placed parts in one view and return their number.
+
+    Args:
+        P: projection matrix, (3, 4), px; its third row gives depths in metres.
+        eye: camera centre in the world, (3,), metres.
+        surfaces: shapes of the parts.
+        piece_px: longest piece, px.
+        out: placed parts (see `place_parts`), and room for the pieces; those that do not fit are left out.
+    """
     n_parts, focal = surfaces.radii.shape[0], focal_px(P)
     n = edge = np.int64(0)  # a literal would compile `trace_part` once more
     place_eye(eye, out)
@@ -179,23 +189,11 @@ def trace_pieces(P: Array, eye: Array, surfaces: Surfaces, piece_px: float, out:
     return int(n)
 
 
-@njit(nogil=True, cache=True)
-def trace_view(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: float, out: Contour) -> int:
-    """Fill a contour buffer for one view and return the number of pieces; see `trace`.
-
-    Args:
-        P: projection matrix, (3, 4), px; its third row gives depths in metres.
-        eye: camera centre in the world, (3,), metres.
-        Ts: part poses, (P, 4, 4), metres.
-        surfaces: shapes of the parts.
-        piece_px: longest piece, px.
-        out: room for the pieces; pieces that do not fit are left out.
-    """
-    pieces = piece_buffer(surfaces, out.parts.shape[0])
-    place_parts(Ts, surfaces, pieces)
-    n = trace_pieces(P, eye, surfaces, piece_px, pieces)
+@njit(**FAST_MATH)
+def store_contour(pieces: Pieces, out: Contour) -> None:
+    """Store the traced pieces with their parts and their points in the world."""
     points, W = out.points_world, pieces.Ts_world_unit
-    for part in range(Ts.shape[0]):
+    for part in range(W.shape[0]):
         for i in range(pieces.firsts[part], pieces.firsts[part + 1]):
             out.parts[i], out.occluded[i] = part, pieces.occluded[i]
             x, y, z = pieces.middles[0, i], pieces.middles[1, i], pieces.middles[2, i]
@@ -203,4 +201,3 @@ def trace_view(P: Array, eye: Array, Ts: Array, surfaces: Surfaces, piece_px: fl
                 out.pieces_px[i, k] = pieces.ends[k, i]
             for k in range(3):
                 points[i, k] = W[part, k, 0] * x + W[part, k, 1] * y + W[part, k, 2] * z + W[part, k, 3]
-    return n

@@ -8,9 +8,9 @@ as much.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.generator import MAX_POINTS
 from tracker.contours.surfaces import Surfaces
@@ -64,9 +64,8 @@ class Pieces(NamedTuple):
     """Whether the pieces of each part come from the cache of static contours, (P,); see `static_cache`."""
 
 
-@njit(nogil=True, cache=True)
 def piece_buffer(surfaces: Surfaces, room: int) -> Pieces:
-    """Return uninitialized room for the pieces of a view, filled by `trace_pieces`."""
+    """Return room for the pieces of a view, filled by `trace_pieces`."""
     n_parts, grid_size = surfaces.offsets.shape
     return Pieces(
         np.empty((4, room), np.float32), np.zeros((3, room + LANES), np.float32), np.empty(room, np.int32),

@@ -8,9 +8,9 @@ traced, and what they occlude.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.contours.generator import MAX_POINTS
 from tracker.contours.occluding_contours import focal_px, mark_all_occluded, trace_part

@@ -6,9 +6,9 @@ part does not fill its quadric, its own shape is tested on the common interval.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.surfaces import ALONG, N_ALONG, N_SECTION, SECTION
 from tracker.geometry.arrays import FloatArray

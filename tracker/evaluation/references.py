@@ -15,7 +15,8 @@ from tracker.formats.model_toml import PRESETS, load_model
 from tracker.formats.pose_csv import PoseTable, read_pose_table
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.geometry.arrays import Array
-from tracker.session.session import SESSION_FILE, Session, load_session
+from tracker.session.folder import SESSION_FILE
+from tracker.session.session import Session, load_session
 from tracker.store.stored_poses import read_stored_poses
 
 

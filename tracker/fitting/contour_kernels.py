@@ -1,8 +1,8 @@
 """Sum the contour residuals of one pose over all views: trace, match, and accumulate part by part."""
 
 import numpy as np
-from numba import njit
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours import occluding_contours
 from tracker.contours.pieces import PIECE_PX, place_parts

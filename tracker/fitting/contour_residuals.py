@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
+from tracker.compute.jit import njit
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import StaticContours, static_contours_buffer
 from tracker.contours.surfaces import Surfaces, resized_surfaces, surfaces_of

@@ -10,11 +10,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
+from tracker.compute.jit import njit
 from tracker.contours.surfaces import surfaces_of
 from tracker.fitting.gauss_newton import NormalEquations
 from tracker.geometry.arrays import Array, IntArray

@@ -5,9 +5,9 @@ their summed weight, so that it pulls a pose like both.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence

@@ -1,9 +1,9 @@
 """Match edge points with segments of visible contours, by distance and orientation (oriented chamfer matching)."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.pieces import PIECE_PX
 from tracker.contours.static_cache import StaticContours, mark_covered_segments, store_pieces, trace_static

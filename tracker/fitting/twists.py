@@ -5,9 +5,9 @@ therefore has the row (X x g, g), whatever joints move the part.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.geometry.arrays import Array, FloatArray, IntArray
 

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.geometry.arrays import FloatArray, IntArray
 

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.quantiles import median
 from tracker.geometry.arrays import Image
 

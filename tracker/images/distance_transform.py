@@ -1,9 +1,9 @@
 """Distance images: compute them from edges and interpolate them between pixels."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.geometry.arrays import FloatArray
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.geometry.segment_distance import LANES, RowSortedPoints, cells_within, sort_points

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.geometry.arrays import FloatArray, Image
 from tracker.images.background_subtraction import SMOOTHING_PX
 

@@ -6,9 +6,9 @@ lies on them is refused as a whole, as GD96 Sect. 4.2 refuses segments that the 
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.geometry.arrays import FloatArray
 from tracker.images.edge_segments import EdgeSegments
 

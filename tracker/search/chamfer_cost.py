@@ -7,7 +7,7 @@ views. Costs are in undistorted pixels of the footage; the views may have a smal
 
 import os
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Literal, NamedTuple
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.threads import kernel_pool
 from tracker.contours import occluding_contours
-from tracker.contours.pieces import piece_buffer
-from tracker.contours.surfaces import surfaces_of
+from tracker.contours.pieces import PIECE_PX, piece_buffer, place_parts
+from tracker.contours.surfaces import Surfaces, surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.segment_distance import (
@@ -29,7 +29,7 @@ from tracker.geometry.segment_distance import (
     stack_rows,
     within_reach,
 )
-from tracker.search.chamfer_kernels import ScoreBuffers, ScoredViews, TracedContours, score_candidates, trace_views
+from tracker.search.chamfer_kernels import ScoreBuffers, ScoredViews, TracedContours, measure_view, score_candidates
 
 Outliers = Literal["truncated", "paper"]
 
@@ -86,21 +86,8 @@ class ChamferCost:
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
         room = occluding_contours.contour_room(widest, len(self.models))
         self._predicted, self._contours = tuple(b.values for b in predicted), self._traced(views, predicted, room)
-        near = [
-            _near(v, *pieces, theta) for v, pieces, theta in zip(views, self._pieces_by_view(), thetas, strict=True)
-        ]
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
-        self._arrays = ScoredViews(
-            np.stack([v.camera.projection for v in views]),
-            np.stack([v.camera.center_world for v in views]),
-            np.array([v.camera.size for v in views], dtype=np.int64),
-            _distances(tuple(views)),
-            np.concatenate([n.points for n in near], axis=1),
-            stack_rows([n.rows for n in near]),
-            np.concatenate([[0], np.cumsum([n.points.shape[1] for n in near])]).astype(np.int64),
-            np.array([n.n_points for n in near], dtype=np.int64),
-            np.array(thetas),
-        )
+        self._arrays = scored_views(views, thetas, self._pieces_by_view())
         self._room = max(room, self._arrays.points.shape[1])
         self._own = threading.local()
 
@@ -152,17 +139,16 @@ class ChamferCost:
 
     def _traced(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], room: int) -> TracedContours:
         """Trace the contours of posed bodies in all views."""
-        out = TracedContours(
-            np.empty((4, room * len(views)), np.float32), np.empty(room * len(views), np.bool_),
-            np.empty(room * len(views), np.int32), np.zeros(len(views) + 1, np.int64),
-        )  # fmt: skip
-        n = trace_views(
-            np.stack([v.camera.projection for v in views]),
-            np.stack([v.camera.center_world for v in views]),
-            occluding_contours.part_poses(bodies), self._surfaces,
-            piece_buffer(self._surfaces, room), out,
-        )  # fmt: skip
-        return TracedContours(out.ends[:, :n].copy(), out.occluded[:n].copy(), out.edges[:n].copy(), out.firsts)
+        pieces, traced = piece_buffer(self._surfaces, room), []
+        place_parts(occluding_contours.part_poses(bodies), self._surfaces, pieces)
+        for view in views:
+            n = occluding_contours.trace_pieces(
+                view.camera.projection, view.camera.center_world, self._surfaces, PIECE_PX, pieces
+            )
+            traced.append((pieces.ends[:, :n].copy(), pieces.occluded[:n].copy(), pieces.edges[:n].copy()))
+        ends, occluded, edges = zip(*traced, strict=True)
+        firsts = np.cumsum([0, *map(len, edges)]).astype(np.int64)
+        return TracedContours(np.concatenate(ends, axis=1), np.concatenate(occluded), np.concatenate(edges), firsts)
 
     def _directed(
         self, person: int, candidates: Array, poses: Sequence[Array], contours: TracedContours | None = None
@@ -180,8 +166,8 @@ class ChamferCost:
 
         def score(share: slice) -> None:
             score_candidates(
-                poses_of[share], first, model.n_dofs, model.tree, Ts, self._surfaces, self._arrays, paper,
-                traced, self._scratch(), directed[share],
+                poses_of[share], first, model.tree, Ts.copy(), self._surfaces, self._arrays, paper, traced,
+                self._scratch(), directed[share],
             )  # fmt: skip
 
         if self._threads > 1 and len(candidates) >= _MIN_SHARED_CANDIDATES:
@@ -202,12 +188,8 @@ class ChamferCost:
         """Return the scratch of the calling thread."""
         scratch: ScoreBuffers | None = getattr(self._own, "scratch", None)
         if scratch is None:
-            room = self._room
-            scratch = self._own.scratch = ScoreBuffers(
-                piece_buffer(self._surfaces, room),
-                segment_buffer(room), np.empty((3, room), np.float32),
-                np.empty(room, np.float32), np.empty(room, np.float32), np.ones(room, np.float32),
-            )  # fmt: skip
+            n_dofs = max(m.n_dofs for m in self.models)
+            scratch = self._own.scratch = score_buffers(self._surfaces, self._room, n_dofs)
         return scratch
 
     def _blank_unseen(self, view_costs_px: Array) -> Array:
@@ -219,6 +201,49 @@ class ChamferCost:
         if not self._seen.any():
             return np.full(view_costs_px.shape[:-1], np.mean(self._arrays.thetas / self._scales))
         return view_costs_px[..., self._seen].mean(axis=-1)
+
+
+def score_buffers(surfaces: Surfaces, room: int, n_dofs: int) -> ScoreBuffers:
+    """Return scratch for pieces and for edge points of one view, both at most `room`, and for a person's dofs."""
+    return ScoreBuffers(
+        piece_buffer(surfaces, room), segment_buffer(room), np.empty((3, room), np.float32),
+        np.empty(room, np.float32), np.empty(room, np.float32), np.ones(room, np.float32),
+        np.empty((n_dofs, 3)), np.empty((n_dofs, 3)),
+    )  # fmt: skip
+
+
+def scored_views(
+    views: Sequence[ViewEvidence],
+    thetas: Sequence[float],
+    contours: Iterable[tuple[FloatArray, NDArray[np.bool_]]],
+) -> ScoredViews:
+    """Return the evidence as arrays, with the edge points near predicted contours.
+
+    Args:
+        views: evidence of each view.
+        thetas: outlier distance of each view, working px.
+        contours: pieces of the predicted contours in each view, (N, 4), and whether they are occluded, (N,).
+    """
+    near = [_near(v, *pieces, theta) for v, pieces, theta in zip(views, contours, thetas, strict=True)]
+    return ScoredViews(
+        np.stack([v.camera.projection for v in views]),
+        np.stack([v.camera.center_world for v in views]),
+        np.array([v.camera.size for v in views], dtype=np.int64),
+        _distances(tuple(views)),
+        np.concatenate([n.points for n in near], axis=1),
+        stack_rows([n.rows for n in near]),
+        np.concatenate([[0], np.cumsum([n.points.shape[1] for n in near])]).astype(np.int64),
+        np.array([n.n_points for n in near], dtype=np.int64),
+        np.array(thetas),
+    )
+
+
+def measure_nothing(views: Sequence[ViewEvidence], models: tuple[BodyModel, ...]) -> None:
+    """Call the kernels that measure contours, without a contour; none that traces contours is needed."""
+    no_pieces = np.empty((0, 4), np.float32), np.empty(0, np.bool_)
+    arrays = scored_views(views, [v.outlier_px(None) for v in views], [no_pieces] * len(views))
+    scratch = score_buffers(surfaces_of(models), arrays.points.shape[1], 1)
+    measure_view(0, 0, 0, arrays, False, scratch, np.empty(2))
 
 
 @lru_cache(maxsize=1)  # a hand makes dozens of costs a second from the same views

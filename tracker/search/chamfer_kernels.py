@@ -3,10 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Tree, forward_kinematics
+from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.occluding_contours import trace_pieces
 from tracker.contours.pieces import PIECE_PX, Pieces, place_parts
@@ -16,6 +16,7 @@ from tracker.geometry.segment_distance import Segments, nearest_segment
 from tracker.images.distance_transform import bilinear
 
 _ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)  # Python floats would promote to float64
+_PAPER = np.bool_(True)  # a literal would compile `_robust_mean` once more
 _JOINED = 10
 """Largest number of consecutive pieces on one straight edge that are joined to one segment: longer segments would reach
 too many points."""
@@ -59,6 +60,10 @@ class ScoreBuffers(NamedTuple):
     """Distances of pieces or of edge points, (room,), px."""
     ones: FloatArray
     """Weights of edge points, (room,)."""
+    axes: Array
+    """Room for the axes of one person's degrees of freedom, (most dofs, 3); see `forward_kinematics`."""
+    origins: Array
+    """Room for their origins, (most dofs, 3)."""
 
 
 class TracedContours(NamedTuple):
@@ -135,7 +140,7 @@ def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: fl
     for i in range(n):
         d[i] = _distance(image, width, height, visible[0, i], visible[1, i])
         lengths[i] = np.sqrt(visible[2, i])
-    return _robust_mean(d, lengths, n, theta, True)
+    return _robust_mean(d, lengths, n, theta, _PAPER)
 
 
 @njit(**FAST_MATH)
@@ -162,26 +167,6 @@ def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segment
     return int(m), int(k)
 
 
-@njit(nogil=True, cache=True)
-def trace_views(
-    P: Array, eyes: Array, Ts: Array, surfaces: Surfaces, pieces: Pieces,
-    out: TracedContours,
-) -> int:  # fmt: skip
-    """Fill the contours of posed parts in all views; return their number."""
-    place_parts(Ts, surfaces, pieces)
-    at = 0
-    for view in range(P.shape[0]):
-        n = trace_pieces(P[view], eyes[view], surfaces, PIECE_PX, pieces)
-        out.firsts[view] = at
-        for i in range(n):
-            for k in range(4):
-                out.ends[k, at + i] = pieces.ends[k, i]
-            out.occluded[at + i], out.edges[at + i] = pieces.occluded[i], pieces.edges[i]
-        at += n
-    out.firsts[P.shape[0]] = at
-    return at
-
-
 @njit(**FAST_MATH)
 def _take_traced(view: int, contours: TracedContours, pieces: Pieces) -> int:
     """Copy the traced pieces of a view; return their number."""
@@ -195,49 +180,67 @@ def _take_traced(view: int, contours: TracedContours, pieces: Pieces) -> int:
 
 
 @njit(**FAST_MATH)
-def _score(
-    Ts: Array,
-    surfaces: Surfaces,
-    views: ScoredViews,
-    paper: bool,
-    contours: TracedContours,
-    scratch: ScoreBuffers,
-    directed: Array,
-) -> None:
-    """Fill the directed costs of one pose, (V, 2): model to image and image to model, working px."""
-    d, pixel = scratch.distances, 0
-    traced = contours.firsts.shape[0] > 0
-    if not traced:
-        place_parts(Ts, surfaces, scratch.pieces)
-    for view in range(views.P.shape[0]):
-        width, height, theta = views.sizes[view, 0], views.sizes[view, 1], views.thetas[view]
-        if traced:
-            n = _take_traced(view, contours, scratch.pieces)
-        else:
-            n = trace_pieces(views.P[view], views.eyes[view], surfaces, PIECE_PX, scratch.pieces)
-        n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
-        image = views.distances[pixel : pixel + width * height]
-        if paper:
-            directed[view, 0] = _forward_paper(n_visible, image, width, height, theta, scratch)
-        else:
-            directed[view, 0] = _forward(n_visible, image, width, height, theta, scratch.visible)
-        first, last = views.firsts[view], views.firsts[view + 1]
-        u, v = views.points[0][first:last], views.points[1][first:last]
-        nearest_segment(u, v, views.rows[view], scratch.segments, n_segments, theta, d)
-        directed[view, 1] = _robust_mean(d, scratch.ones, views.counts[view], theta, paper)
-        pixel += width * height
+def measure_view(
+    view: int, n: int, pixel: int, views: ScoredViews, paper: bool, scratch: ScoreBuffers, directed: Array
+) -> int:
+    """Fill the directed costs of the n pieces of one view: model to image and image to model, (2,), working px.
+
+    Compiled without the kernels that trace, so that both can be compiled side by side.
+
+    Args:
+        view: index of the view.
+        n: number of pieces in the scratch.
+        pixel: index of the first pixel of its distance image.
+        views: the evidence.
+        paper: whether outliers are those of the paper, see `ChamferCost`.
+        scratch: with the pieces.
+        directed: to fill.
+
+    Returns:
+        The index of the first pixel of the next view.
+    """
+    width, height, theta, d = views.sizes[view, 0], views.sizes[view, 1], views.thetas[view], scratch.distances
+    n_visible, n_segments = _take_visible(n, scratch.pieces, scratch.visible, scratch.segments)
+    image = views.distances[pixel : pixel + width * height]
+    if paper:
+        directed[0] = _forward_paper(n_visible, image, width, height, theta, scratch)
+    else:
+        directed[0] = _forward(n_visible, image, width, height, theta, scratch.visible)
+    first, last = views.firsts[view], views.firsts[view + 1]
+    u, v = views.points[0][first:last], views.points[1][first:last]
+    nearest_segment(u, v, views.rows[view], scratch.segments, n_segments, theta, d)
+    directed[1] = _robust_mean(d, scratch.ones, views.counts[view], theta, paper)
+    return int(pixel + width * height)
 
 
-@njit(nogil=True, cache=True)
+@njit(**FAST_MATH)
 def score_candidates(
-    candidates: Array, first: int, n_dofs: int, tree: Tree, Ts: Array,
-    surfaces: Surfaces, views: ScoredViews, paper: bool, contours: TracedContours, scratch: ScoreBuffers,
-    directed: Array,
+    candidates: Array, first: int, tree: Tree, Ts: Array, surfaces: Surfaces, views: ScoredViews, paper: bool,
+    contours: TracedContours, scratch: ScoreBuffers, directed: Array,
 ) -> None:  # fmt: skip
-    """Run `_score` for many poses of the person whose parts begin at `first`; directed is (C, V, 2)."""
-    last = first + tree.parents.shape[0]
-    own = Ts.copy()
-    axes, origins = np.empty((n_dofs, 3)), np.empty((n_dofs, 3))
+    """Fill the directed costs of many poses of the person whose parts begin at `first`, see `measure_view`.
+
+    Args:
+        candidates: the poses, (C, n_values).
+        first: index of the person's first part.
+        tree: of the person's body.
+        Ts: poses of the parts of all people, (P, 4, 4), metres; those of the person are overwritten.
+        surfaces: of all people.
+        views: the evidence.
+        paper: whether outliers are those of the paper, see `ChamferCost`.
+        contours: of the only candidate, if they are traced already.
+        scratch: of this thread.
+        directed: to fill, (C, V, 2), working px.
+    """
+    own, traced = Ts[first : first + tree.parents.shape[0]], contours.firsts.shape[0] > 0
     for c in range(candidates.shape[0]):
-        forward_kinematics(candidates[c], tree, own[first:last], axes, origins)
-        _score(own, surfaces, views, paper, contours, scratch, directed[c])
+        if not traced:
+            forward_kinematics(candidates[c], tree, own, scratch.axes, scratch.origins)
+            place_parts(Ts, surfaces, scratch.pieces)
+        pixel = np.int64(0)  # a literal would compile `measure_view` once more
+        for view in range(views.P.shape[0]):
+            if traced:
+                n = _take_traced(view, contours, scratch.pieces)
+            else:
+                n = trace_pieces(views.P[view], views.eyes[view], surfaces, PIECE_PX, scratch.pieces)
+            pixel = measure_view(view, n, pixel, views, paper, scratch, directed[c, view])

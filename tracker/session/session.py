@@ -10,7 +10,6 @@ Footage may lie anywhere. Paths in session.toml are relative to the session fold
 that both can be moved together, and absolute otherwise.
 """
 
-import os
 import secrets
 import shutil
 from collections.abc import Sequence
@@ -29,6 +28,7 @@ from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
+from tracker.session.folder import SESSION_FILE, session_folder, tidy_path
 from tracker.session.session_file import (
     FloorRow,
     SessionFile,
@@ -38,7 +38,6 @@ from tracker.session.session_file import (
 )
 from tracker.validation import quoted
 
-SESSION_FILE = "session.toml"
 CALIBRATION_FILE = "calibration.toml"
 ANNOTATIONS_FILE = "annotations.sqlite"
 PALETTE = ("#53a504", "#d062f2", "#f5b8c2", "#60c0d8", "#96f19e", "#abb179", "#8793a7", "#a78c85")
@@ -105,7 +104,7 @@ def create_session(
         SessionError: the folder is in use or cannot be written, or a name or axis is not allowed.
         RecordingError: footage is missing or unreadable (only if `n_frames` is left out).
     """
-    folder = _tidy(Path(folder))
+    folder = tidy_path(Path(folder))
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise SessionError(f"{folder} exists already and is not an empty folder; choose another name or remove it")
     sources = tuple(_absolute(c) for c in cameras)
@@ -151,11 +150,8 @@ def load_session(folder: str | Path) -> Session:
         CalibrationError: the calibration is missing or malformed.
         ModelError: a body model is missing or malformed.
     """
-    folder = _tidy(Path(folder))
-    path = folder / SESSION_FILE
-    if not os.path.isfile(path):  # unlike pathlib's, it is False for a name too long for the system
-        raise SessionError(f"{folder} is not a session: expected {SESSION_FILE} in it; make one with 'quadrille new'")
-    row = read_session_file(path)
+    folder = session_folder(folder)
+    row = read_session_file(folder / SESSION_FILE)
     return Session(
         folder,
         row.name,
@@ -318,15 +314,10 @@ def _absolute(source: CameraSource) -> CameraSource:
     """Make relative paths absolute by the current working folder, which the session outlives."""
     return replace(
         source,
-        footage=_tidy(source.footage),
-        background=_tidy(source.background) if source.background is not None else None,
-        masks=_tidy(source.masks) if source.masks is not None else None,
+        footage=tidy_path(source.footage),
+        background=tidy_path(source.background) if source.background is not None else None,
+        masks=tidy_path(source.masks) if source.masks is not None else None,
     )
-
-
-def _tidy(path: Path) -> Path:
-    """Make a path absolute and free of `..`, but keep links: a link to footage elsewhere must stay one."""
-    return Path(os.path.abspath(path))
 
 
 def _relative(path: Path, folder: Path) -> str:
@@ -340,7 +331,7 @@ def _relative(path: Path, folder: Path) -> str:
 
 
 def _resolve(text: str, folder: Path) -> Path:
-    path = _tidy(folder / text)
+    path = tidy_path(folder / text)
     try:
         path.exists()
     except OSError as error:

@@ -12,13 +12,13 @@ from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody
+from tracker.compute.jit import njit
 from tracker.contours import occluding_contours
-from tracker.contours.occluding_contours import Contour, trace_view
-from tracker.contours.pieces import PIECE_PX
+from tracker.contours.occluding_contours import Contour, contour_buffer, store_contour, trace_pieces
+from tracker.contours.pieces import PIECE_PX, Pieces, piece_buffer, place_parts
 from tracker.contours.surfaces import Surfaces, surfaces_of
 from tracker.evidence.view_evidence import (
     ACCEPTED_SHARE,
@@ -126,9 +126,10 @@ class _View:
             np.empty((n_people, len(edges.counts)), np.bool_), np.empty((n_people, len(silhouette.counts)), np.bool_),
             np.zeros(n_people, np.bool_),
         )  # fmt: skip
+        room = occluding_contours.contour_room(view.camera, n_people)
         _assign(
             view.camera.projection, view.camera.center_world, self._Ts, self._surfaces,
-            occluding_contours.contour_buffer(view.camera, n_people), edges, silhouette, view.theta_px, out,
+            piece_buffer(self._surfaces, room), contour_buffer(room), edges, silhouette, view.theta_px, out,
         )  # fmt: skip
         return out
 
@@ -164,16 +165,17 @@ def _no_samples() -> Samples:
 # One call for each view: each call would release the interpreter lock and wait for it again.
 @njit(nogil=True, cache=True)
 def _assign(
-    P: Array, eye: Array, Ts: Array, surfaces: Surfaces, contour: Contour, edges: Samples, silhouette: Samples,
-    theta_px: float, out: _Ownership,
+    P: Array, eye: Array, Ts: Array, surfaces: Surfaces, pieces: Pieces, contour: Contour, edges: Samples,
+    silhouette: Samples, theta_px: float, out: _Ownership,
 ) -> None:  # fmt: skip
     """Compute the ownership of the evidence of one view.
 
     Args:
-        P: of the view; see `trace_view` for this and the next three.
+        P: of the view; see `trace_pieces`.
         eye: of the view.
-        Ts: of all people.
+        Ts: poses of the parts of all people, (P, 4, 4), metres.
         surfaces: of all people.
+        pieces: buffer for tracing.
         contour: buffer for the contours.
         edges: samples of the edges.
         silhouette: points of the silhouette, each a segment of its own.
@@ -181,7 +183,9 @@ def _assign(
         out: is filled.
     """
     reach, n_people = _REACH * theta_px, out.near.shape[0]
-    n = trace_view(P, eye, Ts, surfaces, PIECE_PX, contour)
+    place_parts(Ts, surfaces, pieces)
+    n = trace_pieces(P, eye, surfaces, PIECE_PX, pieces)
+    store_contour(pieces, contour)
     own, boxes = np.empty((n, 4), np.float32), np.empty((n_people, 4))
     # Distances of the samples from each person's visible contours, px, cut off at the reach.
     to_edges = np.empty((n_people, edges.pixels.points.shape[1]), np.float32)

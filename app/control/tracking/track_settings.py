@@ -1,10 +1,26 @@
-"""Edit the settings of the tracker."""
+"""Edit the settings of the tracker, and keep them with the session."""
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypedDict
 
-from tracker.tracking.chamfer.settings import RecoverSettings, TrackSettings
+import msgspec
+
+from tracker.errors import TrackerError
+from tracker.tracking.chamfer.settings import Estimation, RecoverSettings, TrackSettings
+
+SETTING = "track_settings"
+"""Setting of the session."""
+
+
+class _Kept(TypedDict, total=False):
+    """The settings that a user chooses."""
+
+    estimate: Estimation
+    order: int
+    past_poses: int
+    recover: bool
+    backward_pass: bool
 
 
 def changed(before: TrackSettings, changes: Mapping[str, Any]) -> TrackSettings:
@@ -31,4 +47,31 @@ def changed(before: TrackSettings, changes: Mapping[str, Any]) -> TrackSettings:
         recover=(before.recover or RecoverSettings()) if recovers else None,
         backward_pass=changes.get("backward_pass", before.backward_pass),
         smooth=changes.get("smooth", before.smooth),
+    )
+
+
+def stored(settings: TrackSettings) -> dict[str, Any]:
+    """Return what the session keeps: the changes from the default, see `changed`."""
+    own, default = dict(_choices(settings)), dict(_choices(TrackSettings()))
+    return {name: value for name, value in own.items() if value != default[name]}
+
+
+def restored(data: object) -> TrackSettings:
+    """Return the settings that a session keeps; the default where it keeps none, or none of this version."""
+    default = TrackSettings()
+    if not isinstance(data, Mapping) or not data.keys() <= _choices(default).keys():
+        return default
+    try:
+        return changed(default, msgspec.convert(data, _Kept, strict=True))
+    except (TrackerError, msgspec.ValidationError):
+        return default
+
+
+def _choices(settings: TrackSettings) -> "_Kept":
+    return _Kept(
+        estimate=settings.estimate,
+        order=settings.predict.order,
+        past_poses=settings.predict.window,
+        recover=settings.recover is not None,
+        backward_pass=settings.backward_pass,
     )

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
+from app.control.tracking import track_settings
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
 from app.state.progress import TrackState
@@ -54,7 +55,7 @@ class Tracking:
     """Controls the tracking run. There is at most one, running or paused."""
 
     def __init__(self, session_state: SessionState, activities: Activities) -> None:
-        """Track nothing yet.
+        """Restore the settings of the session, and track nothing yet.
 
         Args:
             session_state: holds the state.
@@ -62,6 +63,7 @@ class Tracking:
         """
         self._session_state, self._activities = session_state, activities
         activities.add_job(self, on_shown_frame=True)
+        session_state.set(settings=track_settings.restored(session_state.saver.setting(track_settings.SETTING)))
         self._run: _Run | None = None
         session_state.unwritten.append(lambda: self._run is not None and self._run.session.has_unsaved)
 
@@ -69,6 +71,15 @@ class Tracking:
     def running(self) -> bool:
         """Whether a run is running."""
         return self._run is not None and self._run.job.running
+
+    def store_settings(self) -> None:
+        """Keep the present settings of the tracker with the session; on disk when this returns.
+
+        Raises:
+            TrackerError: the session's settings cannot be written.
+        """
+        settings = track_settings.stored(self._session_state.state.settings)
+        self._session_state.saver.store_setting(track_settings.SETTING, settings)
 
     def start(self, backward: bool, until: int | None) -> None:
         """Begin a run from the shown poses; a former run must have been ended.

@@ -154,7 +154,7 @@ def test_every_tracking_method_can_be_named():
 
 @pytest.mark.parametrize("compiled", [False, True])
 def test_tracking_says_that_kernels_may_have_to_be_compiled(run, session, tmp_path, monkeypatch, compiled):
-    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("tracker.compute.kernel_cache._folder", lambda: tmp_path)
     if compiled:
         compiled_mark().touch()
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
@@ -322,7 +322,8 @@ def test_simulate(run, tmp_path):
 def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
     asked, samples, browsed = [], [], []
     monkeypatch.setattr(
-        "app.server.workbench.open_session", lambda found, doorway, say: asked.append((found.folder, doorway.serving))
+        "app.server.workbench.open_session",
+        lambda found, doorway, compiler, say: asked.append((found.folder, doorway.serving)),
     )
     monkeypatch.setattr("app.session.samples.sample_copy", lambda *words: samples.append(words) or session)
     monkeypatch.setattr("app.server.doorway.listen", lambda host, _: address.listen(host, 0))

@@ -2,6 +2,7 @@
 
 import json
 
+import msgspec
 import pytest
 
 from app.page.commands import dispatch
@@ -47,6 +48,26 @@ def test_settings_are_shown_changed_one_by_one_and_their_defaults_known(page):
     assert page.controller.state.settings.recover is not None
     with pytest.raises(MessageError, match=r"a whole number <= 8 as 'changes.past_poses'"):
         page.send("track_settings", changes={"past_poses": 9})
+
+
+def test_track_settings_are_kept_with_the_session(page, opened):
+    page.send("track_settings", changes={"estimate": "search", "order": 2, "recover": False, "backward_pass": False})
+    page.send("search_settings", changes={"bound_rad": 0.5})
+    chosen = page.updates()["settings"]
+    page.controller = opened()
+    again = Page(page.controller)
+    shown = again.updates()["settings"]
+    assert shown.track == chosen.track != chosen.track_default
+    assert shown.search == chosen.search_default  # those of a search are for trials
+    again.send("track_settings", changes=msgspec.to_builtins(chosen.track_default))
+    assert Page(opened()).updates()["settings"].track == chosen.track_default
+
+
+@pytest.mark.parametrize("kept", [3, {"order": 7}, {"order": "2"}, {"estimate": "guess"}, {"later": True}, ["order"]])
+def test_kept_settings_that_cannot_be_used_are_passed_over(opened, kept):
+    opened()._session_state.saver.store_setting("track_settings", kept)
+    settings = Page(opened()).updates()["settings"]
+    assert settings.track == settings.track_default
 
 
 def test_the_3d_view_is_chosen_and_kept_with_the_session(page, opened):

@@ -3,6 +3,8 @@
 import http.client
 import json
 import socket
+import subprocess
+import sys
 
 import pytest
 from gestures import wait_for
@@ -76,6 +78,7 @@ def test_the_browser_is_opened_with_an_invitation(monkeypatch, tmp_path):
     opened = []
     monkeypatch.setattr("app.server.doorway.webbrowser.open", opened.append)
     with Doorway(Serving(port=0)) as doorway:
+        doorway.open_browser()
         wait_for(lambda: opened)
     assert doorway.access.invitation.code in opened[0]
     assert doorway.access.token not in opened[0]
@@ -86,3 +89,24 @@ def test_nobody_listens_afterwards(monkeypatch, tmp_path):
     with Doorway(Serving(port=0, browser=False)) as doorway:
         pass
     assert [each.fileno() for each in doorway.sockets] == [-1] * len(doorway.sockets)
+
+
+BEFORE_THE_DOORWAY = """
+import sys
+import app.__main__
+from app.cli import open
+from app.runtime.kernel_compiler import KernelCompiler
+from app.server.doorway import Doorway
+from app.session.samples import sample_copy
+from tracker.compute.kernel_cache import is_compiled
+from tracker.session.folder import session_folder
+from tracker.session.lock import SessionLock
+
+is_compiled()
+print(*sorted({"numba", "numpy", "cv2", "av", "scipy", "viser", "aiohttp"} & sys.modules.keys()))
+"""
+
+
+def test_the_port_answers_and_kernels_are_compiled_before_anything_large_is_loaded():
+    loaded = subprocess.run([sys.executable, "-c", BEFORE_THE_DOORWAY], capture_output=True, text=True, check=True)
+    assert loaded.stdout.split() == []

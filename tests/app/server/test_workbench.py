@@ -14,6 +14,7 @@ from gestures import drag, wait_for
 from page_visits import visiting
 
 from app.control.session import save_retry
+from app.runtime.kernel_compiler import KernelCompiler
 from app.server import workbench
 from app.server.address import Serving
 from app.server.doorway import Doorway
@@ -58,7 +59,7 @@ def open_with(session, monkeypatch):
             lines = []
             try:
                 with SessionLock(session), Doorway(Serving(port=0, browser=False)) as doorway:
-                    open_session(load_session(session), doorway, lines.append)
+                    open_session(load_session(session), doorway, KernelCompiler(), lines.append)
             finally:
                 open_it.lines = lines
         return lines

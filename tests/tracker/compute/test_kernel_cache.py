@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numba
 import pytest
 
 import tracker
@@ -19,7 +18,7 @@ SOURCE = Path(tracker.__file__).parent
 CALLEE = '''"""Callees."""
 from typing import NamedTuple
 import numpy as np
-from numba import njit
+from tracker.compute.jit import njit
 
 LIMIT = 10.0
 OTHER = 3.0
@@ -44,8 +43,7 @@ def unrelated():
     return 1
 '''
 CALLER = '''"""Callers."""
-from numba import njit
-
+from tracker.compute.jit import njit
 from tracker.near import callee
 from tracker.near.callee import Pair, least
 from tracker.compute.numba_options import FAST_MATH
@@ -177,6 +175,12 @@ def keys_of(source):
     return {place: source.key(*place) for place in source.kernels()}
 
 
+def test_every_kernel_is_cached_here():
+    """A module that takes `njit` from numba may be loaded before the cache is registered."""
+    lines = {path: path.read_text("utf-8") for path in SOURCE.rglob("*.py")}
+    assert {path.name for path, text in lines.items() if "from numba import" in text} == {"jit.py"}
+
+
 def test_all_kernels_have_a_key_and_use_it():
     keys = kernel_cache.kernel_keys()
     assert len(keys) > 100
@@ -185,11 +189,11 @@ def test_all_kernels_have_a_key_and_use_it():
     for kernel in kernels.values():
         name = f"{kernel.py_func.__module__}.{kernel.py_func.__name__}"
         assert keys[name] in kernel._cache._cache_file._index_name
-        assert Path(kernel.stats.cache_path) == Path(numba.config.CACHE_DIR)
+        assert Path(kernel.stats.cache_path) == kernel_cache._folder()
 
 
 def test_old_kernels_are_pruned(tmp_path, monkeypatch):
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(kernel_cache, "_folder", lambda: tmp_path)
     for i in range(20):
         mark = tmp_path / f"compiled-{i}"
         mark.write_text(f"key{i}\n")

@@ -9,7 +9,8 @@ from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence, default_theta_px
 from tracker.formats.model_toml import load_model
-from tracker.search.chamfer_cost import ChamferCost
+from tracker.search.chamfer_cost import ChamferCost, measure_nothing
+from tracker.search.chamfer_kernels import measure_view
 
 THETA = 15.0
 FRONT = camera_at("front", (4.0, 0.0, 0.0))
@@ -307,3 +308,14 @@ def test_the_cost_at_the_prediction_is_that_of_its_poses(gavrila, outliers):
     for camera, pieces in zip(cameras_around(), cost.predicted_pieces_px, strict=True):
         contour = occluding_contours.trace(bodies, camera)
         np.testing.assert_allclose(pieces, contour.pieces_px[~contour.occluded], atol=1e-3)
+
+
+def test_kernels_that_measure_are_compiled_apart_from_those_that_trace():
+    """With the types with which a cost calls them: otherwise they are compiled twice."""
+    view = ViewEvidence(FRONT, 1.0, ring(1, 2, 3).astype(np.float32), np.zeros((480, 640), np.float32))
+    measure_nothing([view], (BALL.model,))
+    compiled = list(measure_view.signatures)
+    for outliers in ("truncated", "paper"):
+        ChamferCost([view], [BALL], THETA, outliers)([BALL.values])
+    assert measure_view.signatures == compiled
+    assert len(compiled) == 1

@@ -3,9 +3,9 @@
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 

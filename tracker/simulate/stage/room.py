@@ -5,9 +5,9 @@ from functools import cached_property
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from tracker.compute.jit import njit
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.simulate.stage.furniture import HALF_WIDTH_M, furnished

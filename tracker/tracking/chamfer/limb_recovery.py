@@ -12,13 +12,13 @@ from functools import lru_cache
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
+from tracker.compute.jit import njit
 from tracker.compute.threads import N_HELPERS, kernel_pool, map_chunked
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
 from tracker.fitting.gauss_newton import Fit, ResidualBlock

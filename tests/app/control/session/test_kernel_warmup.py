@@ -2,11 +2,10 @@
 
 import os
 import signal
-import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
-import numba
 import numpy as np
 import pytest
 from gestures import wait_for
@@ -16,6 +15,7 @@ from app.drawing import overlays
 from app.runtime import kernel_compiler
 from app.runtime.kernel_compiler import KernelCompiler
 from app.state.page_view import View
+from tracker.compute import kernel_cache
 from tracker.compute.kernel_cache import STAGES, compiled_mark, compiled_stages, record_compiled, record_stage
 
 VIEW = View(frozenset({"contours"}), (1, 0, 0, 0))
@@ -33,7 +33,7 @@ WITH_CHILD = (
 @pytest.fixture
 def empty_cache(monkeypatch, tmp_path):
     """A folder for kernels in which there are none."""
-    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(kernel_cache, "_folder", lambda: tmp_path)
     return tmp_path
 
 
@@ -83,6 +83,7 @@ def test_a_drag_before_all_kernels_moves_a_skeleton_without_cost(compiling):
 
 def test_nothing_is_started_where_all_is_compiled(opened, empty_cache, monkeypatch):
     compiled_mark().touch()
+    kernel_cache._keys_file().touch()
     monkeypatch.setattr(kernel_compiler.subprocess, "Popen", pytest.fail)
     assert KernelCompiler().stages == frozenset(STAGES)
 
@@ -130,21 +131,27 @@ def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monk
     monkeypatch.setattr("os.nice", priorities.append)
 
     class Beside:
-        def __init__(self, command):
-            beside.append(command[-1])
+        exitcode = 0
 
-        def wait(self):
-            beside.append("waited")
+        def __init__(self, target, args, daemon):
+            self._work = lambda: target(*args)
 
-    monkeypatch.setattr(subprocess, "Popen", Beside)
+        def start(self):
+            beside.append("started")
+            self._work()
+
+        def join(self):
+            beside.append("joined")
+
+    monkeypatch.setattr(compile_kernels.multiprocessing, "get_context", lambda kind: SimpleNamespace(Process=Beside))
     monkeypatch.setattr(compile_kernels, "record_stage", lambda stage: stages.append(stage) or record_stage(stage))
     monkeypatch.setattr(
         compile_kernels, "_track", lambda cameras, settings, models, start: tracked.append((cameras, settings, models))
     )
     compile_kernels.main(background=True)
     assert priorities == [19]
-    assert beside == ["--evidence", "waited"]
-    assert stages == list(STAGES[:4])
+    assert beside == ["started", "joined"]
+    assert sorted(stages) == sorted(STAGES[:4])
     assert [(s.estimate, len(m), c[0].background is None) for c, s, m in tracked] == [
         ("refine", 2, False), ("search", 1, False), ("refine", 1, True)
     ]  # fmt: skip
