@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
+from tracker.geometry.triangulation import PointObservation
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,8 @@ class ShownPose:
     """Model revision of a stored pose; None for a pose that is not stored as shown."""
     alternatives: tuple[Array, ...] = ()
     """Alternatives that the tracker found, (n_values,) each, best first; empty for a keyframe."""
+    seen: tuple[PointObservation, ...] = ()
+    """Where the user has just put points in a view, which is to be stored with the pose."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import (
+    SEEN,
     SOURCES,
     Alternative,
     Change,
@@ -37,6 +38,8 @@ T = TypeVar("T")
 
 _BY_HAND = ("manual", "pinned", "fitted")
 """Sources of edits by a person, which make a frame a keyframe; a fit that a person starts is one of them."""
+_BY_PROGRAM = ("searched", "fitted")
+"""Sources whose settings are those of a program."""
 _SAME_PX = 1e-6
 """Pins nearer than this are equal: the rounding of adding and removing lens distortion."""
 _READ_FRAMES = 2000
@@ -174,7 +177,8 @@ class Saver:
         changes: list[Change] = self._pin_changes(state)
         for person, (shown, revision) in enumerate(zip(state.people, state.revisions, strict=True)):
             stored = self._readable(self.record, person, state.frame, None)
-            if shown.source is None or (stored is not None and _is_same(stored, shown, revision)):
+            is_stored = stored is not None and _is_same(stored, shown, revision) and not shown.seen
+            if shown.source is None or is_stored:
                 continue
             sources = _sources_of(stored, shown, source)
             record = PoseRecord(
@@ -183,7 +187,7 @@ class Saver:
                 revision,
                 keyframe=source in _BY_HAND or (stored is not None and stored.keyframe),
                 cost_px=state.cost_px,
-                settings=asdict(state.settings) if source in ("searched", "fitted") else {},
+                settings=self._settings_of(stored, shown, asdict(state.settings) if source in _BY_PROGRAM else {}),
                 view_costs_px=state.view_costs_px,
             )
             if vouched is not None and person not in vouched:
@@ -306,6 +310,15 @@ class Saver:
             return read(person, frame)
         except SessionError:
             return otherwise
+
+    def _settings_of(self, stored: PoseRecord | None, shown: ShownPose, settings: dict[str, Any]) -> dict[str, Any]:
+        """Return the settings of a pose with where a user saw its points, before and now."""
+        seen: dict[str, dict[str, Any]] = {} if stored is None else dict(stored.settings.get(SEEN, {}))
+        for at in shown.seen:
+            camera = self._session.cameras[at.camera].camera
+            u, v = camera.distort_points(np.array(at.position_px))
+            seen[at.point] = {**seen.get(at.point, {}), camera.name: [float(u), float(v)]}
+        return {**settings, SEEN: seen} if seen else settings
 
     def _pin_changes(self, state: State) -> list[Change]:
         """Return the changes that make the stored pins of the frame those of the state."""

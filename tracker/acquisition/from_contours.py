@@ -6,6 +6,7 @@ so that any poses will do and joints are found where the flesh turns about them.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fitting.gauss_newton import PointTargets
+from tracker.fitting.pins import PinBlock
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.tracking.chamfer.frame_problem import FrameProblem, PersonPrior
 from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
@@ -68,6 +70,7 @@ def acquire_from_contours(
     placed: Mapping[int, PointTargets],
     settings: AcquisitionSettings,
     report: Report = lambda stage, share: None,
+    seen: Mapping[int, PinBlock] = MappingProxyType({}),
 ) -> Acquisition:
     """Acquire the body of one person.
 
@@ -78,6 +81,7 @@ def acquire_from_contours(
         placed: by frame, points of the person that somebody has placed.
         settings: of the acquisition.
         report: shows progress.
+        seen: by frame, points of the person that somebody has seen in the images.
 
     Raises:
         TrackerError: there is no frame, or the views show nothing of the person.
@@ -101,7 +105,9 @@ def acquire_from_contours(
         views = _views(observer, k, bodies[k], static_edges)
         observed.append(views)
         before.append(_cost_px(views, bodies[k]))
-        sighted.append(SightedPerson(k, _own_views(views, bodies[k], person), bodies[k], person, placed.get(k)))
+        sighted.append(
+            SightedPerson(k, _own_views(views, bodies[k], person), bodies[k], person, placed.get(k), seen.get(k))
+        )
         report("reading contours", _CHOOSING + (_OBSERVING - _CHOOSING) * (i + 1) / len(frames))
     if not any(len(v.points_px) for s in sighted for v in s.views):
         raise TrackerError(

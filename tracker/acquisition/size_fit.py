@@ -35,7 +35,8 @@ from tracker.fitting.gauss_newton import (
     damped_step,
     normal_equations,
 )
-from tracker.geometry.arrays import Array
+from tracker.fitting.pins import PinBlock
+from tracker.geometry.arrays import Array, IntArray
 
 _MIN_DAMPING, _MAX_DAMPING = 1e-6, 1e6
 _TOLERANCE = 1e-4
@@ -54,6 +55,8 @@ class SightedPerson(NamedTuple):
     """Index of the person among them."""
     placed: PointTargets | None = None
     """Where somebody has placed points of the body; None in a frame that was only tracked."""
+    seen: PinBlock | None = None
+    """Where somebody has seen points of the body in the images; None where nobody has."""
 
     def moved(self, model: BodyModel, pose: Array) -> "SightedPerson":
         """Return the person with another body and pose."""
@@ -278,6 +281,12 @@ class _Problem:
         if placed is not None:
             own = _linearize_placed(placed, body, kinematics, by_sizes)
             cost, gradient, hessian = cost + own.cost, gradient + own.gradient, hessian + own.hessian
+        seen = self._frames[i].seen
+        if seen is not None:
+            r, by_points = seen.residuals(body, kinematics)
+            rows = by_points @ _points_by_unknowns(seen.points, body, kinematics, by_sizes)
+            own = normal_equations(r.ravel(), rows.reshape(-1, rows.shape[2]))
+            cost, gradient, hessian = cost + own.cost, gradient + own.gradient, hessian + own.hessian
         for block in self._priors[i]:
             prior = block.linearize(body, pose, kinematics)
             cost += prior.cost
@@ -290,14 +299,15 @@ def _linearize_placed(
     placed: PointTargets, body: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays
 ) -> NormalEquations:
     """Return the normal equations of placed points by the sizes, then by the pose."""
-    parts, points_world = body.point_parts[placed.points], body.points_at(kinematics, placed.points)
-    sides = (
-        points_by_sizes(body, kinematics, by_sizes)[placed.points],
-        body.point_jacobian(kinematics, parts, points_world),
-    )
-    rows = np.concatenate(sides, axis=2) * placed.weights[:, None, None]
-    r = (points_world - placed.targets_world) * placed.weights[:, None]
+    rows = _points_by_unknowns(placed.points, body, kinematics, by_sizes) * placed.weights[:, None, None]
+    r = (body.points_at(kinematics, placed.points) - placed.targets_world) * placed.weights[:, None]
     return normal_equations(r.ravel(), rows.reshape(-1, rows.shape[2]))
+
+
+def _points_by_unknowns(points: IntArray, body: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
+    """Differentiate some points, given by index (N,), by the sizes and then the pose, (N, 3, n_unknowns), metres."""
+    by_pose = body.point_jacobian(kinematics, body.point_parts[points], body.points_at(kinematics, points))
+    return np.concatenate([points_by_sizes(body, kinematics, by_sizes)[points], by_pose], axis=2)
 
 
 def _residuals(person: SightedPerson, settings: SizeFitSettings, step: Round) -> list[ContourResiduals]:

@@ -4,7 +4,7 @@ Positions are undistorted pixels here; the store holds original pixels.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -36,13 +36,20 @@ class PinBlock:
 
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
-        parts = model.point_parts[self.points]
-        points_world = model.points_at(kinematics, self.points)
-        points_px, px_by_point = project_with_jacobian(*self._projections, points_world)
-        r = (points_px - self.positions_px) / self.sigmas_px[:, None]
-        point_by_dofs = model.point_jacobian(kinematics, parts, points_world)  # (N, 3, n_dofs)
-        rows = px_by_point @ point_by_dofs / self.sigmas_px[:, None, None]
+        parts, points_world = model.point_parts[self.points], model.points_at(kinematics, self.points)
+        r, by_points = self.residuals(model, kinematics)
+        rows = by_points @ model.point_jacobian(kinematics, parts, points_world)
         return normal_equations(r.ravel(), rows.reshape(-1, model.n_dofs))
+
+    def widened(self, factor: float) -> "PinBlock":
+        """Return the same pins with standard deviations that are larger by a factor."""
+        return replace(self, sigmas_px=self.sigmas_px * factor)
+
+    def residuals(self, model: BodyModel, kinematics: Kinematics) -> tuple[Array, Array]:
+        """Return the weighted residuals, (N, 2), and their derivatives by the points, (N, 2, 3), per metre."""
+        points_px, px_by_point = project_with_jacobian(*self._projections, model.points_at(kinematics, self.points))
+        r = (points_px - self.positions_px) / self.sigmas_px[:, None]
+        return r, px_by_point / self.sigmas_px[:, None, None]
 
     @cached_property
     def _projections(self) -> tuple[Array, Array]:

@@ -1,6 +1,7 @@
 """Acquire a person's body from what a session stores, and make it the person's present body."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,12 +13,14 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import PointTargets
+from tracker.fitting.pins import PinBlock, pin_block
 from tracker.formats.model_toml import PRESETS, format_model, load_model
 from tracker.geometry.arrays import Array
+from tracker.geometry.triangulation import PointObservation
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Change, PoseChange, PoseRecord
+from tracker.store.records import SEEN, Change, PoseChange, PoseRecord
 from tracker.store.stored_poses import StoredPose, read_stored_poses
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
@@ -29,6 +32,8 @@ SIZES_EDITS = "sizes_edits"
 before and after it."""
 PLACED_M = 0.02
 """Standard deviation of a joint that a user has placed in the images, metres."""
+_HAND = 3.0
+"""Standard deviation of where a hand puts a point, in that of a pin that pulls a pose."""
 _MOST_TRACKED = 90
 """Number of frames that are tracked for an acquisition where too few poses are stored."""
 _TRACKING = 0.4
@@ -42,6 +47,8 @@ class PosedFrames(NamedTuple):
     """On each frame the person in the present body, then the other people who have a pose there."""
     placed: Mapping[int, PointTargets]
     """By frame, joints of the person that somebody has placed."""
+    seen: Mapping[int, PinBlock]
+    """By frame, points of the person that somebody has seen in the images: pins, and the ends of drags."""
 
 
 def acquire_body(
@@ -74,7 +81,7 @@ def acquire_body(
         known = _with_tracked(session, observer, person, frames, known, lambda share: report("tracking", begun * share))
     return acquire_from_contours(
         observer, known.bodies, 0, known.placed, settings,
-        lambda stage, share: report(stage, begun + (1 - begun) * share),
+        lambda stage, share: report(stage, begun + (1 - begun) * share), known.seen,
     )  # fmt: skip
 
 
@@ -109,8 +116,12 @@ def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedF
         )
         for k, s in usable.items()
     }
-    placed = {k: targets for k, s in usable.items() if (targets := _placed(s)) is not None}
-    return PosedFrames(bodies, placed)
+    keyframes = {k: s for k, s in usable.items() if s.record.keyframe}
+    observed = {k: _observed(session, person, k, s) for k, s in keyframes.items()}
+    cameras = [c.camera for c in session.cameras]
+    seen = {k: pin_block(model, cameras, o).widened(_HAND) for k, o in observed.items() if o}
+    placed = {k: t for k, s in keyframes.items() if (t := _placed(s, observed[k])) is not None and len(t.points)}
+    return PosedFrames(bodies, placed, seen)
 
 
 def store_body(
@@ -153,7 +164,7 @@ def refitted_record(record: PoseRecord, pose: Array, revision: int) -> PoseRecor
         pose: its pose in the other body, (n_values,).
         revision: of the other body.
     """
-    kept = {k: v for k, v in record.settings.items() if k == "joints"}
+    kept = {k: v for k, v in record.settings.items() if k in ("joints", SEEN)}
     return replace(
         record, values=pose, model_revision=revision, status="", cost_px=None,
         settings={"method": "refit", "model_revision": record.model_revision, **kept}, view_costs_px=(),
@@ -166,16 +177,34 @@ def _pose_in(body: BodyModel, stored: StoredPose, known: Array | None) -> Array:
     return retarget_pose(stored.body.values, stored.body.model, body) if known is None else known
 
 
-def _placed(stored: StoredPose) -> PointTargets | None:
-    """Return the joints that somebody has placed on a frame: known joints, or those of a keyframe set by hand."""
+def _observed(session: Session, person: int, frame: int, stored: StoredPose) -> list[PointObservation]:
+    """Return where somebody has seen points of a person on a frame: the ends of drags, and pins, which go before."""
+    index = {c.camera.name: i for i, c in enumerate(session.cameras)}
+    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+        pins = store.pins(session.people[person].name, frame)
+    found = {(p, c): uv for p, views in stored.record.settings.get(SEEN, {}).items() for c, uv in views.items()}
+    found |= {(pin.point, pin.camera): pin.position_px for pin in pins}
+    out = []
+    for (point, camera), (u, v) in sorted(found.items()):
+        if camera in index and point in session.people[person].model.point_names:
+            x, y = session.cameras[index[camera]].camera.undistort_points(np.array([u, v]))
+            out.append(PointObservation(point, index[camera], (float(x), float(y))))
+    return out
+
+
+def _placed(stored: StoredPose, observed: Sequence[PointObservation]) -> PointTargets | None:
+    """Return the joints that somebody has placed on a frame: known joints, or those of a keyframe set by hand.
+
+    Where it is known in which places a user saw points, these say more than a pose that a body of other sizes reached.
+    """
     record, model = stored.record, stored.body.model
-    if not record.keyframe:
-        return None
     joints = record.settings.get("joints")
     if joints:
         return place_joints(model, {n: np.array(p, dtype=np.float64) for n, p in joints.items()}, JOINT_M)
     if not {"manual", "pinned", "imported"} & set(record.sources):
         return None  # a tracked pose that was confirmed shows where the flesh is, not the joints
+    if observed:
+        return None
     return place_joints(model, dict(zip(model.point_names, stored.body.points_world, strict=True)), PLACED_M)
 
 
@@ -197,4 +226,4 @@ def _with_tracked(
             people = zip(subjects.models, found.poses, strict=True)
             bodies.setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))
     assert all(b[0].model is model for b in bodies.values())
-    return PosedFrames(bodies, known.placed)
+    return PosedFrames(bodies, known.placed, known.seen)

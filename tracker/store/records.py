@@ -8,6 +8,8 @@ from tracker.geometry.arrays import Array
 
 SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", "smoothed", "imported")
 """Sources of a value, most manual first. Stored by index: add at the end, never reorder."""
+SEEN = "seen"
+"""Key of a pose's settings: where a user put points by hand, `{point: {camera: [u, v]}}`, original pixels."""
 STATUSES = ("", "good", "doubtful", "lost")
 """Quality of a pose as assessed by its tracker; empty if not assessed."""
 

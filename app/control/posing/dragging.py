@@ -12,6 +12,7 @@ from app.state.people import DragState, HeldPoint
 from app.state.state import State
 from tracker.body.limbs import display_name
 from tracker.geometry.arrays import Array
+from tracker.geometry.triangulation import PointObservation
 from tracker.posing import drag as modes
 from tracker.posing.grab import Grab, grab, grab_part, holdable_points, regrab
 
@@ -157,12 +158,26 @@ class Dragging:
         self._scores_moves = False
         has_moved = not np.array_equal(grab.pose, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
+            self._show_seen(drag, self._seen(drag))
             session_state.save(f"drag {display_name(drag.point)}", "manual", grab, drag.person)
+            self._show_seen(drag, ())
             self._hold(drag)
         elif not session_state.is_shown_stored(session_state.state):
             session_state.show_frame(session_state.state.frame)  # moved back: the pose has its former source
         self._gesture_grab = self._mode_grab = session_state.open_edit_owner = None
         session_state.set(drag=None, **session_state.costs(session_state.state.poses))
+
+    def _seen(self, drag: DragState) -> tuple[PointObservation, ...]:
+        """Return where the user has put the dragged point: the body may not reach it."""
+        if drag.by_surface or drag.mode not in ("move", "bend") or self._mode_grab is None:
+            return ()
+        u, v = (float(c) for c in np.array(drag.pointer_px) + self._mode_grab.offset_px)
+        return (PointObservation(drag.point, drag.camera, (u, v)),)
+
+    def _show_seen(self, drag: DragState, seen: tuple[PointObservation, ...]) -> None:
+        people = list(self._session_state.state.people)
+        people[drag.person] = replace(people[drag.person], seen=seen)
+        self._session_state.set(people=tuple(people))
 
     def _hold(self, drag: DragState) -> None:
         """Hold the point that was placed in a view."""

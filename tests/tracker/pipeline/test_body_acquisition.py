@@ -14,6 +14,7 @@ from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, load_model
+from tracker.geometry.triangulation import sigma_px
 from tracker.pipeline.body_acquisition import (
     PLACED_M,
     SIZES_EDITS,
@@ -24,7 +25,7 @@ from tracker.pipeline.body_acquisition import (
 )
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.records import PinChange, PoseChange, PoseRecord
 
 
 @pytest.fixture
@@ -83,6 +84,23 @@ def test_known_joints_count_more_than_the_pose_fitted_to_them(session, store):
     placed = posed_frames(session, 0, range(10)).placed[0]
     names = [session.people[0].model.point_names[i] for i in placed.points]
     np.testing.assert_allclose(placed.targets_world, [joints[n] for n in names])
+
+
+def test_where_points_were_seen_counts_more_than_the_pose(session, store):
+    """The ends of drags, and pins before them; in undistorted pixels, with a hand's accuracy."""
+    name, camera = session.people[0].name, session.cameras[1].camera
+    seen = {"left_wrist": {camera.name: [100.0, 200.0], "gone": [1.0, 2.0]}, "head": {camera.name: [50.0, 60.0]}}
+    put(session, store, f0=record(session, store, keyframe=True, settings={"seen": seen}))
+    store.commit("pin", [PinChange(name, 0, "head", camera.name, (55.0, 65.0))])
+    found = posed_frames(session, 0, range(10))
+    block = found.seen[0]
+    names = [session.people[0].model.point_names[i] for i in block.points]
+    assert dict(zip(names, block.positions_px.tolist(), strict=True)) == {
+        "head": pytest.approx(camera.undistort_points(np.array([55.0, 65.0]))),
+        "left_wrist": pytest.approx(camera.undistort_points(np.array([100.0, 200.0]))),
+    }
+    assert block.sigmas_px[0] == pytest.approx(3 * sigma_px(camera))
+    assert not found.placed
 
 
 def larger(model):
