@@ -28,7 +28,7 @@ export function acquisitionView({ store, send }) {
   const progress = document.createElement("progress");
   const status = document.createElement("span");
   status.className = "acquisition-status";
-  status.setAttribute("role", "status");
+  status.setAttribute("aria-live", "polite");
   const work = document.createElement("div");
   work.className = "acquisition-work";
   work.append(progress, stop);

@@ -22,7 +22,7 @@ const STEP_CM = 0.5;
 export class BodySection {
   id = "body";
   title = "Body sizes";
-  hint = "Lengths and girths of the active person";
+  hint = "Lengths and girths of the active person; acquire them from the footage";
   body = document.createElement("div");
   #store;
   #send;
@@ -92,7 +92,7 @@ export class BodySection {
     const foot = document.createElement("div");
     foot.className = "section-foot";
     foot.append(this.#keyframes.element, this.#note, buttons);
-    this.body.append(this.#person, this.#acquisition.element, this.#height.element, this.#alike.element, this.#table, foot);
+    this.body.append(this.#person, this.#height.element, this.#alike.element, this.#acquisition.element, this.#table, foot);
   }
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
