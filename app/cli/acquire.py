@@ -44,11 +44,11 @@ class AcquireArguments:
     views: OptionalViews = ()
     """with --paper: names of the frontal and the side view; chosen by the person's heading by default."""
     out: OptionalPath = None
-    """write the body to this TOML file too, for new --model NAME=FILE in another session."""
+    """write the body to this .toml file too, for new --person-model FILE or --model NAME=FILE in another session."""
     dry_run: bool = False
     """show the sizes, but change nothing in the session."""
     json: bool = False
-    """print one JSON object."""
+    """print one JSON object; docs/acquisition.md lists its keys."""
 
 
 def command(arguments: Annotated[AcquireArguments, tyro.conf.arg(name="")]) -> None:
@@ -60,6 +60,8 @@ def command(arguments: Annotated[AcquireArguments, tyro.conf.arg(name="")]) -> N
     frames = parse_frames(arguments.frames, at.session)
     if arguments.n_frames < 1:
         raise TrackerError(f"expected --n-frames of at least 1, found {arguments.n_frames}; 5 to 10 are usual")
+    if arguments.out is not None and (arguments.out.suffix != ".toml" or not arguments.out.parent.is_dir()):
+        raise TrackerError(f"expected --out as a .toml file in a folder that exists, found '{arguments.out}'")
     settings = _settings(arguments, [c.camera.name for c in at.session.cameras])
     found = acquire(at, frames, settings, Reporter(silent=arguments.json), store=not arguments.dry_run)
     if arguments.out is not None:
