@@ -15,14 +15,14 @@ from app.bench.sample_frames import BenchCrowd, BenchFrame, pose_at
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, damped_step
 from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.search.best_first import COARSE_SEARCH, SearchSettings, search
-from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
@@ -184,10 +184,10 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
         yield Row(f"iteration_{name}_views", f"Gauss-Newton iteration, cones, {name} views", *timed, 1 / must, 1 / aim)
         timed = yardstick.beside(partial(_stepped, of.model, match, poses), 30, len(poses))
         yield Row(f"iteration_{name}_views_readable", "the same as `gauss_newton.solve` takes it", *timed)
-    start, cost = cones.near_prediction(), cones.cost(cones.near_prediction())
+    start, edges_px = cones.near_prediction(), cones.cost(cones.near_prediction()).edge_points_px
 
     def residuals(values: Array) -> Array:
-        return np.concatenate(_edge_distances(cost, cones, values))
+        return np.concatenate(edge_distances(cones.views, edges_px, PosedBody(cones.model, values)))
 
     timed = yardstick.beside(lambda: least_squares(residuals, start, method="trf", max_nfev=2), 5, 2)
     yield Row("iteration_scipy", "the same by scipy's least_squares with numeric Jacobian, edges to contour", *timed)
@@ -205,14 +205,14 @@ def _stepped(model: BodyModel, match: ContourResiduals, poses: Sequence[Array]) 
         damped_step(normal.hessian, normal.gradient, 1e-3 * np.diag(normal.hessian) + 1e-9)
 
 
-def _edge_distances(cost: ChamferCost, frame: BenchFrame, values: Array) -> list[Array]:
-    """Distance of each edge point to the nearest visible piece of contour, cut off, (n,) for each view, px."""
+def edge_distances(views: Sequence[ViewEvidence], edges_px: Sequence[FloatArray], body: PosedBody) -> list[Array]:
+    """Distance of each edge point, (n, 2) px, to the nearest visible piece of contour, cut off, (n,) for each view."""
     out: list[Array] = []
-    for view, scene in zip(frame.views, cost.edge_points_px, strict=True):
-        contour = occluding_contours.trace([PosedBody(frame.model, values)], view.camera)
+    for view, points_px in zip(views, edges_px, strict=True):
+        contour = occluding_contours.trace([body], view.camera)
         pieces = contour.pieces_px[~contour.occluded]
         middles = 0.5 * (pieces[:, :2] + pieces[:, 2:])
-        squared = np.sum((scene[:, None] - middles) ** 2, axis=-1).min(axis=1)
+        squared = np.sum((points_px[:, None] - middles) ** 2, axis=-1).min(axis=1)
         out.append(np.minimum(np.sqrt(squared), view.theta_px))
     return out
 

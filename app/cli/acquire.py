@@ -14,10 +14,13 @@ from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
     from tracker.acquisition.from_contours import AcquisitionSettings
+    from tracker.acquisition.two_views import TwoViewSettings
 
 _SHOWN = 12
 """Number of sizes that are listed."""
 _TICKS = 100
+
+OptionalViews = Annotated[tuple[str, ...], tyro.conf.arg(metavar="FRONT SIDE", help_behavior_hint="")]
 
 
 @dataclass(frozen=True)
@@ -36,12 +39,16 @@ class AcquireArguments:
     """number of frames that the sizes are fitted to; they are chosen by what their poses show."""
     uncoupled: bool = False
     """let left and right differ."""
+    paper: bool = False
+    """as Gavrila and Davis 1996: the shapes of the parts alone, from a frontal and a side view of one frame."""
+    views: OptionalViews = ()
+    """with --paper: names of the frontal and the side view; chosen by the person's heading by default."""
     out: OptionalPath = None
-    """write the body to this TOML file too, for new --model NAME=FILE in another session."""
+    """write the body to this .toml file too, for new --person-model FILE or --model NAME=FILE in another session."""
     dry_run: bool = False
     """show the sizes, but change nothing in the session."""
     json: bool = False
-    """print one JSON object."""
+    """print one JSON object; docs/acquisition.md lists its keys."""
 
 
 def command(arguments: Annotated[AcquireArguments, tyro.conf.arg(name="")]) -> None:
@@ -49,13 +56,13 @@ def command(arguments: Annotated[AcquireArguments, tyro.conf.arg(name="")]) -> N
 
     The person needs a pose on one frame. Ctrl+C stops it and changes nothing; the page undoes it.
     """
-    from tracker.acquisition.from_contours import AcquisitionSettings
-
     at = load_target(arguments.session, arguments.person, several=False)
     frames = parse_frames(arguments.frames, at.session)
     if arguments.n_frames < 1:
         raise TrackerError(f"expected --n-frames of at least 1, found {arguments.n_frames}; 5 to 10 are usual")
-    settings = AcquisitionSettings(n_frames=arguments.n_frames, coupled=not arguments.uncoupled)
+    if arguments.out is not None and (arguments.out.suffix != ".toml" or not arguments.out.parent.is_dir()):
+        raise TrackerError(f"expected --out as a .toml file in a folder that exists, found '{arguments.out}'")
+    settings = _settings(arguments, [c.camera.name for c in at.session.cameras])
     found = acquire(at, frames, settings, Reporter(silent=arguments.json), store=not arguments.dry_run)
     if arguments.out is not None:
         from tracker.files import write_text_atomic
@@ -64,8 +71,29 @@ def command(arguments: Annotated[AcquireArguments, tyro.conf.arg(name="")]) -> N
     print(format_json(found) if arguments.json else _format(found, arguments))
 
 
+def _settings(arguments: AcquireArguments, cameras: list[str]) -> "AcquisitionSettings | TwoViewSettings":
+    """Return the settings of the method that the arguments name.
+
+    Raises:
+        TrackerError: the views are not two cameras of the session, or are given without --paper.
+    """
+    from tracker.acquisition.from_contours import AcquisitionSettings
+    from tracker.acquisition.two_views import TwoViewSettings
+
+    views, coupled = arguments.views, not arguments.uncoupled
+    if views and not arguments.paper:
+        raise TrackerError("expected --views with --paper alone, found it without; other methods use all views")
+    if views and (len(set(views)) != len(views) or len(views) != 2 or not set(views) <= set(cameras)):
+        raise TrackerError(
+            f"expected --views as two of {', '.join(cameras)}, found '{' '.join(views)}'; name the frontal view first"
+        )
+    if arguments.paper:
+        return TwoViewSettings((views[0], views[1]) if views else None, arguments.n_frames, coupled)
+    return AcquisitionSettings(n_frames=arguments.n_frames, coupled=coupled)
+
+
 def acquire(
-    at: Target, frames: range, settings: "AcquisitionSettings", progress: Reporter, store: bool = True
+    at: Target, frames: range, settings: "AcquisitionSettings | TwoViewSettings", progress: Reporter, store: bool = True
 ) -> dict[str, Any]:
     """Acquire the body of one person and make it the present one, with keyframes fitted to it.
 
@@ -77,7 +105,8 @@ def acquire(
         store: whether the session is changed.
 
     Returns:
-        The frames used, the cost before and after, each size with its standard deviation, and the model as TOML.
+        `person`; `frames` and `views` that were used; `cost_before_px`, `cost_after_px`; `height_m`; `sizes`, a list
+        of `name`, `before_m`, `after_m` and `sigma_m` (NaN without a known uncertainty); `model`, the body as TOML.
 
     Raises:
         TrackerError: the person has no pose on these frames, or the views show nothing of them.
@@ -112,6 +141,7 @@ def acquire(
     return {
         "person": name,
         "frames": list(found.frames),
+        "views": list(found.views) or [c.camera.name for c in session.cameras],
         "cost_before_px": found.cost_before_px,
         "cost_after_px": found.cost_after_px,
         "height_m": found.body.height_m,
@@ -122,15 +152,16 @@ def acquire(
 
 def _format(found: dict[str, Any], arguments: AcquireArguments) -> str:
     frames = ", ".join(map(str, found["frames"]))
+    where = f"frame {frames}" if len(found["frames"]) == 1 else f"frames {frames}"
+    where += f", front view {found['views'][0]}, side view {found['views'][1]}" if arguments.paper else ""
     lines = [
-        f"{found['person']}: {found['height_m']:.2f} m tall, from frames {frames}",
+        f"{found['person']}: {found['height_m']:.2f} m tall, from {where}",
         f"cost {found['cost_before_px']:.2f} px before, {found['cost_after_px']:.2f} px with the acquired body",
-        "sizes that changed most, cm (before, after, standard deviation):",
+        f"sizes that changed most, cm (before, after{'' if arguments.paper else ', standard deviation'}):",
     ]
     for row in found["sizes"][:_SHOWN]:
-        lines.append(
-            f"  {row['name']:<34}{row['before_m'] * 100:6.1f} {row['after_m'] * 100:6.1f} {row['sigma_m'] * 100:6.1f}"
-        )
+        sizes_m = [row[k] for k in ("before_m", "after_m", "sigma_m")[: 2 if arguments.paper else 3]]
+        lines.append(f"  {row['name']:<34}" + " ".join(f"{size_m * 100:6.1f}" for size_m in sizes_m))
     if arguments.dry_run:
         lines.append("nothing was stored (--dry-run)")
     else:

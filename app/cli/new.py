@@ -1,6 +1,7 @@
 """`quadrille new`: make a session from videos and a calibration."""
 
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -18,6 +19,7 @@ from app.cli.arguments import (
     parse_common_or_pairs,
     parse_pairs,
 )
+from tracker.errors import TrackerError
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,9 @@ class NewArguments:
     people: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("person",)
     """names of the people."""
     model: CommonOrNamed = ()
-    """body model of all people, or NAME=MODEL."""
+    """body model of all people, or NAME=MODEL: a preset, or a .toml file such as acquire --out FILE writes."""
+    person_model: OptionalPath = None
+    """.toml file of the person's body from an earlier session, where there is only one person."""
     height: CommonOrNamed = ()
     """body height in metres of all people, or NAME=METRES."""
     fps: OptionalNumber = None
@@ -69,7 +73,7 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         masks=arguments.masks,
         offsets=parse_pairs(arguments.offset, "--offset", int),
         people=arguments.people,
-        models=parse_common_or_pairs(arguments.model, "--model", str) or DEFAULT_MODEL,
+        models=_models(arguments) or DEFAULT_MODEL,
         heights=parse_common_or_pairs(arguments.height, "--height", float),
         fps=arguments.fps,
         up=arguments.up,
@@ -84,3 +88,27 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         print(f"the videos declare {' or '.join(sorted(declared))} frames per second")
     if note := exchange_note(made):
         print(f"warning: {note}", file=sys.stderr)
+
+
+def _models(arguments: NewArguments) -> Mapping[str, str] | str | None:
+    """Return the body model of all people or by name; None without an option.
+
+    Raises:
+        TrackerError: --person-model with several people, or with another option that gives the same.
+    """
+    path = arguments.person_model
+    if path is None:
+        return parse_common_or_pairs(arguments.model, "--model", str)
+    if len(arguments.people) != 1:
+        people = ", ".join(arguments.people)
+        raise TrackerError(
+            f"expected one person with --person-model, found {people}; say --model NAME={path} for each known body"
+        )
+    for option, words in (("--model", arguments.model), ("--height", arguments.height)):
+        if words:
+            raise TrackerError(f"expected --person-model without {option}, found both; the file has body and height")
+    if path.suffix != ".toml" or not path.is_file():
+        raise TrackerError(
+            f"expected --person-model as a .toml file of a body, found '{path}'; write one with quadrille acquire --out"
+        )
+    return str(path)

@@ -61,6 +61,8 @@ class Acquisition(NamedTuple):
     parameters: SizeParameters
     """What was fitted, from the body before."""
     fit: SizeFit
+    views: tuple[str, ...] = ()
+    """Names of the views that it was fitted to; all of them if empty."""
 
 
 def acquire_from_contours(
@@ -99,14 +101,14 @@ def acquire_from_contours(
         parameters, observer.working_cameras, {k: bodies[k] for k in candidates}, person, settings.n_frames, fixed
     )
     report("reading contours", _CHOOSING)
-    static_edges = _static_edges(observer, {k: bodies[k] for k in candidates})
+    static_edges = learn_static_edges(observer, {k: bodies[k] for k in candidates})
     sighted, observed, before = [], [], []
     for i, k in enumerate(frames):
-        views = _views(observer, k, bodies[k], static_edges)
+        views = read_views(observer, k, bodies[k], static_edges)
         observed.append(views)
         before.append(_cost_px(views, bodies[k]))
         sighted.append(
-            SightedPerson(k, _own_views(views, bodies[k], person), bodies[k], person, placed.get(k), seen.get(k))
+            SightedPerson(k, own_views(views, bodies[k], person), bodies[k], person, placed.get(k), seen.get(k))
         )
         report("reading contours", _CHOOSING + (_OBSERVING - _CHOOSING) * (i + 1) / len(frames))
     if not any(len(v.points_px) for s in sighted for v in s.views):
@@ -138,7 +140,7 @@ def _spread(frames: Sequence[int], n: int, keep: Sequence[int]) -> list[int]:
     return sorted({frames[i] for i in at} | (set(keep) & set(frames)))
 
 
-def _views(
+def read_views(
     observer: Observer, frame: int, bodies: Sequence[PosedBody], static_edges: Sequence[StaticEdgeModel] | None
 ) -> tuple[ViewEvidence, ...]:
     """Return the evidence of a frame around all people."""
@@ -147,19 +149,19 @@ def _views(
     return observer.evidence(frame, regions(cameras, bodies), visible, static_edges)
 
 
-def _own_views(views: Sequence[ViewEvidence], bodies: tuple[PosedBody, ...], person: int) -> Sequence[ViewEvidence]:
+def own_views(views: Sequence[ViewEvidence], bodies: tuple[PosedBody, ...], person: int) -> Sequence[ViewEvidence]:
     """Return the evidence of a frame without what other people explain."""
     people = [PersonPrior(b.model, b.values) for b in bodies]
     return FrameProblem(views, people, TrackSettings()).own_evidence([person], bodies)[0]
 
 
-def _static_edges(observer: Observer, bodies: Mapping[int, tuple[PosedBody, ...]]) -> list[StaticEdgeModel] | None:
+def learn_static_edges(observer: Observer, bodies: Mapping[int, tuple[PosedBody, ...]]) -> list[StaticEdgeModel] | None:
     """Learn the static edges of views without masks and background; None if no view needs it."""
     if all(c.masks is not None or c.background is not None for c in observer.cameras):
         return None
     models = [StaticEdgeModel(c.size) for c in observer.working_cameras]
     for k, people in bodies.items():
-        views = _views(observer, k, people, models)
+        views = read_views(observer, k, people, models)
         for view, camera, model in zip(views, observer.working_cameras, models, strict=True):
             if view.segments is not None and view.silhouette is None:
                 pieces = visible_pieces_px(occluding_contours.trace(people, camera))

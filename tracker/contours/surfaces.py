@@ -53,33 +53,56 @@ class Surfaces(NamedTuple):
     """Index of the body of each part, (P,)."""
 
 
+_OF_SHAPES = ("profiles", "half_axes", "centers", "radii", "profile_sizes", "grids", "normals", "offsets", "solids")
+"""Arrays that have a row for each shape and do not depend on the others, the one of varying width first."""
+
+
 @lru_cache(maxsize=32)
 def surfaces_of(models: tuple[BodyModel, ...]) -> Surfaces:
     """Return the arrays of the shapes of some bodies; cached, because models are immutable."""
     shapes = [s for m in models for s in m.shapes]
-    return _surfaces(models, shapes, [s.profile(PROFILE_TOLERANCE_M) for s in shapes])
+    centers = np.concatenate([m.centers_part for m in models])
+    return _surfaces(models, shapes, centers, [s.profile(PROFILE_TOLERANCE_M) for s in shapes])
 
 
-def resized_surfaces(models: tuple[BodyModel, ...], similar: Surfaces) -> Surfaces:
+def resized_surfaces(
+    models: tuple[BodyModel, ...], similar: Surfaces, changed: Sequence[int] | None = None
+) -> Surfaces:
     """Return the arrays of the shapes of some bodies; quicker than `surfaces_of` where many sizes are tried.
 
     Args:
         models: the bodies.
         similar: arrays of the same bodies at other sizes. Profiles are sampled at the same heights, which fits sizes
             that do not differ much.
+        changed: indices of the parts, counted through all bodies, whose shapes differ from those of `similar`; None
+            stands for all.
     """
     shapes = [s for m in models for s in m.shapes]
     profiles: list[Profile | None] = []
-    for i, shape in enumerate(shapes):
+    at = list(range(len(shapes)) if changed is None else changed)
+    for i in at:
+        shape = shapes[i]
         n = int(similar.profile_sizes[i])
         if n and isinstance(shape, TaperedSuperquadric):
             profiles.append(shape.profile_at(similar.profiles[i, 1, 1 : n - 1].astype(np.float64)))
         else:
             profiles.append(shape.profile(PROFILE_TOLERANCE_M))
-    return _surfaces(models, shapes, profiles)
+    centers = np.concatenate([m.centers_part for m in models])
+    if changed is None:
+        return _surfaces(models, shapes, centers, profiles)
+    own = _surfaces(models, [shapes[i] for i in at], centers[at], profiles)
+    out = similar._replace(**{name: getattr(similar, name).copy() for name in _OF_SHAPES})
+    out.profiles[at] = 0
+    out.profiles[at, :, : own.profiles.shape[2]] = own.profiles
+    for name in _OF_SHAPES[1:]:
+        getattr(out, name)[at] = getattr(own, name)
+    return out
 
 
-def _surfaces(models: tuple[BodyModel, ...], shapes: Sequence[Shape], profiles: Sequence[Profile | None]) -> Surfaces:
+def _surfaces(
+    models: tuple[BodyModel, ...], shapes: Sequence[Shape], centers: Array, profiles: Sequence[Profile | None]
+) -> Surfaces:
+    """Return the arrays of some shapes around their centres, (P, 3), metres."""
     half_axes = np.array([s.half_axes for s in shapes])
     profile_sizes = np.array([0 if p is None else len(p.radii) for p in profiles])
     table = np.zeros((len(shapes), 4, profile_sizes.max()), np.float32)
@@ -89,7 +112,7 @@ def _surfaces(models: tuple[BodyModel, ...], shapes: Sequence[Shape], profiles: 
     points, normals = (np.stack(g) for g in zip(*(_closed_grid(s) for s in shapes), strict=True))
     return Surfaces(
         half_axes,
-        np.concatenate([m.centers_part for m in models]),
+        centers,
         np.linalg.norm(points, axis=1).max(axis=-1),
         profile_sizes,
         table,

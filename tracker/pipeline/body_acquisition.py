@@ -9,6 +9,7 @@ import numpy as np
 
 from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, Report, acquire_from_contours
 from tracker.acquisition.from_joints import JOINT_M, place_joints
+from tracker.acquisition.two_views import TwoViewSettings, acquire_from_two_views
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
@@ -56,7 +57,7 @@ def acquire_body(
     observer: Observer,
     person: int,
     frames: Sequence[int],
-    settings: AcquisitionSettings,
+    settings: AcquisitionSettings | TwoViewSettings,
     report: Report = lambda stage, share: None,
 ) -> Acquisition:
     """Acquire the body of a person from stored poses; where they are too few, from frames tracked for it.
@@ -68,7 +69,7 @@ def acquire_body(
         observer: of its recording.
         person: index of the person.
         frames: the frames that may be used, ascending.
-        settings: of the acquisition.
+        settings: of the acquisition; their type is the method.
         report: shows progress. What it raises ends the acquisition.
 
     Raises:
@@ -79,10 +80,13 @@ def acquire_body(
     if len(known.bodies) < settings.n_frames < len(frames):
         begun = _TRACKING
         known = _with_tracked(session, observer, person, frames, known, lambda share: report("tracking", begun * share))
-    return acquire_from_contours(
-        observer, known.bodies, 0, known.placed, settings,
-        lambda stage, share: report(stage, begun + (1 - begun) * share), known.seen,
-    )  # fmt: skip
+
+    def report_rest(stage: str, share: float) -> None:
+        report(stage, begun + (1 - begun) * share)
+
+    if isinstance(settings, TwoViewSettings):
+        return acquire_from_two_views(observer, known.bodies, 0, settings, report_rest)
+    return acquire_from_contours(observer, known.bodies, 0, known.placed, settings, report_rest, known.seen)
 
 
 def has_preset_sizes(model: BodyModel) -> bool:

@@ -1,0 +1,134 @@
+"""`quadrille acquire`: its JSON, a body that goes to the next session, and a fit that is stopped."""
+
+import hashlib
+import json
+import signal
+
+import numpy as np
+import pytest
+from command_line import SAMPLE, assert_refused, stored
+
+from tracker.acquisition import size_fit
+from tracker.acquisition.chamfer_search import ChamferSearchSettings
+from tracker.acquisition.two_views import TwoViewSettings
+from tracker.formats.model_toml import format_model, load_model
+from tracker.session.session import load_session
+
+KEYS = {
+    "person", "frames", "views", "cost_before_px", "cost_after_px", "height_m", "sizes", "model",
+}  # fmt: skip
+"""Those that docs/acquisition.md lists."""
+
+
+@pytest.fixture
+def placed(run, session):
+    """The sample with the known pose of one frame."""
+    assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "20", "--json")[0] == 0
+    return session
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """A fit of one step in each round."""
+    advance = size_fit._Problem.advance
+    monkeypatch.setattr(size_fit._Problem, "advance", lambda problem: advance(problem) and False)
+
+
+def files_of(session):
+    """Hash of each file of a session."""
+    return {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in session.rglob("*") if p.is_file()}
+
+
+def new_session(run, path, *more):
+    return run(
+        "new", path, "--calibration", SAMPLE / "calibration.toml", "--videos", *sorted(SAMPLE.glob("*.mp4")),
+        "--background", SAMPLE / "background", *more,
+    )  # fmt: skip
+
+
+def test_an_acquired_body_goes_to_the_next_session(run, placed, quick, tmp_path):
+    body = tmp_path / "ann.toml"
+    words = ("acquire", placed, "--frames", "20:23", "--n-frames", "2", "--out", body, "--json")
+    status, out, err = run(*words)
+    found = json.loads(out)
+    assert (status, err) == (0, "")
+    assert found.keys() == KEYS
+    assert found["sizes"][0].keys() == {"name", "before_m", "after_m", "sigma_m"}
+    assert (found["person"], len(found["frames"]), found["views"]) == ("person", 2, ["FRONT", "RIGHT", "BACK", "LEFT"])
+    acquired = load_session(placed).people[0].model
+    assert body.read_text() == found["model"] == format_model(acquired)
+    assert found["height_m"] == acquired.height_m
+    for name, more in (("s2", ("--people", "ann", "--model", f"ann={body}")), ("s3", ("--person-model", body))):
+        second = tmp_path / name
+        assert new_session(run, second, *more)[0] == 0
+        (person,) = load_session(second).people
+        assert format_model(person.model) == found["model"]
+    assert run("init", second, "--joints", SAMPLE / "truth.trc", "--frame", "20")[0] == 0
+    status, out, _ = run("track", second, "--frames", "20:22", "--json")
+    assert (status, json.loads(out)["frames"]) == (0, 2)
+    assert all(np.isfinite(p.cost_px) for k, p in stored(second).items() if k == 21)
+    assert json.loads(run("info", second, "--json")[1])["people"][0]["height_m"] == pytest.approx(acquired.height_m)
+
+
+def test_a_fit_that_is_stopped_leaves_the_session_as_it_was(run, placed, monkeypatch, tmp_path):
+    before, steps, advance = files_of(placed), [], size_fit._Problem.advance
+
+    def stopped(problem):
+        steps.append(advance(problem))
+        if len(steps) == 2:
+            signal.raise_signal(signal.SIGINT)  # as Ctrl+C does
+        return steps[-1]
+
+    monkeypatch.setattr(size_fit._Problem, "advance", stopped)
+    words = ("acquire", placed, "--frames", "20:23", "--n-frames", "2", "--out", tmp_path / "b.toml", "--json")
+    status, out, _ = run(*words)
+    assert (status, out, len(steps)) == (130, "", 2)
+    assert files_of(placed) == before
+    assert not (tmp_path / "b.toml").exists()
+    assert not (placed / "lock.json").exists()
+
+
+def test_the_paper_s_way_names_its_views(run, placed, monkeypatch):
+    quick = TwoViewSettings(search=ChamferSearchSettings(levels=1, passes=1))
+    monkeypatch.setattr("tracker.acquisition.two_views.TwoViewSettings", lambda views, n, coupled: quick)
+    words = ("acquire", placed, "--paper", "--frames", "20:21", "--dry-run")
+    status, out, _ = run(*words, "--json")
+    found = json.loads(out)
+    assert (status, found.keys()) == (0, KEYS)
+    assert (found["frames"], len(found["views"])) == ([20], 2)
+    assert {s["sigma_m"] for s in found["sizes"]} == {None}
+    assert format_model(load_session(placed).people[0].model) != found["model"]
+    status, out, _ = run(*words)
+    assert status == 0
+    assert f"from frame 20, front view {found['views'][0]}, side view {found['views'][1]}" in out
+
+
+def test_wrong_input(run, placed):
+    before = files_of(placed)
+    for words, expected in (
+        (("--views", "FRONT", "RIGHT"), "--views with --paper alone"),
+        (("--paper", "--views", "FRONT"), "found 'FRONT'"),
+        (("--paper", "--views", "FRONT", "FRONT"), "found 'FRONT FRONT'"),
+        (("--paper", "--views", "FRONT", "TOP"), "two of FRONT, RIGHT, BACK, LEFT"),
+        (("--paper", "--views", "FRONT", "BACK", "--frames", "20:21"), "FRONT and BACK show the person"),
+        (("--n-frames", "0"), "at least 1"),
+        (("--out", "body.json"), "a .toml file"),
+        (("--out", "nowhere/body.toml"), "a folder that exists"),
+        (("--frames", "3:9"), "place the body in the page"),
+    ):
+        assert_refused(run("acquire", placed, *words), [expected])
+        assert files_of(placed) == before
+
+
+def test_a_person_s_body_that_cannot_be_used(run, tmp_path):
+    body = tmp_path / "ann.toml"
+    body.write_text(format_model(load_model("gavrila34", 1.6)))
+    for more, expected in (
+        (("--person-model", tmp_path / "no.toml"), "expected --person-model as a .toml file"),
+        (("--person-model", "gavrila34"), "found 'gavrila34'"),
+        (("--person-model", body, "--people", "ann", "bob"), "found ann, bob"),
+        (("--person-model", body, "--height", "1.7"), "without --height"),
+        (("--person-model", body, "--model", "gavrila22"), "without --model"),
+    ):
+        assert_refused(new_session(run, tmp_path / "s", *more), [expected])
+        assert not (tmp_path / "s").exists()

@@ -1,0 +1,172 @@
+"""Acquire a person's body from two near-orthogonal views of one frame, as GD96 Sect. 3 does: `acquire --paper`.
+
+The person faces one view, or turns the back to it, and is seen from the side in the other. The paper leaves open what
+happens where the views are not quite orthogonal, how parts are segmented, and what is searched in which steps; see
+docs/accuracy.md for what was chosen.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import permutations
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.acquisition.chamfer_search import ChamferSearchSettings, search_shapes
+from tracker.acquisition.from_contours import Acquisition, Report, learn_static_edges, own_views, read_views
+from tracker.acquisition.size_fit import SightedPerson, SizeFit
+from tracker.acquisition.size_parameters import SizeParameters, SizePriors
+from tracker.body.model import PosedBody
+from tracker.contours import occluding_contours
+from tracker.errors import TrackerError
+from tracker.evidence.observer import Observer
+from tracker.geometry.cameras import Camera
+from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
+
+MAX_OFF_RAD = np.radians(35.0)
+"""Largest angle between a view and the person's front or side, and of two views from a right angle."""
+_ALIKE_RAD = np.radians(2.0)
+"""Views whose angles differ by less are chosen by what is occluded."""
+_CHOOSING, _OBSERVING = 0.05, 0.15
+"""Shares of the work up to the ends of the stages before the search."""
+
+
+@dataclass(frozen=True)
+class TwoViewSettings:
+    """Settings of an acquisition from two views."""
+
+    views: tuple[str, str] | None = None
+    """Names of the frontal view and the side view; None chooses them by the person's heading."""
+    n_frames: int = 6
+    """Number of poses from which the frame is chosen; missing ones are tracked."""
+    coupled: bool = True
+    """Whether left and right have the same sizes."""
+    priors: SizePriors = field(default_factory=SizePriors)
+    """Standard deviations that give the searched ranges."""
+    search: ChamferSearchSettings = field(default_factory=ChamferSearchSettings)
+
+
+class FrontAndSide(NamedTuple):
+    """A frame on which a person is seen from the front and from the side."""
+
+    frame: int
+    front: int
+    """Index of the view from the front or the back."""
+    side: int
+    """Index of the view from the side."""
+    off_rad: float
+    """Largest angle by which the views depart from front, side and a right angle, rad."""
+
+
+def acquire_from_two_views(
+    observer: Observer,
+    bodies: Mapping[int, tuple[PosedBody, ...]],
+    person: int,
+    settings: TwoViewSettings,
+    report: Report = lambda stage, share: None,
+) -> Acquisition:
+    """Acquire the shapes of one person's parts. Pose, height and lengths stay.
+
+    Args:
+        observer: of the recording.
+        bodies: all people on each frame that may be used, in their present bodies.
+        person: index of the person among them.
+        settings: of the acquisition.
+        report: shows progress.
+
+    Returns:
+        The acquired body. Its covariance is NaN, because a search has none.
+
+    Raises:
+        TrackerError: no frame shows the person from the front and from the side, or the views show nothing of them.
+    """
+    if not bodies:
+        raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
+    report("choosing views", 0.0)
+    chosen = choose_views(observer.working_cameras, bodies, person, settings.views)
+    frame, front, side, _ = chosen
+    report("reading contours", _CHOOSING)
+    static_edges = learn_static_edges(observer, bodies)
+    views = read_views(observer, frame, bodies[frame], static_edges)
+    own = own_views(views, bodies[frame], person)
+    sighted = SightedPerson(frame, [own[front], own[side]], bodies[frame], person)
+    parameters = SizeParameters(bodies[frame][person].model, settings.coupled, settings.priors)
+    found = search_shapes(
+        parameters, sighted, settings.search,
+        report=lambda share: report("searching shapes", _OBSERVING + (1 - _OBSERVING) * share),
+    )  # fmt: skip
+    names = tuple(observer.working_cameras[i].name for i in (front, side))
+    if not np.isfinite(found.chamfer_before_m):
+        raise TrackerError(
+            f"expected contours of the person on frame {frame} in {' and '.join(names)}, found no edges near the body; "
+            "place it where the person is"
+        )
+    body = parameters.body(found.sizes)
+    before, after = (
+        chamfer_cost(views, b, TrackSettings()).at_prediction().total_px
+        for b in (bodies[frame], sighted.moved(body, sighted.pose).bodies)
+    )
+    report("done", 1.0)
+    n = len(found.sizes)
+    fit = SizeFit(found.sizes, body, (sighted.pose,), found.chamfer_after_m, np.full((n, n), np.nan))
+    return Acquisition(body, (frame,), fit.poses, before, after, parameters, fit, names)
+
+
+def choose_views(
+    cameras: Sequence[Camera],
+    bodies: Mapping[int, tuple[PosedBody, ...]],
+    person: int,
+    names: tuple[str, str] | None = None,
+) -> FrontAndSide:
+    """Choose the frame and the two views that show a person best from the front and from the side.
+
+    Args:
+        cameras: all views.
+        bodies: all people on each frame to choose from.
+        person: index of the person among them.
+        names: of the frontal view and the side view, if they are given.
+
+    Raises:
+        TrackerError: no frame has such views within `MAX_OFF_RAD`.
+    """
+    index = {c.name: i for i, c in enumerate(cameras)}
+    pairs = [(index[names[0]], index[names[1]])] if names else list(permutations(range(len(cameras)), 2))
+    found = []
+    for k, people in bodies.items():
+        turns = [_direction_rad(people[person], c) for c in cameras]
+        found += [FrontAndSide(k, front, side, _off_rad(turns[front], turns[side])) for front, side in pairs]
+    best = min((f.off_rad for f in found), default=np.inf)
+    if best > MAX_OFF_RAD:
+        where = f"{names[0]} and {names[1]}" if names else "two views"
+        but = "too few views" if not found else f"{np.degrees(best):.0f} degrees at best"
+        raise TrackerError(
+            f"expected a frame on which {where} show the person from the front and from the side within "
+            f"{np.degrees(MAX_OFF_RAD):.0f} degrees, found {but}; add poses of such a frame, or leave out --paper"
+        )
+    alike = [f for f in found if f.off_rad <= min(best + _ALIKE_RAD, MAX_OFF_RAD)]
+    return min(alike, key=lambda f: sum(_occluded(bodies[f.frame], person, cameras[i]) for i in (f.front, f.side)))
+
+
+def _direction_rad(body: PosedBody, camera: Camera) -> float:
+    """Return the direction of a view from the trunk, in the plane across it: 0 is the front, pi/2 the left, rad."""
+    T = body.kinematics.Ts_world_part[0]
+    x, y, _ = (camera.center_world - T[:3, 3]) @ T[:3, :3]
+    return float(np.arctan2(y, x))
+
+
+def _off_rad(front_rad: float, side_rad: float) -> float:
+    """Return how far two directions depart from front or back, from a side, and from a right angle, rad."""
+    front = np.arcsin(np.abs(np.sin(front_rad)))
+    side = np.arcsin(np.abs(np.cos(side_rad)))
+    between = np.arcsin(np.abs(np.cos(front_rad - side_rad)))
+    return float(max(front, side, between))
+
+
+def _occluded(bodies: Sequence[PosedBody], person: int, camera: Camera) -> float:
+    """Return which share of a person's contour is occluded or outside the image."""
+    contour = occluding_contours.trace(bodies, camera)
+    first = sum(len(b.model.parts) for b in bodies[:person])
+    own = (contour.parts >= first) & (contour.parts < first + len(bodies[person].model.parts))
+    middles = (contour.pieces_px[own, :2] + contour.pieces_px[own, 2:]) / 2
+    hidden = contour.occluded[own] | np.any((middles < 0) | (middles >= camera.size), axis=1)
+    return float(hidden.mean()) if len(hidden) else 1.0
