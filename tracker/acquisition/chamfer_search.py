@@ -109,9 +109,6 @@ class _Space:
         self._first = sum(len(b.model.parts) for b in person.bodies[: person.person])
         self._surfaces = surfaces_of(tuple(b.model for b in person.bodies))
         self._Ts = occluding_contours.part_poses(person.bodies)
-        self._buffers = [
-            occluding_contours.contour_buffer(v.camera, len(person.bodies), _PIECE_PX) for v in person.views
-        ]
         sigmas = parameters.sigmas
         is_girth = parameters.of_kinds("girth")
         self._sigmas = np.where(is_girth, np.hypot(sigmas, parameters.priors.build), sigmas)
@@ -173,13 +170,11 @@ class _Space:
         surfaces = self._surfaces_at(sizes)
         out = {}
         for view in views:
-            camera, buffer = self._person.views[view].camera, self._buffers[view]
-            n = occluding_contours.trace_view(
-                camera.projection, camera.center_world, self._Ts, surfaces, _PIECE_PX, buffer
-            )
-            middles = (buffer.pieces_px[:n, :2] + buffer.pieces_px[:n, 2:]) / 2
-            seen = ~buffer.occluded[:n] & np.all((middles >= 0) & (middles < camera.size), axis=1)
-            owners, points = buffer.parts[:n][seen] - self._first, buffer.points_world[:n][seen]
+            camera = self._person.views[view].camera
+            traced = occluding_contours.trace_surfaces(surfaces, self._Ts, camera, _PIECE_PX)
+            middles = (traced.pieces_px[:, :2] + traced.pieces_px[:, 2:]) / 2
+            seen = ~traced.occluded & np.all((middles >= 0) & (middles < camera.size), axis=1)
+            owners, points = traced.parts[seen] - self._first, traced.points_world[seen]
             out[view] = [points[owners == i] for i in range(len(self._parameters.base.parts))]
         return out
 

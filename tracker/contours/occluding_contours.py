@@ -63,9 +63,14 @@ def trace(bodies: Sequence[PosedBody], camera: Camera, piece_px: float = PIECE_P
         camera: the view; its lens distortion is ignored (undistorted pixels).
         piece_px: longest piece, px.
     """
-    surfaces = surfaces_of(tuple(b.model for b in bodies))
-    pieces = piece_buffer(surfaces, contour_room(camera, len(bodies), piece_px))
-    place_parts(part_poses(bodies), surfaces, pieces)
+    return trace_surfaces(surfaces_of(tuple(b.model for b in bodies)), part_poses(bodies), camera, piece_px)
+
+
+def trace_surfaces(surfaces: Surfaces, Ts_world_part: Array, camera: Camera, piece_px: float) -> Contour:
+    """Trace the contours of shapes, placed by their parts' poses (P, 4, 4), in a view; see `trace`."""
+    n_bodies = int(surfaces.people.max()) + 1
+    pieces = piece_buffer(surfaces, contour_room(camera, n_bodies, piece_px))
+    place_parts(Ts_world_part, surfaces, pieces)
     n = trace_pieces(camera.projection, camera.center_world, surfaces, float(piece_px), pieces)
     out = contour_buffer(n)
     store_contour(pieces, out)
