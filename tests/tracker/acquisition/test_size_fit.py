@@ -163,7 +163,7 @@ def test_a_body_where_nobody_is_gets_no_sizes():
 
 
 def test_the_height_of_a_child_is_the_stature():
-    """A child's head is larger and the legs are shorter: the unit of the fractions is not how tall the child is."""
+    """Head and legs have other shares of the stature: the unit of the fractions is not how tall the child is."""
     model = load_model("gavrila22", 1.1)
     child = with_child_proportions(model)
     frames = sighted(child, model, range(2), placed=True)
@@ -171,6 +171,7 @@ def test_the_height_of_a_child_is_the_stature():
     expected = model.height_m * stature_m(child) / stature_m(model)
     assert abs(expected / child.height_m - 1) > 0.02
     assert found.body.height_m == pytest.approx(expected, rel=0.015)
+    assert found.body.height_m / stature_m(found.body) == pytest.approx(model.height_m / stature_m(model), rel=1e-6)
     off = found.body.points_world(found.poses[0]) - frames[0].placed.targets_world
     assert np.linalg.norm(off, axis=1).mean() < 0.012
 
