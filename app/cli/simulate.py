@@ -18,6 +18,7 @@ def command(
     masks: bool = False,
     body: Literal["skinned", "model"] = "skinned",
     size: tuple[int, int] = (640, 480),
+    person: str = "",
 ) -> None:
     """Make a session of a simulated recording with known truth.
 
@@ -30,11 +31,12 @@ def command(
         masks: write true masks too.
         body: skinned, a smooth body unlike the model; model, the very shapes that are fitted.
         size: width and height of the images, px, both even.
+        person: who plays a scene of one person, such as child_6 or heavy_man; the usual adult by default.
     """
     from tracker.simulate import Simulation, simulate
 
     reporter = Reporter()
     with reporter.over(frames * cameras, "rendering") as tick:  # one tick per image
-        simulation = Simulation(scene, cameras, frames, seed, size, body=body, masks=masks)
+        simulation = Simulation(scene, cameras, frames, seed, size, body=body, masks=masks, person=person)
         simulate(out, simulation, progress=lambda *_: tick())
     print(f"made {out}")

@@ -19,6 +19,7 @@ from tracker.acquisition.part_motions import (
     to_unknowns,
 )
 from tracker.acquisition.size_parameters import SizeArrays, SizeParameters
+from tracker.body.dimensions import with_height_of_stature
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.threads import map_parallel
@@ -108,7 +109,7 @@ class SizeFit(NamedTuple):
     sizes: Array
     """Parameters, (n_sizes,), see `SizeParameters`."""
     body: BodyModel
-    """The body with these sizes."""
+    """The body with these sizes; its height is its stature."""
     poses: tuple[Array, ...]
     """Pose of each frame, (n_values,)."""
     cost: float
@@ -158,7 +159,8 @@ def fit_sizes_to_contours(
         sizes, poses, cost, hessian = problem.sizes, problem.poses, problem.cost, problem.hessian
     n = len(sizes)
     covariance: Array = np.asarray(np.linalg.inv(hessian)[:n, :n], dtype=np.float64)
-    return SizeFit(sizes, parameters.body(sizes), tuple(poses), cost, covariance)
+    body = with_height_of_stature(parameters.body(sizes), parameters.base)
+    return SizeFit(sizes, body, tuple(poses), cost, covariance)
 
 
 class _Resized(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 
 from tracker.acquisition.from_contours import Acquisition
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.body.dimensions import dimensions_of, mirror_part
+from tracker.body.dimensions import dimensions_of, mirror_part, with_height_of_stature
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
 
@@ -45,7 +45,7 @@ def size_changes(acquisition: Acquisition) -> list[SizeChange]:
 def _measured(parameters: SizeParameters, body: BodyModel) -> dict[str, float]:
     """Return each size of a body, metres, by its name for people."""
     sizes = dimensions_of(body)
-    out = {"height": body.height_m}
+    out = {"height": with_height_of_stature(body, parameters.base).height_m}
     for part, own in sizes.parts.items():
         if parameters.coupled and part.startswith("right_") and mirror_part(part) in sizes.parts:
             continue

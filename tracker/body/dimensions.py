@@ -20,6 +20,8 @@ HEIGHT_LIMITS_M = (0.3, 3.0)
 """Least and largest height of a body, metres."""
 _MIN_M, _MAX_SHARE = 0.005, 0.7
 """Shortest dimension of a part, metres; longest, as a share of the body's height."""
+_RESOLUTION = (40, 24)
+"""Rings and sectors of a part whose extent is measured."""
 _SIDES = ("left_", "right_")
 _WIDTHS = ("shoulder", "hip")
 """Pairs of joints, left and right, whose distance is a dimension of its own if one part carries both."""
@@ -110,6 +112,37 @@ def with_dimensions(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
             )
             for m in model.landmarks
         ),
+    )
+
+
+def stature_m(model: BodyModel) -> float:
+    """Return the vertical extent of a body that stands straight, from crown to sole, metres."""
+    Ts = model.kinematics(model.neutral()).Ts_world_part
+    ends = []
+    for shape, center, T in zip(model.shapes, model.centers_part, Ts, strict=True):
+        rings, sectors = _RESOLUTION
+        z = (shape.grid(rings, sectors)[0].reshape(-1, 3) + center) @ T[2, :3] + T[2, 3]
+        ends += [float(z.min()), float(z.max())]
+    return max(ends) - min(ends)
+
+
+def with_height_of_stature(model: BodyModel, like: BodyModel) -> BodyModel:
+    """Return the very same body with its height stated as its stature, in the ratio of another body's.
+
+    A body's height is the unit of its fractions. Where parts have other lengths, it no longer is how tall the body is.
+    """
+    height_m = like.height_m * stature_m(model) / stature_m(like)
+    by = model.height_m / height_m
+
+    def unchanged(at: tuple[float, float, float]) -> tuple[float, float, float]:
+        return _scaled(at, np.full(3, by))
+
+    return replace(
+        model,
+        height_m=height_m,
+        joints=tuple(replace(j, position=unchanged(j.position)) for j in model.joints),
+        parts=tuple(replace(p, center=unchanged(p.center), half_axes=unchanged(p.half_axes)) for p in model.parts),
+        landmarks=tuple(replace(m, position=unchanged(m.position)) for m in model.landmarks),
     )
 
 

@@ -60,6 +60,8 @@ class Simulation:
     """Frame rate, 1/s."""
     body: BodyKind = "skinned"
     """`skinned`: a smooth-skinned person with other bones than the preset's; `model`: the preset's own parts."""
+    person: str = ""
+    """Who plays a scene of one person, see `population.POPULATION`; the usual adult if empty."""
     masks: bool = False
     """Whether to write true masks too, `masks/CAM/%06d.png`: 0 background, k person k."""
 
@@ -86,7 +88,7 @@ def simulate(out: str | Path, simulation: Simulation = _DEFAULT, progress: Progr
     n_frames, fps, seed, body = simulation.n_frames, simulation.fps, simulation.seed, simulation.body
     out = Path(out).absolute()
     _check(out, n_frames, fps, body)
-    cast = cast_of(simulation.scene, seed)
+    cast = cast_of(simulation.scene, seed, simulation.person)
     cameras = make_cameras(simulation.n_cameras, simulation.size, seed)
     presets = [load_model(PRESET, role.height_m) for role in cast]
     models = [

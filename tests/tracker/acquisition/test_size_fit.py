@@ -9,7 +9,7 @@ from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_
 from tracker.acquisition.size_fit import Round, SightedPerson, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.acquisition.size_report import size_changes
-from tracker.body.dimensions import dimensions_of
+from tracker.body.dimensions import PartDimensions, dimensions_of, stature_m, with_dimensions
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import PointTargets
@@ -160,3 +160,28 @@ def test_a_body_where_nobody_is_gets_no_sizes():
         acquire_from_contours(staged, {0: (PosedBody(model, elsewhere),)}, 0, {}, AcquisitionSettings())
     with pytest.raises(TrackerError, match="place the body"):
         acquire_from_contours(staged, {}, 0, {}, AcquisitionSettings())
+
+
+def test_the_height_of_a_child_is_the_stature():
+    """Head and legs have other shares of the stature: the unit of the fractions is not how tall the child is."""
+    model = load_model("gavrila22", 1.1)
+    child = with_child_proportions(model)
+    frames = sighted(child, model, range(2), placed=True)
+    found = fit_sizes_to_contours(SizeParameters(model), frames, SizeFitSettings())
+    expected = model.height_m * stature_m(child) / stature_m(model)
+    assert abs(expected / child.height_m - 1) > 0.02
+    assert found.body.height_m == pytest.approx(expected, rel=0.015)
+    assert found.body.height_m / stature_m(found.body) == pytest.approx(model.height_m / stature_m(model), rel=1e-6)
+    off = found.body.points_world(found.poses[0]) - frames[0].placed.targets_world
+    assert np.linalg.norm(off, axis=1).mean() < 0.012
+
+
+def with_child_proportions(model):
+    """The body of a child of six: head and legs after Snyder et al. 1977."""
+    sizes = dimensions_of(model)
+    parts = dict(sizes.parts)
+    for name in ("left_thigh", "right_thigh", "left_calf", "right_calf", "head"):
+        length_m, girths_m = parts[name]
+        by = 1.28 if name == "head" else 0.86
+        parts[name] = PartDimensions(by * length_m, (girths_m[0] * max(by, 1), girths_m[1] * max(by, 1)))
+    return with_dimensions(model, sizes._replace(parts=parts))

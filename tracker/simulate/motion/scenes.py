@@ -1,6 +1,7 @@
 """The scenes that can be simulated, and the roles in them."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 
@@ -14,6 +15,7 @@ from tracker.simulate.motion.postures import Posture, Role, ramp, stance, standi
 from tracker.simulate.motion.solo_moves import dance, exercise, leaving, mingling, reach_and_cross
 from tracker.simulate.people.builds import MAN, WOMAN
 from tracker.simulate.people.outfit import BLACK_AND_WHITE, GREEN, RED, Outfit
+from tracker.simulate.people.population import individual
 
 
 def elbow_rotation(model: BodyModel, t: float) -> Posture:
@@ -103,12 +105,22 @@ SCENES: Mapping[str, MakeRoles] = MappingProxyType(
 """Makes the roles of each scene for a seed; the first two and the tango are the same for every seed."""
 
 
-def cast_of(scene: str, seed: int = 0) -> tuple[Role, ...]:
+def cast_of(scene: str, seed: int = 0, person: str = "") -> tuple[Role, ...]:
     """Return the roles of a scene.
 
+    Args:
+        scene: one of `SCENES`.
+        seed: of its motion.
+        person: one of `population.POPULATION`, who plays a scene of one person; the usual adult if empty.
+
     Raises:
-        TrackerError: there is no such scene.
+        TrackerError: there is no such scene or person, or the scene has several people.
     """
     if scene not in SCENES:
         raise TrackerError(f"expected one of the scenes {', '.join(SCENES)}, found '{scene}'")
-    return SCENES[scene](seed)
+    roles = SCENES[scene](seed)
+    if not person:
+        return roles
+    if len(roles) > 1:
+        raise TrackerError(f"expected a scene of one person for '{person}', found '{scene}' with {len(roles)}")
+    return (replace(roles[0], **individual(person)._asdict()),)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from tracker.body.model import BodyModel
-from tracker.simulate.people.anatomy import Lobe, lobes
+from tracker.simulate.people.anatomy import Lobe, Point, lobes
 from tracker.simulate.people.skeleton import BONE_FACTORS, Factors
 
 
@@ -19,14 +19,24 @@ class Build:
     """Factor on the thickness of the flesh on each bone, left and right alike; 1 for bones left out."""
     further: tuple[Lobe, ...] = ()
     """Additional flesh and hair."""
+    head_size: float = 1.0
+    """Factor on the size of the head, of an adult's share of the body height."""
 
     def flesh(self, model: BodyModel) -> list[Lobe]:
         """List the lobes of a body of this build whose limbs have the model's lengths."""
-        return [self._thickened(lobe) for lobe in lobes(model)] + list(self.further)
+        return [self._resized(lobe) for lobe in lobes(model)] + list(self.further)
 
-    def _thickened(self, lobe: Lobe) -> Lobe:
+    def _resized(self, lobe: Lobe) -> Lobe:
+        if lobe.bone == "head":
+            lobe = lobe._replace(start=_scaled(lobe.start, self.head_size), end=_scaled(lobe.end, self.head_size))
+            lobe = lobe._replace(radii=(lobe.radii[0] * self.head_size, lobe.radii[1] * self.head_size))
         girth = self.girths.get(lobe.bone.removeprefix("left_").removeprefix("right_"), 1.0)
         return lobe._replace(radii=(lobe.radii[0] * girth, lobe.radii[1] * girth))
+
+
+def _scaled(point: Point, factor: float) -> Point:
+    x, y, z = point
+    return factor * x, factor * y, factor * z
 
 
 MAN = Build()

@@ -220,3 +220,13 @@ def test_walking_lifts_the_knees_in_turn_and_swings_the_arms(true_model):
 def test_an_unknown_scene_lists_those_there_are():
     with pytest.raises(TrackerError, match=r"elbow_rotation.*'tango_solo'"):
         cast_of("tango_solo")
+
+
+def test_other_people_play_a_scene_of_one_person():
+    (child,) = cast_of("exercise", 5, "child_6")
+    assert child.height_m == 1.17
+    assert child.build.head_size > 1.2
+    with pytest.raises(TrackerError, match="expected one of the people child_3"):
+        cast_of("exercise", 5, "giant")
+    with pytest.raises(TrackerError, match="expected a scene of one person"):
+        cast_of("tango", 0, "child_6")

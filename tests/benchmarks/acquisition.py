@@ -1,0 +1,193 @@
+"""Measure what acquired sizes change (docs/accuracy.md): `python tests/benchmarks/acquisition.py`.
+
+Ten simulated people of other builds than the model's, children and heavy people among them, are filmed by four cameras
+with noise and clutter. Each is tracked with the generic body of the height that the joints of frame 0 give, then
+acquired, and tracked again, all by the commands that a user types. `--data DIR` adds the recordings there, `--scenes
+DIR` keeps the simulated ones and takes them up again. Accuracy is the mean error of the 12 limb joints; a frame is lost
+when one of them is off by more than 150 mm.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from sections import put_section, table
+
+from tracker.session.session import load_session
+from tracker.simulate import Simulation, simulate
+from tracker.simulate.people.population import individual
+from tracker.store.stored_poses import read_stored_poses
+
+OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
+PLAYED = {
+    "child_3": ("elbow_rotation", 5),
+    "child_6": ("exercise", 5),
+    "child_10": ("dance", 7),
+    "heavy_child": ("walk_in_place", 10),
+    "heavy_man": ("walk_in_place", 5),
+    "heavy_woman": ("elbow_rotation", 6),
+    "short_woman": ("dance", 5),
+    "long_legged_woman": ("reach_and_cross", 8),
+    "tall_thin_man": ("leaving", 5),
+    "broad_man": ("exercise", 9),
+}
+"""Scene and seed of each person."""
+N_FRAMES = 36
+RECORDED = {"walk": (), "balance_real": (), "fast_arms": (), "two_people": ("person1", "person2")}
+"""Recordings, and the names of their people if there are several."""
+LOST_M = 0.15
+HEADS = ("height off", "error, mm", "lost frames", "cost, px")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Files of a recording with known joints."""
+
+    name: str
+    videos: Sequence[Path]
+    calibration: Path
+    background: Path
+    references: dict[str, Path]
+    """Reference joints of each person."""
+    height_m: float | None = None
+    """True stature, metres, if known."""
+
+
+class Result(NamedTuple):
+    """What a body reaches on a recording."""
+
+    error_mm: float
+    lost: int
+    cost_px: float
+
+
+class Outcome(NamedTuple):
+    """What an acquisition changes for one person."""
+
+    name: str
+    height_share: float | None
+    """Error of the height afterwards, as a share; None where it is not known."""
+    before: Result
+    after: Result
+
+    @property
+    def cells(self) -> list[str]:
+        """Cells of the table, in the order of `HEADS`."""
+        height = "" if self.height_share is None else f"{100 * self.height_share:+.1f}%"
+        (mm, lost, px), (mm_after, lost_after, px_after) = self.before, self.after
+        return [height, f"{mm:.1f} → {mm_after:.1f}", f"{lost} → {lost_after}", f"{px:.2f} → {px_after:.2f}"]
+
+
+def simulated(folder: Path, names: Sequence[str]) -> Iterator[Recording]:
+    """Make the scenes that are not there."""
+    for name in names:
+        scene, seed = PLAYED[name]
+        if not (folder / name).exists():
+            simulate(folder / name, Simulation(scene, n_frames=N_FRAMES, seed=seed, person=name))
+        at = folder / name
+        yield Recording(
+            name, sorted(at.glob("*.mp4")), at / "calibration.toml", at / "background", {"person": at / "truth.trc"},
+            individual(name).height_m,
+        )  # fmt: skip
+
+
+def recorded(data: Path, names: Sequence[str]) -> Iterator[Recording]:
+    """List recordings of a folder."""
+    for name in names:
+        at, people = data / name, RECORDED[name]
+        references = {p: at / f"ground_truth_{p}.trc" for p in people} or {"person": next(at.glob("*.trc"))}
+        yield Recording(name, sorted(at.glob("*.mp4")), at / "Calib.toml", at / "background", references)
+
+
+def measure(recording: Recording, folder: Path) -> list[Outcome]:
+    """Track, acquire and track again; return the outcome of each person."""
+    session, people = folder / recording.name, list(recording.references)
+    _quadrille(
+        "new", session, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
+        recording.background, "--people", *people,
+    )  # fmt: skip
+    for person, joints in recording.references.items():
+        _quadrille("init", session, "--joints", joints, "--person", person)
+    before = _tracked(recording, session)
+    for person in people:
+        _quadrille("acquire", session, "--person", person)
+    after = _tracked(recording, session)
+    out = []
+    for person, model in ((p.name, p.model) for p in load_session(session).people):
+        share = None if recording.height_m is None else model.height_m / recording.height_m - 1
+        name = recording.name if len(people) == 1 else f"{recording.name}, {person}"
+        out.append(Outcome(name, share, before[person], after[person]))
+    return out
+
+
+def _tracked(recording: Recording, session: Path) -> dict[str, Result]:
+    """Track all people and evaluate each."""
+    _quadrille("track", session)
+    out = {}
+    for person, joints in recording.references.items():
+        found = _quadrille("evaluate", session, "--reference", joints, "--person", person)
+        at = load_session(session)
+        model = next(p.model for p in at.people if p.name == person)
+        stored = read_stored_poses(at.annotations_path, person, model)
+        costs = [s.record.cost_px for s in stored.values() if s.record.cost_px is not None]
+        out[person] = Result(found["mpjpe_mm"], found["lost_frames"], float(np.mean(costs)))
+    return out
+
+
+def _quadrille(*words: object) -> dict[str, Any]:
+    """Run a command and return what it prints as JSON."""
+    command = [str(Path(sys.executable).parent / "quadrille"), *map(str, words)]
+    done = subprocess.run(command + ([] if words[0] == "new" else ["--json"]), capture_output=True, text=True)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(command)}:\n{done.stderr}")
+    return {} if words[0] == "new" else json.loads(done.stdout)
+
+
+def section(outcomes: Sequence[Outcome]) -> str:
+    """The results as Markdown."""
+    lines = [
+        "## What acquired sizes change",
+        "",
+        f"Made by `python tests/benchmarks/acquisition.py`. Four cameras, {N_FRAMES} frames of each simulated person "
+        "(`tracker/simulate/people/population.py`; a number in a name is an age), with noise and clutter. Each is "
+        "tracked from the joints of frame 0 with the generic body of the height that these joints give, acquired by "
+        "`quadrille acquire` without further options, and tracked again. Before → after: mean error of the 12 limb "
+        "joints, lost frames, mean cost of the tracked frames. The error of the height is that after it.",
+        "",
+    ]
+    return "\n".join([*lines, table(HEADS, {o.name.replace("_", " "): o.cells for o in outcomes})])
+
+
+def main() -> None:
+    """Measure and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
+    parser.add_argument("--scenes", type=Path, help="folder that keeps the simulated recordings")
+    parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
+    parser.add_argument("--out", type=Path, default=OUT)
+    words = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        scenes = words.scenes or folder / "scenes"
+        scenes.mkdir(exist_ok=True)
+        wanted = words.only or [*PLAYED, *RECORDED]
+        recordings = [*simulated(scenes, [n for n in PLAYED if n in wanted])]
+        recordings += recorded(words.data, [n for n in RECORDED if n in wanted]) if words.data else []
+        outcomes = []
+        for recording in recordings:
+            for outcome in measure(recording, folder):
+                print(f"{outcome.name}: {', '.join(map(' '.join, zip(HEADS, outcome.cells, strict=True)))}", flush=True)
+                outcomes.append(outcome)
+        if not words.only:
+            put_section(words.out, section(outcomes))
+
+
+if __name__ == "__main__":
+    main()
