@@ -1,10 +1,10 @@
-"""People of other ages and statures than the adults of the scenes, from anthropometric surveys.
+"""People of other ages and statures than the adults of the scenes.
 
-Children: stature, sitting height, head height and girths by age after R. G. Snyder et al. 1977 (Anthropometry of
-infants, children, and youths to age 18, UM-HSRI-77-17). A child's head is up to one and a half times as large a share
-of the stature as an adult's, and the legs make up for it. Adults: statures, segments and girths at the tails of
-ANSUR II (C. C. Gordon et al. 2014); girths of obese people at the 90th to 95th percentile of NHANES 2015-2018
-(C. D. Fryar et al. 2021). Factors are rounded, and apply to the skeleton of `gavrila22` and the flesh of `anatomy`.
+Builds are approximate, not read from tables. They aim at the proportions that these surveys describe. Children: R. G.
+Snyder et al. 1977 (Anthropometry of infants, children, and youths to age 18, UM-HSRI-77-17). A child's head is up to
+one and a half times as large a share of the stature as an adult's, and the legs make up for it. Adults: the tails of
+ANSUR II (C. C. Gordon et al. 2014), and obese people in NHANES 2015-2018 (C. D. Fryar et al. 2021). Factors apply to
+the skeleton of `gavrila22` and the flesh of `anatomy`.
 """
 
 from collections.abc import Mapping
