@@ -46,7 +46,7 @@ class EdgeSettings:
     foreground: bool = True
     """Whether edges are restricted to the foreground, where masks or a background exist, and its contour is used."""
     static: bool = True
-    """Whether edges that stay where they are while people move are refused, where nothing tells the foreground."""
+    """Whether edges that stay where they are while people move are refused, in views without masks and background."""
     max_segment_px: int | None = MAX_LENGTH
     """Largest number of pixels of a segment; None: no limit."""
     max_angle_rad: float = MAX_ANGLE_RAD
