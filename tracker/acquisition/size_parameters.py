@@ -191,7 +191,7 @@ class SizeParameters:
                 effects += [(joint.name, f"joint_{a}", _JOINT.start + k, 1.0) for k, a in enumerate("xyz")]
             for owner, name, column, sign in effects:
                 mirrored = mirror_part(owner) is not None
-                if self.coupled and name.endswith("_y"):
+                if self.coupled and name in ("side_y", "joint_y"):
                     if not mirrored:
                         continue  # the middle of the body is symmetric
                     sign = sign if owner.startswith("left") else -sign

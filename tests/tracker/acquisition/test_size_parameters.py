@@ -82,3 +82,10 @@ def test_an_acquired_body_can_be_stored():
     parameters = SizeParameters(load_model("gavrila34", 1.7))
     body = parameters.body(drawn(parameters))
     assert format_model(parse_model(format_model(body), "test")) == format_model(body)
+
+
+def test_the_trunk_tapers_both_ways_and_does_not_shift_sideways():
+    names = SizeParameters(load_model("gavrila34")).names
+    assert {"torso.taper_x", "torso.taper_y", "pelvis.taper_y"} <= set(names)
+    assert not {"torso.side_y", "neck.joint_y"} & set(names)
+    assert {"thigh.side_y", "hip.joint_y"} <= set(names)
