@@ -158,9 +158,10 @@ class Dragging:
         self._scores_moves = False
         has_moved = not np.array_equal(grab.pose, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
-            self._show_seen(drag, self._seen(drag))
+            people = list(session_state.state.people)
+            people[drag.person] = replace(people[drag.person], seen=self._seen(drag))
+            session_state.set(people=tuple(people))
             session_state.save(f"drag {display_name(drag.point)}", "manual", grab, drag.person)
-            self._show_seen(drag, ())
             self._hold(drag)
         elif not session_state.is_shown_stored(session_state.state):
             session_state.show_frame(session_state.state.frame)  # moved back: the pose has its former source
@@ -173,11 +174,6 @@ class Dragging:
             return ()
         u, v = (float(c) for c in np.array(drag.pointer_px) + self._mode_grab.offset_px)
         return (PointObservation(drag.point, drag.camera, (u, v)),)
-
-    def _show_seen(self, drag: DragState, seen: tuple[PointObservation, ...]) -> None:
-        people = list(self._session_state.state.people)
-        people[drag.person] = replace(people[drag.person], seen=seen)
-        self._session_state.set(people=tuple(people))
 
     def _hold(self, drag: DragState) -> None:
         """Hold the point that was placed in a view."""
