@@ -46,6 +46,7 @@ def new_session(run, path, *more):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_an_acquired_body_goes_to_the_next_session(run, placed, quick, tmp_path):
     body = tmp_path / "ann.toml"
     words = ("acquire", placed, "--frames", "20:23", "--n-frames", "2", "--out", body, "--json")
@@ -88,6 +89,7 @@ def test_a_fit_that_is_stopped_leaves_the_session_as_it_was(run, placed, monkeyp
     assert not (placed / "lock.json").exists()
 
 
+@pytest.mark.slow
 def test_the_paper_s_way_names_its_views(run, placed, monkeypatch):
     quick = TwoViewSettings(search=ChamferSearchSettings(levels=1, passes=1))
     monkeypatch.setattr("tracker.acquisition.two_views.TwoViewSettings", lambda views, n, coupled: quick)

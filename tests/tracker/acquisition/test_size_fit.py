@@ -142,12 +142,13 @@ def test_an_acquisition_fits_better_than_the_body_before(acquisition):
 
 
 def test_sizes_are_reported_with_their_uncertainty(acquisition):
-    rows = {r.name: r for r in size_changes(acquisition)}
+    listed = size_changes(acquisition)
+    rows = {r.name: r for r in listed}
     assert rows["height"].after_m == pytest.approx(acquisition.body.height_m)
     assert rows["height"].before_m == pytest.approx(1.7)
     thigh = rows["thigh, thickness side to side"]
     assert 0 < thigh.sigma_m < 0.2 * thigh.after_m
-    changes = [abs(np.log(r.after_m / r.before_m)) for r in size_changes(acquisition)]
+    changes = [abs(np.log(r.after_m / r.before_m)) for r in listed]
     assert changes == sorted(changes, reverse=True)
 
 
