@@ -82,11 +82,11 @@ def test_a_fit_that_is_stopped_leaves_the_session_as_it_was(run, placed, monkeyp
 
     monkeypatch.setattr(size_fit._Problem, "advance", stopped)
     words = ("acquire", placed, "--frames", "20:23", "--n-frames", "2", "--out", tmp_path / "b.toml", "--json")
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
     try:
         status, out, _ = run(*words)
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, handler)
     assert (status, out, len(steps)) == (130, "", 2)
     assert files_of(placed) == before
     assert not (tmp_path / "b.toml").exists()
