@@ -21,6 +21,7 @@ class _Kept(TypedDict, total=False):
     past_poses: int
     recover: bool
     backward_pass: bool
+    smooth: bool
 
 
 def changed(before: TrackSettings, changes: Mapping[str, Any]) -> TrackSettings:
@@ -74,4 +75,5 @@ def _choices(settings: TrackSettings) -> "_Kept":
         past_poses=settings.predict.window,
         recover=settings.recover is not None,
         backward_pass=settings.backward_pass,
+        smooth=settings.smooth,
     )

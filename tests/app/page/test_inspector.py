@@ -52,6 +52,7 @@ def test_settings_are_shown_changed_one_by_one_and_their_defaults_known(page):
 
 def test_track_settings_are_kept_with_the_session(page, opened):
     page.send("track_settings", changes={"estimate": "search", "order": 2, "recover": False, "backward_pass": False})
+    page.send("track_settings", changes={"smooth": False})
     page.send("search_settings", changes={"bound_rad": 0.5})
     chosen = page.updates()["settings"]
     page.controller = opened()
