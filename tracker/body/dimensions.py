@@ -140,9 +140,14 @@ def with_height_of_stature(model: BodyModel, like: BodyModel) -> BodyModel:
     return replace(
         model,
         height_m=height_m,
-        joints=tuple(replace(j, position=unchanged(j.position)) for j in model.joints),
+        joints=tuple(
+            replace(j, position=unchanged(j.position), center_offset=unchanged(j.center_offset)) for j in model.joints
+        ),
         parts=tuple(replace(p, center=unchanged(p.center), half_axes=unchanged(p.half_axes)) for p in model.parts),
-        landmarks=tuple(replace(m, position=unchanged(m.position)) for m in model.landmarks),
+        landmarks=tuple(
+            replace(m, position=unchanged(m.position), center_offset=unchanged(m.center_offset))
+            for m in model.landmarks
+        ),
     )
 
 
