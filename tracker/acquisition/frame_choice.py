@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tracker.acquisition.part_motions import motions_by_pose, motions_by_sizes, sum_motions, to_unknowns
+from tracker.acquisition.part_motions import motions_by_unknowns, sum_motions, to_unknowns
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
@@ -59,8 +59,7 @@ def _information(
     pieces = [(c, _visible_pieces(occluding_contours.trace(bodies, c), first, body, c)) for c in cameras]
     b, M = sum_motions(pieces, model, kinematics)
     by_sizes = parameters.derivatives(np.zeros(len(parameters.names)))
-    J = np.concatenate([motions_by_sizes(model, kinematics, by_sizes), motions_by_pose(model, kinematics)], axis=2)
-    H, n = to_unknowns(J, b, M)[1], len(parameters.names)
+    H, n = to_unknowns(motions_by_unknowns(model, kinematics, by_sizes), b, M)[1], len(parameters.names)
     by_pose = H[n:, n:] + np.eye(model.n_dofs) * _POSE_WEIGHT
     return np.asarray(H[:n, :n] - H[:n, n:] @ np.linalg.solve(by_pose, H[n:, :n]))
 

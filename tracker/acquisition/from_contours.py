@@ -18,10 +18,11 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
-from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock
 from tracker.images.static_edges import StaticEdgeModel
+from tracker.tracking.chamfer.forward_pass import update_static_edges
 from tracker.tracking.chamfer.frame_problem import FrameProblem, PersonPrior
 from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
 from tracker.tracking.view_regions import regions, visible_pieces_px
@@ -106,7 +107,7 @@ def acquire_from_contours(
     for i, k in enumerate(frames):
         views = read_views(observer, k, bodies[k], static_edges)
         observed.append(views)
-        before.append(_cost_px(views, bodies[k]))
+        before.append(cost_px(views, bodies[k]))
         sighted.append(
             SightedPerson(k, own_views(views, bodies[k], person), bodies[k], person, placed.get(k), seen.get(k))
         )
@@ -121,7 +122,7 @@ def acquire_from_contours(
         report=lambda share: report("fitting sizes", _OBSERVING + (1 - _OBSERVING) * share),
     )  # fmt: skip
     after = [
-        _cost_px(views, s.moved(found.body, p).bodies)
+        cost_px(views, s.moved(found.body, p).bodies)
         for views, s, p in zip(observed, sighted, found.poses, strict=True)
     ]
     report("done", 1.0)
@@ -130,7 +131,8 @@ def acquire_from_contours(
     )
 
 
-def _cost_px(views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> float:
+def cost_px(views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> float:
+    """Return the cost of all people on a frame, px."""
     return chamfer_cost(views, bodies, TrackSettings()).at_prediction().total_px
 
 
@@ -162,9 +164,6 @@ def learn_static_edges(observer: Observer, bodies: Mapping[int, tuple[PosedBody,
     models = [StaticEdgeModel(c.size) for c in observer.working_cameras]
     for k, people in bodies.items():
         views = read_views(observer, k, people, models)
-        for view, camera, model in zip(views, observer.working_cameras, models, strict=True):
-            if view.segments is not None and view.silhouette is None:
-                pieces = visible_pieces_px(occluding_contours.trace(people, camera))
-                pieces = pieces - np.array([*view.corner_px, *view.corner_px], np.float32)
-                model.update(view.segments, view.corner_px, view.camera.size, pieces, ACCEPTED_SHARE * view.theta_px)
+        visible = [visible_pieces_px(occluding_contours.trace(people, v.camera)) for v in views]
+        update_static_edges(models, views, visible)
     return models

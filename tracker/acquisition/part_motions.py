@@ -79,6 +79,11 @@ def points_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArra
     return np.concatenate([origins, landmarks])
 
 
+def motions_by_unknowns(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
+    """Differentiate the motions of all parts by the sizes and then the pose, (n_parts, N_MOTIONS, n_sizes + n_dofs)."""
+    return np.concatenate([motions_by_sizes(model, kinematics, by_sizes), motions_by_pose(model, kinematics)], axis=2)
+
+
 def motions_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
     """Differentiate the motions of all parts by the sizes, (n_parts, N_MOTIONS, n_sizes)."""
     Rs, origins = kinematics.Ts_world_part[:, :3, :3], _origins_by_sizes(model, kinematics, by_sizes)

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.acquisition.part_motions import (
-    motions_by_pose,
-    motions_by_sizes,
+    motions_by_unknowns,
     points_by_sizes,
     sum_motions,
     to_unknowns,
@@ -276,9 +275,8 @@ class _Problem:
             pieces.append((view.camera, sums))
         gradient, hessian = np.zeros(n + body.n_dofs), np.zeros((n + body.n_dofs, n + body.n_dofs))
         if pieces:
-            by_sizes_and_pose = motions_by_sizes(body, kinematics, by_sizes), motions_by_pose(body, kinematics)
             sums_of_motions = sum_motions(pieces, body, kinematics, self._with_shapes)
-            gradient, hessian = to_unknowns(np.concatenate(by_sizes_and_pose, axis=2), *sums_of_motions)
+            gradient, hessian = to_unknowns(motions_by_unknowns(body, kinematics, by_sizes), *sums_of_motions)
         placed = self._frames[i].placed
         if placed is not None:
             own = _linearize_placed(placed, body, kinematics, by_sizes)

@@ -2,7 +2,7 @@
 
 The person faces one view, or turns the back to it, and is seen from the side in the other. The paper leaves open what
 happens where the views are not quite orthogonal, how parts are segmented, and what is searched in which steps; see
-docs/accuracy.md for what was chosen.
+docs/acquisition.md for what was chosen.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.chamfer_search import ChamferSearchSettings, search_shapes
-from tracker.acquisition.from_contours import Acquisition, Report, learn_static_edges, own_views, read_views
+from tracker.acquisition.from_contours import Acquisition, Report, cost_px, learn_static_edges, own_views, read_views
 from tracker.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.body.model import PosedBody
@@ -21,7 +21,6 @@ from tracker.contours import occluding_contours
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.cameras import Camera
-from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
 
 MAX_OFF_RAD = np.radians(35.0)
 """Largest angle between a view and the person's front or side, and of two views from a right angle."""
@@ -102,10 +101,7 @@ def acquire_from_two_views(
             "place it where the person is"
         )
     body = parameters.body(found.sizes)
-    before, after = (
-        chamfer_cost(views, b, TrackSettings()).at_prediction().total_px
-        for b in (bodies[frame], sighted.moved(body, sighted.pose).bodies)
-    )
+    before, after = (cost_px(views, b) for b in (bodies[frame], sighted.moved(body, sighted.pose).bodies))
     report("done", 1.0)
     n = len(found.sizes)
     fit = SizeFit(found.sizes, body, (sighted.pose,), found.chamfer_after_m, np.full((n, n), np.nan))

@@ -21,7 +21,7 @@ from tracker.geometry.triangulation import PointObservation
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import SEEN, Change, PoseChange, PoseRecord
+from tracker.store.records import SEEN, Change, Pin, PoseChange, PoseRecord
 from tracker.store.stored_poses import StoredPose, read_stored_poses
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
@@ -121,7 +121,9 @@ def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedF
         for k, s in usable.items()
     }
     keyframes = {k: s for k, s in usable.items() if s.record.keyframe}
-    observed = {k: _observed(session, person, k, s) for k, s in keyframes.items()}
+    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+        pins = {k: store.pins(session.people[person].name, k) for k in keyframes}
+    observed = {k: _observed(session, model, s, pins[k]) for k, s in keyframes.items()}
     cameras = [c.camera for c in session.cameras]
     seen = {k: pin_block(model, cameras, o).widened(_HAND) for k, o in observed.items() if o}
     placed = {k: t for k, s in keyframes.items() if (t := _placed(s, observed[k])) is not None and len(t.points)}
@@ -143,13 +145,11 @@ def store_body(
         poses: by frame, poses of the new body; they replace those of keyframes. Other keyframes are retargeted.
         label: of the entry of the history.
     """
-    name, before = (
-        session.people[person].name,
-        store.add_model_revision(session.people[person].name, format_model(session.people[person].model)),
-    )
+    name, model = session.people[person].name, session.people[person].model
+    before = store.add_model_revision(name, format_model(model))
     changed = save_model(session, person, body)
     revision = store.add_model_revision(name, format_model(body))
-    stored = read_stored_poses(session.annotations_path, name, session.people[person].model)
+    stored = read_stored_poses(session.annotations_path, name, model)
     changes: list[Change] = [
         PoseChange(name, k, refitted_record(s.record, _pose_in(body, s, poses.get(k)), revision))
         for k, s in stored.items()
@@ -181,16 +181,14 @@ def _pose_in(body: BodyModel, stored: StoredPose, known: Array | None) -> Array:
     return retarget_pose(stored.body.values, stored.body.model, body) if known is None else known
 
 
-def _observed(session: Session, person: int, frame: int, stored: StoredPose) -> list[PointObservation]:
+def _observed(session: Session, model: BodyModel, stored: StoredPose, pins: Sequence[Pin]) -> list[PointObservation]:
     """Return where somebody has seen points of a person on a frame: the ends of drags, and pins, which go before."""
     index = {c.camera.name: i for i, c in enumerate(session.cameras)}
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
-        pins = store.pins(session.people[person].name, frame)
     found = {(p, c): uv for p, views in stored.record.settings.get(SEEN, {}).items() for c, uv in views.items()}
     found |= {(pin.point, pin.camera): pin.position_px for pin in pins}
     out = []
     for (point, camera), (u, v) in sorted(found.items()):
-        if camera in index and point in session.people[person].model.point_names:
+        if camera in index and point in model.point_names:
             x, y = session.cameras[index[camera]].camera.undistort_points(np.array([u, v]))
             out.append(PointObservation(point, index[camera], (float(x), float(y))))
     return out

@@ -98,7 +98,7 @@ def track_forward(run: TrackingRun, settings: TrackSettings, lead_in: int = 0) -
         cost_of = chamfer_cost(views, estimator.bodies, settings)
         if static_edges is not None:
             there = cost_of if learnt == estimator.bodies else chamfer_cost(views, learnt, settings)
-            _update_static_edges(static_edges, views, there.predicted_pieces_px)
+            update_static_edges(static_edges, views, there.predicted_pieces_px)
         if i >= lead_in:
             found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in range(len(models))]
             yield make_estimate(frame, cost_of, estimator.bodies, found, settings)
@@ -144,7 +144,7 @@ def _remember(
     map_parallel(remember, range(len(memories)))
 
 
-def _update_static_edges(
+def update_static_edges(
     static_edges: Sequence[StaticEdgeModel], views: Sequence[ViewEvidence], visible: Sequence[FloatArray]
 ) -> None:
     """Learn the edges away from all people, in views where no silhouette tells people from the background.
@@ -152,7 +152,7 @@ def _update_static_edges(
     Args:
         static_edges: of each view.
         views: the evidence of the frame.
-        visible: visible contours of all people in each view, x0, y0, x1, y1, (M, 4), working px.
+        visible: visible contours of all people in each view, x0, y0, x1, y1, (M, 4), px of the region.
     """
     for view, model, pieces in zip(views, static_edges, visible, strict=True):
         if view.segments is not None and view.silhouette is None:
