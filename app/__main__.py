@@ -12,6 +12,7 @@ from app.cli import (
     acquire,
     bench,
     evaluate,
+    experiment,
     export,
     index,
     info,
@@ -42,6 +43,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "export": export.command,
     "restore": restore.command,
     "simulate": simulate.command,
+    "experiment": experiment.command,
     "bench": bench.command,
 }
 _HELP = ("-h", "--help")

@@ -73,7 +73,7 @@ def _with(
     found: Observability, bodies: Sequence[PosedBody], camera: Camera, person: int, noise: ContourNoise | None
 ) -> Observability:
     """Return the observability with one more view."""
-    own, more = found.information, view_information(bodies, [camera], person, noise)
+    own, more = found.information, view_information(bodies, [camera], person, noise or ContourNoise())
     both = own._replace(
         cameras=own.cameras + more.cameras,
         matrices=np.concatenate([own.matrices, more.matrices]),

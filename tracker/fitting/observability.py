@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
+from tracker.contours.pieces import PIECE_PX
 from tracker.fitting.twists import twists_to_dofs
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 
 OBSERVABLE_RAD, OBSERVABLE_M = float(np.radians(10.0)), 0.03
@@ -35,6 +36,10 @@ class ContourNoise:
     """Standard deviation across the contour, working px."""
     length_px: float = 80.0
     """Length of contour along which the error is the same, working px: edges of clothes and wrong shapes are."""
+    joint_share: float = 0.018
+    """Standard deviation of the place of a joint on its parent along each axis, fraction of the body height: lengths of
+    bones differ by 5% between people of one height, and joints are known to 1 or 2 cm (see
+    `acquisition.size_parameters`). 0 if the body is that of the person exactly."""
 
     @property
     def information_per_px(self) -> float:
@@ -42,12 +47,17 @@ class ContourNoise:
         return 1.0 / (self.sigma_px**2 * self.length_px)
 
 
+EXACT_1PX = ContourNoise(1.0, PIECE_PX, 0.0)
+"""Noise of 1 px, independent from piece to piece, on the contours of the very body that is fitted."""
+
+
 class ViewInformation(NamedTuple):
     """What each view sees of a person's contours."""
 
     cameras: tuple[str, ...]
     matrices: Array
-    """Normal matrix of the degrees of freedom in each view, (V, n_dofs, n_dofs), 1/rad^2 and 1/m^2."""
+    """Normal matrix of the degrees of freedom, and then of the places of joints on their parents, in each view,
+    (V, n_dofs + n_places, n_dofs + n_places), 1/rad^2 and 1/m^2. Places of joints are unknown, but not estimated."""
     lengths_px: Array
     """Visible length of contour of each part in each view, (V, n_parts), working px."""
 
@@ -59,12 +69,12 @@ class Observability:
     model: BodyModel
     information: ViewInformation
     prior: Array
-    """Information before any view is seen, (n_dofs,): that of the spreads, and next to nothing elsewhere."""
+    """Information before any view is seen, (n_dofs + n_places,): that of the spreads, and next to nothing elsewhere."""
 
     @cached_property
     def covariance(self) -> Array:
         """Covariance with all views, (n_dofs, n_dofs), rad and metres."""
-        return _inverse(self.information.matrices.sum(axis=0), self.prior)
+        return self._covariance(self.information.matrices.sum(axis=0))
 
     @cached_property
     def sigmas(self) -> Array:
@@ -73,14 +83,19 @@ class Observability:
 
     @cached_property
     def sigmas_alone(self) -> Array:
-        """Standard deviation if all other degrees of freedom were known, (n_dofs,), rad or metres."""
-        return 1.0 / np.sqrt(np.diagonal(self.information.matrices.sum(axis=0)) + self.prior)
+        """Standard deviation if everything else were known, (n_dofs,), rad or metres."""
+        total = np.diagonal(self.information.matrices.sum(axis=0)) + self.prior
+        return 1.0 / np.sqrt(total[: self.model.n_dofs])
 
     @cached_property
     def sigmas_without(self) -> Array:
         """Standard deviation without each view, (V, n_dofs), rad or metres."""
         total = self.information.matrices.sum(axis=0)
-        return np.array([np.sqrt(np.diag(_inverse(total - m, self.prior))) for m in self.information.matrices])
+        return np.array([np.sqrt(np.diag(self._covariance(total - m))) for m in self.information.matrices])
+
+    def _covariance(self, information: Array) -> Array:
+        n = self.model.n_dofs
+        return np.asarray(np.linalg.inv(information + np.diag(self.prior))[:n, :n])
 
     @cached_property
     def best_views(self) -> NDArray[np.int64]:
@@ -91,7 +106,7 @@ class Observability:
     def is_observable(self) -> NDArray[np.bool_]:
         """Whether the views determine a degree of freedom, (n_dofs,), and not its spread alone."""
         limits = np.where(self.model.dof_is_length, OBSERVABLE_M, OBSERVABLE_RAD)
-        return self.sigmas <= np.minimum(limits, _SHARE_OF_PRIOR / np.sqrt(self.prior))
+        return self.sigmas <= np.minimum(limits, _SHARE_OF_PRIOR / np.sqrt(self.prior[: self.model.n_dofs]))
 
     @cached_property
     def correlations(self) -> Array:
@@ -111,7 +126,8 @@ class Observability:
 
     @cached_property
     def _eigenvalues(self) -> Array:
-        total = self.information.matrices.sum(axis=0)
+        n = self.model.n_dofs
+        total = self.information.matrices[:, :n, :n].sum(axis=0)
         scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
         return np.linalg.eigvalsh(total / np.outer(scale, scale))
 
@@ -127,37 +143,81 @@ def observe_pose(
         person: index of the person.
         noise: of the contours.
     """
-    model = bodies[person].model
-    return Observability(model, view_information(bodies, cameras, person, noise), prior_information(model))
+    model, noise = bodies[person].model, noise or ContourNoise()
+    return Observability(model, view_information(bodies, cameras, person, noise), prior_information(model, noise))
 
 
-def prior_information(model: BodyModel) -> Array:
-    """Return the information on a pose before any view is seen, (n_dofs,), 1/rad^2 or 1/m^2."""
-    return 1.0 / np.minimum(model.spreads, _UNKNOWN) ** 2
+def prior_information(model: BodyModel, noise: ContourNoise) -> Array:
+    """Return the information before any view is seen, (n_dofs + n_places,), 1/rad^2 or 1/m^2; see `ViewInformation`."""
+    places_m = np.full(_n_places(model, noise), noise.joint_share * model.height_m)
+    return 1.0 / np.concatenate([np.minimum(model.spreads, _UNKNOWN), places_m]) ** 2
 
 
 def view_information(
-    bodies: Sequence[PosedBody], cameras: Sequence[Camera], person: int = 0, noise: ContourNoise | None = None
+    bodies: Sequence[PosedBody], cameras: Sequence[Camera], person: int, noise: ContourNoise
 ) -> ViewInformation:
     """Return the normal matrix of a person's visible contours in each view.
 
     The row of a piece is `normal . J_I A J_H` (KRH08 Eq. 55). The sliding term is left out, because a contour slides
     along itself.
     """
-    noise, body = noise or ContourNoise(), bodies[person]
-    model, kinematics = body.model, body.kinematics
-    own = parts_of([b.model for b in bodies], person)
-    matrices, lengths = [], []
+    model = bodies[person].model
+    own, motions = parts_of([b.model for b in bodies], person), _motions(bodies[person], noise)
+    n = len(motions.order)
+    gradient, hessian, matrices, lengths = np.empty(n), np.empty((n, n)), [], []
     for camera in cameras:
         twists, length_px = _part_twists(bodies, camera, own, noise)
-        gradient, hessian = np.empty(model.n_dofs), np.empty((model.n_dofs, model.n_dofs))
         twists_to_dofs(
-            twists, np.zeros(twists.shape[:2]), kinematics.axes_world, kinematics.origins_world, model.dof_is_length,
-            model.dof_joint, model.tree.parents, model.moves, gradient, hessian,
+            twists, np.zeros(twists.shape[:2]), motions.axes, motions.origins, motions.is_length, motions.parts,
+            model.tree.parents, motions.moves, gradient, hessian,
         )  # fmt: skip
-        matrices.append(hessian)
+        matrices.append(hessian[np.ix_(motions.order, motions.order)])
         lengths.append(length_px)
     return ViewInformation(tuple(c.name for c in cameras), np.array(matrices), np.array(lengths))
+
+
+class _Motions(NamedTuple):
+    """Degrees of freedom and places of joints in the order of the parts that they move, as `twists_to_dofs` wants."""
+
+    axes: Array
+    origins: Array
+    is_length: NDArray[np.bool_]
+    parts: IntArray
+    moves: NDArray[np.bool_]
+    order: IntArray
+    """Index into these of each degree of freedom, then of each place of a joint."""
+
+
+def _n_places(model: BodyModel, noise: ContourNoise) -> int:
+    return 3 * (len(model.parts) - 1) if noise.joint_share else 0
+
+
+def _motions(body: PosedBody, noise: ContourNoise) -> _Motions:
+    model, kinematics = body.model, body.kinematics
+    joints = np.repeat(np.arange(1, len(model.parts)), 3)[: _n_places(model, noise)]
+    # A joint moves along the axes of its parent, and all that it carries with it.
+    parents = np.array(model.parents)[joints]
+    along = kinematics.Ts_world_part[parents, :3, np.tile(np.arange(3), len(parents) // 3)]
+    carried = _carried(model)[joints]
+    parts = np.concatenate([model.dof_joint, joints])
+    sorted_ = np.argsort(parts, kind="stable")
+    return _Motions(
+        np.concatenate([kinematics.axes_world, along])[sorted_],
+        np.concatenate([kinematics.origins_world, np.zeros_like(along)])[sorted_],
+        np.concatenate([model.dof_is_length, np.ones(len(joints), bool)])[sorted_],
+        parts[sorted_],
+        np.concatenate([model.moves, carried])[sorted_],
+        np.argsort(sorted_, kind="stable"),
+    )
+
+
+def _carried(model: BodyModel) -> NDArray[np.bool_]:
+    """Return whether a joint carries a part, (n_parts, n_parts)."""
+    out = np.eye(len(model.parts), dtype=bool)
+    for part, parent in enumerate(model.parents):
+        if parent >= 0:
+            out[:, part] |= out[:, parent]
+    return out
 
 
 def _part_twists(bodies: Sequence[PosedBody], camera: Camera, own: slice, noise: ContourNoise) -> tuple[Array, Array]:
@@ -181,7 +241,3 @@ def _part_twists(bodies: Sequence[PosedBody], camera: Camera, own: slice, noise:
     weights = noise.information_per_px * lengths
     np.add.at(out, parts, weights[:, None, None] * rows[:, :, None] * rows[:, None, :])
     return out, np.bincount(parts, lengths, n_parts).astype(np.float64)
-
-
-def _inverse(information: Array, prior: Array) -> Array:
-    return np.asarray(np.linalg.inv(information + np.diag(prior)))

@@ -69,7 +69,7 @@ def test_a_limb_that_no_view_shows():
     """A camera that looks at the head alone."""
     body = standing()
     head = body.points_world[MODEL.point_names.index("head")]
-    cameras = [camera_at("near", head + [0.5, 0, 0], head, focal=2000.0)]
+    cameras = [camera_at("near", head + np.array([0.5, 0, 0]), head, focal=2000.0)]
     told = sentence(body, cameras, "left_knee.extension")
     assert told == "extension of the left knee: not observable, because no view shows left calf"
 
