@@ -34,12 +34,13 @@ class ContourNoise:
 
     sigma_px: float = 1.0
     """Standard deviation across the contour, working px."""
-    length_px: float = 80.0
-    """Length of contour along which the error is the same, working px: edges of clothes and wrong shapes are."""
-    joint_share: float = 0.018
-    """Standard deviation of the place of a joint on its parent along each axis, fraction of the body height: lengths of
-    bones differ by 5% between people of one height, and joints are known to 1 or 2 cm (see
-    `acquisition.size_parameters`). 0 if the body is that of the person exactly."""
+    length_px: float = 120.0
+    """Length of contour along which the error is the same, working px: edges of clothes and wrong shapes are. It is
+    calibrated on five simulated people, and checked on five others (docs/accuracy.md)."""
+    joint_share: float = 0.012
+    """Standard deviation of the place of a joint on its parent along each axis, fraction of the body height, as in
+    `acquisition.size_parameters.SizePriors`; of the root, in its own part. 0 if the body is exactly that of the
+    person."""
 
     @property
     def information_per_px(self) -> float:
@@ -189,14 +190,14 @@ class _Motions(NamedTuple):
 
 
 def _n_places(model: BodyModel, noise: ContourNoise) -> int:
-    return 3 * (len(model.parts) - 1) if noise.joint_share else 0
+    return 3 * len(model.parts) if noise.joint_share else 0
 
 
 def _motions(body: PosedBody, noise: ContourNoise) -> _Motions:
     model, kinematics = body.model, body.kinematics
-    joints = np.repeat(np.arange(1, len(model.parts)), 3)[: _n_places(model, noise)]
-    # A joint moves along the axes of its parent, and all that it carries with it.
-    parents = np.array(model.parents)[joints]
+    joints = np.repeat(np.arange(len(model.parts)), 3)[: _n_places(model, noise)]
+    # A joint moves along the axes of its parent, and all that it carries with it; the root within its own part.
+    parents = np.maximum(np.array(model.parents)[joints], 0)
     along = kinematics.Ts_world_part[parents, :3, np.tile(np.arange(3), len(parents) // 3)]
     carried = _carried(model)[joints]
     parts = np.concatenate([model.dof_joint, joints])
