@@ -149,11 +149,12 @@ def section(samples: Mapping[str, Sample], noise: ContourNoise, people: Mapping[
         "",
         "Made by `python tests/benchmarks/observability.py`. The people of the table above are tracked with the "
         "generic body `gavrila22` of their height, from the true pose of frame 0. Each tracked pose predicts the "
-        "standard deviation of every degree of freedom from its contours (`tracker/fitting/observability.py`). The length of "
-        f"correlated errors, {noise.length_px:.0f} px, is calibrated on one half of the people, as the shortest of "
+        "standard deviation of every degree of freedom from its contours (`tracker/fitting/observability.py`). "
+        "Observable means a standard deviation of at most "
+        f"{np.degrees(OBSERVABLE_RAD):.0f} degrees or {100 * OBSERVABLE_M:.0f} cm. The length of correlated errors, "
+        f"{noise.length_px:.0f} px, is calibrated on one half of the people. It is the shortest of "
         f"{', '.join(map(str, LENGTHS_PX))} px with which at most {100 * MOST_OFF:.0f}% of the observable degrees of "
-        "freedom are off by three standard deviations. Nothing is fitted to the other half. Observable means a standard "
-        f"deviation of at most {np.degrees(OBSERVABLE_RAD):.0f} degrees or {100 * OBSERVABLE_M:.0f} cm.",
+        "freedom are off by three standard deviations. Nothing is fitted to the other half.",
         "",
         "| | calibrated on | checked on |",
         "|---|---|---|",
