@@ -33,6 +33,7 @@ ROOMS = [
     "tracker.simulate.stage",
     "tracker.simulate",
     "tracker.pipeline",
+    "tracker.experiments",
     "app",
     "app.runtime",
     "app.state",
