@@ -151,9 +151,15 @@ class _Handle(NamedTuple):
 
 def minor_points(model: BodyModel) -> tuple[str, ...]:
     """Return the joints that a user rarely drags: rigid ones, and those that bend the trunk a little (waist, neck,
-    collarbones)."""
+    collarbones).
+
+    A stiff joint at the end of a limb, such as a wrist, is none of them: it places the limb.
+    """
     stiff = [np.all(np.isfinite(model.spreads[model.dof_joint == i])) for i in range(len(model.joints))]
-    return tuple(j.name for j, is_stiff in zip(model.joints, stiff, strict=True) if is_stiff)
+    of_limb = (model.moves & model.limb_dofs[:, None]).any(axis=0)
+    return tuple(
+        j.name for j, is_stiff, is_limb in zip(model.joints, stiff, of_limb, strict=True) if is_stiff > is_limb
+    )
 
 
 @lru_cache(maxsize=32)
