@@ -155,11 +155,9 @@ def minor_points(model: BodyModel) -> tuple[str, ...]:
 
     A stiff joint at the end of a limb, such as a wrist, is none of them: it places the limb.
     """
-    stiff = [np.all(np.isfinite(model.spreads[model.dof_joint == i])) for i in range(len(model.joints))]
-    of_limb = (model.moves & model.limb_dofs[:, None]).any(axis=0)
-    return tuple(
-        j.name for j, is_stiff, is_limb in zip(model.joints, stiff, of_limb, strict=True) if is_stiff > is_limb
-    )
+    stiff = [bool(np.all(np.isfinite(model.spreads[model.dof_joint == i]))) for i in range(len(model.joints))]
+    of_limb = model.limb_dofs @ model.moves  # whether a part moves with a limb
+    return tuple(j.name for i, j in enumerate(model.joints) if stiff[i] and not of_limb[i])
 
 
 @lru_cache(maxsize=32)
