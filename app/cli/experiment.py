@@ -40,7 +40,7 @@ def command(
     experiment = ContourExperiment(frames, cameras, camera_counts, noise, seed)
     experiment.check()
     methods, reporter = _methods(), Reporter()
-    n_runs = len({*camera_counts, cameras}) * len(ACTORS) * len(methods)
+    n_runs = len({*camera_counts, cameras}) * len(ACTORS) * len(methods) + 2  # and those of the paper's minimization
     with reporter.over(n_runs, "runs") as tick:
         found = run_contour_experiment(experiment, methods, lambda *_: tick())
     print(f"wrote {write_contour_report(out, found)}")

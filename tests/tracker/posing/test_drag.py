@@ -239,6 +239,8 @@ def test_what_a_hand_hardly_needs(gavrila):
     assert minor_points(gavrila) == ("neck",)  # rigid there
     bending = load_model("gavrila34")
     assert sorted(minor_points(bending)) == ["left_collarbone", "neck", "right_collarbone", "spine", "waist"]
+    with_hands = minor_points(load_model("knossow54"))  # wrists and ankles are stiff too, but place their limbs
+    assert sorted(with_hands) == ["left_collarbone", "neck", "right_collarbone", "spine", "upper_neck", "waist"]
 
 
 @pytest.mark.parametrize(("point", "bent"), [("left_hip", "waist"), ("right_shoulder", "right_collarbone")])
