@@ -36,7 +36,7 @@ HOUSE = {
         ["simulate", "evaluation", "posing", "acquisition"],
         ["tracking/chamfer"],
         ["tracking"],
-        ["search", "appearance", "fitting"],
+        ["search", "appearance", "fitting", "voxels"],
         ["evidence"],
         ["contours", "images"],
         ["session", "store"],

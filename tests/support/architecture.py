@@ -19,6 +19,7 @@ ROOMS = [
     "tracker.images",
     "tracker.contours",
     "tracker.evidence",
+    "tracker.voxels",
     "tracker.fitting",
     "tracker.appearance",
     "tracker.search",

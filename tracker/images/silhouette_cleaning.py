@@ -37,7 +37,7 @@ def clean_silhouette(changed: Mask) -> CleanSilhouette:
     closed = cv2.morphologyEx(changed.view(np.uint8), cv2.MORPH_CLOSE, disc)
     mask = _without_small_holes(largest_components(np.asarray(closed) > 0))
     union = np.count_nonzero(changed | mask)
-    return CleanSilhouette(mask, np.count_nonzero(changed & mask) / union if union else 0.0)
+    return CleanSilhouette(mask, float(np.count_nonzero(changed & mask) / union) if union else 0.0)
 
 
 def largest_components(mask: Mask, min_share: float = MIN_COMPONENT) -> Mask:
