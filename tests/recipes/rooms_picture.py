@@ -33,7 +33,8 @@ HOUSE = {
     ],
     "tracker/  the library": [
         ["pipeline", "export"],
-        ["simulate", "evaluation", "posing", "acquisition"],
+        ["simulate", "evaluation", "posing"],
+        ["acquisition", "initialization"],
         ["tracking/chamfer"],
         ["tracking"],
         ["search", "appearance", "fitting", "voxels"],

@@ -26,6 +26,7 @@ ROOMS = [
     "tracker.tracking",
     "tracker.tracking.chamfer",
     "tracker.acquisition",
+    "tracker.initialization",
     "tracker.posing",
     "tracker.evaluation",
     "tracker.export",
