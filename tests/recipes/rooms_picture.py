@@ -34,10 +34,11 @@ HOUSE = {
     "tracker/  the library": [
         ["experiments"],
         ["pipeline", "export"],
-        ["simulate", "evaluation", "posing", "acquisition"],
+        ["simulate", "evaluation", "posing"],
+        ["acquisition", "initialization"],
         ["tracking/chamfer"],
         ["tracking"],
-        ["search", "appearance", "fitting"],
+        ["search", "appearance", "fitting", "voxels"],
         ["evidence"],
         ["contours", "images"],
         ["session", "store"],
