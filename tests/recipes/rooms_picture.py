@@ -35,6 +35,7 @@ HOUSE = {
         ["pipeline", "export"],
         ["simulate", "evaluation", "posing", "acquisition"],
         ["tracking/chamfer"],
+        ["tracking/estimation"],
         ["tracking"],
         ["search", "appearance", "fitting"],
         ["evidence"],

@@ -23,6 +23,7 @@ ROOMS = [
     "tracker.appearance",
     "tracker.search",
     "tracker.tracking",
+    "tracker.tracking.estimation",
     "tracker.tracking.chamfer",
     "tracker.acquisition",
     "tracker.posing",

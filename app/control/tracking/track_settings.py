@@ -7,7 +7,8 @@ from typing import Any, TypedDict
 import msgspec
 
 from tracker.errors import TrackerError
-from tracker.tracking.chamfer.settings import Estimation, RecoverSettings, TrackSettings
+from tracker.tracking.chamfer.settings import Estimation, TrackSettings
+from tracker.tracking.estimation.settings import RecoverSettings
 
 SETTING = "track_settings"
 """Setting of the session."""

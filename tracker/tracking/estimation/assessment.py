@@ -10,8 +10,8 @@ from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import covariance
 from tracker.geometry.arrays import Array
 from tracker.tracking import confidence
-from tracker.tracking.chamfer.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
 from tracker.tracking.confidence import PoseQuality, Status
+from tracker.tracking.estimation.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
 from tracker.tracking.view_regions import px_per_m
 
 ELSEWHERE_RAD = 0.3

@@ -19,8 +19,8 @@ from tracker.fitting.gauss_newton import Fit, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
-from tracker.tracking.chamfer.settings import MAX_ITERATIONS, TOLERANCE, TrackSettings, prior_blocks
 from tracker.tracking.confidence import PoseQuality
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings, prior_blocks
 from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
 
 _SAME_ASSIGNMENT_M = 0.01
@@ -82,7 +82,7 @@ class FrameProblem:
         self,
         views: Sequence[ViewEvidence],
         people: Sequence[PersonPrior],
-        settings: TrackSettings,
+        settings: EstimationSettings,
         predicted: tuple[Bodies, Sequence[Contour]] | None = None,
     ) -> None:
         """Prepare the problem.
