@@ -32,6 +32,7 @@ HOUSE = {
         ["state", "runtime"],
     ],
     "tracker/  the library": [
+        ["experiments"],
         ["pipeline", "export"],
         ["simulate", "evaluation", "posing", "acquisition"],
         ["tracking/chamfer"],

@@ -34,6 +34,7 @@ ROOMS = [
     "tracker.simulate.stage",
     "tracker.simulate",
     "tracker.pipeline",
+    "tracker.experiments",
     "app",
     "app.runtime",
     "app.state",
