@@ -25,6 +25,7 @@ ROOMS = [
     "tracker.tracking",
     "tracker.tracking.estimation",
     "tracker.tracking.chamfer",
+    "tracker.tracking.contour",
     "tracker.acquisition",
     "tracker.posing",
     "tracker.evaluation",

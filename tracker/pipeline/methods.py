@@ -5,9 +5,10 @@ from typing import Any
 
 from tracker.errors import TrackerError
 from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.contour.tracker import ContourTracker
 from tracker.tracking.tracker import Tracker, TrackerSettings
 
-METHODS: Mapping[str, Callable[[Any], Tracker]] = {"chamfer": ChamferTracker}
+METHODS: Mapping[str, Callable[[Any], Tracker]] = {"chamfer": ChamferTracker, "contour": ContourTracker}
 """Makes the tracker of each method from its settings."""
 
 

@@ -133,6 +133,7 @@ def make_estimate(
         frame, tuple(b.values for b in bodies), cost.total_px, cost.view_costs_px, sum(e.evaluations for e in people),
         tuple(e.status for e in people), tuple(e.note for e in people), tuple(e.part_costs_px for e in people),
         tuple(e.covariance for e in people), tuple(e.quality for e in people), alternatives, settings.method,
+        tuple(e.normal_matrix for e in people),
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import PoseQuality
-from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings, prior_blocks
+from tracker.tracking.estimation.settings import TOLERANCE, EstimationSettings, prior_blocks
 from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
 
 _SAME_ASSIGNMENT_M = 0.01
@@ -111,7 +111,7 @@ class FrameProblem:
         residuals = self.residuals(person, bodies, everywhere=untrusted is not None)
         blocks = [residuals, *self.priors(person, bodies, untrusted or ())]
         min_decrease = MIN_DECREASE if len(self.people) > 1 else 0.0  # several people are refined more than once
-        fit = self.solve(person, bodies[person].values, blocks, MAX_ITERATIONS, min_decrease)
+        fit = self.solve(person, bodies[person].values, blocks, self.settings.max_iterations, min_decrease)
         body = PosedBody(self.people[person].model, fit.pose)
         if before is None:
             return PersonFit(residuals, bodies, fit, body)

@@ -93,6 +93,10 @@ class EstimationSettings:
     """Whether the poses are smoothed at the end of a run."""
     apart: float = 1.0
     """Weight of the term against people passing through each other; 0 leaves it out."""
+    max_iterations: int = MAX_ITERATIONS
+    """Largest number of Gauss-Newton iterations of a whole body from its prediction."""
+    incremental_start: bool = False
+    """Whether a start that does not fit is fitted chain by chain before it is searched."""
 
     @property
     def settles_start(self) -> bool:

@@ -22,6 +22,7 @@ from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import Status, worst
 from tracker.tracking.estimation.assessment import PersonEstimate, estimate_at
 from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior, moved_m, with_body
+from tracker.tracking.estimation.incremental_fit import fit_by_chains
 from tracker.tracking.estimation.limb_recovery import PoseScorer, search_limbs
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
@@ -99,7 +100,11 @@ def _searched(problem: FrameProblem, person: int, bodies: Bodies, memory: Person
     (own,) = problem.own_evidence([person], bodies, everywhere=True)
     residuals = problem.residuals_on(own, person, bodies, everywhere=True)
     priors = problem.priors(person, bodies)
-    fit = problem.solve(person, bodies[person].values, [residuals, *priors], MAX_ITERATIONS)
+    blocks: list[ResidualBlock] = [residuals, *priors]
+    fit = problem.solve(person, bodies[person].values, blocks, MAX_ITERATIONS)
+    if problem.settings.incremental_start:
+        *_, last = fit_by_chains(model, bodies[person].values, blocks, memory.active_dofs)
+        fit = min(fit, last.fit, key=lambda f: f.cost)
     colors = Colors(own, *problem.around(person, bodies))
     scorer = PoseScorer.of(residuals, priors, colors, None, recover, memory.active_dofs)
     for pair in _pairs(memory.limbs):
