@@ -37,6 +37,7 @@ HOUSE = {
         ["simulate", "evaluation", "posing"],
         ["acquisition", "initialization"],
         ["tracking/chamfer"],
+        ["tracking/estimation"],
         ["tracking"],
         ["search", "appearance", "fitting", "voxels"],
         ["evidence"],

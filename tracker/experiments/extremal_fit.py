@@ -47,6 +47,8 @@ class Linearization(NamedTuple):
     """(m,), px."""
     jacobian: Array
     """(m, n_dofs), px per radian or metre."""
+    lengths: Array
+    """Length of the piece of contour around each point, (m,), px."""
 
     @property
     def rms_px(self) -> float:
@@ -95,7 +97,7 @@ def linearize(model: BodyModel, pose: Array, views: Sequence[ViewEvidence], slid
     angular = np.where(model.dof_is_length[:, None], 0.0, kinematics.axes_world)
     linear = np.where(model.dof_is_length[:, None], kinematics.axes_world, lever)
     twists = np.hstack([angular, linear])  # spatial, the columns of J_H
-    distances, rows, parts = [], [], []
+    distances, rows, parts, lengths = [], [], [], []
     for view in views:
         seen = occluding_contours.trace([body], view.camera)
         at = ~seen.occluded
@@ -111,8 +113,11 @@ def linearize(model: BodyModel, pose: Array, views: Sequence[ViewEvidence], slid
         distances.append(d)
         rows.append(row)
         parts.append(of)
+        ends = seen.pieces_px[at][inside].astype(np.float64)
+        lengths.append(np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1))
     moves = model.moves[:, np.concatenate(parts)].T
-    return Linearization(np.concatenate(distances), np.where(moves, np.concatenate(rows) @ twists.T, 0.0))
+    jacobian = np.where(moves, np.concatenate(rows) @ twists.T, 0.0)
+    return Linearization(np.concatenate(distances), jacobian, np.concatenate(lengths))
 
 
 def _bilinear(image: FloatArray, x: Array) -> tuple[Array, Array]:

@@ -9,7 +9,9 @@ from staging import camera_at, cameras_around, own_evidence, posed
 from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import trace
 from tracker.contours.surfaces import surfaces_of
-from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.experiments.extremal_fit import linearize
+from tracker.fitting.contour_residuals import ContourResiduals, paper_match
+from tracker.fitting.sliding import add_sliding_twists
 from tracker.fitting.twists import add_twists, twists_to_dofs
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
@@ -154,8 +156,11 @@ def test_without_rulings_within_the_extension_of_a_cone():
     assert Cone(0.05, 0.08, 0.4).rulings(np.array([0.0, 0.0, -1.0])) == ()
 
 
-def row_of_kernels(part, values, camera, point_world, normal_px, x):
-    """Derivative of the contour's motion along its normal by the degrees of freedom, (n_dofs,), by the kernels."""
+def row_of_kernels(part, values, camera, point_world, normal_px, x, slope=None):
+    """Derivative of the contour's motion along its normal by the degrees of freedom, (n_dofs,), by the kernels.
+
+    With `slope`, (2,), it is the motion along that image gradient, sliding included.
+    """
     kinematics, surfaces = BODY.kinematics(values), surfaces_of((BODY,))
     n = len(BODY.parts)
     M, b = np.zeros((n, 6, 6)), np.zeros((n, 6))
@@ -165,8 +170,13 @@ def row_of_kernels(part, values, camera, point_world, normal_px, x):
     unit = np.linalg.solve(W[:, :3], point_world - W[:, 3])
     pieces = np.array([*x, 1.0, *normal_px, *unit], np.float32)[:, None]
     pulls = np.array([1.0, 1.0, 0, 0, 0, 0, 0])[:, None]  # one residual across the piece, of value 1
-    add_twists(np.array([0, 1]), np.ascontiguousarray(pieces), np.ascontiguousarray(pulls), camera.projection, W,
-               M[part], b[part])  # fmt: skip
+    if slope is None:
+        add_twists(np.array([0, 1]), pieces, pulls, camera.projection, W, M[part], b[part])
+    else:
+        u, v = slope
+        pulls = np.array([0, 0, u * u, u * v, v * v, u, v])[:, None]
+        eye = camera.center_world
+        add_sliding_twists(np.array([0, 1]), pieces, pulls, camera.projection, W, eye, M[part], b[part])
     gradient, hessian = np.empty(BODY.n_dofs), np.empty((BODY.n_dofs, BODY.n_dofs))
     twists_to_dofs(
         M, b, kinematics.axes_world, kinematics.origins_world, BODY.dof_is_length, BODY.dof_joint, BODY.tree.parents,
@@ -184,6 +194,37 @@ def test_kernels_agree_with_the_reference():
         gradient, hessian = row_of_kernels(part, values, camera, r.point_world, r.normal_px, r.x)
         np.testing.assert_allclose(gradient, row, atol=1e-3 * np.abs(row).max())
         np.testing.assert_allclose(hessian, np.outer(row, row), atol=1e-3 * np.abs(row).max() ** 2)
+
+
+def test_the_kernel_of_the_sliding_term_agrees_with_the_reference():
+    """The rows that the kernel sums are dD/dx . J_I (A + B) J_H of Eq. 55 for any slope of the distance, to 1e-3."""
+    reference, rng, slides = ZeroReference(BODY, np.zeros(6)), np.random.default_rng(5), 0
+    for values, part, cone, camera, theta, z in cases(200, 22):
+        r, slope = ruling(cone, cone_pose(values, part), camera, theta, 0.99 * z), rng.normal(size=2)
+        row = slope @ r.J_I @ (r.A + r.B) @ reference.J_H(values, part)
+        rigid_row = slope @ r.J_I @ r.A @ reference.J_H(values, part)
+        gradient, hessian = row_of_kernels(part, values, camera, r.point_world, r.normal_px, r.x, slope)
+        np.testing.assert_allclose(gradient, row, atol=1e-3 * np.abs(row).max())
+        np.testing.assert_allclose(hessian, np.outer(row, row), atol=1e-3 * np.abs(row).max() ** 2)
+        slides += np.abs(row - rigid_row).max() > 0.01 * np.abs(row).max()
+    assert slides > 100
+
+
+@pytest.mark.parametrize("motion", ["rigid", "sliding"])
+def test_normal_equations_agree_with_the_plain_version(motion):
+    """All visible contour points of a frame, Eq. 60-61: the kernels against numpy, point by point."""
+    body = PosedBody(BODY, posed(BODY, 3))
+    views = own_evidence([PosedBody(BODY, BODY.retract(body.values, np.full(BODY.n_dofs, 0.03)))], cameras_around(3))
+    found = ContourResiduals(views, [body], settings=paper_match(motion), theta_px=1e4, everywhere=True)
+    got = found.linearize(BODY, body.values, BODY.kinematics(body.values))
+    plain = linearize(BODY, body.values, views, motion == "sliding")
+    w = plain.lengths
+    H = (plain.jacobian * w[:, None]).T @ plain.jacobian
+    np.testing.assert_allclose(got.cost, 0.5 * np.sum(w * plain.distances**2), rtol=2e-3)
+    np.testing.assert_allclose(
+        got.gradient, plain.jacobian.T @ (w * plain.distances), atol=5e-3 * np.sqrt(2 * got.cost * np.diag(H).max())
+    )
+    np.testing.assert_allclose(got.hessian, H, atol=5e-3 * np.diag(H).max())
 
 
 def test_traced_contours_lie_on_the_rulings():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from staging import posed
 
-from tracker.tracking.chamfer.limb_recovery import MIN_COST_GAIN
-from tracker.tracking.chamfer.pose_paths import (
+from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN
+from tracker.tracking.estimation.pose_paths import (
     _ACCELERATION_SIGMA_M,
     _MAX_ACCELERATION_COST,
     _MAX_CANDIDATES,

@@ -6,10 +6,10 @@ from staging import SUIT, Shown, cameras_around, dressed, posed
 from tracking_runs import track_back
 
 from tracker.body.model import PosedBody
-from tracker.tracking.chamfer.backward_pass import lost_intervals
-from tracker.tracking.chamfer.pose_paths import ROUNDS
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import BackwardStep, TrackedFrame
+from tracker.tracking.estimation.backward_pass import lost_intervals
+from tracker.tracking.estimation.pose_paths import ROUNDS
 
 N = 9
 LOST = range(2, 5)

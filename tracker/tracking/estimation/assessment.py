@@ -10,8 +10,9 @@ from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import covariance
 from tracker.geometry.arrays import Array
 from tracker.tracking import confidence
-from tracker.tracking.chamfer.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
 from tracker.tracking.confidence import PoseQuality, Status
+from tracker.tracking.estimate import NormalMatrix
+from tracker.tracking.estimation.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
 from tracker.tracking.view_regions import px_per_m
 
 ELSEWHERE_RAD = 0.3
@@ -35,6 +36,8 @@ class PersonEstimate(NamedTuple):
     alternatives: tuple[tuple[Array, ...], ...] = ()
     """Poses of all people, (n_values,) each, in which this person is elsewhere and which are about as good, best
     first."""
+    normal_matrix: NormalMatrix | None = None
+    """How well the contours determine the pose, if the method says."""
 
     def in_doubt(self, note: str, alternatives: Sequence[tuple[Array, ...]]) -> "PersonEstimate":
         """Return the estimate with more alternatives, at most doubtful."""

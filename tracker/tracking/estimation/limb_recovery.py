@@ -24,7 +24,7 @@ from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
 from tracker.fitting.gauss_newton import Fit, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.geometry.arrays import Array, IntArray
-from tracker.tracking.chamfer.settings import MAX_ITERATIONS, TOLERANCE, RecoverSettings
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, RecoverSettings
 
 T = TypeVar("T")
 

@@ -11,9 +11,9 @@ from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import load_model
-from tracker.tracking.chamfer import limb_recovery
-from tracker.tracking.chamfer.limb_recovery import PoseScorer, for_several, search_limbs
-from tracker.tracking.chamfer.settings import RecoverSettings
+from tracker.tracking.estimation import limb_recovery
+from tracker.tracking.estimation.limb_recovery import PoseScorer, for_several, search_limbs
+from tracker.tracking.estimation.settings import RecoverSettings
 
 
 def limb_of(model, name):

@@ -1,4 +1,4 @@
-"""Track people forward through the frames of a run (GD96): predict, observe, estimate, remember."""
+"""Track people forward through the frames of a run: predict, observe, estimate, remember."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -12,24 +12,28 @@ from tracker.geometry.cameras import Region
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.motion.prediction import PredictSettings
 from tracker.search.chamfer_cost import ChamferCost
-from tracker.tracking.chamfer.assessment import PersonEstimate
-from tracker.tracking.chamfer.frame_estimator import FrameEstimator
-from tracker.tracking.chamfer.frame_problem import Bodies
-from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
-from tracker.tracking.chamfer.start_pose import StartFrame, settle_starts
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import AlternativePose, PoseEstimate
+from tracker.tracking.estimation.assessment import PersonEstimate
+from tracker.tracking.estimation.frame_estimator import FrameEstimator
+from tracker.tracking.estimation.frame_problem import Bodies
+from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
+from tracker.tracking.estimation.start_pose import StartFrame, settle_starts
 from tracker.tracking.person_memory import PersonMemory
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.view_regions import confirmed_regions, regions, regions_ahead, visible_pieces_px
 
 
-def track_forward(run: TrackingRun, settings: TrackSettings, lead_in: int = 0) -> Iterator[PoseEstimate]:
+def track_forward(
+    run: TrackingRun, settings: EstimationSettings, make_estimator: type[FrameEstimator] = FrameEstimator,
+    lead_in: int = 0,
+) -> Iterator[PoseEstimate]:  # fmt: skip
     """Track all people frame by frame, in the order of `run.frames`.
 
     Args:
         run: what to track.
         settings: of the tracker.
+        make_estimator: estimates a frame by the tracker's method.
         lead_in: number of frames at the beginning that are learnt from, but not yielded.
 
     Yields:
@@ -89,7 +93,7 @@ def track_forward(run: TrackingRun, settings: TrackSettings, lead_in: int = 0) -
                 contours, views = observe(frame, predicted, around(predicted))
         for k in () if several else following:  # for one person later: this frame has kept all cores busy
             observer.prefetch(k)
-        estimator = FrameEstimator(views, memories, predicted, settings, contours)
+        estimator = make_estimator(views, memories, predicted, settings, contours)
         estimates = estimator.estimate([p for p in subjects.tracked if p not in keyframes])
         statuses: list[Status] = [estimates[p].status if p in estimates else "good" for p in range(len(models))]
         # What is learnt of a keyframe that its frame contradicts is learnt from the settled pose.
@@ -109,7 +113,7 @@ def make_estimate(
     cost_of: ChamferCost,
     bodies: Sequence[PosedBody],
     people: Sequence[PersonEstimate],
-    settings: TrackSettings,
+    settings: EstimationSettings,
 ) -> PoseEstimate:
     """Collect the estimates of all people of a frame.
 
@@ -129,6 +133,7 @@ def make_estimate(
         frame, tuple(b.values for b in bodies), cost.total_px, cost.view_costs_px, sum(e.evaluations for e in people),
         tuple(e.status for e in people), tuple(e.note for e in people), tuple(e.part_costs_px for e in people),
         tuple(e.covariance for e in people), tuple(e.quality for e in people), alternatives, settings.method,
+        tuple(e.normal_matrix for e in people),
     )  # fmt: skip
 
 

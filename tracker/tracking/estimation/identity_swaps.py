@@ -5,8 +5,8 @@ from itertools import combinations
 
 from tracker.body.model import PosedBody
 from tracker.geometry.arrays import Array
-from tracker.tracking.chamfer.frame_problem import Bodies, FrameProblem, PersonFit, with_body
-from tracker.tracking.chamfer.limb_recovery import MIN_COST_GAIN
+from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonFit, with_body
+from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN
 
 _MAX_PRIOR_INCREASE = 60.0
 """Largest increase in prior cost (nats) at which swapping two people is still tried."""

@@ -19,8 +19,8 @@ from tracker.fitting.gauss_newton import Fit, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
-from tracker.tracking.chamfer.settings import MAX_ITERATIONS, TOLERANCE, TrackSettings, prior_blocks
 from tracker.tracking.confidence import PoseQuality
+from tracker.tracking.estimation.settings import TOLERANCE, EstimationSettings, prior_blocks
 from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
 
 _SAME_ASSIGNMENT_M = 0.01
@@ -82,7 +82,7 @@ class FrameProblem:
         self,
         views: Sequence[ViewEvidence],
         people: Sequence[PersonPrior],
-        settings: TrackSettings,
+        settings: EstimationSettings,
         predicted: tuple[Bodies, Sequence[Contour]] | None = None,
     ) -> None:
         """Prepare the problem.
@@ -111,7 +111,7 @@ class FrameProblem:
         residuals = self.residuals(person, bodies, everywhere=untrusted is not None)
         blocks = [residuals, *self.priors(person, bodies, untrusted or ())]
         min_decrease = MIN_DECREASE if len(self.people) > 1 else 0.0  # several people are refined more than once
-        fit = self.solve(person, bodies[person].values, blocks, MAX_ITERATIONS, min_decrease)
+        fit = self.solve(person, bodies[person].values, blocks, self.settings.max_iterations, min_decrease)
         body = PosedBody(self.people[person].model, fit.pose)
         if before is None:
             return PersonFit(residuals, bodies, fit, body)

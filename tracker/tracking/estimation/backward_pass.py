@@ -22,13 +22,14 @@ from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
-from tracker.tracking.chamfer.assessment import estimate_at, estimate_fixed
-from tracker.tracking.chamfer.forward_pass import make_estimate, track_forward
-from tracker.tracking.chamfer.frame_problem import Bodies, FrameProblem, PersonPrior
-from tracker.tracking.chamfer.pose_paths import ROUNDS, Candidates, FrameCost, propagate_candidates, viterbi_path
-from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
+from tracker.tracking.estimation.assessment import estimate_at, estimate_fixed
+from tracker.tracking.estimation.forward_pass import make_estimate, track_forward
+from tracker.tracking.estimation.frame_estimator import FrameEstimator
+from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior
+from tracker.tracking.estimation.pose_paths import ROUNDS, Candidates, FrameCost, propagate_candidates, viterbi_path
+from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
 from tracker.tracking.subjects import Keyframes
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.view_regions import regions, visible_pieces_px
@@ -70,8 +71,9 @@ def lost_intervals(statuses: Sequence[Status], keyframes: Sequence[bool]) -> lis
 
 
 def track_lost_backward(
-    run: TrackingRun, tracked: Sequence[TrackedFrame], settings: TrackSettings
-) -> Iterator[BackwardStep]:
+    run: TrackingRun, tracked: Sequence[TrackedFrame], settings: EstimationSettings,
+    make_estimator: type[FrameEstimator] = FrameEstimator,
+) -> Iterator[BackwardStep]:  # fmt: skip
     """Track people backward through the intervals in which they were lost. The other people keep their poses.
 
     Without a lost interval no frame is read.
@@ -80,6 +82,7 @@ def track_lost_backward(
         run: gives the observer and the subjects.
         tracked: all frames, in the order of tracking.
         settings: of the tracker.
+        make_estimator: estimates a frame by the tracker's method.
 
     Yields:
         A step for each visit to a frame; the last of an interval with the estimates that are better.
@@ -90,7 +93,7 @@ def track_lost_backward(
     total, done = _VISITS * sum(len(s.frames) for s in work), 0
     for interval in work:
         person, backward, last = interval.person, list[PoseEstimate](), done + _VISITS * len(interval.frames)
-        for estimate in _track_interval(run, known, interval, settings):
+        for estimate in _track_interval(run, known, interval, settings, make_estimator):
             backward.append(estimate)
             done += 1
             yield BackwardStep(estimate.frame, person, done, total)
@@ -121,8 +124,9 @@ def _intervals_of(tracked: Sequence[TrackedFrame], person: int, keyframes: Keyfr
 
 
 def _track_interval(
-    run: TrackingRun, tracked: Sequence[TrackedFrame], interval: _Interval, settings: TrackSettings
-) -> Iterator[PoseEstimate]:
+    run: TrackingRun, tracked: Sequence[TrackedFrame], interval: _Interval, settings: EstimationSettings,
+    make_estimator: type[FrameEstimator],
+) -> Iterator[PoseEstimate]:  # fmt: skip
     """Track one person from the last frame of an interval to its first; the others keep their poses."""
     subjects, person, (first, end) = run.subjects, interval.person, (interval.frames.start, interval.frames.stop)
     after = takewhile(lambda f: f.statuses[person] == "good", tracked[end + 1 : end + 1 + _MOTION_FRAMES])
@@ -135,7 +139,7 @@ def _track_interval(
     )
     frames = [f.frame for f in reversed(tracked[first : end + 1])]
     alone = replace(subjects, tracked=(person,), keyframes=fixed)
-    return track_forward(TrackingRun(run.observer, alone, start, frames), settings, lead_in=1)
+    return track_forward(TrackingRun(run.observer, alone, start, frames), settings, make_estimator, lead_in=1)
 
 
 class _PathSelection:
@@ -143,7 +147,7 @@ class _PathSelection:
 
     def __init__(
         self, run: TrackingRun, tracked: Sequence[TrackedFrame], interval: _Interval,
-        backward: Sequence[PoseEstimate], settings: TrackSettings,
+        backward: Sequence[PoseEstimate], settings: EstimationSettings,
     ) -> None:  # fmt: skip
         """Collect the candidates of both passes.
 

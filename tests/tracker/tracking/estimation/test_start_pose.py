@@ -16,9 +16,9 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.assemble import NewSession, assemble
-from tracker.tracking.chamfer import start_pose
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.start_pose import StartFrame, _exchanged, settle_starts
+from tracker.tracking.estimation import start_pose
+from tracker.tracking.estimation.start_pose import StartFrame, _exchanged, settle_starts
 from tracker.tracking.person_memory import PersonMemory
 
 N_SEEDS, N_FRAMES = 20, 11

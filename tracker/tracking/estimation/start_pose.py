@@ -19,11 +19,12 @@ from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, solve
 from tracker.geometry.arrays import Array
-from tracker.tracking.chamfer.assessment import PersonEstimate, estimate_at
-from tracker.tracking.chamfer.frame_problem import Bodies, FrameProblem, PersonPrior, moved_m, with_body
-from tracker.tracking.chamfer.limb_recovery import PoseScorer, search_limbs
-from tracker.tracking.chamfer.settings import MAX_ITERATIONS, TrackSettings
 from tracker.tracking.confidence import Status, worst
+from tracker.tracking.estimation.assessment import PersonEstimate, estimate_at
+from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior, moved_m, with_body
+from tracker.tracking.estimation.incremental_fit import fit_by_chains
+from tracker.tracking.estimation.limb_recovery import PoseScorer, search_limbs
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
 
 _START_RAD, _START_M = 0.35, 0.15
@@ -48,7 +49,7 @@ class StartFrame(NamedTuple):
 
 
 def settle_starts(
-    frame: StartFrame, memories: Sequence[PersonMemory], people: Sequence[int], settings: TrackSettings
+    frame: StartFrame, memories: Sequence[PersonMemory], people: Sequence[int], settings: EstimationSettings
 ) -> dict[int, PosedBody]:
     """Search the start poses that the first frame contradicts.
 
@@ -65,7 +66,7 @@ def settle_starts(
     Returns:
         By person the poses that replace the start; nobody whose start fits the frame, or whose search fails.
     """
-    if settings.recover is None or settings.estimate != "refine":
+    if not settings.settles_start:
         return {}
     start, observe = frame.bodies, frame.observe
     known = [PersonPrior(m.model, b.values, m.active_dofs) for m, b in zip(memories, start, strict=True)]
@@ -99,7 +100,11 @@ def _searched(problem: FrameProblem, person: int, bodies: Bodies, memory: Person
     (own,) = problem.own_evidence([person], bodies, everywhere=True)
     residuals = problem.residuals_on(own, person, bodies, everywhere=True)
     priors = problem.priors(person, bodies)
-    fit = problem.solve(person, bodies[person].values, [residuals, *priors], MAX_ITERATIONS)
+    blocks: list[ResidualBlock] = [residuals, *priors]
+    fit = problem.solve(person, bodies[person].values, blocks, MAX_ITERATIONS)
+    if problem.settings.incremental_start:
+        *_, last = fit_by_chains(model, bodies[person].values, blocks, memory.active_dofs)
+        fit = min(fit, last.fit, key=lambda f: f.cost)
     colors = Colors(own, *problem.around(person, bodies))
     scorer = PoseScorer.of(residuals, priors, colors, None, recover, memory.active_dofs)
     for pair in _pairs(memory.limbs):

@@ -19,8 +19,8 @@ from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
 from tracker.fitting.gauss_newton import ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.geometry.arrays import Array
-from tracker.tracking.chamfer.limb_recovery import DISTINCT_POSE_M, MIN_COST_GAIN
-from tracker.tracking.chamfer.settings import MAX_ITERATIONS, TOLERANCE, TrackSettings, prior_blocks
+from tracker.tracking.estimation.limb_recovery import DISTINCT_POSE_M, MIN_COST_GAIN
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings, prior_blocks
 
 ROUNDS = 2
 """How often candidates are propagated forward through all frames and back."""
@@ -41,7 +41,7 @@ class FrameCost:
 
     def __init__(
         self, model: BodyModel, residuals: ContourResiduals, colors: Colors, part_colors: PartColors | None,
-        penetration: Sequence[ResidualBlock], settings: TrackSettings, active_dofs: NDArray[np.bool_] | None,
+        penetration: Sequence[ResidualBlock], settings: EstimationSettings, active_dofs: NDArray[np.bool_] | None,
     ) -> None:  # fmt: skip
         """Prepare a clone of the residuals for each thread.
 
