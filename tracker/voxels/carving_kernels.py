@@ -13,6 +13,7 @@ from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M
+from tracker.voxels.sensor_lookup import BEYOND_LENS
 
 _UNSEEN, _OUTSIDE, _INSIDE, _MIXED_SEEN, _MIXED = 0, 1, 2, 3, 4
 """What a view says of a block: out of the image, out of the silhouette, within it, or different things of its voxels
@@ -190,6 +191,8 @@ def _view_test(views: ViewTables, v: int, x: float, y: float, z: float, radius: 
         return _MIXED_SEEN
     at = views.lookup_layout[v, 0] + int(fy + np.float32(0.5)) * columns + int(fx + np.float32(0.5))
     u, w = int(views.lookups[at, 0]), int(views.lookups[at, 1])
+    if u == BEYOND_LENS:
+        return _MIXED_SEEN
     d = int(entries / scale * views.lookup_scale[v, 3]) + 1  # one for the rounding of both pixels
     u0, v0, u1, v1 = u - d, w - d, u + d + 1, w + d + 1
     width, height = views.sizes[v, 0], views.sizes[v, 1]

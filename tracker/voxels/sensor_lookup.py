@@ -18,7 +18,8 @@ _STEPS_PER_PX = 2
 """Entries of the table per raw pixel along each axis."""
 _MAX_ENTRIES = 4096
 """Largest number of entries along each axis. Wide lenses have long borders."""
-_MAX_PX = 32000
+BEYOND_LENS = -32000
+"""Column and row of what lies beyond the lens, where nothing is seen."""
 _BORDER_SAMPLES = 64
 
 
@@ -53,8 +54,8 @@ def _lookup(size: tuple[int, int], K: bytes, distortion: bytes) -> SensorLookup:
     points = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3)
     exact = camera.project(points)
     # Beyond the lens the polynomial bends back: nothing is seen there.
-    exact[~camera.within_lens(camera.pinhole.project(points))] = -_MAX_PX
-    pixels = np.round(np.clip(exact, -_MAX_PX, _MAX_PX)).astype(np.int16).reshape(n_rows, n_columns, 2)
+    exact[~camera.within_lens(camera.pinhole.project(points))] = BEYOND_LENS
+    pixels = np.round(np.clip(exact, BEYOND_LENS, -BEYOND_LENS)).astype(np.int16).reshape(n_rows, n_columns, 2)
     return SensorLookup(pixels, low, step, _steepest(exact.reshape(n_rows, n_columns, 2)) / step)
 
 
@@ -70,7 +71,7 @@ def _border(camera: Camera) -> tuple[Array, Array]:
 
 def _steepest(pixels: Array) -> float:
     """Return the largest change of a pixel coordinate per step of the table, for a step in any direction of a box."""
-    valid = np.asarray((pixels > -_MAX_PX).all(axis=-1), dtype=bool)
+    valid = np.asarray((pixels > BEYOND_LENS).all(axis=-1), dtype=bool)
     along_x = np.abs(np.diff(pixels, axis=1))[valid[:, 1:] & valid[:, :-1]].max(axis=0)
     along_y = np.abs(np.diff(pixels, axis=0))[valid[1:] & valid[:-1]].max(axis=0)
     return float((along_x + along_y).max())

@@ -21,6 +21,8 @@ _MIN_COVERAGE = 0.6
 """Share of its silhouette that the hull explains in a view that agrees with the others."""
 _MIN_GAIN = 0.15
 """Gain of the others' mean coverage above which a view is left out as broken."""
+_MIN_LEAD = 0.05
+"""Lead of that gain over the gain without any other view."""
 
 
 class VisualHull(NamedTuple):
@@ -51,10 +53,7 @@ def carve_people(
             person is found.
     """
     seen = [s for s in silhouettes if not s.is_empty]
-    voxels = _carve(seen, size_m, settings)
-    found, broken = coverages(voxels, seen), -1
-    if len(seen) > 2 and found.min() < 1 - _MIN_GAIN:
-        voxels, found, broken = _without_broken(seen, size_m, settings, (voxels, found))
+    voxels, found, broken = _carve_consistent(seen, size_m, settings)
     names = [s.camera.name for s in seen]
     figures = (
         [v for v in voxels.components(_MIN_SHARE) if v.volume_m3 >= MIN_FIGURE_M3] if voxels.occupied.any() else []
@@ -86,26 +85,46 @@ def _carve(silhouettes: Sequence[ViewSilhouette], size_m: float, settings: Carve
     return Carver(silhouettes).carve(VoxelGrid.over(box.low, box.high, size_m), settings)
 
 
-def _without_broken(
-    silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings, whole: tuple[Voxels, Array]
+def _carve_consistent(
+    silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings
 ) -> tuple[Voxels, Array, int]:
-    """Leave out the view without which the others agree best, if they agree much better.
+    """Carve all views, or all but the one without which the others agree much better.
+
+    A view that is left out must stand out: where the others agree about as well without another view, none is.
 
     Returns:
-        The voxels, the coverages with that of the view that was left out, and its index; -1 if none was.
+        The voxels, each view's coverage, (n_views,), and the index of the view that was left out; -1 if none was.
     """
-    (best, found), index, gain = whole, -1, _MIN_GAIN
-    for i in range(len(silhouettes)):
-        others = [s for j, s in enumerate(silhouettes) if j != i]
-        try:
-            voxels = _carve(others, size_m, settings)
-        except TrackerError:
-            continue
-        now = coverages(voxels, silhouettes)
-        more = float(np.delete(now - whole[1], i).mean())
-        if more > gain:
-            best, found, index, gain = voxels, now, i, more
-    return best, found, index
+    whole: tuple[Voxels, Array] | None = None
+    contradiction: TrackerError | None = None
+    try:
+        voxels = _carve(silhouettes, size_m, settings)
+        whole = voxels, coverages(voxels, silhouettes)
+    except TrackerError as error:
+        contradiction = error
+    n = len(silhouettes)
+    before = whole[1] if whole else np.zeros(n)
+    if n > 2 and before.min() < 1 - _MIN_GAIN:
+        without = [_without(i, silhouettes, size_m, settings) for i in range(n)]
+        gains = [float(np.delete(w[1] - before, i).mean()) if w else 0.0 for i, w in enumerate(without)]
+        best, second = (int(i) for i in np.argsort(gains)[:-3:-1])
+        chosen = without[best]
+        if chosen and gains[best] > _MIN_GAIN and gains[best] - gains[second] > _MIN_LEAD:
+            return *chosen, best
+    if whole is None:
+        raise contradiction or AssertionError
+    return *whole, -1
+
+
+def _without(
+    left_out: int, silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings
+) -> tuple[Voxels, Array] | None:
+    """Return the voxels of all views but one, and the coverages of all; None if the others contradict each other."""
+    try:
+        voxels = _carve([s for i, s in enumerate(silhouettes) if i != left_out], size_m, settings)
+    except TrackerError:
+        return None
+    return voxels, coverages(voxels, silhouettes)
 
 
 def _coverage(points: Array, size_m: float, silhouette: ViewSilhouette) -> float:

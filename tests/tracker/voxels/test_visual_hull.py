@@ -31,21 +31,32 @@ def test_a_broken_view_is_left_out():
     assert 0.9 < hull.figures[0].volume_m3 / whole.figures[0].volume_m3 < 1.3
 
 
-def moved(view):
-    T = view.camera.T_world_camera @ rigid.transform(rigid.so3_exp(np.array([0.06, 0.06, 0.0])))
+def turned(view, radians):
+    """The same silhouette in a camera that is not where its calibration says."""
+    T = view.camera.T_world_camera @ rigid.transform(rigid.so3_exp(np.array([0.0, radians, 0.0])))
     return view._replace(camera=replace(view.camera, T_world_camera=T))
 
 
-def test_a_camera_that_moved_is_left_out():
+@pytest.mark.parametrize("radians", [0.05, 0.15])
+def test_a_camera_that_moved_is_left_out(radians):
+    """Turned a little, its silhouette meets the others in part; turned farther, not at all."""
     views = silhouettes_of([MAN], CAMERAS)
-    hull = carve_people([views[0], moved(views[1]), *views[2:]], SIZE_M)
+    hull = carve_people([views[0], turned(views[1], radians), *views[2:]], SIZE_M)
     assert hull.broken == ("c1",)
+    assert hull.coverages[[0, 2, 3, 4, 5]].min() > 0.95
 
 
 def test_several_cameras_that_moved_are_an_error():
-    views = silhouettes_of([MAN], CAMERAS[:3])
+    views = silhouettes_of([MAN], CAMERAS)
     with pytest.raises(TrackerError, match="no camera has moved"):
-        carve_people([views[0], moved(views[1]), moved(moved(views[2]))], SIZE_M)
+        carve_people([*views[:3], turned(views[3], 0.3), turned(views[4], -0.3), turned(views[5], 0.3)], SIZE_M)
+
+
+def test_no_view_is_left_out_where_several_could_be():
+    """Any two of three views at one height agree in space, so that nothing tells which of them is broken."""
+    views = silhouettes_of([MAN], cameras_around(101, focal=250.0)[49:52])
+    with pytest.raises(TrackerError, match="no camera has moved"):
+        carve_people([views[0], turned(views[1], 0.15), views[2]], SIZE_M)
 
 
 def test_nothing_of_the_size_of_a_person():
