@@ -42,8 +42,8 @@ class InspectorFeed:
 def _ingredients(state: State) -> tuple[Identity, ...]:
     """Return what the messages are made from, for comparison."""
     made_from = (
-        state.settings, state.method, state.view_3d, state.floor, state.prediction_note, state.person, state.draft, state.present,
-        state.sides_alike, state.sizes_message, state.acquisition,
+        state.settings, state.method, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
+        state.present, state.sides_alike, state.sizes_message, state.acquisition,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
 
@@ -59,8 +59,8 @@ def settings(found: TrackSettings, method: MethodName = "chamfer") -> wire.Setti
 def track_values(found: TrackSettings, method: MethodName) -> wire.TrackValues:
     """Describe the settings of the tracker."""
     return wire.TrackValues(
-        method, found.estimate, found.predict.order, found.predict.window, found.recover is not None, found.backward_pass,
-        found.smooth,
+        method, found.estimate, found.predict.order, found.predict.window, found.recover is not None,
+        found.backward_pass, found.smooth,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from app.state.people import ShownPose
 from app.state.progress import TrackState
 from app.state.state import StateChanges, finite_or_none
 from tracker.errors import TrackerError
-from tracker.pipeline.methods import make_tracker
+from tracker.pipeline.methods import MethodName, make_tracker
 from tracker.pipeline.track_session import SmoothedRows, Step, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson
 from tracker.store.records import PoseChange
