@@ -38,9 +38,10 @@ test-quick: $(VENV)/.tested
 test-library: test-quick kernels
 	nice -n 19 $(PYTEST) -m "not slow" $(addprefix --ignore=,tests/browser $(QUICK)) tests
 
-# Starts at once: only the files of tests/browser/live, which come last, wait for the kernels.
+# Starts at once: only the files of tests/browser/live, which come last, wait for the kernels. Three processes, because
+# these tests wait more than they compute.
 test-page: $(VENV)/.tested
-	nice -n 5 $(PYTEST) --no-loadscope-reorder -m "not slow" tests/browser
+	nice -n 5 $(PYTEST) --numprocesses 3 --no-loadscope-reorder -m "not slow" tests/browser
 
 test-slow: $(VENV)/.slow kernels
 	$(PYTEST) -m slow

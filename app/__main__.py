@@ -8,7 +8,22 @@ from importlib import metadata
 import tyro
 from rich.console import Console
 
-from app.cli import acquire, bench, evaluate, export, index, info, init, new, relink, restore, simulate, track
+from app.cli import (
+    acquire,
+    bench,
+    evaluate,
+    experiment,
+    export,
+    index,
+    info,
+    init,
+    new,
+    observability,
+    relink,
+    restore,
+    simulate,
+    track,
+)
 from app.cli import open as open_
 from app.runtime import process_exit
 from app.runtime.malloc_trim import give_back_freed_memory
@@ -24,9 +39,11 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "acquire": acquire.command,
     "track": track.command,
     "evaluate": evaluate.command,
+    "observability": observability.command,
     "export": export.command,
     "restore": restore.command,
     "simulate": simulate.command,
+    "experiment": experiment.command,
     "bench": bench.command,
 }
 _HELP = ("-h", "--help")

@@ -155,7 +155,7 @@ def _searched_and_refined(frame: BenchFrame, start: Array) -> Fit:
 
 
 def _refined(frame: BenchFrame, start: Array, predicted: Array) -> Fit:
-    """Refine as the tracker does; see `tracker.tracking.chamfer.frame_estimator`."""
+    """Refine as the tracker does; see `tracker.tracking.estimation.frame_estimator`."""
     model = frame.model
     match = ContourResiduals(frame.views, [PosedBody(model, start)])
     sigma = np.where(model.dof_is_length, _SETTINGS.trust_m, _SETTINGS.trust_rad)

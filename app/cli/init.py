@@ -1,4 +1,4 @@
-"""`quadrille init`: set a first pose, from known joints or from a table of poses."""
+"""`quadrille init`: set a first pose, from known joints, from a table of poses, or from the silhouettes."""
 
 import sys
 from collections.abc import Sequence
@@ -11,6 +11,7 @@ import tyro
 from app.cli.arguments import OptionalName, OptionalPath, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import Target, load_target
+from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
@@ -34,10 +35,13 @@ class InitArguments:
     """TRC file of 3-D joints."""
     poses: OptionalPath = None
     """table of poses (CSV), as `simulate` writes it."""
-    method: Literal["joints", "poses"] = "joints"
-    """joints fits the pose to known joints; poses copies it from a table."""
+    method: Literal["joints", "poses", "voxels", "auto"] = "joints"
+    """joints fits the pose to known joints; poses copies it from a table; voxels finds it in the silhouettes; auto
+    tries voxels on several frames and keeps the start that tracks best."""
     frame: int = 0
-    """frame to set."""
+    """frame to set; with auto the first one to try."""
+    voxel_size: float = 25.0
+    """edge of a voxel, mm."""
     person: OptionalName = None
     """name; needed in a session of several people."""
     fit_sizes: bool = False
@@ -60,6 +64,9 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
     if not 0 <= frame < at.session.n_frames:
         n = at.session.n_frames
         raise TrackerError(f"expected --frame within 0:{n} (from 0 to {n - 1}), found {frame}; correct it")
+    if method in ("voxels", "auto"):
+        _init_from_voxels(at, arguments)
+        return
     path = arguments.joints if method == "joints" else arguments.poses
     if path is None:
         raise TrackerError(f"expected --{method} FILE, found none; say where the {method} are")
@@ -84,6 +91,16 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
         lines.append(f"note: only '{seeing[0]}' has the body in its picture: check --axes and the world of the file")
     lines += [] if found["warning"] is None else [f"warning: {found['warning']}"]
     print(format_json(found) if arguments.json else "\n".join(lines))
+
+
+def _init_from_voxels(at: Target, arguments: InitArguments) -> None:
+    from app.cli.init_voxels import auto_frames, format_found, init_from_voxels
+
+    method, frame = arguments.method, arguments.frame
+    frames = auto_frames(frame, at.session.n_frames) if method == "auto" else [frame]
+    progress = Reporter(silent=arguments.json or method == "voxels")
+    found = init_from_voxels(at, frames, arguments.voxel_size / 1000, method, progress)
+    print(format_json(found) if arguments.json else format_found(found))
 
 
 def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool) -> dict[str, Any]:

@@ -12,10 +12,11 @@ from app.cli.arguments import Names, OptionalName, OptionalNumber, OptionalRange
 from app.cli.json_output import format_json
 from app.cli.target import Target, check_stride, load_target, parse_frames
 from app.runtime.progress import Reporter
+from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
     from tracker.pipeline.track_session import TrackSession
-    from tracker.tracking.chamfer.settings import TrackSettings
+    from tracker.tracking.estimation.settings import EstimationSettings
     from tracker.tracking.tracker import TrackerSettings
 
 
@@ -25,8 +26,9 @@ class TrackArguments:
 
     session: SessionArg
     """session folder."""
-    method: Literal["chamfer"] = "chamfer"
-    """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice."""
+    method: Literal["chamfer", "contour"] = "chamfer"
+    """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice. contour: extremal
+    contours, refined by Gauss-Newton until it converges, without a search of whole bodies."""
     frames: OptionalRange = None
     """A:B, half open; all by default."""
     stride: int = 1
@@ -44,7 +46,12 @@ class TrackArguments:
     window: OptionalWhole = None
     """past frames that the motion is estimated from; 3 by default, 8 with --paper."""
     paper: bool = False
-    """as Gavrila and Davis 1996, in a session made with --model gavrila22; see docs/accuracy.md."""
+    """as the method's paper: chamfer as Gavrila and Davis 1996, in a session made with --model gavrila22; contour as
+    Knossow, Ronfard and Horaud 2008. See docs/trackers.md."""
+    image_contours: Literal["edges", "silhouettes"] | None = None
+    """contour: what the model's contours are compared with; edges by default, silhouettes with --paper."""
+    sliding: bool = True
+    """contour: whether the Jacobian has the term of contours that slide on the surface."""
     backward_pass: bool = True
     """at the end, track lost people backward from the first trusted poses after the loss."""
     smooth: bool = True
@@ -62,7 +69,7 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     frames: Sequence[int] = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
     frames = frames[::-1] if arguments.backward else frames
     settings = _SETTINGS[arguments.method](arguments)
-    if arguments.paper:
+    if arguments.paper and arguments.method == "chamfer":
         _require_paper_body(at)
     found = track(at, frames, settings, Reporter(silent=arguments.json), arguments.cameras)
     print(format_json(found) if arguments.json else _format(found))
@@ -70,12 +77,32 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
         sys.exit(130)
 
 
-def _chamfer_settings(arguments: TrackArguments) -> "TrackSettings":
+def _chamfer_settings(arguments: TrackArguments) -> "TrackerSettings":
     from tracker.tracking.chamfer.paper import paper_settings
     from tracker.tracking.chamfer.settings import TrackSettings
 
+    if arguments.image_contours is not None or not arguments.sliding:
+        raise TrackerError(
+            "expected --image-contours and --no-sliding with the contour method, found the method 'chamfer'; "
+            "add --method contour, or leave them out"
+        )
+    settings = paper_settings() if arguments.paper else TrackSettings(backward_pass=arguments.backward_pass)
+    return _shared_settings(settings, arguments)
+
+
+def _contour_settings(arguments: TrackArguments) -> "TrackerSettings":
+    from tracker.tracking.contour.paper import paper_settings
+    from tracker.tracking.contour.settings import ContourSettings, with_sliding
+
+    wanted = arguments.image_contours
+    if arguments.paper:
+        return _shared_settings(paper_settings(wanted or "silhouettes", arguments.sliding), arguments)
+    settings = ContourSettings(backward_pass=arguments.backward_pass, image_contours=wanted or "edges")
+    return _shared_settings(with_sliding(settings, arguments.sliding), arguments)
+
+
+def _shared_settings(settings: "EstimationSettings", arguments: TrackArguments) -> "TrackerSettings":
     paper, stride = arguments.paper, arguments.stride
-    settings = paper_settings() if paper else TrackSettings(backward_pass=arguments.backward_pass)
     motion, order, window = settings.predict, arguments.order, arguments.window
     # Bodies move farther between frames that are farther apart.
     motion = replace(
@@ -95,7 +122,10 @@ def _require_paper_body(at: Target) -> None:
     require_paper_body({p.name: p.model for p in people})
 
 
-_SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {"chamfer": _chamfer_settings}
+_SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {
+    "chamfer": _chamfer_settings,
+    "contour": _contour_settings,
+}
 """Makes the settings of each method (`METHODS`) from the arguments."""
 
 

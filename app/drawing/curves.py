@@ -14,7 +14,7 @@ GROUPS: tuple[CurveGroup, ...] = get_args(CurveGroup)
 
 # Words in the names of the joints of limbs; all other joints belong to the trunk.
 _LIMBS = {
-    "arms": ("clavicle", "shoulder", "elbow", "wrist", "hand"),
+    "arms": ("clavicle", "collarbone", "shoulder", "elbow", "wrist", "hand"),
     "legs": ("hip", "knee", "ankle", "foot", "toe"),
 }
 

@@ -15,10 +15,12 @@ from tracker.validation import quoted
 
 
 def _track_settings(controller: Controller, _: int, message: wire.SetTrackSettings) -> None:
-    before = controller.state.settings
-    after = track_settings.changed(before, msgspec.to_builtins(message.changes))
-    if after != before:
+    before, changes = controller.state, msgspec.to_builtins(message.changes)
+    after = track_settings.changed(before.settings, changes)
+    if after != before.settings:
         controller.search.set_settings(after)
+    controller.tracking.set_method(changes.get("method", before.method))
+    if after != before.settings or controller.state.method != before.method:
         controller.tracking.store_settings()
 
 

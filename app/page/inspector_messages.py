@@ -9,6 +9,7 @@ from app.page.message_types import Command, Index, Message, Name, Part
 from app.page.search_messages import OutlierMode
 from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
 from tracker.motion.prediction import MAX_ORDER
+from tracker.pipeline.methods import MethodName
 
 MAX_PAST_POSES = 8
 """Largest number of poses from which a page may let the motion be predicted."""
@@ -23,6 +24,8 @@ _Metres: TypeAlias = Annotated[float, Meta(gt=0, le=10)]
 class TrackChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Settings of the tracker to change; what is left out stays."""
 
+    method: MethodName | UnsetType = UNSET
+    """The tracking method."""
     estimate: EstimationMode | UnsetType = UNSET
     """How the pose of a frame is found."""
     order: Annotated[int, Meta(ge=0, le=MAX_ORDER)] | UnsetType = UNSET
@@ -127,8 +130,11 @@ class AcquireSizes(Command, frozen=True, tag="acquire"):
 class TrackValues(Part, frozen=True):
     """Settings of the tracker."""
 
+    method: MethodName
+    """The tracking method: chamfer matching, or extremal contours."""
     estimate: EstimationMode
-    """How the pose of a frame is found: refined, and searched where that does not suffice; or searched alone."""
+    """How chamfer matching finds the pose of a frame: refined, and searched where that does not suffice; or searched
+    alone."""
     order: int
     """Degree of the motion model: 0 stays, 1 is constant velocity, 2 is constant acceleration."""
     past_poses: int

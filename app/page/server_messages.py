@@ -351,8 +351,28 @@ class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
     """All of them, ascending."""
 
 
+class DofObservability(Part, frozen=True):
+    """How well the views constrain a degree of freedom."""
+
+    level: Literal["known", "weak", "unknown"]
+    """`weak` where the standard deviation is more than half of what counts as observable."""
+    sigma: float
+    """Standard deviation in the unit of the degree of freedom, degrees or centimetres."""
+    sentence: str
+
+
+class ObservabilityMessage(Message, frozen=True, tag="observability"):
+    """How well the views constrain the pose of the selected person; only for pages that show the layer of this name."""
+
+    frame: int
+    person: int
+    dofs: tuple[DofObservability, ...]
+    """In the order of the person's degrees of freedom; empty where the person has no pose."""
+
+
 TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
+    ObservabilityMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
     AcquisitionMessage,
 ]  # fmt: skip

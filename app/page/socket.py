@@ -18,6 +18,7 @@ from app.page.encoding import encode_text
 from app.page.inspector_feed import InspectorFeed
 from app.page.message_parsing import MessageError, parse
 from app.page.message_types import Message
+from app.page.observability_feed import ObservabilityFeed
 from app.page.search_feed import SearchFeed
 from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
 from app.page.server_messages import HistoryMessage, InconsistentMessage, NoticeMessage, StateMessage
@@ -86,6 +87,7 @@ class PageConnection:
         self._sent_curves: tuple[CurveGroup, int, int] | None = None  # group, person, version of the timeline
         self._feed = SearchFeed()
         self._inspector = InspectorFeed()
+        self._observability = ObservabilityFeed()
         self._history_limit = 0  # entries in each direction; 0: not subscribed
         self._sent_history: HistoryMessage | None = None
         self._loop = asyncio.get_running_loop()
@@ -201,6 +203,7 @@ class PageConnection:
                 if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
                     await self._send(InconsistentMessage(state.inconsistent_frames))
                 await self._send_curves(state)
+                await self._send_observability(state)
                 await self._send_history()
                 for update in await asyncio.to_thread(self._feed.updates, self._controller, with_figures):
                     await self._send(update)
@@ -293,6 +296,11 @@ class PageConnection:
             messages.curves, self._controller.session, person, group, frames, rows, since == 0
         )
         await self._send(message)
+
+    async def _send_observability(self, state: State) -> None:
+        """Send how well the views constrain the shown pose, if the page shows that layer."""
+        if self._observability.is_due(state, self._view):
+            await self._send(await asyncio.to_thread(self._observability.update, self._controller, state))
 
     async def _send_history(self) -> None:
         """Send the history to a subscribed page if it changed."""

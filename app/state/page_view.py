@@ -22,6 +22,7 @@ Layer = Literal[
     "part_edges",
     "skeleton",
     "joints",
+    "observability",
     "epipolar",
 ]
 LAYERS: tuple[Layer, ...] = get_args(Layer)

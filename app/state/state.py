@@ -15,6 +15,7 @@ from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import STAGES
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.pipeline.methods import MethodName
 from tracker.tracking.chamfer.settings import TrackSettings
 
 
@@ -83,6 +84,8 @@ class State:
     """Index of the camera through which the 3-D view looks; None for a free view."""
     settings: TrackSettings = field(default_factory=TrackSettings)
     """Settings of searches and trackers."""
+    method: MethodName = "chamfer"
+    """The method of the next tracking run."""
     undo: str | None = None
     """Label of the edit that undo would revert."""
     redo: str | None = None
@@ -208,6 +211,7 @@ class StateChanges(TypedDict, total=False):
     compiled: frozenset[str]
     snapped: int | None
     settings: TrackSettings
+    method: MethodName
     undo: str | None
     redo: str | None
     saved: bool

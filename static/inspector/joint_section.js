@@ -1,5 +1,6 @@
 /** Degrees of freedom of the selected joint, with sliders over their limits. */
 
+import { ofDof } from "../model/observability.js";
 import { meaning } from "../posing/dof_names.js";
 import { capital, displayName } from "../widgets/text.js";
 import { boundedField } from "./rows.js";
@@ -8,8 +9,9 @@ const UNITS = { deg: "°", cm: "cm" };
 /** Range of the slider of an angle without limits, degrees. */
 const FULL_TURN = { low: -180, high: 180 };
 const MAX_CM = 1e5;
+const SHOWN_FACTS = /** @type {const} */ (["state", "session", "observability", "layers"]);
 
-/** @typedef {{dof: number, field: ReturnType<typeof boundedField>, slider: HTMLInputElement | null, element: HTMLElement}} Row */
+/** @typedef {{dof: number, field: ReturnType<typeof boundedField>, slider: HTMLInputElement | null, element: HTMLElement, title: string}} Row */
 
 /**
  * @param {import("../model/index.js").Context} context
@@ -34,7 +36,7 @@ export function jointSection({ store, notify }, { posing }) {
     const unit = UNITS[info.unit];
     const limits = info.low === null || info.high === null ? "no limits" : `from ${info.low} to ${info.high} ${unit}`;
     const effect = meaning(info);
-    element.title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}; ${limits}`;
+    const title = `${displayName(info.joint)} ${info.name}${effect && `: ${effect}`}; ${limits}`;
     const head = Object.assign(document.createElement("span"), { className: "row-label", textContent: capital(info.name) });
     const [low, high] = info.unit === "cm" ? [-MAX_CM, MAX_CM] : [info.low ?? -360, info.high ?? 360];
     const field = boundedField({
@@ -54,7 +56,7 @@ export function jointSection({ store, notify }, { posing }) {
       slider.addEventListener("input", () => posing.slide(dof, Number(slider.value)));
       element.append(slider);
     }
-    return { dof, field, slider, element };
+    return { dof, field, slider, element, title };
   };
 
   const show = () => {
@@ -70,7 +72,10 @@ export function jointSection({ store, notify }, { posing }) {
       rows = dofs.map((dof) => makeRow(person.dofs[dof], dof));
       body.replaceChildren(title, ...rows.map(({ element }) => element));
     }
-    for (const { dof, field, slider } of rows) {
+    for (const { dof, field, slider, element, title } of rows) {
+      const observed = ofDof(store.facts, dof);
+      element.title = observed ? `${title}\n${observed.sentence}` : title;
+      element.dataset.observed = observed?.level ?? "";
       const value = Math.round(10 * (state.dofs[dof] ?? 0)) / 10;
       const isLocked = state.locked.includes(dof);
       field.show(value);
@@ -85,6 +90,6 @@ export function jointSection({ store, notify }, { posing }) {
     title: "Joint",
     hint: "Angles of the selected joint (J selects the next one)",
     body,
-    update: (changed) => (changed.has("state") || changed.has("session")) && show(),
+    update: (changed) => SHOWN_FACTS.some((fact) => changed.has(fact)) && show(),
   };
 }

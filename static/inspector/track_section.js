@@ -14,8 +14,17 @@ const ORDERS = { 0: "Stays in place", 1: "Constant velocity", 2: "Constant accel
 export function trackSection({ store, send, notify }) {
   const set = (/** @type {Partial<TrackValues>} */ changes) => send({ type: "track_settings", changes });
   const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
-  const estimate = choiceRow({
+  const method = choiceRow({
     label: "Method",
+    title: "Chamfer matching searches whole bodies where refinement fails. Extremal contours (KRH08) refine until they converge",
+    options: [
+      ["chamfer", "Chamfer matching"],
+      ["contour", "Extremal contours"],
+    ],
+    change: (value) => set({ method: value }),
+  });
+  const estimate = choiceRow({
+    label: "Estimation",
     title: "How the pose of a frame is found from its prediction. Refinement fits contours to edges and searches only what it cannot fit",
     options: [
       ["refine", "Refine, then search"],
@@ -62,12 +71,14 @@ export function trackSection({ store, send, notify }) {
     if (settings) set(settings.track_default);
   });
   const body = document.createElement("div");
-  body.append(estimate.element, order.element, past.element, recover.element, backward.element, smooth.element, reset);
+  body.append(method.element, estimate.element, order.element, past.element, recover.element, backward.element, smooth.element, reset);
 
   const show = () => {
     const { settings } = store.facts;
     if (!settings) return;
     const { track, track_default: initial } = settings;
+    method.show(track.method, track.method !== initial.method);
+    estimate.element.hidden = track.method !== "chamfer";
     estimate.show(track.estimate, track.estimate !== initial.estimate);
     order.show(/** @type {"0"} */ (String(track.order)), track.order !== initial.order);
     past.show(track.past_poses, track.past_poses !== initial.past_poses);

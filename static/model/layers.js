@@ -79,6 +79,14 @@ export const LAYERS = [
   { id: "skeleton", group: "Model", label: "Skeleton", title: "Lines between the joints", shown: false, opacity: 0.8 },
   { id: "joints", group: "Model", label: "Joints", title: "Joints, which can be dragged", shown: true, opacity: 1 },
   {
+    id: "observability",
+    group: "Model",
+    label: "Observability",
+    title: "How well the cameras constrain each joint of the selected person: a ring, dashed where weakly, double where not",
+    shown: false,
+    opacity: 1,
+  },
+  {
     id: "epipolar",
     group: "Model",
     label: "Epipolar lines",

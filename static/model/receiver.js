@@ -72,6 +72,9 @@ export class Receiver {
       case "search_runs":
         this.#store.set(takeRuns(this.#store.facts, message));
         break;
+      case "observability":
+        this.#store.set({ observability: message });
+        break;
       case "inconsistent":
         this.#store.set({ disagreeing: message.frames });
         break;

@@ -24,6 +24,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("./cells.js").Cells} timeline cells of all people together
  * @property {import("./cells.js").Cells[]} lanes cells of each person, if there are several
  * @property {number[]} disagreeing frames whose pose is inconsistent with its neighbours, ascending
+ * @property {import("./protocol.js").ObservabilityMessage | null} observability of the selected person
  * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
  * @property {import("./series.js").Curves | null} curves the current group of curves
  * @property {import("./series.js").Tab | null} drawer the open tab; null while the drawer is closed
@@ -78,6 +79,7 @@ export class Store {
     state: null,
     timeline: new Cells(0),
     lanes: [],
+    observability: null,
     disagreeing: [],
     visible: null,
     curves: null,

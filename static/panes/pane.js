@@ -3,7 +3,9 @@
 import * as drawing from "./drawing.js";
 import { drawPins } from "./pin_drawing.js";
 import { decluttered } from "./declutter.js";
+import { ofJoint } from "../model/observability.js";
 import { jointLabel } from "./joint_label.js";
+import { drawObservability } from "./observability_marks.js";
 import { isDimmed, isInSight } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
@@ -255,6 +257,8 @@ export class Pane {
       const isSelected = state.person === one.handle.person && state.point === one.handle.point;
       if (isHovered && hover?.camera === this.#camera) named = one;
       const color = people[one.handle.person]?.color ?? "#fff";
+      const observed = ofJoint(this.#store.facts, one.handle);
+      if (observed) drawObservability(context, one, observed.level, layers.opacity.observability);
       drawing.drawHandle(context, one, color, isHovered ? "hovered" : isSelected ? "selected" : "plain", isInSight(state, one.handle));
     }
     context.globalAlpha = 1;
@@ -272,7 +276,8 @@ export class Pane {
     const overlapping = this.graspableHandles().filter(({ handle }) =>
       offered.some(({ person, point }) => person === handle.person && point === handle.point),
     );
-    return jointLabel(named, overlapping, people);
+    const observed = ofJoint(this.#store.facts, named.handle);
+    return [...jointLabel(named, overlapping, people), ...(observed ? observed.sentence.split(/(?<=:) /) : [])];
   }
 
   /**

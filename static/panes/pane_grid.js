@@ -9,8 +9,8 @@ import { PaneShares } from "../layout/pane_shares.js";
 
 /** Two digits within this time form one number. */
 const SECOND_DIGIT_MS = 700;
-/** Facts that change the highlights. @type {(keyof import("../model/store.js").Facts)[]} */
-const HOVERED = ["hover", "hoverPart", "pinHover", "heldPin"];
+/** Facts that change the marks over the overlay. @type {(keyof import("../model/store.js").Facts)[]} */
+const MARKED = ["hover", "hoverPart", "pinHover", "heldPin", "observability"];
 /** Facts that change the pictures. @type {(keyof import("../model/store.js").Facts)[]} */
 const PICTURED = ["shown", "placeholder", "layers", "imageTones"];
 
@@ -193,8 +193,8 @@ export class PaneGrid {
     // Each move of a drag changes the state, but only these fields of it change the vectors.
     const { person, point, solo } = this.#store.facts.state ?? {};
     const choice = JSON.stringify([person, point, solo]);
-    const hovered = HOVERED.some((fact) => changed.has(fact));
-    if (withPictures || changed.has("overlay") || choice !== this.#choice || hovered) {
+    const marked = MARKED.some((fact) => changed.has(fact));
+    if (withPictures || changed.has("overlay") || choice !== this.#choice || marked) {
       this.#choice = choice;
       for (const pane of this.panes) pane.draw(withPictures);
     }

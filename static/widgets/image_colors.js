@@ -3,7 +3,7 @@
 /** @type {Map<string, string>} */
 const known = new Map();
 
-/** @param {"mark" | "off" | "neutral" | "outline"} name */
+/** @param {"mark" | "off" | "good" | "warning" | "neutral" | "outline"} name */
 export function imageColor(name) {
   const color = known.get(name) ?? getComputedStyle(document.documentElement).getPropertyValue(`--image-${name}`).trim();
   if (color) known.set(name, color);

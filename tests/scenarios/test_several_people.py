@@ -9,10 +9,10 @@ from tracking_runs import track
 
 from tracker.body.model import PosedBody
 from tracker.motion.prediction import PredictSettings
-from tracker.tracking.chamfer.frame_estimator import FrameEstimator
-from tracker.tracking.chamfer.frame_problem import FrameProblem
-from tracker.tracking.chamfer.limb_recovery import search_limbs
 from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimation.frame_estimator import FrameEstimator
+from tracker.tracking.estimation.frame_problem import FrameProblem
+from tracker.tracking.estimation.limb_recovery import search_limbs
 from tracker.tracking.person_memory import PersonMemory
 
 N_FRAMES = 3
@@ -87,10 +87,10 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
         return np.array([*(b.values for b in estimator.bodies), *(found[p].covariance.sum(axis=1) for p in (0, 1))])
 
     monkeypatch.setattr(
-        "tracker.tracking.chamfer.frame_estimator.search_limbs", lambda *a: searched.append(a) or search_limbs(*a)
+        "tracker.tracking.estimation.frame_estimator.search_limbs", lambda *a: searched.append(a) or search_limbs(*a)
     )
     usual = poses()
     assert len(searched) == 2
     one_by_one = lambda work, items: [work(x) for x in items[::-1]][::-1]  # noqa: E731
-    monkeypatch.setattr("tracker.tracking.chamfer.frame_estimator.map_parallel", one_by_one)
+    monkeypatch.setattr("tracker.tracking.estimation.frame_estimator.map_parallel", one_by_one)
     np.testing.assert_array_equal(poses(), usual)

@@ -22,9 +22,10 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock
 from tracker.images.static_edges import StaticEdgeModel
-from tracker.tracking.chamfer.forward_pass import update_static_edges
-from tracker.tracking.chamfer.frame_problem import FrameProblem, PersonPrior
-from tracker.tracking.chamfer.settings import TrackSettings, chamfer_cost
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimation.forward_pass import update_static_edges
+from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior
+from tracker.tracking.estimation.settings import chamfer_cost
 from tracker.tracking.view_regions import regions, visible_pieces_px
 
 Report = Callable[[str, float], None]

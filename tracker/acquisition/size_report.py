@@ -35,8 +35,8 @@ def size_changes(acquisition: Acquisition) -> list[SizeChange]:
     before, after = (_measured(parameters, b) for b in (parameters.body(np.zeros_like(fit.sizes)), fit.body))
     J = np.empty((len(after), len(fit.sizes)))
     for i, step in enumerate(_STEP * np.eye(len(fit.sizes))):
-        more, less = (_measured(parameters, parameters.body(fit.sizes + s * step)) for s in (1, -1))
-        J[:, i] = [(more[n] - less[n]) / (2 * _STEP) for n in after]
+        more = _measured(parameters, parameters.body(fit.sizes + step))
+        J[:, i] = [(more[n] - after[n]) / _STEP for n in after]
     sigmas = np.sqrt(np.einsum("ij,jk,ik->i", J, fit.covariance, J))
     rows = [SizeChange(n, before[n], after[n], float(s)) for n, s in zip(after, sigmas, strict=True)]
     return sorted(rows, key=lambda r: -abs(np.log(r.after_m / r.before_m)))

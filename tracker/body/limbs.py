@@ -42,5 +42,11 @@ def display_name(name: str) -> str:
 
 
 def limb_display_name(limb: str) -> str:
-    """Format the name of a limb for display: `left_forearm`, its last part, gives "left arm"."""
-    return display_name(limb.replace("forearm", "arm").replace("calf", "leg"))
+    """Format the name of a limb for display: `left_forearm` or `left_hand`, its last part, gives "left arm"."""
+    for part, whole in _LIMBS.items():
+        limb = limb.replace(part, whole)
+    return display_name(limb)
+
+
+_LIMBS = {"forearm": "arm", "hand": "arm", "calf": "leg", "foot": "leg"}
+"""Limbs of people by the name of their last part."""

@@ -149,7 +149,7 @@ def silhouette_evidence(inside: Mask, edges: Edges, limit_px: float) -> Silhouet
         limit_px: largest distance to its contour, working px.
     """
     contour = trace_silhouette(inside)
-    first = _first_in_cells(contour.points_px, *inside.shape)
+    first = thin_points(contour.points_px, *inside.shape)
     trust = contour_trust(contour, inside, edges)
     return Silhouette(inside, contour.points_px[first], contour.normals[first], trust, contour, limit_px)
 
@@ -247,7 +247,7 @@ def _matched_edges(
         normals = np.zeros_like(points)
     else:
         points, normals = segments.points_px, segments.normals
-    first = _first_in_cells(points, *found.shape)
+    first = thin_points(points, *found.shape)
     return points[first], normals[first], found
 
 
@@ -285,8 +285,14 @@ def _mark_chosen(
 
 
 @njit(nogil=True, cache=True)
-def _first_in_cells(points: FloatArray, height: int, width: int) -> NDArray[np.int64]:
-    """Return the index of the first of the points (N, 2) in each cell of `SCENE_SPACING_PX`, (M,)."""
+def thin_points(points: FloatArray, height: int, width: int) -> NDArray[np.int64]:
+    """Return the index of the first of the points (N, 2), px, in each cell of `SCENE_SPACING_PX`, (M,).
+
+    Args:
+        points: (N, 2), px, within an image.
+        height: of the image, px.
+        width: of the image, px.
+    """
     columns = width // SCENE_SPACING_PX + 1
     taken = np.zeros((height // SCENE_SPACING_PX + 1) * columns, np.bool_)
     first = np.empty(points.shape[0], np.int64)

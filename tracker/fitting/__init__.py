@@ -2,5 +2,6 @@
 
 The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use `gauss_newton`
 (`solve`, `fit_to_points` and the plain blocks), `gauss_newton_compiled.solve_compiled`, `contour_residuals`,
-`interpenetration` and `pins`.
+`interpenetration` and `pins`. `observability`, `observability_reasons` and `added_camera` say how well views constrain
+a pose.
 """

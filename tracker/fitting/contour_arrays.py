@@ -10,6 +10,9 @@ from tracker.contours.static_cache import StaticContours
 from tracker.contours.surfaces import Surfaces
 from tracker.geometry.arrays import Array, FloatArray
 
+ACROSS, RIGID, SLIDING = 0, 1, 2
+"""Values of `ContourTerm.motion`."""
+
 
 class ViewArrays(NamedTuple):
     """The evidence of all views as arrays; lengths in working px."""
@@ -109,6 +112,8 @@ class ContourTerm(NamedTuple):
     """See `contour_residuals.MatchSettings`."""
     turn: float
     """See `contour_residuals.MatchSettings`."""
+    motion: int
+    """How contour points move: `ACROSS`, `RIGID` or `SLIDING`; see `contour_residuals.MatchSettings`."""
     static: StaticContours
     scratch: Scratch
     sums: Sums

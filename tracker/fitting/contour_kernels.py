@@ -8,8 +8,9 @@ from tracker.contours import occluding_contours
 from tracker.contours.pieces import PIECE_PX, place_parts
 from tracker.contours.static_cache import StaticContours, copy_poses, is_static_unchanged, trace_moving_parts
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
-from tracker.fitting.contour_arrays import ContourTerm, Scratch, Sums, ViewArrays
+from tracker.fitting.contour_arrays import ACROSS, SLIDING, ContourTerm, Scratch, Sums, ViewArrays
 from tracker.fitting.segment_matching import match_points, pack_visible, store_static
+from tracker.fitting.sliding import add_sliding_twists
 from tracker.fitting.twists import add_twists
 from tracker.images.distance_transform import bilinear
 
@@ -18,7 +19,7 @@ _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote th
 
 @njit(**FAST_MATH)
 def _model_to_image(
-    view: int, first: int, last: int, pixel: int, views: ViewArrays, scale: float, with_jacobian: bool,
+    view: int, first: int, last: int, pixel: int, views: ViewArrays, scale: float, motion: int, with_jacobian: bool,
     static: StaticContours, scratch: Scratch, sums: Sums,
 ) -> float:  # fmt: skip
     """Add the model-to-image residuals of the visible pieces of some parts; return their cost."""
@@ -47,9 +48,16 @@ def _model_to_image(
             cost += length * f * cut * cut
             if pulled and d < theta:
                 across = q[3, k] * along_u + q[4, k] * along_v
-                w = weight * length * (f * f) * across
-                pulls[0, k] += w * across
-                pulls[1, k] += w * d
+                w = weight * length * (f * f)
+                if motion == ACROSS:
+                    pulls[0, k] += w * across * across
+                    pulls[1, k] += w * across * d
+                    continue
+                pulls[2, k] += w * along_u * along_u
+                pulls[3, k] += w * along_u * along_v
+                pulls[4, k] += w * along_v * along_v
+                pulls[5, k] += w * d * along_u
+                pulls[6, k] += w * d * along_v
         sums.parts[view, part, 0] += seen
         sums.parts[view, part, 1] += far
     return 0.5 * float(weight) * cost
@@ -130,7 +138,7 @@ def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float
     Without `with_jacobian` the normal matrices stay 0. With it the matrices of static parts stay 0 (see
     `static_cache`).
     """
-    Ts, first, last, surfaces, views, scale, turn, static, scratch, sums = term
+    Ts, first, last, surfaces, views, scale, turn, motion, static, scratch, sums = term
     sums.M[:] = 0.0
     sums.b[:] = 0.0
     sums.parts[:] = 0.0
@@ -151,7 +159,9 @@ def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float
             scratch.pulls[:, : scratch.firsts[-1]] = 0.0
             # The costs of the parts need both directions.
             if views.weights[view, 0] > 0.0 or not with_jacobian:
-                cost += _model_to_image(view, first, last, pixel, views, scale, with_jacobian, static, scratch, sums)
+                cost += _model_to_image(
+                    view, first, last, pixel, views, scale, motion, with_jacobian, static, scratch, sums
+                )
             if views.weights[view, 1] > 0.0:
                 cost += _image_to_model(view, n_segments, views, scale, turn, with_jacobian, static, scratch, sums)
             if with_jacobian:
@@ -159,7 +169,11 @@ def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float
                     if not static.moves[part]:
                         continue
                     span, W = scratch.firsts[part : part + 2], scratch.traced.Ts_world_unit[part]
-                    add_twists(span, scratch.pieces, scratch.pulls, views.P[view], W, sums.M[part], sums.b[part])
+                    M, b = sums.M[part], sums.b[part]
+                    if motion == SLIDING and surfaces.profile_sizes[part] > 0:
+                        add_sliding_twists(span, scratch.pieces, scratch.pulls, P, W, eye, M, b)
+                    else:
+                        add_twists(span, scratch.pieces, scratch.pulls, P, W, M, b)
         pixel += views.sizes[view, 0] * views.sizes[view, 1]
     if stale:
         copy_poses(Ts, static.Ts)

@@ -15,7 +15,7 @@ freedom, whatever the shapes of the parts.
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -26,7 +26,17 @@ from tracker.contours import occluding_contours
 from tracker.contours.static_cache import StaticContours, static_contours_buffer
 from tracker.contours.surfaces import Surfaces, resized_surfaces, surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_arrays import ContourTerm, Scratch, Sums, ViewArrays, scratch_buffer, sums_buffer
+from tracker.fitting.contour_arrays import (
+    ACROSS,
+    RIGID,
+    SLIDING,
+    ContourTerm,
+    Scratch,
+    Sums,
+    ViewArrays,
+    scratch_buffer,
+    sums_buffer,
+)
 from tracker.fitting.contour_kernels import COST_ONLY, accumulate_normal_equations
 from tracker.fitting.gauss_newton import NormalEquations
 from tracker.fitting.match_points import points_to_match
@@ -60,6 +70,24 @@ class MatchSettings:
     """Weight of points of the silhouette's contour in a fully trusted view."""
     information_per_px: float = 0.0125
     """Information of one pixel of contour: 1 / (variance in px^2 times the length of correlated errors, px)."""
+    motion: Literal["across", "rigid", "sliding"] = "across"
+    """How contour points move in the derivatives of the model-to-image residuals. `across` counts the motion across
+    the contour only. `rigid` counts the whole motion of the material point (A of KRH08 Eq. 22). `sliding` adds the
+    motion of the contour on the surface (B of Eq. 31)."""
+
+
+_UNBOUNDED = 1e6
+"""A scale at which residuals of any size count in full."""
+
+
+def paper_match(motion: Literal["rigid", "sliding"] = "sliding") -> MatchSettings:
+    """Return the weights of KRH08 Eq. 60: model to image, a sum of squares in px^2 with every pixel of contour."""
+    return MatchSettings(
+        scale=_UNBOUNDED, model_to_image=1.0, image_to_model=0.0, information_per_px=1.0, motion=motion
+    )
+
+
+_MOTIONS = {"across": ACROSS, "rigid": RIGID, "sliding": SLIDING}
 
 
 class PartCosts(NamedTuple):
@@ -175,6 +203,7 @@ class ContourResiduals:
         )
         self._term = ContourTerm(
             Ts, own.start, own.stop, surfaces, arrays, settings.scale, settings.turn,
+            _MOTIONS[settings.motion],
             self._static_buffer(np.arange(own.start, own.stop), len(Ts), arrays),
             scratch_buffer(surfaces, self._max_pieces, arrays.points.shape[1]), sums_buffer(len(Ts), len(views)),
         )  # fmt: skip

@@ -2,7 +2,7 @@
 
 import threading
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
@@ -174,28 +174,36 @@ def read_background(source: CameraSource) -> Image | None:
     Raises:
         RecordingError: the file is missing, unreadable or of another size than the camera.
     """
+    total, count = np.zeros(0), 0
+    for image in background_frames(source):
+        total = total + image if count else image.astype(np.float64)
+        count += 1
+    return np.round(total / count).astype(np.uint8) if count else None
+
+
+def background_frames(source: CameraSource) -> Iterator[Image]:
+    """Read the images of the empty scene as filmed, (H, W, 3) RGB: one, or those of a video; none if there is none.
+
+    Raises:
+        RecordingError: as `read_background`.
+    """
     if source.background is None:
-        return None
-    name, path = source.camera.name, source.background
+        return
+    name, path, size, count = source.camera.name, source.background, source.camera.size, 0
     if path.suffix.lower() in IMAGE_SUFFIXES:
         image = read_image(path, f"camera '{name}': background")
-    else:
-        image = _mean_frame(path, name)
-    check_size(name, path, image.shape[1::-1], source.camera.size)
-    return image
-
-
-def _mean_frame(path: Path, camera: str) -> Image:
-    with closing(open_footage(path, camera)) as footage:
-        total, count = np.zeros((footage.size[1], footage.size[0], 3)), 0
+        check_size(name, path, image.shape[1::-1], size)
+        yield image
+        return
+    with closing(open_footage(path, name)) as footage:
+        check_size(name, path, footage.size, size)
         for k in range(footage.n_frames):
-            image = footage.read(k)
-            if image is not None:
-                total += image
+            frame = footage.read(k)
+            if frame is not None:
                 count += 1
+                yield frame
     if not count:
-        raise RecordingError(f"camera '{camera}': no frame of the background {path} can be decoded; record it again")
-    return np.round(total / count).astype(np.uint8)
+        raise RecordingError(f"camera '{name}': no frame of the background {path} can be decoded; record it again")
 
 
 def read_mask(source: CameraSource, k: int) -> NDArray[np.uint8] | None:

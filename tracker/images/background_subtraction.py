@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
 from tracker.compute.quantiles import median
-from tracker.geometry.arrays import Image
+from tracker.geometry.arrays import FloatArray, Image
 
 Mask = NDArray[np.bool_]
 
@@ -20,6 +20,10 @@ MIN_SHADE = 0.5
 """Brightness of the darkest shadow, as a share of the unshaded background."""
 MAX_HUE_SHIFT = 7.0
 """Largest deviation of a channel from the darkened background within a shadow, gray levels."""
+MAX_HIGHLIGHT = 1.3
+"""Brightness of the brightest highlight, as a share of the unlit background."""
+NOISE_SIGMAS = 5.0
+"""Smallest difference that counts as a change, in standard deviations of the background at that pixel."""
 _DARK, _BRIGHT = 20.0, 235.0  # gray levels between which a ratio of colours is reliable
 _MIN_SAMPLES = 50
 _MIN_GAIN_CHANGE = 0.01
@@ -71,6 +75,23 @@ def apply_gain(image: Image, gain: NDArray[np.float32]) -> Image:
     return np.asarray(cv2.LUT(np.ascontiguousarray(image), table[None]), dtype=np.uint8)
 
 
+class Shading(NamedTuple):
+    """Changes of the light that leave a pixel in the background (Horprasert, Harwood & Davis 1999)."""
+
+    darkest: float = MIN_SHADE
+    """Brightness distortion of the darkest shadow, as a share of the background."""
+    brightest: float = 1.0
+    """Brightness distortion of the brightest highlight, as a share of the background; 1 for none."""
+    max_chromaticity: float = MAX_HUE_SHIFT
+    """Largest chromaticity distortion: deviation of a channel from the background at that brightness, gray levels."""
+
+
+SHADOWS = Shading()
+"""Shadows alone are background. Edges of a bright person count while tracking."""
+SHADOWS_AND_HIGHLIGHTS = Shading(brightest=MAX_HIGHLIGHT)
+"""Shadows and highlights are background."""
+
+
 class Changes(NamedTuple):
     """The pixels in which a frame differs from the empty scene."""
 
@@ -80,20 +101,27 @@ class Changes(NamedTuple):
     """Silhouette with shadows, (H, W). It includes clothes that look like a shadow of what is behind them."""
 
 
-def subtract_background(smooth: Image, background: Image, threshold: float) -> Changes:
+def subtract_background(
+    smooth: Image, background: Image, threshold: float, shading: Shading = SHADOWS, noise: FloatArray | None = None
+) -> Changes:
     """Find the pixels that differ from the background.
 
-    A darker pixel with the hue of the background is classified as shadow (brightness and chromaticity distortion,
-    Horprasert, Harwood & Davis 1999).
+    A darker or brighter pixel with the hue of the background is classified as shadow or highlight (brightness and
+    chromaticity distortion, Horprasert, Harwood & Davis 1999 Eq. 4 and 5, with one threshold for a whole view).
 
     Args:
         smooth: smoothed frame, (H, W, 3) RGB.
         background: smoothed empty scene, (H, W, 3) RGB, with the same pixels.
         threshold: see `change_threshold`.
+        shading: changes of the light that are background.
+        noise: standard deviation of the empty scene over time, (H, W), gray levels; None if it is not known.
     """
     changed = np.empty(smooth.shape[:2], np.uint8)
-    bounds = np.float32(threshold), np.float32(MIN_SHADE), np.float32(MAX_HUE_SHIFT)
+    bounds = [np.float32(x) for x in (threshold, *shading)]
     _find_changes(smooth.ravel(), background.ravel(), *bounds, changed.ravel())
+    if noise is not None:
+        difference = cv2.absdiff(smooth, background).max(axis=-1)
+        changed[difference < NOISE_SIGMAS * noise] = _SAME
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     inside, anything = (
         np.asarray(cv2.morphologyEx((changed > least).view(np.uint8), cv2.MORPH_OPEN, cross)) > 0
@@ -104,10 +132,10 @@ def subtract_background(smooth: Image, background: Image, threshold: float) -> C
 
 @njit(nogil=True, cache=True, error_model="numpy")
 def _find_changes(
-    image: NDArray[np.uint8], empty: NDArray[np.uint8], threshold: float, least: float, hue: float,
-    changed: NDArray[np.uint8],
+    image: NDArray[np.uint8], empty: NDArray[np.uint8], threshold: float, darkest: float, brightest: float,
+    max_chromaticity: float, changed: NDArray[np.uint8],
 ) -> None:  # fmt: skip
-    """Fill the class of each pixel, (n,): unchanged, in a shadow, or new.
+    """Fill the class of each pixel, (n,): unchanged, in a shadow or highlight, or new.
 
     The kernel uses float32, no branches and no check for division by zero, so that it is vectorized: ten times as fast.
 
@@ -115,8 +143,9 @@ def _find_changes(
         image: colours of the frame, (3 n,).
         empty: colours of the empty scene, (3 n,).
         threshold: smallest difference of a changed pixel, gray levels.
-        least: brightness of the darkest shadow, as a share.
-        hue: largest deviation of a channel in a shadow, gray levels.
+        darkest: see `Shading`.
+        brightest: see `Shading`.
+        max_chromaticity: see `Shading`.
         changed: filled with `_SAME`, `_SHADOW` or `_NEW`, (n,).
     """
     one = np.float32(1.0)
@@ -131,9 +160,9 @@ def _find_changes(
         red, green, blue = abs(r - shade * r0), abs(g - shade * g0), abs(b - shade * b0)
         shift = red if red > green else green
         shift = shift if shift > blue else blue
-        became = shadow if shift < hue else new
-        became = became if shade > least else new
-        became = became if shade < one else new
+        became = shadow if shift < max_chromaticity else new
+        became = became if shade > darkest else new
+        became = became if shade < brightest else new
         changed[i] = np.uint8(became if difference > threshold else same)
 
 

@@ -1,13 +1,15 @@
 """The tracking methods by name."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from tracker.errors import TrackerError
 from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.contour.tracker import ContourTracker
 from tracker.tracking.tracker import Tracker, TrackerSettings
 
-METHODS: Mapping[str, Callable[[Any], Tracker]] = {"chamfer": ChamferTracker}
+MethodName: TypeAlias = Literal["chamfer", "contour"]
+METHODS: Mapping[str, Callable[[Any], Tracker]] = {"chamfer": ChamferTracker, "contour": ContourTracker}
 """Makes the tracker of each method from its settings."""
 
 

@@ -151,9 +151,13 @@ class _Handle(NamedTuple):
 
 def minor_points(model: BodyModel) -> tuple[str, ...]:
     """Return the joints that a user rarely drags: rigid ones, and those that bend the trunk a little (waist, neck,
-    collarbones)."""
-    stiff = [np.all(np.isfinite(model.spreads[model.dof_joint == i])) for i in range(len(model.joints))]
-    return tuple(j.name for j, is_stiff in zip(model.joints, stiff, strict=True) if is_stiff)
+    collarbones).
+
+    A stiff joint at the end of a limb, such as a wrist, is none of them: it places the limb.
+    """
+    stiff = [bool(np.all(np.isfinite(model.spreads[model.dof_joint == i]))) for i in range(len(model.joints))]
+    of_limb = model.limb_dofs @ model.moves  # whether a part moves with a limb
+    return tuple(j.name for i, j in enumerate(model.joints) if stiff[i] and not of_limb[i])
 
 
 @lru_cache(maxsize=32)

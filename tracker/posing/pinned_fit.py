@@ -19,7 +19,8 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.grab import Constraints, holds_at
-from tracker.tracking.chamfer.settings import TrackSettings, prior_blocks
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimation.settings import prior_blocks
 
 _REACHES = (2.0, 1.0)
 """Outlier distances of the rounds, in those of the settings."""

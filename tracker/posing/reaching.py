@@ -48,6 +48,13 @@ _STIFF_WEIGHT = 0.015
 _AGREE_M = 0.1
 """Distance between lines of sight of a point in two views at which the earlier one counts by half, metres."""
 
+_MIDDLE_WEIGHT, _BOW = 0.35, 0.35
+"""Weight of keeping an elbow or knee that was not placed from moving farther than the wrist or ankle is dragged; and
+the share of its distance from the line between base and end that it may move besides."""
+_TWIST_WEIGHT, _AXIAL = 0.1, 0.1
+"""Weight of the twist of such a limb, per rad; and the motion of the elbow or knee, in lengths of the upper bone, below
+which a degree of freedom counts as a twist."""
+
 _REACHED_M, _REACHED_DEPTH_M = 0.002, 0.02
 """Tolerances across the line of sight and along it within which a point has reached its target, metres. The pull to the
 rest pose holds a point back in depth by some 4 mm."""
@@ -97,6 +104,76 @@ class PointerTarget:
         return target_px, m_per_px, self.depth_weight * camera.T_camera_world[2, :3]
 
 
+@dataclass(frozen=True, eq=False)
+class MiddleJoint:
+    """Residual of an elbow or knee that moves much farther than the wrist or ankle is dragged; see `ResidualBlock`.
+
+    At a straight limb, a short drag of its end towards the base folds it far. The end rather gives way in depth.
+    """
+
+    grabbed: Grab
+    active_dofs: NDArray[np.bool_]
+    """Degrees of freedom of the limb that follow the point, (n_dofs,)."""
+    target_world: Array
+    """Target of the grabbed point, (3,), metres."""
+
+    @classmethod
+    def between(cls, grabbed: Grab, active_dofs: NDArray[np.bool_], target_world: Array) -> "MiddleJoint | None":
+        """Return the residual of the joint between the limb's base and the grabbed point; None without any."""
+        of_limb = active_dofs & grabbed.model.limb_dofs
+        moving = grabbed.model.dof_joint[of_limb]
+        if grabbed.role != "limb" or grabbed.part not in moving or grabbed.model.parents[grabbed.part] != moving[0]:
+            return None
+        return cls(grabbed, of_limb, target_world)
+
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
+        place, J = self._derivatives(kinematics)
+        start, allowed_m = self._allowed
+        moved = float(np.linalg.norm(place - start))
+        if moved <= allowed_m:
+            return normal_equations(np.zeros(1), np.zeros((1, model.n_dofs)))
+        way = (place - start) / moved
+        return normal_equations(np.array([_MIDDLE_WEIGHT * (moved - allowed_m)]), _MIDDLE_WEIGHT * way[None] @ J)
+
+    def is_exceeded(self, pose: Array) -> bool:
+        """Return whether the joint moved farther than is allowed."""
+        place, (start, allowed_m) = self.grabbed.model.kinematics(pose).Ts_world_part[self._part, :3, 3], self._allowed
+        return float(np.linalg.norm(place - start)) > allowed_m
+
+    def prior(self) -> PosePrior:
+        """Return the rest prior with a firm twist of the limb: else the limb turns to its side before it gives way."""
+        grabbed = self.grabbed
+        kinematics = grabbed.model.kinematics(grabbed.pose)
+        first = grabbed.model.dof_joint == grabbed.model.dof_joint[self.active_dofs][0]
+        place, J = self._derivatives(kinematics)
+        length_m = np.linalg.norm(place - kinematics.Ts_world_part[grabbed.model.parents[self._part], :3, 3])
+        is_twist = first & self.active_dofs & (np.linalg.norm(J, axis=0) < _AXIAL * length_m)
+        weights = _rest_prior(grabbed.model, grabbed.pose).weights
+        return PosePrior(grabbed.pose, np.where(is_twist, _TWIST_WEIGHT, weights))
+
+    @property
+    def _part(self) -> int:
+        """Index of the joint and of the part that it carries."""
+        return self.grabbed.part
+
+    def _derivatives(self, kinematics: Kinematics) -> tuple[Array, Array]:
+        """Return the joint's position, (3,), metres, and its Jacobian, (3, n_dofs)."""
+        place = kinematics.Ts_world_part[self._part, :3, 3]
+        return place, self.grabbed.model.point_jacobian(kinematics, np.array([self._part]), place[None])[0]
+
+    @cached_property
+    def _allowed(self) -> tuple[Array, float]:
+        """Position of the joint at the grab, (3,), and how far it may move, metres.
+
+        That is the length of the drag. A bent limb has a share of its bend more, because it folds no faster.
+        """
+        base, start, end = _chain(self.grabbed, self.grabbed.pose, self.active_dofs)[0][::-1]
+        along = (end - base) / np.linalg.norm(end - base)
+        bow_m = np.linalg.norm(np.cross(along, start - base))
+        return start, float(np.linalg.norm(self.target_world - end) + _BOW * bow_m)
+
+
 def reach(
     grabbed: Grab,
     target_world: Array,
@@ -137,6 +214,10 @@ def reach(
         return _has_reached(grabbed, found, target_world) or _is_stretched(grabbed, found, active_dofs, target_world)
 
     fit = _solve_bending(model, pose, blocks, active, is_done)
+    middle = MiddleJoint.between(grabbed, active_dofs, target_world)
+    if middle is not None and grabbed.part not in holds.points and middle.is_exceeded(fit.pose):
+        blocks[1:2] = [middle.prior(), middle]
+        fit = solve(model, fit.pose, blocks, active, **QUICK)
     if _is_near(grabbed, fit.pose, active_dofs, target_world):
         return fit.pose
     # Descent along the view does not cross between the two depths at which a limb is seen, nor around a limit. A first

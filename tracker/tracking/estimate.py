@@ -15,6 +15,16 @@ class AlternativePose(NamedTuple):
     """`PoseEstimate.cost_px` with this pose, px; where two people may be swapped, with both swapped."""
 
 
+class NormalMatrix(NamedTuple):
+    """How well contours determine a pose: of their normal matrix, in radians and metres (KRH08 Sect. 5.4)."""
+
+    rank: int
+    n_dofs: int
+    """Number of degrees of freedom that may move."""
+    condition: float
+    """Ratio of the largest to the smallest eigenvalue; infinite where one is zero."""
+
+
 class PoseEstimate(NamedTuple):
     """The poses of all people on one frame. Tuples are indexed by person."""
 
@@ -41,6 +51,8 @@ class PoseEstimate(NamedTuple):
     """Poses that are about as good, best first. A person who has any is at most doubtful."""
     method: str
     """Name of the tracking method, such as `chamfer`."""
+    normal_matrices: tuple[NormalMatrix | None, ...] = ()
+    """How well the contours determine each pose; None or empty where the method does not say."""
 
 
 class TrackedFrame(NamedTuple):

@@ -1,21 +1,28 @@
 """Edit the settings of the tracker, and keep them with the session."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, TypedDict
 
 import msgspec
 
 from tracker.errors import TrackerError
-from tracker.tracking.chamfer.settings import Estimation, RecoverSettings, TrackSettings
+from tracker.pipeline.methods import MethodName
+from tracker.tracking.chamfer.settings import Estimation, TrackSettings
+from tracker.tracking.contour.settings import ContourSettings
+from tracker.tracking.estimation.settings import EstimationSettings, RecoverSettings
+from tracker.tracking.tracker import TrackerSettings
 
 SETTING = "track_settings"
 """Setting of the session."""
+_SHARED = ("predict", "recover", "theta_px", "outliers", "backward_pass", "smooth")
+"""Settings that a user chooses for every method."""
 
 
 class _Kept(TypedDict, total=False):
     """The settings that a user chooses."""
 
+    method: MethodName
     estimate: Estimation
     order: int
     past_poses: int
@@ -51,25 +58,35 @@ def changed(before: TrackSettings, changes: Mapping[str, Any]) -> TrackSettings:
     )
 
 
-def stored(settings: TrackSettings) -> dict[str, Any]:
+def of_method(settings: TrackSettings, method: MethodName) -> TrackerSettings:
+    """Return the settings of a run by a method: the chosen ones, as far as it has them."""
+    if method == "chamfer":
+        return settings
+    shared = {f.name: getattr(settings, f.name) for f in fields(EstimationSettings) if f.name in _SHARED}
+    return ContourSettings(**shared)
+
+
+def stored(settings: TrackSettings, method: MethodName = "chamfer") -> dict[str, Any]:
     """Return what the session keeps: the changes from the default, see `changed`."""
-    own, default = dict(_choices(settings)), dict(_choices(TrackSettings()))
+    own, default = dict(_choices(settings, method)), dict(_choices(TrackSettings(), "chamfer"))
     return {name: value for name, value in own.items() if value != default[name]}
 
 
-def restored(data: object) -> TrackSettings:
-    """Return the settings that a session keeps; the default where it keeps none, or none of this version."""
+def restored(data: object) -> tuple[TrackSettings, MethodName]:
+    """Return settings and method that a session keeps; the default where it keeps none, or none of this version."""
     default = TrackSettings()
-    if not isinstance(data, Mapping) or not data.keys() <= _choices(default).keys():
-        return default
+    if not isinstance(data, Mapping) or not data.keys() <= _choices(default, "chamfer").keys():
+        return default, "chamfer"
     try:
-        return changed(default, msgspec.convert(data, _Kept, strict=True))
+        kept = msgspec.convert(data, _Kept, strict=True)
+        return changed(default, kept), kept.get("method", "chamfer")
     except (TrackerError, msgspec.ValidationError):
-        return default
+        return default, "chamfer"
 
 
-def _choices(settings: TrackSettings) -> "_Kept":
+def _choices(settings: TrackSettings, method: MethodName) -> "_Kept":
     return _Kept(
+        method=method,
         estimate=settings.estimate,
         order=settings.predict.order,
         past_poses=settings.predict.window,

@@ -14,7 +14,7 @@ from app.state.people import ShownPose
 from app.state.progress import TrackState
 from app.state.state import StateChanges, finite_or_none
 from tracker.errors import TrackerError
-from tracker.pipeline.methods import make_tracker
+from tracker.pipeline.methods import MethodName, make_tracker
 from tracker.pipeline.track_session import SmoothedRows, Step, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson
 from tracker.store.records import PoseChange
@@ -63,7 +63,8 @@ class Tracking:
         """
         self._session_state, self._activities = session_state, activities
         activities.add_job(self, on_shown_frame=True)
-        session_state.set(settings=track_settings.restored(session_state.saver.setting(track_settings.SETTING)))
+        settings, method = track_settings.restored(session_state.saver.setting(track_settings.SETTING))
+        session_state.set(settings=settings, method=method)
         self._run: _Run | None = None
         session_state.unwritten.append(lambda: self._run is not None and self._run.session.has_unsaved)
 
@@ -78,8 +79,13 @@ class Tracking:
         Raises:
             TrackerError: the session's settings cannot be written.
         """
-        settings = track_settings.stored(self._session_state.state.settings)
+        state = self._session_state.state
+        settings = track_settings.stored(state.settings, state.method)
         self._session_state.saver.store_setting(track_settings.SETTING, settings)
+
+    def set_method(self, method: MethodName) -> None:
+        """Choose the method of the next run."""
+        self._session_state.set(method=method)
 
     def start(self, backward: bool, until: int | None) -> None:
         """Begin a run from the shown poses; a former run must have been ended.
@@ -102,7 +108,7 @@ class Tracking:
             way = "backward" if backward else "forward"
             free = [session_state.active_dofs(person) for person in range(len(models))]
             session = TrackSession(
-                make_tracker(state.settings),
+                make_tracker(track_settings.of_method(state.settings, state.method)),
                 TrackingRun(
                     session_state.frames.observer,
                     Subjects.of(models, people, free, saver.keyframes(frames)),

@@ -89,7 +89,7 @@ def test_only_what_is_new_is_read_and_what_changed_is_read_again(gavrila, stored
     assert stored.asked[2:] == [range(55, 56)]
 
 
-@pytest.mark.parametrize("n_frames", [2_000, 100_000])
+@pytest.mark.parametrize("n_frames", [2_000, pytest.param(100_000, marks=pytest.mark.slow)])
 def test_long_footage_costs_what_short_costs(gavrila, monkeypatch, n_frames):
     """The next frame reads and computes one pose, whatever the recording's length."""
     stored, middle, computed = Stored(gavrila, range(n_frames)), n_frames // 2, []

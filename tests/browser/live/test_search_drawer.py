@@ -71,8 +71,10 @@ async def drawn(page, kind):
 
 
 async def test_a_search_goes_stage_by_stage_and_the_tree_marks_where_it_is(page):
-    passes = page.locator(".tree-pass")
+    passes, strip = page.locator(".tree-pass"), page.locator("#candidates")
+    assert not await strip.is_visible()  # empty before a search
     await page.keyboard.press("Shift+S")
+    await strip.wait_for(state="visible")
     await shows(page, f"{RUNS}[0]?.stages[0].done && !quadrille.state.state.job.running", 30)
     await shows(page, "document.querySelectorAll('.tree-pass.is-done').length === 1")
     stages = (await state_of(page))["searchRuns"]["runs"][0]["stages"]

@@ -51,6 +51,8 @@ async def test_it_says_why_not(page, endpoint):
     assert await page.locator("#palette-why").inner_text() == "The last frame is 119."
     await page.locator("#palette-query").fill("qwrtz")
     assert "qwrtz" in await page.locator("#palette-why").inner_text()
+    palette = await page.locator("#palette").bounding_box()
+    assert palette["height"] < 120  # no empty list
     await page.keyboard.press("Enter")
     await page.keyboard.press("Escape")
     assert not endpoint.received

@@ -36,6 +36,7 @@ def test_one_bad_frame_does_not_matter(joints):
     assert height_from_joints(MODEL, joints) == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_bad_frame_is_left_out(joints):
     joints.points[4, :6] += (0.5, 0, 0)
     joints.points[5, 3:] = np.nan

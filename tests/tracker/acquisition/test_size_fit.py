@@ -49,7 +49,7 @@ def lengths(body):
     return np.array([sizes[p].length_m for p in ("left_upper_arm", "left_thigh", "left_forearm", "left_calf")])
 
 
-@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("seed", [pytest.param(3, marks=pytest.mark.slow), 4])
 def test_lengths_and_girths_of_another_body_are_found(seed):
     person = other_body(seed=seed)
     model = load_model("gavrila22", 1.7)
@@ -66,6 +66,7 @@ def test_lengths_and_girths_of_another_body_are_found(seed):
     assert np.mean(off) < 0.012
 
 
+@pytest.mark.slow
 def test_an_own_body_stays_as_it_is():
     """Contours of the very body, from poses that are off: nothing makes the sizes differ."""
     model = load_model("gavrila22", 1.7)

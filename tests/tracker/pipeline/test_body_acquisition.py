@@ -137,6 +137,7 @@ def test_a_preset_is_told_from_sizes_that_somebody_chose():
     assert not has_preset_sizes(larger(load_model("gavrila34")))
 
 
+@pytest.mark.slow
 def test_too_few_poses_are_completed_by_tracking(session, store):
     """The sample's person, from the first frame alone: other frames are tracked, and nothing is stored."""
     start = np.array(load_session(session.folder).people[0].model.neutral())

@@ -211,7 +211,7 @@ LIMBS = [
 ]
 
 
-@pytest.mark.parametrize("name", ["gavrila22", "gavrila22_cones", "gavrila34"])
+@pytest.mark.parametrize("name", ["gavrila22", "gavrila22_cones", "gavrila34", "knossow54"])
 @pytest.mark.parametrize("seed", range(6))
 def test_no_drag_of_a_limb_moves_another(name, seed):
     """Any pose, size, view, pointer and kind of drag, with the arms and legs of the other joints where they were."""
@@ -220,7 +220,8 @@ def test_no_drag_of_a_limb_moves_another(name, seed):
     values = shaken(model, model.neutral(), rng, 0.8, 0.4)
     for side, *joints in LIMBS:
         own = {f"{side}_{joint}" for joint in joints[1:]}
-        others = [n for n in model.point_names if n not in own]
+        carried = own | {f"{side}_knuckles", f"{side}_toe"}
+        others = [n for n in model.point_names if n not in carried]
         for point in own:
             camera = cameras_around()[rng.integers(3)]
             start = camera.project(place(model, values, point))
@@ -238,6 +239,8 @@ def test_what_a_hand_hardly_needs(gavrila):
     assert minor_points(gavrila) == ("neck",)  # rigid there
     bending = load_model("gavrila34")
     assert sorted(minor_points(bending)) == ["left_collarbone", "neck", "right_collarbone", "spine", "waist"]
+    with_hands = minor_points(load_model("knossow54"))  # wrists and ankles are stiff too, but place their limbs
+    assert sorted(with_hands) == ["left_collarbone", "neck", "right_collarbone", "spine", "upper_neck", "waist"]
 
 
 @pytest.mark.parametrize(("point", "bent"), [("left_hip", "waist"), ("right_shoulder", "right_collarbone")])

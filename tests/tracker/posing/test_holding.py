@@ -127,6 +127,38 @@ def test_an_ankle_drag_bends_the_knee_forwards(model, seed):
     assert abs(bow @ y) < 0.03
 
 
+def walking(model, rng):
+    """A person who stands or walks, in any direction, one leg straight in every second pose."""
+    values = model.neutral()
+    values[5] = rng.uniform(0, 2 * np.pi)
+    for side in ("left", "right"):
+        degrees = {
+            "hip.flexion": rng.uniform(-20, 35), "hip.elevation": rng.uniform(-20, 35),
+            "hip.abduction": rng.uniform(0, 12), "knee.extension": rng.choice([0, rng.uniform(0, 60)]),
+        }  # fmt: skip
+        for name, angle in degrees.items():
+            if f"{side}_{name}" in model.dof_names:
+                values[model.dof_value[model.dof_names.index(f"{side}_{name}")]] = np.radians(angle)
+    return model.clip(values)
+
+
+def test_short_drags_of_an_ankle_do_not_fold_the_leg(model):
+    """A leg that an ankle's drag stretches is another matter: its knee comes to the line from hip to ankle."""
+    rng, moved_m, missed_m = np.random.default_rng(11), [], []
+    knee = model.value_names.index("left_knee.extension")
+    while len(moved_m) < 60:
+        values, camera, angle = walking(model, rng), cameras_around()[rng.integers(3)], rng.uniform(0, 2 * np.pi)
+        by_px = 25 * np.array([np.cos(angle), np.sin(angle)])
+        moved = dragged(model, values, camera, "left_ankle", by_px, steps=2)
+        if moved[knee] > values[knee] + 0.03:
+            moved_m += away(model, moved, values, "left_knee")
+            start = camera.project(place(model, values, "left_ankle"))
+            missed_m.append(grab(model, values, camera, "left_ankle", start).miss_m(start + by_px, moved))
+    assert np.mean(np.array(moved_m) > 0.25) < 0.06
+    assert np.median(moved_m) > 0.05  # knees still bend
+    assert np.median(missed_m) < 0.01
+
+
 def test_an_elbow_that_is_raised_from_a_hanging_arm_arrives(model):
     values = model.neutral()
     shoulder = place(model, values, "left_shoulder")

@@ -1,5 +1,5 @@
-"""The chamfer tracker (GD96): predict, observe, refine, recover, assess; then a backward pass over lost intervals.
+"""The chamfer tracker (GD96): refinement by contours, best-first search of lost bodies, and the paper's search alone.
 
-It may import compute, search, and what `tracker.tracking` may. Public: `tracker.ChamferTracker`,
+It may import compute, search, and what `tracker.tracking.estimation` may. Public: `tracker.ChamferTracker`,
 `settings.TrackSettings`, `settings.pose_cost` and `settings.search_frame`.
 """

@@ -1,4 +1,4 @@
-"""Settings of the chamfer tracker, and the cost function, search and priors that follow from them."""
+"""Settings of the chamfer tracker, and the cost function and search that follow from them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -7,99 +7,31 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
-from tracker.fitting.contour_residuals import MatchSettings
-from tracker.fitting.gauss_newton import PosePrior, ResidualBlock
-from tracker.fitting.interpenetration import SelfPenetration
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
-from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings, SearchStep, search
-from tracker.search.chamfer_cost import ChamferCost, Outliers
+from tracker.search.chamfer_cost import ChamferCost
+from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
 from tracker.tracking.subjects import Subjects
 
 Estimation = Literal["refine", "search"]
 
-MAX_ITERATIONS = 15
-"""Gauss-Newton iterations of a whole body."""
-TOLERANCE = 1e-3
-"""Step at which they end, rad or metres: a tenth of a pixel on a limb."""
-
 
 @dataclass(frozen=True)
-class RecoverSettings:
-    """Settings of the recovery of lost limbs."""
-
-    proposals: int = 1024
-    """Poses of a limb that are ranked; a power of two, so that they fill the space evenly."""
-    reach_rad: float = float(np.radians(35))
-    """Spread of the proposals around the pose, rad; the other half fill the joint limits."""
-    n_local_search: int = 48
-    """Proposals that are improved by random perturbation."""
-    scored: int = 48
-    """Proposals that go through all rounds, and whose contours are scored."""
-    perturbations: int = 16
-    """Steps tried around each proposal in a round."""
-    perturbations_rad: tuple[float, ...] = tuple(np.radians([16.0, 11.0, 7.0, 4.0]).tolist())
-    """Their standard deviation, rad, round by round."""
-    n_limb_refined: int = 10
-    """Proposals whose limb is refined alone."""
-    n_refined: int = 3
-    """Proposals that are refined with the whole body."""
-    beam_width: int = 3
-    """Poses that are kept while the next limb is searched."""
-    restart_per_candidate: bool = True
-    """Whether the next limb is searched from each of them; else once, and its places are scored with each."""
-    min_decrease: float = 0.0
-    """Smallest decrease of the cost for another iteration with the whole body."""
-    margin: float = 40.0
-    """Largest excess cost (nats) of a pose that is kept for the next limb: more than a limb can make up for."""
-    colors: float = 0.2
-    """Weight of the colours against edges. Neighbouring pixels are correlated, so it is well below 1."""
-    trust_rad: float = 1.0
-    """Standard deviation of the prediction of a limb that seems lost, rad: nearly none."""
-    refine_margin: float = np.inf
-    """Largest excess cost (nats) of a proposal whose limb is refined alone, to be refined with the whole body; at least
-    the margin where another limb follows."""
-
-
-@dataclass(frozen=True)
-class TrackSettings:
+class TrackSettings(EstimationSettings):
     """Settings of the chamfer tracker."""
 
     method: ClassVar[str] = "chamfer"
     """Name of the method, which the store keeps with the settings."""
     estimate: Estimation = "refine"
     """`refine` searches only where refinement does not suffice; `search` is best-first search alone, as in GD96."""
-    predict: PredictSettings = field(default_factory=PredictSettings)
-    """Motion model."""
-    match: MatchSettings = field(default_factory=MatchSettings)
-    """Weights of the contour residuals."""
     search: SearchSettings = field(default_factory=SearchSettings)
     """Bounds, steps and stopping rule of the best-first search."""
-    recover: RecoverSettings | None = field(default_factory=RecoverSettings)
-    """Recovery of lost limbs; None switches it off."""
-    theta_px: float | None = None
-    """Outlier distance, px of the footage; None for 3% of the longer side of each image."""
-    outliers: Outliers = "truncated"
-    """Treatment of outliers in the search, see `ChamferCost`."""
-    segments: bool = True
-    """Whether edges are accepted or refused in whole segments (GD96 Sect. 4.2), and static ones are refused."""
-    edges: EdgeSettings = field(default_factory=EdgeSettings)
-    """Which edges are found and accepted."""
-    trust_rad: float = 0.15
-    """Standard deviation of the prediction of an angle, rad."""
-    trust_m: float = 0.05
-    """Standard deviation of the prediction of a position, metres."""
-    occlusion: bool = True
-    """Whether people occlude each other and edges are assigned; else each is tracked as if alone."""
-    rounds: int = 2
-    """Largest number of rounds in which all people are refined again with the others where they were found."""
-    backward_pass: bool = True
-    """Whether people are tracked backward through intervals in which they were lost, see `backward_pass`."""
-    smooth: bool = True
-    """Whether the poses are smoothed at the end of a run."""
-    apart: float = 1.0
-    """Weight of the term against people passing through each other; 0 leaves it out."""
+
+    @property
+    def settles_start(self) -> bool:
+        """See `EstimationSettings.settles_start`; best-first search alone settles nothing."""
+        return self.recover is not None and self.estimate == "refine"
 
 
 def pose_cost(
@@ -107,11 +39,6 @@ def pose_cost(
 ) -> ChamferCost:
     """Return the cost function around given poses, (n_values,) each: a search from them minimizes it."""
     return chamfer_cost(views, [PosedBody(m, p) for m, p in zip(models, poses, strict=True)], settings)
-
-
-def chamfer_cost(views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], settings: TrackSettings) -> ChamferCost:
-    """Return the cost function around posed bodies."""
-    return ChamferCost(views, bodies, settings.theta_px, settings.outliers)
 
 
 def search_frame(
@@ -134,14 +61,3 @@ def search_frame(
         for m, a in zip(subjects.models, subjects.active_dofs, strict=True)
     ]
     return search(cost, predicted, settings.search, subjects.tracked, active)
-
-
-def prior_blocks(model: BodyModel, predicted: Array, sigmas: Array) -> list[ResidualBlock]:
-    """Build the prior terms of one body: prediction, joint spread and self-penetration.
-
-    Args:
-        model: the body.
-        predicted: the predicted pose, (n_values,).
-        sigmas: its standard deviations, (n_dofs,), rad or metres.
-    """
-    return [PosePrior(predicted, 1 / sigmas), PosePrior(model.neutral(), 1 / model.spreads), SelfPenetration()]

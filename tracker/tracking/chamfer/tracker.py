@@ -3,10 +3,11 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from tracker.tracking.chamfer.backward_pass import track_lost_backward
-from tracker.tracking.chamfer.forward_pass import track_forward
+from tracker.tracking.chamfer.frame_estimator import ChamferEstimator
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
+from tracker.tracking.estimation.backward_pass import track_lost_backward
+from tracker.tracking.estimation.forward_pass import track_forward
 from tracker.tracking.tracker import TrackingRun
 
 
@@ -18,10 +19,10 @@ class ChamferTracker:
 
     def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
         """See `Tracker.estimates`."""
-        return track_forward(run, self.settings)
+        return track_forward(run, self.settings, ChamferEstimator)
 
     def backward_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
         """See `Tracker.backward_pass`; nothing where the settings switch it off."""
         if not self.settings.backward_pass:
             return iter(())
-        return track_lost_backward(run, tracked, self.settings)
+        return track_lost_backward(run, tracked, self.settings, ChamferEstimator)

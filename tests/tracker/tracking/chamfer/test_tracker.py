@@ -18,8 +18,8 @@ from tracker.search import chamfer_cost
 from tracker.search.best_first import SearchSettings
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.session import load_session
-from tracker.tracking.chamfer.limb_recovery import LimbSearch
 from tracker.tracking.chamfer.settings import TrackSettings, pose_cost, search_frame
+from tracker.tracking.estimation.limb_recovery import LimbSearch
 from tracker.tracking.subjects import Subjects
 
 COARSE = TrackSettings(
@@ -199,7 +199,7 @@ def test_what_is_locked_is_neither_refined_nor_searched(gavrila, monkeypatch):
     views = [dressed([PosedBody(gavrila, v)], cameras_around(4), SUIT) for v in truth]
     searched = []
     monkeypatch.setattr(
-        "tracker.tracking.chamfer.frame_estimator.search_limbs",
+        "tracker.tracking.estimation.frame_estimator.search_limbs",
         lambda m, due, fit, *_: searched.extend(due) or LimbSearch(fit),
     )
     free = ~np.array([name.startswith(("left_shoulder", "left_elbow")) for name in gavrila.dof_names])

@@ -1,0 +1,50 @@
+"""`quadrille observability`: a sentence for each degree of freedom, medians over frames, and one more camera."""
+
+import json
+
+import pytest
+from command_line import SAMPLE, assert_refused
+
+
+@pytest.fixture
+def placed(run, session):
+    """The sample with the known pose of one frame."""
+    assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "20", "--json")[0] == 0
+    return session
+
+
+def test_one_frame_and_another_camera(run, placed):
+    status, out, err = run("observability", placed, "--frame", "20", "--another-camera", "--json")
+    found = json.loads(out)
+    assert (status, err) == (0, "")
+    assert found.keys() == {"person", "frames", "rank", "dofs", "another_camera"}
+    assert (found["frames"], found["rank"]) == ([20], len(found["dofs"]))
+    dofs = {d["name"]: d for d in found["dofs"]}
+    assert dofs["torso.x"]["unit"] == "m"
+    assert dofs["torso.x"]["sigma"] < 0.05
+    assert dofs["left_elbow.extension"]["sentence"].startswith("extension of the left elbow: ")
+    assert dofs["left_elbow.extension"]["best_view"] in ("FRONT", "RIGHT", "BACK", "LEFT")
+    best, *_, last = found["another_camera"]
+    assert best["mean_after_deg"] < last["mean_after_deg"] < best["mean_before_deg"]
+
+
+def test_what_a_person_reads(run, placed):
+    _, out, _ = run("observability", placed, "--another-camera")
+    lines = out.splitlines()
+    assert lines[0].startswith("person, frame 20: ")
+    assert sum(line.startswith("another camera at (") for line in lines) == 3
+    assert any("left elbow.extension" in line and "view" in line for line in lines)
+    _, out, _ = run("observability", placed, "--frames", "0:50")
+    assert "medians over 1 frames" in out or "frame 20" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--frame", "3"), ["stored pose of 'person' in frame 3, found none", "init and track"]),
+        (("--frame", "3", "--frames", "0:4"), ["--frame or --frames, found both"]),
+        (("--frames", "40:60"), ["A:B within 0:50"]),
+    ],
+)
+def test_refused(run, placed, words, expected):
+    assert_refused(run("observability", placed, *words), expected)

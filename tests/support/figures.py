@@ -1,0 +1,54 @@
+"""A figure of voxels with known joints, unlike any body model of the program."""
+
+import numpy as np
+
+from tracker.voxels.voxel_grid import VoxelGrid, Voxels
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def joints_of(arms_deg=35.0, legs_deg=12.0, turn_deg=0.0):
+    """Joints of a person who stands at the origin and faces x, turned about z; arms and legs spread by angles."""
+    found = {"neck": (0, 0, 1.45), "head": (0, 0, 1.62)}
+    for side, y in (("left", 1), ("right", -1)):
+        a, b = np.radians([arms_deg, legs_deg])
+        arm, leg = np.array([0, y * np.sin(a), -np.cos(a)]), np.array([0, y * np.sin(b), -np.cos(b)])
+        found[f"{side}_shoulder"] = shoulder = np.array([0, y * 0.18, 1.40])
+        found[f"{side}_elbow"] = shoulder + 0.29 * arm
+        found[f"{side}_wrist"] = shoulder + 0.55 * arm
+        found[f"{side}_hip"] = hip = np.array([0, y * 0.10, 0.92])
+        found[f"{side}_knee"] = hip + 0.43 * leg
+        found[f"{side}_ankle"] = hip + 0.84 * leg
+    t = np.radians(turn_deg)
+    R = np.array([[np.cos(t), -np.sin(t), 0], [np.sin(t), np.cos(t), 0], [0, 0, 1]])
+    return {n: R @ np.array(p, float) for n, p in found.items()}, R
+
+
+def figure(size_m=0.025, noise=0.0, **pose):
+    """Voxels of such a person, and the true joints. `noise` is the share of surface voxels that are missing."""
+    joints, R = joints_of(**pose)
+    grid = VoxelGrid.over(np.array([-0.9, -0.9, -0.05]), np.array([0.9, 0.9, 1.85]), size_m)
+    points = grid.centers(np.argwhere(np.ones(grid.shape, bool)))
+    trunk = (points - (0, 0, 1.16)) @ R
+    inside = np.linalg.norm((points - joints["head"]) / (0.09, 0.09, 0.125), axis=1) <= 1
+    inside |= (np.linalg.norm(trunk[:, :2] / (0.12, 0.18), axis=1) <= 1) & (np.abs(trunk[:, 2]) < 0.30)
+    inside |= _capsule(points, joints["neck"] - (0, 0, 0.05), joints["neck"] + (0, 0, 0.08), 0.055)
+    for side in ("left", "right"):
+        arm, leg = joints[f"{side}_wrist"] - joints[f"{side}_shoulder"], joints[f"{side}_ankle"]
+        inside |= _capsule(points, joints[f"{side}_shoulder"], joints[f"{side}_wrist"] + 0.15 * arm, 0.05)
+        inside |= _capsule(points, joints[f"{side}_hip"], joints[f"{side}_knee"], 0.075)
+        inside |= _capsule(points, joints[f"{side}_knee"], leg, 0.055)
+        inside |= _capsule(points, leg - (0, 0, 0.03), leg - (0, 0, 0.03) + 0.17 * R[:, 0], 0.04)
+    voxels = Voxels(grid, inside.reshape(grid.shape))
+    if noise:
+        lost = voxels.indices[voxels.is_surface & (np.random.default_rng(0).random(len(voxels.indices)) < noise)]
+        occupied = voxels.occupied.copy()
+        occupied[tuple(lost.T)] = False
+        voxels = Voxels(grid, occupied)
+    return voxels.cropped(), joints
+
+
+def _capsule(points, a, b, radius):
+    axis = b - a
+    along = np.clip((points - a) @ axis / (axis @ axis), 0, 1)
+    return np.linalg.norm(points - a - along[:, None] * axis, axis=1) <= radius

@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+from figures import UP, figure
+
+from tracker.body.model import BodyModel
+from tracker.errors import TrackerError
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.formats.model_toml import PRESETS, load_model
+from tracker.initialization.head_template import find_head
+from tracker.initialization.voxel_start import locate_parts, measured_height, start_pose, turned_round
+from tracker.voxels.voxel_grid import Voxels
+
+POSES = [
+    {"arms_deg": arms, "legs_deg": legs, "turn_deg": turn, "noise": 0.1}
+    for arms, legs, turn in (
+        (35, 12, 0), (45, 15, 30), (60, 10, 75), (30, 20, 120), (80, 12, 160),
+        (40, 14, 200), (55, 18, 250), (35, 10, 290), (70, 16, 310), (50, 12, 345),
+    )
+]  # fmt: skip
+
+
+def errors_mm(model: BodyModel, pose, joints):
+    own = dict(zip(model.point_names, model.points_world(pose), strict=True))
+    return {n: 1000 * float(np.linalg.norm(own[n] - joints[n])) for n in LIMB_JOINTS}
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_all_parts_are_found_left_and_right(pose):
+    voxels, joints = figure(**pose)
+    parts = locate_parts(voxels)
+    assert parts.unresolved == ()
+    assert parts.is_facing_sure
+    left = joints["left_shoulder"] - joints["right_shoulder"]
+    assert parts.torso.axes[:, 1] @ left / np.linalg.norm(left) > 0.95
+    height_m = measured_height(parts, UP)
+    # Spread legs lower the head: the figure's own extent is what can be measured. Its soles lie 7 cm below the ankles.
+    extent_m = joints["head"][2] + 0.125 - (joints["left_ankle"][2] - 0.07)
+    assert height_m == pytest.approx(extent_m, abs=0.04)
+    model = load_model("gavrila34").with_height(height_m)
+    errors = errors_mm(model, start_pose(model, parts), joints)
+    assert np.mean(list(errors.values())) < 80
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_any_body_takes_the_start(name):
+    voxels, joints = figure(turn_deg=40)
+    model = load_model(name)
+    assert np.mean(list(errors_mm(model, start_pose(model, locate_parts(voxels)), joints).values())) < 80
+
+
+def test_the_head_and_the_neck():
+    voxels, joints = figure()
+    head = find_head(voxels)
+    assert np.linalg.norm(head.center - joints["head"]) < 0.05
+    # The neck is where the sphere around the head meets the body.
+    assert np.linalg.norm(head.neck[:2] - joints["neck"][:2]) < 0.02
+    assert joints["neck"][2] < head.neck[2] < joints["head"][2]
+
+
+def test_arms_on_the_body_and_closed_legs_are_not_guessed():
+    parts = locate_parts(figure(arms_deg=2, legs_deg=-6)[0])
+    assert {"left_leg", "right_leg"} <= set(parts.unresolved)
+    model = load_model("gavrila34")
+    assert np.all(np.isfinite(start_pose(model, parts)))
+
+
+def test_straight_limbs_are_named():
+    assert {"left_leg", "right_leg"} <= set(locate_parts(figure()[0]).straight)
+
+
+def test_motion_tells_the_direction():
+    voxels, _ = figure(turn_deg=90)
+    ahead, back = (locate_parts(voxels, sign * np.array([0.0, 1.0, 0.0])) for sign in (1, -1))
+    assert ahead.torso.axes[1, 0] > 0.9
+    assert ahead.facing > back.facing
+
+
+def test_turning_round_exchanges_left_and_right():
+    parts = locate_parts(figure()[0])
+    other = turned_round(parts)
+    assert other.limbs["left_arm"] is parts.limbs["right_arm"]
+    np.testing.assert_allclose(other.torso.axes[:, 1], -parts.torso.axes[:, 1])
+    assert turned_round(other).limbs == parts.limbs
+
+
+def test_a_figure_without_a_head():
+    voxels, _ = figure()
+    occupied = voxels.occupied.copy()
+    occupied[:, :, voxels.grid.centers(np.array([[0, 0, k] for k in range(occupied.shape[2])]))[:, 2] > 1.40] = False
+    with pytest.raises(TrackerError, match="expected a head that stands out"):
+        locate_parts(Voxels(voxels.grid, occupied).cropped())

@@ -1,0 +1,146 @@
+"""Find the silhouettes of a frame in all views, from the user's masks or by background subtraction.
+
+Silhouettes are in *raw* pixels: as filmed, lens distortion included, at working scale. A look-up table
+(`tracker.voxels.sensor_lookup`) leads from points in space to them (MTHC01 Sect. 2).
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Literal, NamedTuple
+
+import cv2
+import numpy as np
+
+from tracker.errors import RecordingError
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import Recording, background_frames, read_mask
+from tracker.geometry.arrays import FloatArray, Image
+from tracker.geometry.cameras import Camera
+from tracker.images.background_model import BackgroundModel, background_of_clip, background_of_recording
+from tracker.images.background_subtraction import (
+    SHADOWS_AND_HIGHLIGHTS,
+    Mask,
+    Shading,
+    apply_gain,
+    change_threshold,
+    exposure_gain,
+    has_usable_exposure,
+    smooth_image,
+    subtract_background,
+)
+from tracker.images.silhouette_cleaning import clean_silhouette
+from tracker.images.working_view import WorkingView
+
+SilhouetteSource = Literal["mask", "background", "recording", "none"]
+"""Where a silhouette comes from: the user's mask, an empty scene, the recording's own median, or a damaged frame."""
+
+N_LEARNED = 25
+"""Number of frames from which the empty scene is learnt where the session has none."""
+_SPACING_PX = 8
+"""Distance between the samples that measure exposure and noise, px."""
+_ANYONE = 255
+"""Value of a mask where it does not say which person it is."""
+
+
+class ViewSilhouette(NamedTuple):
+    """The people in one view of a frame."""
+
+    mask: Mask
+    """(H, W), raw pixels at working scale; nobody where the frame is damaged."""
+    camera: Camera
+    """Camera of these pixels, with its lens distortion."""
+    quality: float
+    """How cleanly the silhouette was found, 0 to 1, see `CleanSilhouette`; 1 for a user's mask."""
+    source: SilhouetteSource
+    """Where it comes from."""
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nobody was found."""
+        return not self.mask.any()
+
+
+class SilhouetteFinder:
+    """Finds the silhouettes of a recording. Thread-safe."""
+
+    def __init__(
+        self, cameras: Sequence[CameraSource], recording: Recording, shading: Shading = SHADOWS_AND_HIGHLIGHTS
+    ) -> None:
+        """Read the backgrounds, or learn them from the recording where there are none.
+
+        Args:
+            cameras: the views, with their side files.
+            recording: their footage.
+            shading: changes of the light that are background.
+
+        Raises:
+            RecordingError: a background is unreadable or of the wrong size.
+        """
+        self.cameras, self.recording = tuple(cameras), recording
+        self._shading = shading
+        # Without its lens distortion a camera's working view is the footage itself, reduced.
+        self._views = [WorkingView(c.camera.pinhole) for c in self.cameras]
+        self._pool = ThreadPoolExecutor(2, "silhouettes", initializer=cv2.setNumThreads, initargs=(1,))
+        self._models = list(self._pool.map(self._model, range(len(self.cameras))))
+
+    def silhouettes(self, k: int, person: int | None = None) -> tuple[ViewSilhouette, ...]:
+        """Find the silhouettes of frame k in all views.
+
+        Args:
+            k: frame number.
+            person: index of a person whom numbered masks are restricted to; None for everybody.
+
+        Raises:
+            RecordingError: the frame or a mask cannot be read.
+        """
+        frames = self.recording.read(k)
+        return tuple(self._pool.map(lambda i: self._silhouette(i, frames[i], k, person), range(len(frames))))
+
+    def close(self) -> None:
+        """End the threads."""
+        self._pool.shutdown()
+
+    def _silhouette(self, i: int, frame: Image | None, k: int, person: int | None) -> ViewSilhouette:
+        source, view = self.cameras[i], self._views[i]
+        camera = source.camera.scaled(view.scale)
+        mask = read_mask(source, k)
+        if mask is not None:
+            if person is not None:
+                mask = ((mask == _ANYONE) | (mask == person + 1)).astype(np.uint8)
+            return ViewSilhouette(view.mask(mask, view.whole), camera, 1.0, "mask")
+        if frame is None:
+            return ViewSilhouette(np.zeros((camera.height, camera.width), bool), camera, 0.0, "none")
+        model = self._models[i]
+        clean = clean_silhouette(self._changes(self._smooth(i, frame), model))
+        learnt = source.background is None
+        return ViewSilhouette(clean.mask, camera, clean.quality, "recording" if learnt else "background")
+
+    def _changes(self, smooth: Image, model: BackgroundModel) -> Mask:
+        samples, empty = (x[::_SPACING_PX, ::_SPACING_PX].reshape(-1, 3) for x in (smooth, model.image))
+        colors, empty_colors = samples.astype(np.float32), empty.astype(np.float32)
+        usable = has_usable_exposure(empty_colors)
+        gain: FloatArray = exposure_gain(colors[usable], empty_colors[usable])
+        threshold = change_threshold(np.abs(colors - gain * empty_colors).max(axis=-1))
+        background = apply_gain(model.image, gain)
+        return subtract_background(smooth, background, threshold, self._shading, model.noise).inside
+
+    def _smooth(self, i: int, frame: Image) -> Image:
+        view = self._views[i]
+        return smooth_image(view.image(frame, view.whole))
+
+    def _model(self, i: int) -> BackgroundModel:
+        source = self.cameras[i]
+        found = background_of_clip(self._smooth(i, frame) for frame in background_frames(source))
+        return self._learnt(i) if found is None else found
+
+    def _learnt(self, i: int) -> BackgroundModel:
+        last = self.recording.n_frames - 1
+        spread = sorted({round(j * last / (N_LEARNED - 1)) for j in range(N_LEARNED)})
+        frames = (self.recording.read_view(i, k) for k in spread)
+        images = [self._smooth(i, f) for f in frames if f is not None]
+        if not images:
+            raise RecordingError(
+                f"camera '{self.cameras[i].camera.name}': no frame of {self.cameras[i].footage} can be decoded to "
+                "learn the background; give one with --background"
+            )
+        return background_of_recording(images)

@@ -1,0 +1,167 @@
+"""The minimization of KRH08 Sect. 5.3 as printed: model to image, without robust weights, prior or prediction.
+
+It serves the convergence experiment (Fig. 13), where the sliding term is switched. Trackers use the compiled kernels of
+`tracker.fitting`, which leave that term out: it moves a contour along itself only.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.body.model import BodyModel, PosedBody
+from tracker.contours import occluding_contours
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.gauss_newton import INITIAL_DAMPING, damped_step
+from tracker.geometry.arrays import Array, FloatArray, IntArray
+from tracker.geometry.shapes import EllipticalCone
+
+MAX_ITERATIONS = 15
+MIN_GAIN = 0.01
+"""Relative decrease of the RMS distance below which an iteration is the last."""
+SINGULAR = 0.02
+"""Conditioning of a ruling below which its sliding term is weighted down: the two rulings of a cone nearly meet."""
+_MAX_DAMPING = 1e4
+_ON_SIDE = 0.999
+"""Largest height of a point on the curved surface, in half its length. Points beyond lie on the rim of an end."""
+
+
+class ExtremalFit(NamedTuple):
+    """A fit of one frame."""
+
+    pose: Array
+    """(n_values,)."""
+    rms_px: tuple[float, ...]
+    """RMS distance of the contours before the first iteration and after each one, px."""
+
+    @property
+    def iterations(self) -> int:
+        """Number of iterations."""
+        return len(self.rms_px) - 1
+
+
+class Linearization(NamedTuple):
+    """Distances of all visible contour points, and their derivatives."""
+
+    distances: Array
+    """(m,), px."""
+    jacobian: Array
+    """(m, n_dofs), px per radian or metre."""
+    lengths: Array
+    """Length of the piece of contour around each point, (m,), px."""
+
+    @property
+    def rms_px(self) -> float:
+        """RMS distance, px; NaN where nothing is visible."""
+        return float(np.sqrt(np.mean(self.distances**2))) if len(self.distances) else np.nan
+
+
+def fit_extremal_contours(
+    model: BodyModel, start: Array, views: Sequence[ViewEvidence], sliding: bool = True
+) -> ExtremalFit:
+    """Minimize the sum of squared chamfer distances (KRH08 Eq. 60) by damped Gauss-Newton from a start pose.
+
+    The paper does not say how degrees of freedom that nothing constrains are treated. Here the diagonal is damped.
+
+    Args:
+        model: the body, whose parts are elliptical cones.
+        start: initial pose, (n_values,).
+        views: the evidence.
+        sliding: whether the sliding term B of Eq. 31 is part of the Jacobian.
+    """
+    pose, here = start, linearize(model, start, views, sliding)
+    rms, damping = [here.rms_px], INITIAL_DAMPING
+    while len(rms) <= MAX_ITERATIONS and len(here.distances):
+        H, g = here.jacobian.T @ here.jacobian, here.jacobian.T @ here.distances
+        scale = np.diag(H) + 1e-6 * float(np.trace(H)) / len(H)
+        while True:
+            trial = model.clip(model.retract(pose, damped_step(H, g, damping * scale)))
+            there = linearize(model, trial, views, sliding)
+            if there.rms_px < here.rms_px or damping > _MAX_DAMPING:
+                break
+            damping *= 10
+        if not there.rms_px < here.rms_px:
+            break
+        pose, here, damping = trial, there, damping / 10
+        rms.append(here.rms_px)
+        if rms[-1] > (1 - MIN_GAIN) * rms[-2]:
+            break
+    return ExtremalFit(pose, tuple(rms))
+
+
+def linearize(model: BodyModel, pose: Array, views: Sequence[ViewEvidence], sliding: bool) -> Linearization:
+    """Return the chamfer distances of all visible contour points (Eq. 59) and their derivatives (Eq. 55, 61)."""
+    body = PosedBody(model, pose)
+    kinematics = body.kinematics
+    lever = np.cross(kinematics.origins_world, kinematics.axes_world)
+    angular = np.where(model.dof_is_length[:, None], 0.0, kinematics.axes_world)
+    linear = np.where(model.dof_is_length[:, None], kinematics.axes_world, lever)
+    twists = np.hstack([angular, linear])  # spatial, the columns of J_H
+    distances, rows, parts, lengths = [], [], [], []
+    for view in views:
+        seen = occluding_contours.trace([body], view.camera)
+        at = ~seen.occluded
+        points, of = seen.points_world[at].astype(np.float64), seen.parts[at].astype(np.int64)
+        x, J_I = view.camera.project_with_jacobian(points)
+        inside = np.all((x >= 0) & (x < np.array(view.camera.size) - 1), axis=1)
+        points, of, J_I = points[inside], of[inside], J_I[inside]
+        d, slope = _bilinear(view.distance, x[inside])
+        spatial = np.einsum("ni,nij->nj", slope, J_I)
+        row = np.hstack([np.cross(points, spatial), spatial])  # slope . J_I A
+        if sliding:
+            row += _sliding_rows(body, of, points, view.camera.center_world, spatial)
+        distances.append(d)
+        rows.append(row)
+        parts.append(of)
+        ends = seen.pieces_px[at][inside].astype(np.float64)
+        lengths.append(np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1))
+    moves = model.moves[:, np.concatenate(parts)].T
+    jacobian = np.where(moves, np.concatenate(rows) @ twists.T, 0.0)
+    return Linearization(np.concatenate(distances), jacobian, np.concatenate(lengths))
+
+
+def _bilinear(image: FloatArray, x: Array) -> tuple[Array, Array]:
+    """Return distances (N,) and their gradients (N, 2) at points (N, 2) within an image, px (Eq. 59, corrected)."""
+    u, v = np.floor(x).astype(np.int64).T
+    r1, r2 = (x - np.floor(x)).T
+    C = image.astype(np.float64)
+    C00, C10, C01, C11 = C[v, u], C[v, u + 1], C[v + 1, u], C[v + 1, u + 1]
+    along_u = (1 - r2) * (C10 - C00) + r2 * (C11 - C01)
+    along_v = (1 - r1) * (C01 - C00) + r1 * (C11 - C10)
+    return C00 + r1 * (C10 - C00) + r2 * ((1 - r1) * (C01 - C00) + r1 * (C11 - C10)), np.stack([along_u, along_v], 1)
+
+
+def _sliding_rows(body: PosedBody, parts: IntArray, points: Array, eye: Array, spatial: Array) -> Array:
+    """Return the sliding part of the derivatives of distances by spatial twists, `spatial . B` of Eq. 31, (N, 6).
+
+    Points on the rim of an end do not slide. Where the two rulings of a cone nearly meet, the weight falls to 0.
+
+    Args:
+        body: in its pose.
+        parts: index of the part of each point, (N,).
+        points: on contour generators, (N, 3), metres, world.
+        eye: camera centre, (3,).
+        spatial: derivative of each distance by its point, (N, 3).
+    """
+    out = np.zeros((len(points), 6))
+    for part, shape in enumerate(body.model.shapes):
+        at = np.flatnonzero(parts == part)
+        if not isinstance(shape, EllipticalCone) or not len(at):
+            continue
+        T, (a, b, half) = body.kinematics.Ts_world_part[part], shape.half_axes
+        R, center = T[:3, :3], T[:3, :3] @ body.model.centers_part[part] + T[:3, 3]
+        own, k = (points[at] - center) @ R, shape.taper / half
+        theta = np.arctan2(own[:, 1] / b, own[:, 0] / a)
+        c, s, zero, w = np.cos(theta), np.sin(theta), np.zeros(len(at)), 1 + k * own[:, 2]
+        normal = np.stack([b * c, a * s, zero - a * b * k], axis=1)
+        normal_by_theta = np.stack([-b * s, a * c, zero], axis=1)
+        point_by_theta = np.stack([-a * s * w, b * c * w, zero], axis=1)
+        sight = own + (center - eye) @ R
+        slope = np.sum(sight * normal_by_theta, axis=1)  # b of Eq. 31
+        least = SINGULAR * np.linalg.norm(sight, axis=1) * np.linalg.norm(normal_by_theta, axis=1)
+        inverse = np.where(np.abs(slope) >= least, 1 / np.where(slope == 0, 1.0, slope), slope / least**2)
+        inverse[np.abs(own[:, 2]) > _ON_SIDE * half] = 0.0
+        n = normal @ R.T
+        weight = inverse * np.sum((point_by_theta @ R.T) * spatial[at], axis=1)
+        out[at] = weight[:, None] * np.hstack([np.cross(n, eye), -n])
+    return out

@@ -1,0 +1,175 @@
+"""Find the limbs of a figure as connected regions beside the torso, and divide them (MTHC01 Sect. 3)."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.geometry.arrays import Array, IntArray
+from tracker.initialization.torso_template import Torso
+from tracker.voxels.voxel_grid import Voxels
+
+_SKIN_M = 0.11
+"""Voxels that are closer to the torso through the body belong to its skin, which would connect the limbs, metres."""
+_MIN_LIMB_M = 0.25
+"""Smallest distance of a limb's end from its beginning, metres."""
+_MIN_VOXELS = 0.01
+"""Smallest share of a figure's voxels in a limb."""
+_MIN_REACH_M = 0.12
+"""Smallest length of a branch beyond a fork, metres."""
+_LEG_M = 0.30
+"""A limb whose tip is farther than this below the trunk is a leg, metres."""
+_SLICE_M = 0.03
+"""Half the thickness of the slice whose mean is a limb's centre, metres."""
+_SHARES = np.linspace(0.0, 1.0, 51)
+_SPLITS = np.arange(0.40, 0.601, 0.02)
+"""Places of the middle joint along a limb that are tried, as shares of its length."""
+_MIN_ANGLE = 0.35
+"""Smallest bend, rad, that shows the middle joint."""
+_MIN_BEND = 1.5
+"""Ratio of the errors of one and of two straight lines above which the place of the middle joint is known."""
+_USUAL_SPLIT = {"arm": 0.53, "leg": 0.52}
+"""Place of the middle joint of a straight limb, as a share of its length to the wrist or ankle."""
+_END_M = {"arm": 0.10, "leg": 0.08}
+"""Distance of the wrist and the ankle from the end of the limb, metres."""
+
+
+class LimbRegion(NamedTuple):
+    """One limb of a figure."""
+
+    kind: str
+    """`arm` or `leg`."""
+    proximal: Array
+    """Where it leaves the torso, (3,), metres."""
+    middle: Array
+    """Elbow or knee, (3,), metres."""
+    distal: Array
+    """Wrist or ankle, (3,), metres."""
+    tip: Array
+    """Its farthest voxels: fingers or toes, (3,), metres."""
+    is_bent: bool
+    """Whether its bend shows the place of the middle joint; else it follows from usual proportions."""
+    indices: IntArray
+    """Its voxels, indices into those of the figure, (n,)."""
+
+
+def find_limbs(figure: Voxels, torso: Torso, is_head: NDArray[np.bool_]) -> list[LimbRegion]:
+    """Return the limbs that stand out, at most four, the largest first.
+
+    Args:
+        figure: voxels of one person.
+        torso: its torso.
+        is_head: which voxels belong to the head, (N,).
+    """
+
+    points, size_m = figure.points_world, figure.grid.size_m
+    distances = _geodesic(points, torso.is_torso | is_head, size_m)
+    whole = np.flatnonzero(np.isfinite(distances) & (distances > _SKIN_M))
+    found = [_limb(points, branch, distances, torso) for branch in _branches(figure, whole, distances, _SKIN_M)]
+    return sorted(found, key=lambda limb: -len(limb.indices))
+
+
+class _Branch(NamedTuple):
+    own: IntArray
+    """Its voxels, indices into those of the figure, (n,)."""
+    begins_m: float
+    """Distance from the torso at which it stands out."""
+
+
+def _branches(figure: Voxels, own: IntArray, distances: Array, begins_m: float) -> list[_Branch]:
+    """Return the connected regions of voxels beyond a distance, divided where they fork farther out."""
+    size_m, n_least = figure.grid.size_m, _MIN_VOXELS * len(figure.indices)
+    level = begins_m
+    while True:
+        beyond = own[distances[own] > level]
+        regions = [
+            r for r in _connected(figure, beyond) if len(r) >= n_least and distances[r].max() - level >= _MIN_REACH_M
+        ]
+        if not regions:
+            enough = len(own) >= n_least and distances[own].max() - begins_m >= _MIN_LIMB_M if len(own) else False
+            return [_Branch(own, begins_m)] if enough else []
+        if len(regions) > 1 or len(own) == len(distances):
+            return [b for r in regions for b in _branches(figure, r, distances, level)]
+        if level == begins_m:
+            own = regions[0]
+        level += size_m
+
+
+def _connected(figure: Voxels, own: IntArray) -> list[IntArray]:
+    """Return the connected regions of some voxels, indices into those of the figure."""
+    from scipy.ndimage import label
+
+    occupied = np.zeros(figure.grid.shape, bool)
+    at = tuple(figure.indices[own].T)
+    occupied[at] = True
+    labels, n = label(occupied, np.ones((3, 3, 3)))
+    return [own[labels[at] == i + 1] for i in range(n)]
+
+
+def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso) -> LimbRegion:
+    """Return the limb of a branch. Where it does not stand out yet it runs straight from the torso."""
+    region, from_torso, half = points[branch.own], distances[branch.own], torso.half_axes[2]
+    first = region[from_torso < branch.begins_m + 0.05].mean(axis=0)
+    tip = region[from_torso > from_torso.max() - 0.04].mean(axis=0)
+    (begins_z, tip_z) = torso.local(np.stack([first, tip]))[:, 2]
+    own_root = branch.begins_m < _SKIN_M + 0.05
+    kind = "leg" if tip_z < -half - _LEG_M or (own_root and begins_z < -0.4 * half) else "arm"
+    length = from_torso.max() - _END_M[kind]
+    side = np.sign(torso.local(first[None])[0, 1]) or 1.0
+    across, along = (0.35, -0.75) if kind == "leg" else (1.0, 0.85)
+    root = torso.center + torso.axes @ np.array([0.0, side * across * max(0.12, torso.half_axes[1]), along * half])
+    line = np.array([_at(region, from_torso, (root, branch.begins_m, first), s * length) for s in _SHARES])
+    split, is_bent = _split(line, kind)
+    middle = line[int(np.argmin(np.abs(_SHARES - split)))]
+    return LimbRegion(kind, root, middle, line[-1], tip, is_bent and own_root, branch.own)
+
+
+def _at(region: Array, from_torso: Array, begin: tuple[Array, float, Array], distance: float) -> Array:
+    """Return the centre of a limb at a distance from the torso through the body, (3,), metres.
+
+    Args:
+        region: voxels of the limb, (n, 3).
+        from_torso: their distances, (n,), metres.
+        begin: root of the limb, the distance at which it stands out, and its centre there.
+        distance: the distance, metres.
+    """
+    root, begins_m, first = begin
+    if distance <= begins_m:
+        return np.asarray(root + (first - root) * max(0.0, distance) / begins_m)
+    gaps = np.abs(from_torso - distance)
+    return np.asarray(region[gaps <= max(_SLICE_M, float(gaps.min()))].mean(axis=0))
+
+
+def _split(line: Array, kind: str) -> tuple[float, bool]:
+    """Return the place of the middle joint along a limb, and whether a bend shows it."""
+    errors = [_line_error(line[s + 1e-9 >= _SHARES]) + _line_error(line[s - 1e-9 <= _SHARES]) for s in _SPLITS]
+    best = int(np.argmin(errors))
+    gain = _line_error(line) / max(errors[best], 1e-6 * len(line))
+    is_bent = gain > _MIN_BEND and _bend(line, float(_SPLITS[best])) > _MIN_ANGLE
+    return (float(_SPLITS[best]), True) if is_bent else (_USUAL_SPLIT[kind], False)
+
+
+def _bend(line: Array, at: float) -> float:
+    """Return the angle by which a line bends at a share of its length, rad."""
+    middle = line[int(np.argmin(np.abs(_SHARES - at)))]
+    a, b = middle - line[0], line[-1] - middle
+    return float(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b) + 1e-9), -1, 1)))
+
+
+def _line_error(points: Array) -> float:
+    """Return the sum of squared distances of points from their line, square metres."""
+    deviations = points - points.mean(axis=0)
+    return float(np.sum(np.linalg.svd(deviations, compute_uv=False)[1:] ** 2))
+
+
+def _geodesic(region: Array, sources: NDArray[np.bool_], size_m: float) -> Array:
+    """Return the distance of each voxel, (n,), from the sources through the voxels of a region, metres."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import dijkstra
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(region).query_pairs(1.8 * size_m, output_type="ndarray")
+    lengths = np.linalg.norm(region[pairs[:, 0]] - region[pairs[:, 1]], axis=1)
+    graph = coo_matrix((lengths, (pairs[:, 0], pairs[:, 1])), shape=(len(region), len(region)))
+    found = dijkstra(graph.tocsr(), directed=False, indices=np.flatnonzero(sources), min_only=True)
+    return np.asarray(found)

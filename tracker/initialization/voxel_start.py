@@ -1,0 +1,167 @@
+"""Turn the parts that voxels show into joints, and joints into start poses of any body (MTHC01 Sect. 3 and 6)."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.body.model import BodyModel
+from tracker.errors import TrackerError
+from tracker.fitting.gauss_newton import fit_to_points
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.initialization.head_template import Head, find_head
+from tracker.initialization.limb_regions import LimbRegion, find_limbs
+from tracker.initialization.torso_template import Torso, find_torso
+from tracker.voxels.voxel_grid import Voxels
+
+SIDES = ("left", "right")
+_JOINTS = {"arm": ("elbow", "wrist"), "leg": ("knee", "ankle")}
+_TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
+_FOOT_M, _BEND_M, _MOTION_M = 0.06, 0.06, 0.12
+"""Lengths that say with some certainty where a person faces: a foot before its ankle, a knee or elbow beside the line
+through its limb, and the way to the next frames, metres."""
+_SURE = 1.0
+"""Sum of these cues from which on left and right are known."""
+_ONE_LEG = 0.25
+"""Largest share of a figure's voxels in a single leg."""
+_MIN_STANDING = 0.85
+"""Smallest height of a figure, as a share of the body's, at which it counts as standing."""
+_UPRIGHT = 0.9
+"""Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
+
+
+class FigureParts(NamedTuple):
+    """The parts of a figure."""
+
+    figure: Voxels
+    head: Head
+    torso: Torso
+    """Its narrow axis points forwards and its wide one to the left, as far as the cues say."""
+    limbs: dict[str, LimbRegion]
+    """Limbs that stand out, by name: `left_arm` and so on."""
+    facing: float
+    """Sum of the cues for the direction; below `_SURE` left and right may be exchanged."""
+
+    @property
+    def is_facing_sure(self) -> bool:
+        """Whether the cues tell left from right."""
+        return self.facing >= _SURE
+
+    @property
+    def unresolved(self) -> tuple[str, ...]:
+        """Names of the limbs that do not stand out, as `left_arm`; a leg or an arm whose side is open without it."""
+        return tuple(f"{s}_{k}" for k in _JOINTS for s in SIDES if f"{s}_{k}" not in self.limbs)
+
+    @property
+    def straight(self) -> tuple[str, ...]:
+        """Names of the limbs whose middle joint follows from proportions, because no bend shows it."""
+        return tuple(name for name, limb in self.limbs.items() if not limb.is_bent)
+
+
+def locate_parts(figure: Voxels, motion: Array | None = None) -> FigureParts:
+    """Locate head, neck, torso and limbs of a figure.
+
+    Args:
+        figure: voxels of one person.
+        motion: the way of the figure to later frames, (3,), metres; None if it is not known.
+
+    Raises:
+        TrackerError: no head is found.
+    """
+    head = find_head(figure)
+    if head is None:
+        raise TrackerError(
+            "expected a head that stands out of the silhouettes, found none; choose another --frame, on which no "
+            "arm or other person is beside the head"
+        )
+    torso = find_torso(figure, head.neck, head.is_head)
+    limbs = find_limbs(figure, torso, head.is_head)
+    facing = _facing(figure, torso, limbs, motion)
+    if facing < 0:
+        torso = torso._replace(axes=torso.axes * np.array([-1.0, -1.0, 1.0]))
+    return FigureParts(figure, head, torso, _by_side(torso, limbs, len(figure.indices)), abs(facing))
+
+
+def turned_round(parts: FigureParts) -> FigureParts:
+    """Return the same parts of a person who faces the other way: left and right are exchanged."""
+    torso = parts.torso._replace(axes=parts.torso.axes * np.array([-1.0, -1.0, 1.0]))
+    other = {"left": "right", "right": "left"}
+    limbs = {f"{other[n.split('_')[0]]}_{limb.kind}": limb for n, limb in parts.limbs.items()}
+    return parts._replace(torso=torso, limbs=limbs)
+
+
+def measured_height(parts: FigureParts, up: Array) -> float | None:
+    """Return the height of a person who stands upright, metres; None if the person does not.
+
+    Args:
+        parts: of the figure.
+        up: vertical axis of the world, (3,).
+    """
+    if parts.torso.axes[:, 2] @ up < _UPRIGHT:
+        return None
+    along = parts.figure.points_world @ up
+    height = float(np.ptp(along)) + parts.figure.grid.size_m
+    trunk = float((parts.head.neck @ up) - along.min())
+    return height if trunk > _MIN_STANDING * 0.8 * height else None
+
+
+def start_pose(model: BodyModel, parts: FigureParts) -> Array:
+    """Return the pose of a body that comes closest to the joints of a figure, (n_values,).
+
+    Shoulders and hips lie in the torso's frame as in the body. Limbs that are not resolved hang.
+    """
+    known = joint_positions(model, parts)
+    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    place = rigid.transform(parts.torso.axes, parts.head.neck)
+    for name in parts.unresolved:
+        side, kind = name.split("_")
+        known |= {j: rigid.apply(place, own[j] - own["neck"]) for j in (f"{side}_{x}" for x in _JOINTS[kind])}
+    return fit_to_points(model, known).pose
+
+
+def joint_positions(model: BodyModel, parts: FigureParts) -> dict[str, Array]:
+    """Return the joints that the parts of a figure show, by name, (3,) each, metres."""
+    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    place = rigid.transform(parts.torso.axes, parts.head.neck)
+    found = {n: rigid.apply(place, own[n] - own["neck"]) for n in _TRUNK if n in own}
+    for name, limb in parts.limbs.items():
+        side = name.split("_")[0]
+        middle, distal = _JOINTS[limb.kind]
+        found[f"{side}_{middle}"], found[f"{side}_{distal}"] = limb.middle, limb.distal
+    return {n: p for n, p in found.items() if n in own}
+
+
+def _by_side(torso: Torso, limbs: Sequence[LimbRegion], n_voxels: int) -> dict[str, LimbRegion]:
+    """Name limbs by the side of the torso that they leave; two of a kind are told apart by their order."""
+    found: dict[str, LimbRegion] = {}
+    for kind in _JOINTS:
+        own = sorted((limb for limb in limbs if limb.kind == kind), key=lambda limb: -len(limb.indices))[:2]
+        own.sort(key=lambda limb: -float(torso.local(limb.middle[None])[0, 1]))
+        if len(own) == 2:
+            found |= {f"left_{kind}": own[0], f"right_{kind}": own[1]}
+        elif own and (kind == "arm" or len(own[0].indices) < _ONE_LEG * n_voxels):
+            side = "left" if torso.local(own[0].proximal[None])[0, 1] > 0 else "right"
+            found[f"{side}_{kind}"] = own[0]
+        # A single thick region at the lower end holds both legs: neither is resolved.
+    return found
+
+
+def _facing(figure: Voxels, torso: Torso, limbs: Sequence[LimbRegion], motion: Array | None) -> float:
+    """Return the sum of the cues for the torso's narrow axis as the direction in which a person faces."""
+    forward, total = torso.axes[:, 0], 0.0
+    points = figure.points_world
+    for limb in limbs:
+        bend = float((limb.middle - (limb.proximal + limb.distal) / 2) @ forward)
+        if limb.kind == "leg":
+            total += 0.5 * np.clip(bend / _BEND_M, -1, 1) if limb.is_bent else 0.0
+        else:
+            total -= 0.5 * np.clip(bend / _BEND_M, -1, 1) if limb.is_bent else 0.0
+    feet = points @ torso.axes[:, 2]
+    low = points[feet < feet.min() + 0.06]
+    above = points[(feet > feet.min() + 0.10) & (feet < feet.min() + 0.22)]
+    if len(low) and len(above):
+        total += float(np.clip((low.mean(axis=0) - above.mean(axis=0)) @ forward / _FOOT_M, -1.5, 1.5))
+    if motion is not None:
+        total += float(np.clip(motion @ forward / _MOTION_M, -2, 2))
+    return total

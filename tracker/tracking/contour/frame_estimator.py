@@ -1,0 +1,106 @@
+"""Estimate a frame by the extremal contours of KRH08, made robust and symmetric, or as the paper does."""
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body.model import PosedBody
+from tracker.contours.occluding_contours import Contour
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.contour_residuals import ContourResiduals, paper_match
+from tracker.fitting.gauss_newton import NormalEquations
+from tracker.tracking.contour.image_contours import select_contours, with_unlimited_distances
+from tracker.tracking.contour.settings import ContourSettings
+from tracker.tracking.estimate import NormalMatrix
+from tracker.tracking.estimation.assessment import PersonEstimate
+from tracker.tracking.estimation.frame_estimator import FrameEstimator
+from tracker.tracking.estimation.frame_problem import PersonFit, with_body
+from tracker.tracking.estimation.incremental_fit import fit_by_chains
+from tracker.tracking.estimation.settings import EstimationSettings
+from tracker.tracking.person_memory import PersonMemory
+
+_NO_LIMIT_PX = 1e5
+"""An outlier distance that no residual reaches, px of the footage."""
+
+
+class ContourEstimator(FrameEstimator):
+    """Estimates the poses of all people in one frame; see `FrameEstimator`."""
+
+    def __init__(
+        self,
+        views: Sequence[ViewEvidence],
+        memories: Sequence[PersonMemory],
+        bodies: Sequence[PosedBody],
+        settings: EstimationSettings,
+        contours: Sequence[Contour] | None = None,
+    ) -> None:
+        """Begin at the predicted poses; see `FrameEstimator`."""
+        assert isinstance(settings, ContourSettings)
+        self._contour_settings = settings
+        chosen = [select_contours(v, settings.image_contours) for v in views]
+        super().__init__(chosen, memories, bodies, settings, contours)
+        self._is_first = [len(m.history) == 1 for m in memories]
+        self._unlimited: list[ViewEvidence] = []
+
+    def estimate(self, people: Sequence[int]) -> dict[int, PersonEstimate]:
+        """Find the poses of some people and move them there."""
+        if not self._contour_settings.paper:
+            return super().estimate(people)
+        wanted = self._contour_settings.image_contours
+        self._unlimited = [with_unlimited_distances(v, wanted) for v in self.problem.views]
+        return {p: self.finalize(p, self.move(p, self._minimize(p))) for p in people}
+
+    def finalize(self, person: int, found: PersonFit) -> PersonEstimate:
+        """Turn the fit of a person into an estimate, with the rank of its normal matrix (KRH08 Sect. 5.4)."""
+        out = super().finalize(person, found)
+        model, active = found.body.model, self.problem.people[person].active_dofs
+        residuals = self._paper_residuals(person) if self._contour_settings.paper else found.residuals
+        pose = found.fit.pose
+        linear = residuals.linearize(model, pose, model.kinematics(pose))
+        matrix = conditioning(linear, active)
+        length_px = float(residuals.part_costs(pose).length_px.sum())
+        out = out._replace(normal_matrix=matrix)
+        if length_px < matrix.n_dofs:
+            return out._replace(
+                status="lost",
+                note=f"{length_px:.0f} px of contour are visible, fewer than the {matrix.n_dofs} degrees of freedom",
+            )
+        if self._contour_settings.paper and matrix.rank < matrix.n_dofs:
+            few = f"the contours determine {matrix.rank} of {matrix.n_dofs} degrees of freedom"
+            return out._replace(note=", ".join(n for n in (out.note, few) if n))
+        return out
+
+    def _minimize(self, person: int) -> PersonFit:
+        """Minimize the squared chamfer distances of a person's contours from the pose so far (KRH08 Eq. 60)."""
+        problem, bodies, settings = self.problem, self.bodies, self._contour_settings
+        model, _, active, _ = problem.people[person]
+        start, blocks = bodies[person].values, [self._paper_residuals(person)]
+        if self._is_first[person] and settings.incremental_start:
+            for step in fit_by_chains(model, start, blocks, active):
+                start = step.fit.pose
+        fit = problem.solve(person, start, blocks, settings.max_iterations)
+        body = PosedBody(model, fit.pose)
+        # The status follows from the same features as that of other methods.
+        return PersonFit(problem.residuals(person, bodies), with_body(bodies, person, body), fit, body)
+
+    def _paper_residuals(self, person: int) -> ContourResiduals:
+        around, index = self.problem.around(person, self.bodies)
+        motion: Literal["rigid", "sliding"] = "sliding" if self._contour_settings.sliding else "rigid"
+        return ContourResiduals(self._unlimited, around, index, paper_match(motion), _NO_LIMIT_PX, everywhere=True)
+
+
+def conditioning(linear: NormalEquations, active_dofs: NDArray[np.bool_] | None) -> NormalMatrix:
+    """Return rank and condition number of the normal matrix of contours, of the active degrees of freedom, (n_dofs,).
+
+    Angles are in radians and lengths in metres.
+    """
+    n = len(linear.gradient)
+    at = np.arange(n) if active_dofs is None else np.flatnonzero(active_dofs)
+    if not len(at):
+        return NormalMatrix(0, 0, np.inf)
+    values = np.maximum(np.linalg.eigvalsh(linear.hessian[np.ix_(at, at)]), 0.0)
+    least = len(at) * np.finfo(np.float32).eps * values[-1]  # the kernels' points are single precision
+    condition = values[-1] / values[0] if values[0] > 0 else np.inf
+    return NormalMatrix(int(np.sum(values > least)), len(at), float(condition))

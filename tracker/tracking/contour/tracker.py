@@ -1,0 +1,41 @@
+"""The contour tracker of KRH08 behind the interface that all trackers share."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tracker.errors import TrackerError
+from tracker.tracking.contour.frame_estimator import ContourEstimator
+from tracker.tracking.contour.settings import ContourSettings
+from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
+from tracker.tracking.estimation.backward_pass import track_lost_backward
+from tracker.tracking.estimation.forward_pass import track_forward
+from tracker.tracking.tracker import TrackingRun
+
+
+@dataclass(frozen=True)
+class ContourTracker:
+    """Predict, observe, minimize and assess, one frame at a time; then track back through lost intervals."""
+
+    settings: ContourSettings = field(default_factory=ContourSettings)
+
+    def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
+        """See `Tracker.estimates`.
+
+        Raises:
+            TrackerError: a start pose holds a value that is not a number.
+        """
+        for person, start in enumerate(run.start):
+            if not np.all(np.isfinite(start)):
+                raise TrackerError(
+                    f"expected numbers in the start pose of person {person + 1}, found a value that is none; "
+                    "pose the person on the first frame, or begin elsewhere"
+                )
+        return track_forward(run, self.settings, ContourEstimator)
+
+    def backward_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
+        """See `Tracker.backward_pass`; nothing where the settings switch it off."""
+        if not self.settings.backward_pass:
+            return iter(())
+        return track_lost_backward(run, tracked, self.settings, ContourEstimator)

@@ -1,0 +1,108 @@
+"""Assess the pose of a person on a frame: quality, status, notes and covariance."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.body.limbs import limb_display_name, limbs
+from tracker.fitting.contour_residuals import PartCosts
+from tracker.fitting.gauss_newton import covariance
+from tracker.geometry.arrays import Array
+from tracker.tracking import confidence
+from tracker.tracking.confidence import PoseQuality, Status
+from tracker.tracking.estimate import NormalMatrix
+from tracker.tracking.estimation.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
+
+ELSEWHERE_RAD = 0.3
+"""A limb of which a joint turned farther is elsewhere, rad."""
+
+
+class PersonEstimate(NamedTuple):
+    """The estimate of one person on one frame, besides the pose."""
+
+    status: Status
+    note: str
+    """What was unusual, for people to read; empty where nothing was."""
+    part_costs_px: Array
+    """Mean distance of each part's contour to the edges, (n_parts,), px of the footage; NaN where hidden."""
+    covariance: Array
+    """Covariance of the pose, (n_dofs, n_dofs), rad and metres."""
+    evaluations: int
+    """Number of poses that the best-first search scored."""
+    quality: PoseQuality | None
+    """Features from which the status follows; None for a keyframe."""
+    alternatives: tuple[tuple[Array, ...], ...] = ()
+    """Poses of all people, (n_values,) each, in which this person is elsewhere and which are about as good, best
+    first."""
+    normal_matrix: NormalMatrix | None = None
+    """How well the contours determine the pose, if the method says."""
+
+    def in_doubt(self, note: str, alternatives: Sequence[tuple[Array, ...]]) -> "PersonEstimate":
+        """Return the estimate with more alternatives, at most doubtful."""
+        status: Status = "doubtful" if self.status == "good" else self.status
+        notes = ", ".join(n for n in (self.note, note) if n)
+        return self._replace(status=status, note=notes, alternatives=(*self.alternatives, *alternatives))
+
+
+def estimate_fixed(problem: FrameProblem, person: int, bodies: Bodies) -> PersonEstimate:
+    """Return the estimate of a person whose pose is a keyframe; it is not assessed."""
+    model = bodies[person].model
+    costs = problem.residuals(person, bodies).part_costs(bodies[person].values)
+    zero = np.zeros((model.n_dofs, model.n_dofs))
+    return PersonEstimate("good", "", _part_costs_px(problem, costs), zero, 0, None)
+
+
+def estimate_at(
+    problem: FrameProblem, person: int, bodies: Bodies, alternatives: Sequence[Array] = ()
+) -> PersonEstimate:
+    """Assess a person in the pose that they have.
+
+    Args:
+        problem: of the frame.
+        person: whom to assess.
+        bodies: all people.
+        alternatives: poses of the person that are about as good, (n_values,) each.
+    """
+    residuals = problem.residuals(person, bodies, everywhere=True)
+    blocks = [residuals, *problem.priors(person, bodies)]
+    fit = problem.solve(person, bodies[person].values, blocks, max_iterations=0)
+    found = PersonFit(residuals, bodies, fit, bodies[person], alternatives=tuple(alternatives))
+    return finalize(problem, person, bodies, found)
+
+
+def assess(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFit) -> Assessment:
+    """Compute the features of a fit from which its status follows."""
+    known, colors = problem.people[person].colors, None
+    if known is not None:
+        colors = problem.colors(person, bodies).score(found.fit.pose, known), known
+    costs = found.residuals.part_costs(found.fit.pose)
+    quality = confidence.quality(found.body, found.fit, costs, problem.views, problem.thetas_px, colors)
+    return Assessment(quality, costs)
+
+
+def finalize(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFit) -> PersonEstimate:
+    """Turn a fit into an estimate: assess it unless that is done, and note its alternatives."""
+    quality, costs = found.assessment or assess(problem, person, bodies, found)
+    model = found.body.model
+    out = PersonEstimate(
+        confidence.classify(quality), ", ".join(found.notes) or confidence.reason(quality),
+        _part_costs_px(problem, costs), covariance(model, found.fit), found.evaluations, quality,
+    )  # fmt: skip
+    if not found.alternatives:
+        return out
+    turned = np.abs([model.difference(other, found.fit.pose) for other in found.alternatives]).max(axis=0)
+    names = [limb_display_name(x.name) for x in limbs(model) if turned[x.dofs].max() > ELSEWHERE_RAD]
+    poses = tuple(b.values for b in bodies)
+    return out.in_doubt(
+        f"{' and '.join(names) or 'body'} may be elsewhere",
+        [(*poses[:person], other, *poses[person + 1 :]) for other in found.alternatives],
+    )
+
+
+def _part_costs_px(problem: FrameProblem, costs: PartCosts) -> Array:
+    """Return the mean distance of each part's contour to the edges over all views, (n_parts,), px of the footage."""
+    scales = np.array([v.scale for v in problem.views])
+    length = (costs.length_px / scales[:, None]).sum(axis=0)
+    far = np.nansum(costs.forward_px * costs.length_px / scales[:, None] ** 2, axis=0)
+    return np.divide(far, length, out=np.full_like(length, np.nan), where=length > 0)

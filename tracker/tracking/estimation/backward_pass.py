@@ -1,0 +1,253 @@
+"""Track people backward through intervals in which they were lost, from the first trusted poses after them.
+
+A limb that is lost in fast motion is found again where the motion slows down. Tracked backward from there, it is often
+found on frames where it was lost. Where it is lost in both directions, the two passes are seldom wrong on the same
+frames. Therefore the candidates of both are propagated to neighbouring frames, and one path through all frames of the
+interval is selected (`pose_paths`).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from itertools import takewhile
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.appearance.part_colors import Colors, PartColors
+from tracker.body.model import PosedBody
+from tracker.contours import occluding_contours
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import with_locked_dofs
+from tracker.fitting.interpenetration import BodyPenetration
+from tracker.geometry.arrays import Array
+from tracker.tracking.confidence import Status
+from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
+from tracker.tracking.estimation.assessment import estimate_at, estimate_fixed
+from tracker.tracking.estimation.forward_pass import make_estimate, track_forward
+from tracker.tracking.estimation.frame_estimator import FrameEstimator
+from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior
+from tracker.tracking.estimation.pose_paths import ROUNDS, Candidates, FrameCost, propagate_candidates, viterbi_path
+from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
+from tracker.tracking.subjects import Keyframes
+from tracker.tracking.tracker import TrackingRun
+from tracker.tracking.view_regions import regions, visible_pieces_px
+
+_TRUSTED_FRAMES = 3
+"""Number of good frames in a row that end an interval. A lost limb may look good by chance on fewer."""
+_MOTION_FRAMES = 3
+"""Number of poses after the interval from which its motion is predicted."""
+_VISITS = 1 + 2 * ROUNDS
+"""Number of visits to each frame."""
+_CACHED_FRAMES = 32
+"""Number of frames whose evidence is cached while candidates are propagated, some megabytes each."""
+
+
+class _Interval(NamedTuple):
+    """Frames in which one person was lost."""
+
+    person: int
+    frames: range
+    """Indices into the tracked frames. Backward tracking begins on the one after the last."""
+
+
+def lost_intervals(statuses: Sequence[Status], keyframes: Sequence[bool]) -> list[range]:
+    """Return the intervals in which one person was lost, as indices. The first and last frame of each are not good.
+
+    Intervals separated by a few good frames are joined, unless a keyframe lies between them.
+
+    Args:
+        statuses: of the person on each frame, in the order of tracking.
+        keyframes: whether the person's pose is a keyframe, likewise.
+    """
+    out: list[range] = []
+    for i in (i for i, status in enumerate(statuses) if status != "good" and not keyframes[i]):
+        if out and i - out[-1].stop < _TRUSTED_FRAMES and not any(keyframes[out[-1].stop : i]):
+            out[-1] = range(out[-1].start, i + 1)
+        else:
+            out.append(range(i, i + 1))
+    return [r for r in out if any(statuses[i] == "lost" for i in r)]
+
+
+def track_lost_backward(
+    run: TrackingRun, tracked: Sequence[TrackedFrame], settings: EstimationSettings,
+    make_estimator: type[FrameEstimator] = FrameEstimator,
+) -> Iterator[BackwardStep]:  # fmt: skip
+    """Track people backward through the intervals in which they were lost. The other people keep their poses.
+
+    Without a lost interval no frame is read.
+
+    Args:
+        run: gives the observer and the subjects.
+        tracked: all frames, in the order of tracking.
+        settings: of the tracker.
+        make_estimator: estimates a frame by the tracker's method.
+
+    Yields:
+        A step for each visit to a frame; the last of an interval with the estimates that are better.
+    """
+    known, subjects = list(tracked), run.subjects
+    work = [s for person in subjects.tracked for s in _intervals_of(known, person, subjects.keyframes)]
+    work.sort(key=lambda s: s.frames.stop)
+    total, done = _VISITS * sum(len(s.frames) for s in work), 0
+    for interval in work:
+        person, backward, last = interval.person, list[PoseEstimate](), done + _VISITS * len(interval.frames)
+        for estimate in _track_interval(run, known, interval, settings, make_estimator):
+            backward.append(estimate)
+            done += 1
+            yield BackwardStep(estimate.frame, person, done, total)
+        backward.reverse()
+        selection = _PathSelection(run, known, interval, backward, settings)
+        for i in selection.propagate():
+            done += 1
+            if done < last:
+                yield BackwardStep(backward[i].frame, person, done, total)
+        better = selection.better()
+        at = {f.frame: i for i, f in enumerate(known)}
+        for estimate in better:
+            known[at[estimate.frame]] = TrackedFrame.of(estimate)
+        yield BackwardStep(backward[0].frame, person, done, total, better)
+
+
+def _intervals_of(tracked: Sequence[TrackedFrame], person: int, keyframes: Keyframes) -> list[_Interval]:
+    """Return the lost intervals of one person that end on a frame from which backward tracking can begin."""
+    statuses = [f.statuses[person] for f in tracked]
+    out = []
+    for frames in lost_intervals(statuses, [person in keyframes.get(f.frame, {}) for f in tracked]):
+        end = frames.stop
+        if end == len(tracked):  # no trusted frame follows: begin on the last frame that is not lost
+            end = max((i for i in frames if statuses[i] != "lost"), default=frames.start)
+        if end > frames.start:
+            out.append(_Interval(person, range(frames.start, end)))
+    return out
+
+
+def _track_interval(
+    run: TrackingRun, tracked: Sequence[TrackedFrame], interval: _Interval, settings: EstimationSettings,
+    make_estimator: type[FrameEstimator],
+) -> Iterator[PoseEstimate]:  # fmt: skip
+    """Track one person from the last frame of an interval to its first; the others keep their poses."""
+    subjects, person, (first, end) = run.subjects, interval.person, (interval.frames.start, interval.frames.stop)
+    after = takewhile(lambda f: f.statuses[person] == "good", tracked[end + 1 : end + 1 + _MOTION_FRAMES])
+    ahead = [*reversed(list(after)), tracked[end]]
+    start = [[f.poses[p] for f in ahead] for p in range(len(subjects.models))]
+    fixed = {f.frame: {p: v for p, v in enumerate(f.poses) if p != person} for f in tracked[first : end + 1]}
+    # Locked degrees of freedom have the values of the interval.
+    fixed[tracked[end].frame][person] = with_locked_dofs(
+        subjects.models[person], tracked[end].poses[person], tracked[first].poses[person], subjects.active_dofs[person]
+    )
+    frames = [f.frame for f in reversed(tracked[first : end + 1])]
+    alone = replace(subjects, tracked=(person,), keyframes=fixed)
+    return track_forward(TrackingRun(run.observer, alone, start, frames), settings, make_estimator, lead_in=1)
+
+
+class _PathSelection:
+    """The candidate poses of one person in an interval, and the selection of a path through them."""
+
+    def __init__(
+        self, run: TrackingRun, tracked: Sequence[TrackedFrame], interval: _Interval,
+        backward: Sequence[PoseEstimate], settings: EstimationSettings,
+    ) -> None:  # fmt: skip
+        """Collect the candidates of both passes.
+
+        Args:
+            run: gives the observer and the subjects.
+            tracked: all frames.
+            interval: the lost interval.
+            backward: the estimates of backward tracking on its frames, in the order of tracking.
+            settings: of the tracker.
+        """
+        self._observer, self._models, self._settings = run.observer, run.subjects.models, settings
+        self._person, (first, end) = interval.person, (interval.frames.start, interval.frames.stop)
+        self._model, self._active_dofs = self._models[self._person], run.subjects.active_dofs[self._person]
+        self._before, self._after = tracked[max(0, first - 2) : first], tracked[end : end + 2]
+        self._forward, self._backward = tracked[first:end], backward
+        self._part_colors: PartColors | None = None
+        for good in (*self._before[-1:], self._after[0]):
+            self._part_colors = self._colors(good).learn(self._part_colors, 0.5)
+        self._candidates = [
+            self._candidates_of(f, TrackedFrame.of(b)) for f, b in zip(self._forward, backward, strict=True)
+        ]
+        self._views = lru_cache(_CACHED_FRAMES)(self._observe)
+        self._frame_cost = lru_cache(_CACHED_FRAMES)(self._make_frame_cost)
+
+    def propagate(self) -> Iterator[int]:
+        """Propagate the candidates through the interval. Yields the index of each frame that is visited."""
+        locked = self._forward[0].poses[self._person]
+        ends = [e[i].poses[self._person] if e else None for e, i in ((self._before, -1), (self._after, 0))]
+        ends = [None if e is None else with_locked_dofs(self._model, e, locked, self._active_dofs) for e in ends]
+        yield from propagate_candidates(self._candidates, self._frame_cost, ends)
+
+    def better(self) -> tuple[PoseEstimate, ...]:
+        """Return the estimates of the selected path that replace those of forward tracking, in tracking order."""
+        ends = [[self._model.points_world(e.poses[self._person]) for e in some] for some in (self._before, self._after)]
+        points, costs = [np.array(c.points) for c in self._candidates], [np.array(c.costs) for c in self._candidates]
+        out = []
+        for i, chosen in enumerate(viterbi_path(points, costs, *ends)):
+            if chosen == 1:
+                out.append(self._merged(i, self._backward[i], f"tracked back from frame {self._after[0].frame}"))
+            elif chosen > 1:
+                out.append(self._merged(i, self._estimate(i, chosen), "taken over from neighbouring frames"))
+        return tuple(out)
+
+    def _candidates_of(self, *passes: TrackedFrame) -> Candidates:
+        p = self._person
+        alternatives = [v for e in passes if e.alternatives for v in e.alternatives[p]]
+        return Candidates(self._model, [e.poses[p] for e in passes], alternatives)
+
+    def _bodies(self, i: int, pose: Array) -> Bodies:
+        """Return all people on a frame of the interval, the person in a pose, (n_values,)."""
+        poses = [pose if p == self._person else v for p, v in enumerate(self._forward[i].poses)]
+        return tuple(PosedBody(m, p) for m, p in zip(self._models, poses, strict=True))
+
+    def _make_frame_cost(self, i: int) -> FrameCost:
+        person, settings = self._person, self._settings
+        bodies, views = self._bodies(i, self._forward[i].poses[person]), self._views(i)
+        residuals = ContourResiduals(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
+        penetration = (
+            [BodyPenetration(bodies, person, settings.apart)] if len(bodies) > 1 and settings.apart > 0 else []
+        )
+        colors = Colors(views, bodies, person)
+        return FrameCost(self._model, residuals, colors, self._part_colors, penetration, settings, self._active_dofs)
+
+    def _observe(self, i: int) -> tuple[ViewEvidence, ...]:
+        """Return the evidence of a frame around the poses of both passes; all candidates are compared on it."""
+        cameras = self._observer.working_cameras
+        guesses = [self._bodies(i, e.poses[self._person]) for e in (self._forward[i], self._backward[i])]
+        visible = [
+            np.concatenate([visible_pieces_px(occluding_contours.trace(g, c)) for g in guesses]) for c in cameras
+        ]
+        where = regions(cameras, [body for g in guesses for body in g])
+        accepting = visible if self._settings.segments else None
+        return self._observer.evidence(self._forward[i].frame, where, accepting, edges=self._settings.edges)
+
+    def _estimate(self, i: int, chosen: int) -> PoseEstimate:
+        """Return the estimate of a frame with a candidate that was propagated there."""
+        candidates, views, settings = self._candidates[i], self._views(i), self._settings
+        bodies = self._bodies(i, candidates.poses[chosen])
+        people = [
+            PersonPrior(b.model, b.values, colors=self._part_colors if p == self._person else None)
+            for p, b in enumerate(bodies)
+        ]
+        problem = FrameProblem(views, people, settings)
+        estimates = [
+            estimate_at(problem, p, bodies, candidates.alternatives(chosen))
+            if p == self._person
+            else estimate_fixed(problem, p, bodies)
+            for p in range(len(bodies))
+        ]
+        return make_estimate(self._forward[i].frame, chamfer_cost(views, bodies, settings), bodies, estimates, settings)
+
+    def _merged(self, i: int, estimate: PoseEstimate, note: str) -> PoseEstimate:
+        """Return an estimate with a note on the person, and the former statuses of the others."""
+        person, statuses, notes = self._person, list(self._forward[i].statuses), list(estimate.notes)
+        statuses[person] = estimate.statuses[person]
+        notes[person] = ", ".join(filter(None, (notes[person], note)))
+        return estimate._replace(statuses=tuple(statuses), notes=tuple(notes))
+
+    def _colors(self, frame: TrackedFrame) -> Colors:
+        """Return the colours under the person on a frame on which they were not lost."""
+        bodies = [PosedBody(m, p) for m, p in zip(self._models, frame.poses, strict=True)]
+        views = self._observer.evidence(frame.frame, regions(self._observer.working_cameras, bodies))
+        return Colors(views, bodies, self._person)

@@ -1,0 +1,164 @@
+"""Track people forward through the frames of a run: predict, observe, estimate, remember."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+from tracker.body.model import PosedBody
+from tracker.compute.threads import map_parallel
+from tracker.contours import occluding_contours
+from tracker.contours.occluding_contours import Contour
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
+from tracker.geometry.arrays import Array, FloatArray
+from tracker.geometry.cameras import Region
+from tracker.images.static_edges import StaticEdgeModel
+from tracker.motion.prediction import PredictSettings
+from tracker.search.chamfer_cost import ChamferCost
+from tracker.tracking.confidence import Status
+from tracker.tracking.estimate import AlternativePose, PoseEstimate
+from tracker.tracking.estimation.assessment import PersonEstimate
+from tracker.tracking.estimation.frame_estimator import FrameEstimator
+from tracker.tracking.estimation.frame_problem import Bodies
+from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
+from tracker.tracking.estimation.start_pose import StartFrame, settle_starts
+from tracker.tracking.person_memory import PersonMemory
+from tracker.tracking.tracker import TrackingRun
+from tracker.tracking.view_regions import confirmed_regions, regions, regions_ahead, visible_pieces_px
+
+
+def track_forward(
+    run: TrackingRun, settings: EstimationSettings, make_estimator: type[FrameEstimator] = FrameEstimator,
+    lead_in: int = 0,
+) -> Iterator[PoseEstimate]:  # fmt: skip
+    """Track all people frame by frame, in the order of `run.frames`.
+
+    Args:
+        run: what to track.
+        settings: of the tracker.
+        make_estimator: estimates a frame by the tracker's method.
+        lead_in: number of frames at the beginning that are learnt from, but not yielded.
+
+    Yields:
+        The poses of each frame.
+    """
+    observer, subjects, frames, models = run.observer, run.subjects, run.frames, run.subjects.models
+    several = len(models) > 1
+    memories = [
+        PersonMemory(m, start, active, alone=not several)
+        for m, start, active in zip(models, run.start, subjects.active_dofs, strict=True)
+    ]
+    learns_static, edges = settings.segments and settings.edges.static, settings.edges
+    static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if learns_static else None
+    cameras, ahead = observer.working_cameras, list[Region | None]()
+    everywhere: list[Region | None] | None = [None] * len(cameras) if edges.whole_images else None
+
+    def placed(frame: int, predict: Callable[[PersonMemory, PredictSettings], Array]) -> Bodies:
+        """Return all people on a frame, in their keyframes or as predicted."""
+        keyframes = subjects.keyframes_at(frame)
+        poses = [
+            keyframes.get(p, predict(m, settings.predict) if p in subjects.tracked else m.history[-1])
+            for p, m in enumerate(memories)
+        ]
+        return tuple(PosedBody(m, v) for m, v in zip(models, poses, strict=True))
+
+    def observe(
+        frame: int, bodies: Bodies, where: Sequence[Region | None]
+    ) -> tuple[list[Contour], tuple[ViewEvidence, ...]]:
+        """Return the contours of all people in each view, and the evidence around them."""
+        contours = [occluding_contours.trace(bodies, c) for c in cameras]
+        visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
+        return contours, observer.evidence(frame, where, visible, static_edges, edges)
+
+    def around(bodies: Bodies) -> list[Region | None]:
+        return everywhere or regions(cameras, bodies)
+
+    for i, frame in enumerate(frames):
+        if i == 0:  # a run that goes on from known poses uses the regions that one without a break would use
+            if several and all(len(m.history) > 1 for m in memories):
+                ahead = everywhere or regions_ahead(cameras, placed(frame, PersonMemory.predict_before_last))
+            observer.prefetch(frame, ahead or None, learns_static, edges)
+        keyframes, predicted = subjects.keyframes_at(frame), placed(frame, PersonMemory.predict)
+        where = confirmed_regions(ahead, cameras, predicted) if ahead and not everywhere else around(predicted)
+        following = frames[i + 1 : i + 2]
+        for k in following if several else ():
+            ahead = everywhere or regions_ahead(cameras, placed(k, PersonMemory.predict_two_ahead))
+            observer.prefetch(k, ahead, learns_static, edges)
+        contours, views = observe(frame, predicted, where)
+        settled: Mapping[int, PosedBody] = {}
+        if i == 0 and not lead_in:
+            begun = StartFrame(predicted, contours, views, lambda bodies: observe(frames[0], bodies, around(bodies))[1])
+            settled = settle_starts(begun, memories, subjects.tracked, settings)
+            for p, body in settled.items():
+                memories[p] = PersonMemory(models[p], body.values, subjects.active_dofs[p], alone=not several)
+            if not settled.keys() <= keyframes.keys():
+                predicted = tuple(b if p in keyframes else settled.get(p, b) for p, b in enumerate(predicted))
+                contours, views = observe(frame, predicted, around(predicted))
+        for k in () if several else following:  # for one person later: this frame has kept all cores busy
+            observer.prefetch(k)
+        estimator = make_estimator(views, memories, predicted, settings, contours)
+        estimates = estimator.estimate([p for p in subjects.tracked if p not in keyframes])
+        statuses: list[Status] = [estimates[p].status if p in estimates else "good" for p in range(len(models))]
+        # What is learnt of a keyframe that its frame contradicts is learnt from the settled pose.
+        learnt = tuple(settled.get(p, b) if p in keyframes else b for p, b in enumerate(estimator.bodies))
+        _remember(memories, estimator, learnt, statuses, keyframes)
+        cost_of = chamfer_cost(views, estimator.bodies, settings)
+        if static_edges is not None:
+            there = cost_of if learnt == estimator.bodies else chamfer_cost(views, learnt, settings)
+            update_static_edges(static_edges, views, there.predicted_pieces_px)
+        if i >= lead_in:
+            found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in range(len(models))]
+            yield make_estimate(frame, cost_of, estimator.bodies, found, settings)
+
+
+def make_estimate(
+    frame: int,
+    cost_of: ChamferCost,
+    bodies: Sequence[PosedBody],
+    people: Sequence[PersonEstimate],
+    settings: EstimationSettings,
+) -> PoseEstimate:
+    """Collect the estimates of all people of a frame.
+
+    Args:
+        frame: its number.
+        cost_of: the cost function around the estimated poses.
+        bodies: all people in these poses.
+        people: the estimate of each person.
+        settings: of the tracker.
+    """
+    cost = cost_of.at_prediction()
+    alternatives = tuple(
+        tuple(AlternativePose(poses[p], cost_of(poses).total_px) for poses in e.alternatives)
+        for p, e in enumerate(people)
+    )
+    return PoseEstimate(
+        frame, tuple(b.values for b in bodies), cost.total_px, cost.view_costs_px, sum(e.evaluations for e in people),
+        tuple(e.status for e in people), tuple(e.note for e in people), tuple(e.part_costs_px for e in people),
+        tuple(e.covariance for e in people), tuple(e.quality for e in people), alternatives, settings.method,
+        tuple(e.normal_matrix for e in people),
+    )  # fmt: skip
+
+
+def _remember(
+    memories: Sequence[PersonMemory], estimator: FrameEstimator, bodies: Bodies, statuses: Sequence[Status],
+    keyframes: Mapping[int, Array],
+) -> None:  # fmt: skip
+    """Update the memory of each person with the result of a frame: all people in some poses."""
+
+    def remember(p: int) -> None:
+        memories[p].update(bodies[p].values, estimator.colors(p, bodies), statuses[p], keyframe=p in keyframes)
+
+    map_parallel(remember, range(len(memories)))
+
+
+def update_static_edges(
+    static_edges: Sequence[StaticEdgeModel], views: Sequence[ViewEvidence], visible: Sequence[FloatArray]
+) -> None:
+    """Learn the edges away from all people, in views where no silhouette tells people from the background.
+
+    Args:
+        static_edges: of each view.
+        views: the evidence of the frame.
+        visible: visible contours of all people in each view, x0, y0, x1, y1, (M, 4), px of the region.
+    """
+    for view, model, pieces in zip(views, static_edges, visible, strict=True):
+        if view.segments is not None and view.silhouette is None:
+            model.update(view.segments, view.corner_px, view.camera.size, pieces, ACCEPTED_SHARE * view.theta_px)

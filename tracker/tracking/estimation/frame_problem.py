@@ -1,0 +1,205 @@
+"""The fitting problem of one frame: the evidence, residuals and priors of each person, for any poses of all people.
+
+Nothing here moves a person: bodies come in as arguments, and fits are returned.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.appearance.part_colors import Colors, PartColors
+from tracker.body.limbs import Limb
+from tracker.body.model import BodyModel, PosedBody
+from tracker.contours.occluding_contours import Contour
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals, PartCosts
+from tracker.fitting.gauss_newton import Fit, ResidualBlock
+from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting.interpenetration import BodyPenetration
+from tracker.geometry.arrays import Array
+from tracker.tracking.confidence import PoseQuality
+from tracker.tracking.estimation.settings import TOLERANCE, EstimationSettings, prior_blocks
+from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
+
+_SAME_ASSIGNMENT_M = 0.01
+"""Evidence is assigned again where a person has moved farther, metres."""
+
+Bodies = tuple[PosedBody, ...]
+"""All people in their poses."""
+
+
+class PersonPrior(NamedTuple):
+    """What is known of a person before a frame."""
+
+    model: BodyModel
+    predicted: Array
+    """Predicted pose, (n_values,)."""
+    active_dofs: NDArray[np.bool_] | None = None
+    """The degrees of freedom that may move, (n_dofs,); None: all."""
+    colors: PartColors | None = None
+    """Colours of the parts; None before the first frame."""
+
+
+class Assessment(NamedTuple):
+    """How well a pose fits the evidence."""
+
+    quality: PoseQuality
+    part_costs: PartCosts
+
+
+class PersonFit(NamedTuple):
+    """One person fitted to a frame."""
+
+    residuals: ContourResiduals
+    """The residuals that were minimized."""
+    bodies: Bodies
+    """All people when the residuals were made."""
+    fit: Fit
+    body: PosedBody
+    """The person in the pose that was found."""
+    untrusted_limbs: tuple[Limb, ...] | None = None
+    """Limbs whose prediction is not trusted, if the person was recovered; None if that was not needed."""
+    assessment: Assessment | None = None
+    """None before the fit is assessed."""
+    evaluations: int = 0
+    """Number of poses that the best-first search scored."""
+    notes: tuple[str, ...] = ()
+    """What was done to find the person, for people to read."""
+    alternatives: tuple[Array, ...] = ()
+    """Poses that are about as good, (n_values,) each, best first."""
+
+
+class FrameProblem:
+    """The fitting problem of one frame.
+
+    It caches how evidence is assigned to people, per set of poses. The cache lives as long as the frame. Evidence must
+    not be asked for by several threads at a time.
+    """
+
+    def __init__(
+        self,
+        views: Sequence[ViewEvidence],
+        people: Sequence[PersonPrior],
+        settings: EstimationSettings,
+        predicted: tuple[Bodies, Sequence[Contour]] | None = None,
+    ) -> None:
+        """Prepare the problem.
+
+        Args:
+            views: the evidence of the frame.
+            people: what is known of each person.
+            settings: of the tracker.
+            predicted: all people as predicted, and their contours in each view, if those have been traced.
+        """
+        self.views, self.people, self.settings = tuple(views), tuple(people), settings
+        self.thetas_px = np.array([v.outlier_px(settings.theta_px) for v in views])
+        """Outlier distance of each view, (V,), working px."""
+        self._predicted = predicted
+        self._pool, self._assignments = EvidencePool(views), list[EvidenceAssignment]()
+
+    def refine(self, person: int, bodies: Bodies, before: PersonFit | None = None) -> PersonFit:
+        """Refine the pose of one person, and return the fit.
+
+        Args:
+            person: whom to refine, from the pose in `bodies`.
+            bodies: all people.
+            before: a former fit on this frame. Its notes are kept, and its untrusted limbs stay untrusted.
+        """
+        untrusted = None if before is None else before.untrusted_limbs
+        residuals = self.residuals(person, bodies, everywhere=untrusted is not None)
+        blocks = [residuals, *self.priors(person, bodies, untrusted or ())]
+        min_decrease = MIN_DECREASE if len(self.people) > 1 else 0.0  # several people are refined more than once
+        fit = self.solve(person, bodies[person].values, blocks, self.settings.max_iterations, min_decrease)
+        body = PosedBody(self.people[person].model, fit.pose)
+        if before is None:
+            return PersonFit(residuals, bodies, fit, body)
+        return before._replace(residuals=residuals, bodies=bodies, fit=fit, body=body, assessment=None)
+
+    def solve(
+        self, person: int, start: Array, blocks: Sequence[ResidualBlock], max_iterations: int, min_decrease: float = 0.0
+    ) -> Fit:
+        """Minimize the cost of some blocks from a pose, (n_values,)."""
+        model, _, active, _ = self.people[person]
+        return solve_compiled(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
+
+    def priors(self, person: int, bodies: Bodies, untrusted: Sequence[Limb] = ()) -> list[ResidualBlock]:
+        """Build the prior terms: prediction (first, weak for untrusted limbs), joint spread, penetration."""
+        settings, model = self.settings, self.people[person].model
+        sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
+        for limb in untrusted:
+            assert settings.recover is not None
+            sigma[limb.dofs] = settings.recover.trust_rad
+        blocks = prior_blocks(model, self.people[person].predicted, sigma)
+        if len(self.people) > 1 and settings.apart > 0:
+            blocks.append(BodyPenetration(bodies, person, settings.apart))
+        return blocks
+
+    def residuals(self, person: int, bodies: Bodies, everywhere: bool = False) -> ContourResiduals:
+        """Build the residuals of a person's contours against the evidence assigned to them.
+
+        Args:
+            person: whom to fit.
+            bodies: all people; the others occlude.
+            everywhere: keep edges far from the contours too, for poses far from these.
+        """
+        (own,) = self.own_evidence([person], bodies, everywhere)
+        return self.residuals_on(own, person, bodies, everywhere)
+
+    def residuals_on(
+        self, own: Sequence[ViewEvidence], person: int, bodies: Bodies, everywhere: bool
+    ) -> ContourResiduals:
+        """Build the same against given evidence of the person."""
+        settings, (around, index) = self.settings, self.around(person, bodies)
+        # Of segments a prediction accepts those near it: to look for what is farther costs more than it saves.
+        everywhere = everywhere or settings.segments
+        contours = None
+        if self._predicted is not None and bodies == self._predicted[0] and len(around) == len(bodies):
+            contours = self._predicted[1]
+        return ContourResiduals(own, around, index, settings.match, settings.theta_px, everywhere, contours)
+
+    def own_evidence(
+        self, people: Sequence[int], bodies: Bodies, everywhere: bool = False
+    ) -> list[tuple[ViewEvidence, ...]]:
+        """Return for each of some people the evidence of each view without what the others explain.
+
+        An assignment made for poses within a centimetre is used again.
+        """
+        if len(bodies) == 1 or not self.settings.occlusion:
+            return [self._pool.all_edges if everywhere else self._pool.views] * len(people)
+        assignment = next((a for a in reversed(self._assignments) if _are_near(a.bodies, bodies)), None)
+        if assignment is None:
+            assignment = EvidenceAssignment(self._pool, bodies)
+            self._assignments.append(assignment)
+        return [assignment.own(p, everywhere) for p in people]
+
+    def colors(self, person: int, bodies: Bodies) -> Colors:
+        """Return the colours of the frame under a person."""
+        return Colors(self.views, *self.around(person, bodies))
+
+    def color_nats(self, person: int, bodies: Bodies) -> float:
+        """Return the log-likelihood ratio of the colours under a person, nats; 0 where their colours are unknown."""
+        known = self.people[person].colors
+        return 0.0 if known is None else float(self.colors(person, bodies).nats(bodies[person].values[None], known)[0])
+
+    def around(self, person: int, bodies: Bodies) -> tuple[list[PosedBody], int]:
+        """Return the bodies that may occlude a person, the person included, and the person's index among them."""
+        return (list(bodies), person) if self.settings.occlusion else ([bodies[person]], 0)
+
+
+def with_body(bodies: Bodies, person: int, body: PosedBody) -> Bodies:
+    """Return all people with one in another pose."""
+    return (*bodies[:person], body, *bodies[person + 1 :])
+
+
+def _are_near(before: Sequence[PosedBody], now: Sequence[PosedBody]) -> bool:
+    """Return whether evidence assigned to people in some poses may be used for others."""
+    return all(moved_m(a, b) < _SAME_ASSIGNMENT_M for a, b in zip(before, now, strict=True))
+
+
+def moved_m(before: PosedBody, now: PosedBody) -> float:
+    """Return the largest distance between the points of a person in two poses, metres."""
+    if before is now:
+        return 0.0
+    return float(np.linalg.norm(now.points_world - before.points_world, axis=1).max())

@@ -1,0 +1,122 @@
+"""Settings that all trackers share: motion model, evidence, priors, recovery; and the priors and the shown
+cost that follow from them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from tracker.body.model import BodyModel, PosedBody
+from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
+from tracker.fitting.contour_residuals import MatchSettings
+from tracker.fitting.gauss_newton import PosePrior, ResidualBlock
+from tracker.fitting.interpenetration import SelfPenetration
+from tracker.geometry.arrays import Array
+from tracker.motion.prediction import PredictSettings
+from tracker.search.chamfer_cost import ChamferCost, Outliers
+
+MAX_ITERATIONS = 15
+"""Gauss-Newton iterations of a whole body."""
+TOLERANCE = 1e-3
+"""Step at which they end, rad or metres: a tenth of a pixel on a limb."""
+
+
+@dataclass(frozen=True)
+class RecoverSettings:
+    """Settings of the recovery of lost limbs."""
+
+    proposals: int = 1024
+    """Poses of a limb that are ranked; a power of two, so that they fill the space evenly."""
+    reach_rad: float = float(np.radians(35))
+    """Spread of the proposals around the pose, rad; the other half fill the joint limits."""
+    n_local_search: int = 48
+    """Proposals that are improved by random perturbation."""
+    scored: int = 48
+    """Proposals that go through all rounds, and whose contours are scored."""
+    perturbations: int = 16
+    """Steps tried around each proposal in a round."""
+    perturbations_rad: tuple[float, ...] = tuple(np.radians([16.0, 11.0, 7.0, 4.0]).tolist())
+    """Their standard deviation, rad, round by round."""
+    n_limb_refined: int = 10
+    """Proposals whose limb is refined alone."""
+    n_refined: int = 3
+    """Proposals that are refined with the whole body."""
+    beam_width: int = 3
+    """Poses that are kept while the next limb is searched."""
+    restart_per_candidate: bool = True
+    """Whether the next limb is searched from each of them; else once, and its places are scored with each."""
+    min_decrease: float = 0.0
+    """Smallest decrease of the cost for another iteration with the whole body."""
+    margin: float = 40.0
+    """Largest excess cost (nats) of a pose that is kept for the next limb: more than a limb can make up for."""
+    colors: float = 0.2
+    """Weight of the colours against edges. Neighbouring pixels are correlated, so it is well below 1."""
+    trust_rad: float = 1.0
+    """Standard deviation of the prediction of a limb that seems lost, rad: nearly none."""
+    refine_margin: float = np.inf
+    """Largest excess cost (nats) of a proposal whose limb is refined alone, to be refined with the whole body; at least
+    the margin where another limb follows."""
+
+
+@dataclass(frozen=True)
+class EstimationSettings:
+    """Settings that all trackers share."""
+
+    method: ClassVar[str]
+    """Name of the method, which the store keeps with the settings."""
+    predict: PredictSettings = field(default_factory=PredictSettings)
+    """Motion model."""
+    match: MatchSettings = field(default_factory=MatchSettings)
+    """Weights of the contour residuals."""
+    recover: RecoverSettings | None = field(default_factory=RecoverSettings)
+    """Recovery of lost limbs; None switches it off."""
+    theta_px: float | None = None
+    """Outlier distance, px of the footage; None for 3% of the longer side of each image."""
+    outliers: Outliers = "truncated"
+    """Treatment of outliers in the chamfer cost that is shown, see `ChamferCost`."""
+    segments: bool = True
+    """Whether edges are accepted or refused in whole segments (GD96 Sect. 4.2), and static ones are refused."""
+    edges: EdgeSettings = field(default_factory=EdgeSettings)
+    """Which edges are found and accepted."""
+    trust_rad: float = 0.15
+    """Standard deviation of the prediction of an angle, rad."""
+    trust_m: float = 0.05
+    """Standard deviation of the prediction of a position, metres."""
+    occlusion: bool = True
+    """Whether people occlude each other and edges are assigned; else each is tracked as if alone."""
+    rounds: int = 2
+    """Largest number of rounds in which all people are refined again with the others where they were found."""
+    backward_pass: bool = True
+    """Whether people are tracked backward through intervals in which they were lost, see `backward_pass`."""
+    smooth: bool = True
+    """Whether the poses are smoothed at the end of a run."""
+    apart: float = 1.0
+    """Weight of the term against people passing through each other; 0 leaves it out."""
+    max_iterations: int = MAX_ITERATIONS
+    """Largest number of Gauss-Newton iterations of a whole body from its prediction."""
+    incremental_start: bool = False
+    """Whether a start that does not fit is fitted chain by chain before it is searched."""
+
+    @property
+    def settles_start(self) -> bool:
+        """Whether a start that the first frame contradicts is searched, see `start_pose`."""
+        return self.recover is not None
+
+
+def chamfer_cost(
+    views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], settings: EstimationSettings
+) -> ChamferCost:
+    """Return the cost function around posed bodies."""
+    return ChamferCost(views, bodies, settings.theta_px, settings.outliers)
+
+
+def prior_blocks(model: BodyModel, predicted: Array, sigmas: Array) -> list[ResidualBlock]:
+    """Build the prior terms of one body: prediction, joint spread and self-penetration.
+
+    Args:
+        model: the body.
+        predicted: the predicted pose, (n_values,).
+        sigmas: its standard deviations, (n_dofs,), rad or metres.
+    """
+    return [PosePrior(predicted, 1 / sigmas), PosePrior(model.neutral(), 1 / model.spreads), SelfPenetration()]

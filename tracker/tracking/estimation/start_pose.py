@@ -1,0 +1,137 @@
+"""Search the start pose of a run where the first frame contradicts it.
+
+A person places a start by hand, to within several degrees of each joint and centimetres. Limbs may then lie on other
+edges, and the colours under the parts are not theirs. The search keeps to the neighbourhood of the start, so that left
+and right stay what the person said. It scores contours alone: colours are learnt from its result.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.appearance.part_colors import Colors
+from tracker.body.dimensions import mirror_part
+from tracker.body.limbs import Limb
+from tracker.body.model import BodyModel, PosedBody
+from tracker.contours.occluding_contours import Contour
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, solve
+from tracker.geometry.arrays import Array
+from tracker.tracking.estimation.assessment import PersonEstimate, estimate_at
+from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior, moved_m, with_body
+from tracker.tracking.estimation.incremental_fit import fit_by_chains
+from tracker.tracking.estimation.limb_recovery import PoseScorer, search_limbs
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, EstimationSettings
+from tracker.tracking.person_memory import PersonMemory
+
+_START_RAD, _START_M = 0.35, 0.15
+"""Standard deviation of a start placed by hand, rad and metres: about twice the error that people leave."""
+_MAX_ROUNDS = 4
+_SETTLED_M = 0.01
+"""The search ends where nobody moves farther in a round, metres."""
+_EXCHANGE_M, _EXCHANGE_RAD = 0.01, 1.5
+"""Standard deviations of joints and angles where two limbs are exchanged, metres and rad."""
+
+
+class StartFrame(NamedTuple):
+    """The first frame of a run, with all people in their start poses."""
+
+    bodies: Bodies
+    contours: Sequence[Contour]
+    """Contours of all bodies in each view."""
+    views: tuple[ViewEvidence, ...]
+    """The evidence around them."""
+    observe: Callable[[Bodies], tuple[ViewEvidence, ...]]
+    """Returns the evidence around other poses."""
+
+
+def settle_starts(
+    frame: StartFrame, memories: Sequence[PersonMemory], people: Sequence[int], settings: EstimationSettings
+) -> dict[int, PosedBody]:
+    """Search the start poses that the first frame contradicts.
+
+    The start of a single person is searched where a limb is worth a search, and that of one of several where a limb is
+    missing. Limbs are searched together with those of the other side, and exchanged with them. Nobody is searched who
+    was tracked before: a motion is known of them, and the pose is a prediction.
+
+    Args:
+        frame: the first frame.
+        memories: of each person, before the first frame.
+        people: whose start is checked.
+        settings: of the tracker.
+
+    Returns:
+        By person the poses that replace the start; nobody whose start fits the frame, or whose search fails.
+    """
+    if not settings.settles_start:
+        return {}
+    start, observe = frame.bodies, frame.observe
+    known = [PersonPrior(m.model, b.values, m.active_dofs) for m, b in zip(memories, start, strict=True)]
+    first = FrameProblem(frame.views, known, settings, (start, frame.contours))
+    before = {p: estimate_at(first, p, start) for p in people if len(memories[p].history) == 1}
+    # In a close hold a right start is doubtful, and a search may take the other's limb.
+    least = 1 if len(memories) == 1 else 2
+    doubted = [p for p, e in before.items() if _contradiction(e) >= least]
+    if not doubted or not any(len(v.points_px) for v in first.views):
+        return {}
+    wide, bodies = replace(settings, trust_rad=_START_RAD, trust_m=_START_M), start
+    for _ in range(_MAX_ROUNDS):
+        problem, last = FrameProblem(observe(bodies), known, wide), bodies
+        for person in doubted:
+            bodies = with_body(bodies, person, _searched(problem, person, bodies, memories[person]))
+        if all(moved_m(a, b) < _SETTLED_M for a, b in zip(last, bodies, strict=True)):
+            break
+    found = FrameProblem(observe(bodies), known, wide)
+    return {p: bodies[p] for p in doubted if _contradiction(estimate_at(found, p, bodies)) <= _contradiction(before[p])}
+
+
+def _contradiction(estimate: PersonEstimate) -> int:
+    """Return how strongly a frame contradicts a pose: 0 not, 1 a limb is worth a search, 2 a limb is missing."""
+    quality = estimate.quality
+    assert quality is not None
+    if quality.missing_limbs or quality.is_body_lost:
+        return 2
+    return 1 if quality.search_candidates(alone=True) else 0
+
+
+def _searched(problem: FrameProblem, person: int, bodies: Bodies, memory: PersonMemory) -> PosedBody:
+    """Refine the pose of one person, search all limbs that have a counterpart, and return the person there."""
+    model, recover, start = memory.model, problem.settings.recover, problem.people[person].predicted
+    assert recover is not None
+    (own,) = problem.own_evidence([person], bodies, everywhere=True)
+    residuals = problem.residuals_on(own, person, bodies, everywhere=True)
+    priors = problem.priors(person, bodies)
+    blocks: list[ResidualBlock] = [residuals, *priors]
+    fit = problem.solve(person, bodies[person].values, blocks, MAX_ITERATIONS)
+    if problem.settings.incremental_start:
+        *_, last = fit_by_chains(model, bodies[person].values, blocks, memory.active_dofs)
+        fit = min(fit, last.fit, key=lambda f: f.cost)
+    colors = Colors(own, *problem.around(person, bodies))
+    scorer = PoseScorer.of(residuals, priors, colors, None, recover, memory.active_dofs)
+    for pair in _pairs(memory.limbs):
+        fit = search_limbs(model, pair, fit, (start,), scorer).best
+        exchanged = problem.solve(person, _exchanged(model, fit.pose, pair), scorer.blocks, MAX_ITERATIONS)
+        fit = min(fit, exchanged, key=scorer.cost)
+    return PosedBody(model, fit.pose)
+
+
+def _pairs(limbs: Sequence[Limb]) -> list[tuple[Limb, Limb]]:
+    """Return the limbs of one side with those of the other."""
+    by_name = {limb.name: limb for limb in limbs}
+    found = [(limb, by_name.get(mirror_part(limb.name) or "")) for limb in limbs]
+    return [(one, other) for one, other in found if other is not None and one.parts[0] < other.parts[0]]
+
+
+def _exchanged(model: BodyModel, pose: Array, pair: tuple[Limb, Limb]) -> Array:
+    """Return a pose, (n_values,), in which two limbs lie where the other was, as far as the joints allow."""
+    names, points_world = list(model.point_names), model.points_world(pose)
+    of_pair = np.isin(model.point_parts, np.concatenate([limb.parts for limb in pair]))
+    targets = {i: names.index(other) for i in np.flatnonzero(of_pair) if (other := mirror_part(names[i])) in names}
+    points = np.array([*targets], dtype=np.int64)
+    blocks: list[ResidualBlock] = [
+        PointTargets(points, points_world[[*targets.values()]], np.full(len(points), 1 / _EXCHANGE_M)),
+        PosePrior(model.neutral(), np.full(model.n_dofs, 1 / _EXCHANGE_RAD)),
+    ]
+    return solve(model, pose, blocks, pair[0].dofs | pair[1].dofs, max_iterations=40, tolerance=1e-4).pose

@@ -1,0 +1,5 @@
+"""Carve voxels from the silhouettes of a frame (MTHC01 Sect. 2), and measure what they show.
+
+The room imports `compute`, `geometry` and `evidence`, and knows no body. Callers use `visual_hull.carve_people`,
+`carving.carve` and `part_size`.
+"""

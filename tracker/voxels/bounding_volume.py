@@ -1,0 +1,115 @@
+"""The volume in which people can be, from the centroids and boxes of their silhouettes (MTHC01 Sect. 2)."""
+
+import itertools
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.errors import TrackerError
+from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import NEAR_PLANE_M, viewed_point
+
+_REACH = 1.5
+"""Half the edge of the largest volume, in the mean distance of the cameras from what they look at."""
+_PIXEL = 1.0
+"""Margin around the box of a silhouette, px: a body may reach nearly to the next pixel's centre."""
+
+
+class BoundingVolume(NamedTuple):
+    """A box in the world that holds all people."""
+
+    low: Array
+    """Lowest corner, (3,), metres."""
+    high: Array
+    """Highest corner, (3,), metres."""
+    center: Array
+    """The point nearest to the rays through the silhouettes' centroids, (3,), metres."""
+    center_miss_m: float
+    """Largest distance of such a ray from that point, metres."""
+
+
+def bounding_volume(silhouettes: Sequence[ViewSilhouette], missing: int = 0) -> BoundingVolume:
+    """Return the box around the intersection of the pyramids that the silhouettes' boxes span.
+
+    A side of a box at the image's border does not bound the person, who may be cut off there.
+
+    Args:
+        silhouettes: of all views. Views with an empty silhouette are left out.
+        missing: number of views that may be broken. The box holds what all but any so many views allow.
+
+    Raises:
+        TrackerError: fewer than two views show anybody, or the views show nothing in common.
+    """
+    seen = [s for s in silhouettes if not s.is_empty]
+    if len(seen) < 2:
+        listed = ", ".join(s.camera.name for s in seen) or "none"
+        raise TrackerError(
+            f"expected somebody in the silhouettes of at least 2 views, found {listed}; choose a frame that shows the "
+            "person, and check the background"
+        )
+    around = [s.camera for s in seen]
+    middle = viewed_point(around)
+    reach = _REACH * float(np.mean([np.linalg.norm(c.center_world - middle) for c in around]))
+    center, miss = _center(seen)
+    boxes = []
+    for kept in itertools.combinations(seen, max(2, len(seen) - missing)):
+        box = _intersection([_pyramid(s) for s in kept], middle - reach, middle + reach)
+        if box is not None:
+            boxes.append(box)
+    if not boxes:
+        raise TrackerError(
+            "expected silhouettes of the same people in all views, found none in common; check that the calibration is "
+            "of these cameras, that no camera has moved, and that the videos start at the same time"
+        )
+    low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+    return BoundingVolume(low, high, center, miss)
+
+
+def _center(silhouettes: Sequence[ViewSilhouette]) -> tuple[Array, float]:
+    rays, centers = [], []
+    for s in silhouettes:
+        v, u = np.nonzero(s.mask)
+        rays.append(s.camera.rays(np.array([u.mean(), v.mean()])))
+        centers.append(s.camera.center_world)
+    across = np.eye(3) - np.einsum("ni,nj->nij", rays, rays)
+    point = np.linalg.lstsq(across.sum(axis=0), np.einsum("nij,nj->i", across, centers), rcond=None)[0]
+    misses = np.linalg.norm(np.einsum("nij,nj->ni", across, point - np.array(centers)), axis=-1)
+    return point, float(misses.max())
+
+
+def _pyramid(silhouette: ViewSilhouette) -> Array:
+    """Return the planes (a, b) with a . x <= b, (m, 4), of the pyramid that a silhouette's box spans."""
+    camera, mask = silhouette.camera, silhouette.mask
+    v, u = np.nonzero(mask)
+    on_border = (u.min() == 0, v.min() == 0, u.max() == camera.width - 1, v.max() == camera.height - 1)
+    rows, columns = np.unique(v), np.unique(u)
+    outline = [(mask[r].nonzero()[0][[0, -1]], r) for r in rows] + [
+        (c, mask[:, c].nonzero()[0][[0, -1]]) for c in columns
+    ]
+    points = np.concatenate([np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in outline]).astype(np.float64)
+    corners = np.concatenate([points + d for d in itertools.product((-_PIXEL, _PIXEL), repeat=2)])
+    rays = camera.rays(corners) @ camera.T_camera_world[:3, :3].T
+    slopes = rays[:, :2] / rays[:, 2:]
+    (x0, y0), (x1, y1) = slopes.min(axis=0), slopes.max(axis=0)
+    sides = [(-1.0, 0.0, x0), (0.0, -1.0, y0), (1.0, 0.0, -x1), (0.0, 1.0, -y1)]
+    planes = [(*side, 0.0) for side, cut in zip(sides, on_border, strict=True) if not cut]
+    planes.append((0.0, 0.0, -1.0, -NEAR_PLANE_M))
+    T = camera.T_camera_world
+    normals = np.array(planes)
+    return np.column_stack([normals[:, :3] @ T[:3, :3], normals[:, 3] - normals[:, :3] @ T[:3, 3]])
+
+
+def _intersection(pyramids: Sequence[Array], low: Array, high: Array) -> tuple[Array, Array] | None:
+    """Return the box around the intersection of pyramids within a box; None if it is empty."""
+    from scipy.optimize import linprog  # imported lazily: loading scipy takes 0.3 s
+
+    planes = np.concatenate(pyramids)
+    limits, bounds = [], list(zip(low, high, strict=True))
+    for sign, axis in itertools.product((1.0, -1.0), range(3)):
+        found = linprog(sign * np.eye(3)[axis], A_ub=planes[:, :3], b_ub=planes[:, 3], bounds=bounds)
+        if not found.success:
+            return None
+        limits.append(sign * float(found.fun or 0.0))
+    return np.array(limits[:3]), np.array(limits[3:])

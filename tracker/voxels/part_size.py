@@ -1,0 +1,58 @@
+"""Sizes and orientations of solids from the covariance of their voxels (MTHC01 Sect. 3).
+
+MTHC01 prints a half-axis of sqrt(3) sigma for the ellipsoid, which is exact for the shell of a sphere only. A solid
+uniform ellipsoid has sqrt(5) sigma, an elliptical cylinder 2 sigma across and sqrt(3) sigma along its axis.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.geometry.arrays import Array
+
+ELLIPSOID = np.sqrt(5.0)
+"""Half-axis of a solid ellipsoid in standard deviations, along all axes."""
+CYLINDER_ACROSS, CYLINDER_ALONG = 2.0, np.sqrt(3.0)
+"""Half-axes of a solid elliptical cylinder in standard deviations, across and along its axis."""
+
+
+class PrincipalAxes(NamedTuple):
+    """Centre, directions and spreads of a cloud of voxels."""
+
+    center: Array
+    """(3,), metres."""
+    axes: Array
+    """Unit directions as columns, (3, 3), by ascending spread; right-handed."""
+    sigmas: Array
+    """Standard deviations along them, (3,), metres, ascending."""
+
+
+def principal_axes(points: Array, size_m: float) -> PrincipalAxes:
+    """Return the principal axes of solid voxels.
+
+    Args:
+        points: centres of the voxels, (N, 3), N > 0, metres.
+        size_m: edge of a voxel, metres. Its own variance of size^2 / 12 is that of a solid cube.
+    """
+    center = points.mean(axis=0)
+    deviations = points - center
+    variances, axes = np.linalg.eigh(deviations.T @ deviations / len(points) + np.eye(3) * size_m**2 / 12)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    return PrincipalAxes(center, axes, np.sqrt(variances))
+
+
+def ellipsoid_half_axes(found: PrincipalAxes) -> Array:
+    """Return the half-axes of a solid ellipsoid along its principal axes, (3,), metres."""
+    return np.asarray(ELLIPSOID * found.sigmas)
+
+
+def cylinder_half_axes(found: PrincipalAxes, axis: int = 2) -> Array:
+    """Return the half-axes of a solid elliptical cylinder along its principal axes, (3,), metres.
+
+    Args:
+        found: principal axes.
+        axis: index of the principal axis along which the cylinder lies; the longest one unless it is a disc.
+    """
+    factors = np.full(3, CYLINDER_ACROSS)
+    factors[axis] = CYLINDER_ALONG
+    return np.asarray(factors * found.sigmas)

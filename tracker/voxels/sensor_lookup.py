@@ -1,0 +1,77 @@
+"""Look up raw pixels from undistorted sensor coordinates, so that only the rigid motion is computed at run time.
+
+MTHC01 Eq. 1 maps distorted to undistorted coordinates (Tsai). Cameras here have OpenCV's model, which maps undistorted
+to distorted ones, so that the table is filled without inverting it. The table depends on the lens alone and holds for
+any pose of the camera.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera
+
+_STEPS_PER_PX = 2
+"""Entries of the table per raw pixel along each axis."""
+_MAX_ENTRIES = 4096
+"""Largest number of entries along each axis. Wide lenses have long borders."""
+BEYOND_LENS = -32000
+"""Column and row of what lies beyond the lens, where nothing is seen."""
+_BORDER_SAMPLES = 64
+
+
+class SensorLookup(NamedTuple):
+    """Raw pixel of each quantized point of the undistorted sensor plane at focal length 1."""
+
+    pixels: NDArray[np.int16]
+    """Column and row of the raw pixel, (rows, columns, 2). It may lie outside the image."""
+    corner: Array
+    """Sensor coordinates x, y of the first entry, (2,)."""
+    step: float
+    """Distance between entries along both axes."""
+    px_per_unit: float
+    """Upper bound of the distance of two entries' pixels along an image axis, divided by their distance."""
+
+
+def sensor_lookup(camera: Camera) -> SensorLookup:
+    """Return the table of a camera, cached by its lens and image size.
+
+    It covers the image and half a pixel around it.
+    """
+    return _lookup(camera.size, camera.K.tobytes(), camera.distortion.tobytes())
+
+
+@lru_cache(maxsize=32)
+def _lookup(size: tuple[int, int], K: bytes, distortion: bytes) -> SensorLookup:
+    camera = Camera("", size, np.frombuffer(K).reshape(3, 3), np.frombuffer(distortion), np.eye(4))
+    low, high = _border(camera)
+    step = max(1 / (_STEPS_PER_PX * max(camera.K[0, 0], camera.K[1, 1])), float((high - low).max()) / _MAX_ENTRIES)
+    n_columns, n_rows = (int(np.ceil(n)) + 1 for n in (high - low) / step)
+    x, y = np.meshgrid(low[0] + step * np.arange(n_columns), low[1] + step * np.arange(n_rows))
+    points = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3)
+    exact = camera.project(points)
+    # Beyond the lens the polynomial bends back: nothing is seen there.
+    exact[~camera.within_lens(camera.pinhole.project(points))] = BEYOND_LENS
+    pixels = np.round(np.clip(exact, BEYOND_LENS, -BEYOND_LENS)).astype(np.int16).reshape(n_rows, n_columns, 2)
+    return SensorLookup(pixels, low, step, _steepest(exact.reshape(n_rows, n_columns, 2)) / step)
+
+
+def _border(camera: Camera) -> tuple[Array, Array]:
+    """Return the lowest and highest sensor coordinates of the image, (2,) each."""
+    width, height = camera.size
+    u, v = np.linspace(-1, width, _BORDER_SAMPLES), np.linspace(-1, height, _BORDER_SAMPLES)
+    sides = [np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in ((u, -1), (u, height), (-1, v), (width, v))]
+    rays = camera.rays(np.concatenate(sides))
+    xy = rays[:, :2] / rays[:, 2:]
+    return xy.min(axis=0), xy.max(axis=0)
+
+
+def _steepest(pixels: Array) -> float:
+    """Return the largest change of a pixel coordinate per step of the table, for a step in any direction of a box."""
+    valid = np.asarray((pixels > BEYOND_LENS).all(axis=-1), dtype=bool)
+    along_x = np.abs(np.diff(pixels, axis=1))[valid[:, 1:] & valid[:, :-1]].max(axis=0)
+    along_y = np.abs(np.diff(pixels, axis=0))[valid[1:] & valid[:-1]].max(axis=0)
+    return float((along_x + along_y).max())

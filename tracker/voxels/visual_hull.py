@@ -1,0 +1,147 @@
+"""The visual hull of the people in a frame: bounded, carved, separated into figures, and checked against the views."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from tracker.errors import TrackerError
+from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.geometry.arrays import Array
+from tracker.voxels.bounding_volume import bounding_volume
+from tracker.voxels.carving import DEFAULT_CARVING, Carver, CarveSettings
+from tracker.voxels.voxel_grid import VoxelGrid, Voxels
+
+MIN_FIGURE_M3 = 0.02
+"""Smallest volume of a figure, cubic metres: half of a small child."""
+_MIN_SHARE = 0.25
+"""Smallest volume of a figure, as a share of the largest one."""
+_MIN_COVERAGE = 0.6
+"""Share of its silhouette that the hull explains in a view that agrees with the others."""
+_MIN_GAIN = 0.15
+"""Gain of the others' mean coverage above which a view is left out as broken."""
+_MIN_LEAD = 0.05
+"""Lead of that gain over the gain without any other view."""
+
+
+class VisualHull(NamedTuple):
+    """The voxels of all people of a frame."""
+
+    figures: tuple[Voxels, ...]
+    """Connected figures of the size of a person, the largest first."""
+    coverages: Array
+    """Share of each view's silhouette that the hull explains, (n_views,); NaN for an empty silhouette."""
+    broken: tuple[str, ...]
+    """Names of the views that were left out, because the others agree without them."""
+
+
+def carve_people(
+    silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings = DEFAULT_CARVING
+) -> VisualHull:
+    """Carve the people of a frame.
+
+    A view that the others contradict is left out if at least two others remain.
+
+    Args:
+        silhouettes: of all views.
+        size_m: edge of a voxel, metres.
+        settings: which voxels agree with the silhouettes.
+
+    Raises:
+        TrackerError: fewer than two views show anybody, the views contradict each other, or nothing of the size of a
+            person is found.
+    """
+    seen = [s for s in silhouettes if not s.is_empty]
+    voxels, found, broken = _carve_consistent(seen, size_m, settings)
+    names = [s.camera.name for s in seen]
+    figures = (
+        [v for v in voxels.components(_MIN_SHARE) if v.volume_m3 >= MIN_FIGURE_M3] if voxels.occupied.any() else []
+    )
+    if not figures:
+        raise TrackerError(
+            f"expected a figure of at least {1000 * MIN_FIGURE_M3:.0f} litres where the silhouettes meet, found "
+            f"{1000 * voxels.volume_m3:.0f} litres in all; check that no camera has moved, and the background"
+        )
+    poor = [f"{n} {100 * c:.0f}%" for n, c in zip(names, found, strict=True) if c < _MIN_COVERAGE]
+    if len(poor) > (broken >= 0):
+        raise TrackerError(
+            f"expected silhouettes that agree, found views of which little can be explained ({', '.join(poor)}); check "
+            "that no camera has moved, that the videos start at the same time, and the background"
+        )
+    by_name = dict(zip(names, found, strict=True))
+    of_views = np.array([by_name.get(s.camera.name, np.nan) for s in silhouettes])
+    return VisualHull(tuple(f.cropped() for f in figures), of_views, (names[broken],) if broken >= 0 else ())
+
+
+def coverages(voxels: Voxels, silhouettes: Sequence[ViewSilhouette]) -> Array:
+    """Return the share of each view's silhouette that projected voxels cover, (n_views,)."""
+    indices = voxels.indices[voxels.is_surface]
+    return np.array([_coverage(voxels.grid.centers(indices), voxels.grid.size_m, s) for s in silhouettes])
+
+
+def _carve(silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings) -> Voxels:
+    box = bounding_volume(silhouettes, settings.missing)
+    return Carver(silhouettes).carve(VoxelGrid.over(box.low, box.high, size_m), settings)
+
+
+def _carve_consistent(
+    silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings
+) -> tuple[Voxels, Array, int]:
+    """Carve all views, or all but the one without which the others agree much better.
+
+    A view that is left out must stand out: where the others agree about as well without another view, none is.
+
+    Returns:
+        The voxels, each view's coverage, (n_views,), and the index of the view that was left out; -1 if none was.
+    """
+    whole: tuple[Voxels, Array] | None = None
+    contradiction: TrackerError | None = None
+    try:
+        voxels = _carve(silhouettes, size_m, settings)
+        whole = voxels, coverages(voxels, silhouettes)
+    except TrackerError as error:
+        contradiction = error
+    n = len(silhouettes)
+    before = whole[1] if whole else np.zeros(n)
+    if n > 2 and before.min() < 1 - _MIN_GAIN:
+        without = [_without(i, silhouettes, size_m, settings) for i in range(n)]
+        gains = [float(np.delete(w[1] - before, i).mean()) if w else 0.0 for i, w in enumerate(without)]
+        best, second = (int(i) for i in np.argsort(gains)[:-3:-1])
+        chosen = without[best]
+        if chosen and gains[best] > _MIN_GAIN and gains[best] - gains[second] > _MIN_LEAD:
+            return *chosen, best
+    if whole is None:
+        raise contradiction or AssertionError
+    return *whole, -1
+
+
+def _without(
+    left_out: int, silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings
+) -> tuple[Voxels, Array] | None:
+    """Return the voxels of all views but one, and the coverages of all; None if the others contradict each other."""
+    try:
+        voxels = _carve([s for i, s in enumerate(silhouettes) if i != left_out], size_m, settings)
+    except TrackerError:
+        return None
+    return voxels, coverages(voxels, silhouettes)
+
+
+def _coverage(points: Array, size_m: float, silhouette: ViewSilhouette) -> float:
+    """Return the share of a silhouette within squares of the size of a voxel around projected surface voxels.
+
+    Squares of the hull's surface cover the inside too, because the far and the near side are projected.
+    """
+    camera, mask = silhouette.camera, silhouette.mask
+    depths = camera.depths(points)
+    near = depths > size_m
+    if not near.any():
+        return 0.0
+    px = camera.project(points[near])
+    half = int(np.ceil(0.5 * size_m * camera.K[0, 0] / float(np.median(depths[near])))) + 1
+    painted = np.zeros(mask.shape, np.uint8)
+    inside = (px >= 0).all(axis=1) & (px <= np.array(camera.size) - 1).all(axis=1)
+    columns, rows = np.round(px[inside]).astype(int).T
+    painted[rows, columns] = 1
+    painted = np.asarray(cv2.dilate(painted, np.ones((2 * half + 1, 2 * half + 1), np.uint8)), np.uint8)
+    return float(np.count_nonzero(painted[mask]) / np.count_nonzero(mask))
