@@ -1,5 +1,6 @@
 """The model behind the statuses: fit it, leave one body out, and count what its statuses are worth."""
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from tracker.tracking import confidence
 OFF_MM, LOST_MM = 100.0, 150.0
 """A limb is off, and lost, where the error of a joint is larger."""
 UNSEARCHED_WEIGHT, REPLACED_WEIGHT = 0.3, 0.5
-"""Weight of a limb that was tracked without search, where more is lost, and of a pose that the backward pass replaced."""
+"""Weight of a limb that was tracked without search, where more is lost, and of a pose that was replaced."""
 RIDGE = 3e-3
 
 
@@ -201,7 +202,7 @@ def reliability(
 ) -> list[tuple[float, float, int]]:
     """Return the mean probability, the share that happened and the number of rows between each two edges."""
     out = []
-    for low, high in zip(edges, edges[1:], strict=False):
+    for low, high in itertools.pairwise(edges):
         own = (probabilities >= low) & (probabilities < high)
         if own.any():
             out.append((float(probabilities[own].mean()), float(happened[own].mean()), int(own.sum())))

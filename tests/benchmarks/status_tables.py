@@ -1,5 +1,6 @@
 """Write what the statuses are worth: the section of docs/accuracy.md, and the picture of the reliability."""
 
+import itertools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -43,7 +44,7 @@ def write_results(runs: Sequence[Run], outside: Sequence[Run]) -> None:
     lines = [
         "## Statuses",
         "",
-        "Each frame has a status: good, doubtful or lost. Made by `python tests/benchmarks/calibrate_status.py`. A frame "
+        "Each frame has a status: good, doubtful or lost (`python tests/benchmarks/calibrate_status.py`). A frame "
         "is lost when a limb joint is off by more than 150 mm, off when by more than 100 mm, and fine when not off. "
         "Rows of simulated people are by weights fitted to all other people; recordings are by the tracker's own "
         "statuses, and nothing is fitted to them. Each cell: lost frames that are flagged (doubtful or lost) / good "
@@ -116,7 +117,7 @@ def _reliability_table(runs: Sequence[Run], odds: Sequence[Array]) -> list[str]:
     columns = []
     for curve in _curves(runs, odds):
         columns.append(dict(zip(curve.bins, curve.points, strict=True)))
-    for low, high in zip(EDGES, EDGES[1:], strict=False):
+    for low, high in itertools.pairwise(EDGES):
         cells = [_reliability_cell(column.get((low, high))) for column in columns]
         lines.append(f"| {low:.0%} to {high:.0%} | {' | '.join(cells)} |")
     return lines
@@ -134,7 +135,7 @@ def _curves(runs: Sequence[Run], odds: Sequence[Array]) -> list[Curve]:
         happened: NDArray[np.bool_] = errors_mm > limit_mm
         points = [
             ((low, high), reliability(probabilities[:, i], happened, (low, high)))
-            for low, high in zip(EDGES, EDGES[1:], strict=False)
+            for low, high in itertools.pairwise(EDGES)
         ]
         known = [(span, found[0]) for span, found in points if found]
         out.append(Curve(name, [span for span, _ in known], [point for _, point in known]))
