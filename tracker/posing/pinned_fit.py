@@ -1,6 +1,7 @@
 """Fit the people on one frame to pins and edges.
 
-Pins alone first bring a body near. Then the edges are added, at first with twice the outlier distance.
+Pins first bring a body near, while points that were placed by hand stay. Then the edges are added, at first with twice
+the outlier distance.
 """
 
 from collections.abc import Iterable, Sequence
@@ -63,24 +64,25 @@ def fit_frame(
         views: evidence of each view. Without it only pins count, and people without pins stay.
         settings: settings of the contour residuals.
         people: indices of the people to fit.
-        constraints: locked degrees of freedom and held points of each person; none by default. Edges move a held point
-            by some centimetres at most. A pin of a point overrules it.
+        constraints: locked degrees of freedom and held points of each person; none by default. Pins of other points and
+            edges move a held point by some centimetres at most. A pin of the point itself overrules it.
     """
     people = list(people)
     models, now = [b.model for b in bodies], [np.array(b.values) for b in bodies]
     constraints = constraints or [Constraints()] * len(models)
     active = [c.active_dofs for c in constraints]
+    # Where they were placed: pins of the trunk must not carry placed limbs away.
+    holds = [
+        holds_at(m, v, {n: seen for n, seen in c.held.items() if n not in {pin.point for pin in p}}).scaled(1 / _HELD_M)
+        for m, v, c, p in zip(models, now, constraints, pins, strict=True)
+    ]
     blocks = [pin_block(m, cameras, p) if p else None for m, p in zip(models, pins, strict=True)]
     pinned = [np.zeros(len(m.value_names), dtype=bool) for m in models]
     for person in people:
         block, model = blocks[person], models[person]
         if block is not None:
             sigma = np.where(model.dof_is_length, _PLACE_M, np.where(model.dof_joint == 0, _TRUNK_RAD, _LIMB_RAD))
-            now[person], pinned[person] = _fit_one(model, now[person], block, [], sigma, active[person])
-    holds = [
-        holds_at(m, v, {n: seen for n, seen in c.held.items() if n not in {pin.point for pin in p}}).scaled(1 / _HELD_M)
-        for m, v, c, p in zip(models, now, constraints, pins, strict=True)
-    ]
+            now[person], pinned[person] = _fit_one(model, now[person], block, [holds[person]], sigma, active[person])
     for reach in _REACHES if views is not None else ():
         for person in people:
             assert views is not None
