@@ -4,7 +4,7 @@
 clutter and noise. It tracks them with the generic body of the height that their joints give, and with the body acquired
 from one of the recordings: with two to eight cameras, at half the frame rate, without backgrounds, and without the
 search for lost limbs. The weights are fitted to all of that. What they are worth is measured on each body by weights
-fitted to the others, and on the recordings in DIR, to which nothing is fitted, by the statuses of the tracker.
+fitted to the others, and on the recordings in DIR, to which nothing is fitted.
 
 It prints the weights, to be copied into the code, and writes the tables and docs/images/reliability.svg. `--work DIR`
 keeps scenes, bodies and features there: after a change of the tracker, remove `DIR/rows` and run it again.
@@ -181,7 +181,7 @@ class _RowList:
                 own = [errors[n] for n in _joints_of(model, limb.name) if n in errors]
                 self._rows.append((
                     confidence.features(quality, limb), max(own, default=np.nan), worst, person, found.frame, False,
-                    quality.is_unseen, bool(found.alternatives[person]), found.statuses[person],
+                    quality.is_unseen, bool(found.alternatives[person]),
                 ))  # fmt: skip
 
     def replace(self, better: PoseEstimate, person: int) -> None:

@@ -38,8 +38,6 @@ class LimbRows(NamedTuple):
     """Whether no edge is near the body, (n,)."""
     alternatives: NDArray[np.bool_]
     """Whether other poses are about as good, (n,)."""
-    status: NDArray[np.str_]
-    """Status that the tracker gave the person in the frame, (n,)."""
 
 
 class Run(NamedTuple):
@@ -157,17 +155,22 @@ def held_out_odds(runs: Sequence[Run]) -> list[Array]:
         odds = np.empty((len(run.rows.frame), 2))
         for person, body in enumerate(run.bodies):
             own = run.rows.person == person
-            odds[own] = (run.rows.features[own] @ models[body][:-2])[:, None] + models[body][-2:]
+            odds[own] = odds_by(models[body], run.rows.features[own])
         out.append(odds)
     return out
 
 
-def statuses(rows: LimbRows, odds: Array | None = None) -> Statuses:
-    """Return the statuses of the final poses: by log odds of off and lost, (n, 2), or as the tracker gave them."""
+def odds_by(weights: Array, features: Array) -> Array:
+    """Return the log odds of off and lost, (n, 2), by weights and constants as `fit_weights` returns them."""
+    return np.asarray((features @ weights[:-2])[:, None] + weights[-2:])
+
+
+def statuses(rows: LimbRows, odds: Array) -> Statuses:
+    """Return the statuses of the final poses by log odds of off and lost, (n, 2)."""
     out: list[tuple[str, float, int]] = []
     for own in _by_frame(rows):
         i = own[0]
-        called = str(rows.status[i]) if odds is None else _status(odds[own], rows.unseen[i], rows.alternatives[i])
+        called = _status(odds[own], rows.unseen[i], rows.alternatives[i])
         out.append((called, float(rows.worst_mm[i]), int(rows.person[i])))
     status, worst, person = zip(*out, strict=True)
     return Statuses(np.array(status), np.array(worst), np.array(person))

@@ -16,6 +16,7 @@ from status_model import (
     Statuses,
     fitted,
     held_out_odds,
+    odds_by,
     pooled,
     reliability,
     statuses,
@@ -38,7 +39,8 @@ def write_results(runs: Sequence[Run], outside: Sequence[Run]) -> None:
         runs: of the simulated recordings, to which the weights are fitted.
         outside: of recordings to which nothing is fitted.
     """
-    print("weights, constants of off and lost:", np.round(fitted(runs), 3).tolist())
+    weights = fitted(runs)
+    print("weights, constants of off and lost:", np.round(weights, 3).tolist())
     odds = held_out_odds(runs)
     found = [statuses(r.rows, o) for r, o in zip(runs, odds, strict=True)]
     lines = [
@@ -46,11 +48,11 @@ def write_results(runs: Sequence[Run], outside: Sequence[Run]) -> None:
         "",
         "Each frame has a status: good, doubtful or lost (`python tests/benchmarks/calibrate_status.py`). A frame "
         "is lost when a limb joint is off by more than 150 mm, off when by more than 100 mm, and fine when not off. "
-        "Rows of simulated people are by weights fitted to all other people; recordings are by the tracker's own "
-        "statuses, and nothing is fitted to them. Each cell: lost frames that are flagged (doubtful or lost) / good "
+        "Rows of simulated people are by weights fitted to all other people, those of recordings by weights fitted to "
+        "all simulated people. Each cell: lost frames that are flagged (doubtful or lost) / good "
         "frames that are off / flagged frames that are fine.",
         "",
-        *_table(runs, found, outside),
+        *_table(runs, found, [(r, statuses(r.rows, odds_by(weights, r.rows.features))) for r in outside]),
         "",
         "![Share of limbs that were off or lost, by the probability that the tracker gave](images/reliability.svg)",
         "",
@@ -60,8 +62,8 @@ def write_results(runs: Sequence[Run], outside: Sequence[Run]) -> None:
     (DOCS / "images" / "reliability.svg").write_text(reliability_svg(_curves(runs, odds)), "utf-8")
 
 
-def _table(runs: Sequence[Run], found: Sequence[Statuses], outside: Sequence[Run]) -> list[str]:
-    """Return the rows of Markdown."""
+def _table(runs: Sequence[Run], found: Sequence[Statuses], outside: Sequence[tuple[Run, Statuses]]) -> list[str]:
+    """Return the rows of Markdown: of the simulated recordings, and of those outside."""
     lines = ["| recordings | frames | generic body | frames | acquired body |", "|---|---|---|---|---|"]
     simulated = list(zip(runs, found, strict=True))
     alone = sorted({r.bodies[0] for r in runs if len(r.bodies) == 1})
@@ -75,14 +77,13 @@ def _table(runs: Sequence[Run], found: Sequence[Statuses], outside: Sequence[Run
             if any(r.condition == condition and (len(r.bodies) > 1) == several for r in runs):
                 lines.append(_row(title, simulated, _of(condition, several)))
     lines.append(_row("**all with 4 cameras and backgrounds**", simulated, lambda r: not r.condition))
-    called = [(r, statuses(r.rows)) for r in outside]
-    for name in dict.fromkeys(r.recording for r in outside):
-        people = next(len(r.bodies) for r in outside if r.recording == name)
+    for name in dict.fromkeys(r.recording for r, _ in outside):
+        people = next(len(r.bodies) for r, _ in outside if r.recording == name)
         for person in range(people):
             title = f"`{name}`" + (f", person {person + 1}" if people > 1 else "")
-            lines.append(_row(title, called, lambda r, n=name: r.recording == n, person))
+            lines.append(_row(title, outside, lambda r, n=name: r.recording == n, person))
     if outside:
-        lines.append(_row("**all recordings**", called, lambda _: True))
+        lines.append(_row("**all recordings**", outside, lambda _: True))
     return lines
 
 

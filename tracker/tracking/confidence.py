@@ -34,9 +34,9 @@ _MIN_TRUST = 0.5
 """Silhouettes trusted less are left out."""
 _LIMIT_RAD = 0.05
 """An angle is at its limit where it is nearer, rad."""
-_WEIGHTS = np.array([-0.257, 0.273, 1.854, 5.716, -2.457, 1.362, 5.192, -1.203])
+_WEIGHTS = np.array([-0.241, 0.309, 2.037, 8.293, -2.248, 1.241, 5.118, -0.869])
 """Weights of `features`, in their order."""
-_OFF_CONSTANT, _LOST_CONSTANT = -5.708, -6.939
+_OFF_CONSTANT, _LOST_CONSTANT = -6.34, -7.585
 """Constants of the log odds that a joint of a limb is off by more than 100 mm, and by more than 150 mm."""
 
 
@@ -45,9 +45,9 @@ def _odds(probability: float) -> float:
     return float(np.log(probability / (1.0 - probability)))
 
 
-OFF_ODDS, LOST_ODDS = _odds(0.1), _odds(0.3)
+OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.3)
 """A limb is doubtful above these log odds that a joint is off by more than 100 mm, and lost above these that one is by
-more than 150 mm."""
+more than 150 mm. To call a wrong pose good is the worse error."""
 _DOUBTFUL_ODDS = OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT
 """Log odds of a lost limb where the odds that it is off are `OFF_ODDS`."""
 DOUBTFUL_FROM, LOST_FROM = (float(1.0 / (1.0 + np.exp(-odds))) for odds in (_DOUBTFUL_ODDS, LOST_ODDS))

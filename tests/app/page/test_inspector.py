@@ -82,16 +82,10 @@ def test_stride_and_cameras_are_kept_and_only_known_cameras_taken(page, opened):
 @pytest.mark.parametrize(
     "kept",
     [
-        3,
-        {"order": 7},
-        {"stride": 0},
+        3, {"order": 7}, {"order": "2"}, {"estimate": "guess"}, {"later": True}, ["order"], {"stride": 0},
         {"cameras": ["roof"]},
-        {"order": "2"},
-        {"estimate": "guess"},
-        {"later": True},
-        ["order"],
     ],
-)
+)  # fmt: skip
 def test_kept_settings_that_cannot_be_used_are_passed_over(opened, kept):
     opened()._session_state.saver.store_setting("track_settings", kept)
     settings = Page(opened()).updates()["settings"]
