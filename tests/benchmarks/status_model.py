@@ -77,6 +77,8 @@ class Statuses(NamedTuple):
     status: NDArray[np.str_]
     worst_mm: Array
     person: NDArray[np.int64]
+    odds: Array
+    """Highest log odds of a limb that it is off."""
 
     def counts(self, of: NDArray[np.bool_] | None = None) -> Counts:
         """Count the frames of some persons; of all by default."""
@@ -167,13 +169,12 @@ def odds_by(weights: Array, features: Array) -> Array:
 
 def statuses(rows: LimbRows, odds: Array) -> Statuses:
     """Return the statuses of the final poses by log odds of off and lost, (n, 2)."""
-    out: list[tuple[str, float, int]] = []
+    out: list[tuple[str, float, int, float]] = []
     for own in _by_frame(rows):
         i = own[0]
         called = _status(odds[own], rows.unseen[i], rows.alternatives[i])
-        out.append((called, float(rows.worst_mm[i]), int(rows.person[i])))
-    status, worst, person = zip(*out, strict=True)
-    return Statuses(np.array(status), np.array(worst), np.array(person))
+        out.append((called, float(rows.worst_mm[i]), int(rows.person[i]), float(odds[own, 0].max())))
+    return Statuses(*(np.array(column) for column in zip(*out, strict=True)))
 
 
 def _status(odds: Array, unseen: bool, alternatives: bool) -> str:
@@ -182,6 +183,13 @@ def _status(odds: Array, unseen: bool, alternatives: bool) -> str:
     if unseen or lost.any():
         return "lost"
     return "doubtful" if off.any() or alternatives else "good"
+
+
+def first_off(found: Sequence[Statuses], shares: Sequence[float]) -> list[float]:
+    """Return which share of the frames that are likeliest off is off, for each share of all frames."""
+    odds, worst = (np.concatenate([getattr(s, name) for s in found]) for name in ("odds", "worst_mm"))
+    off = (worst > OFF_MM)[np.argsort(-odds, kind="stable")]
+    return [float(off[: max(1, round(share * len(off)))].mean()) for share in shares]
 
 
 def _by_frame(rows: LimbRows) -> Iterable[NDArray[np.int64]]:

@@ -14,6 +14,7 @@ from status_model import (
     Counts,
     Run,
     Statuses,
+    first_off,
     fitted,
     held_out_odds,
     odds_by,
@@ -28,6 +29,8 @@ from tracker.geometry.arrays import Array
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 EDGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 """Bounds of the groups of limbs whose probabilities are compared with what happened."""
+FIRST = (0.01, 0.02, 0.05, 0.1, 1.0)
+"""Shares of all frames, the likeliest off first."""
 CONDITIONS = ("2 cameras", "3 cameras", "8 cameras", "half the frame rate", "no backgrounds")
 BODIES = ("generic", "acquired")
 
@@ -57,6 +60,11 @@ def write_results(runs: Sequence[Run], outside: Sequence[Run]) -> None:
         "![Share of limbs that were off or lost, by the probability that the tracker gave](images/reliability.svg)",
         "",
         *_reliability_table(runs, odds),
+        "",
+        "The list of doubts begins with the likeliest. Share of frames that are off, among the first of all frames in "
+        "the order of the probability:",
+        "",
+        *_ranking_table(runs, found),
     ]
     put_section(DOCS / "accuracy.md", "\n".join(lines) + "\n")
     (DOCS / "images" / "reliability.svg").write_text(reliability_svg(_curves(runs, odds)), "utf-8")
@@ -121,6 +129,20 @@ def _reliability_table(runs: Sequence[Run], odds: Sequence[Array]) -> list[str]:
     for low, high in itertools.pairwise(EDGES):
         cells = [_reliability_cell(column.get((low, high))) for column in columns]
         lines.append(f"| {low:.0%} to {high:.0%} | {' | '.join(cells)} |")
+    return lines
+
+
+def _ranking_table(runs: Sequence[Run], found: Sequence[Statuses]) -> list[str]:
+    """Return the rows of Markdown."""
+    groups: dict[str, Callable[[Run], bool]] = {
+        "4 cameras, one person": lambda r: not r.condition and len(r.bodies) == 1,
+        "4 cameras, several people": lambda r: not r.condition and len(r.bodies) > 1,
+        "half the frame rate": lambda r: r.condition == "half the frame rate",
+    }
+    lines = [f"| recordings | {' | '.join(f'first {s:.0%}' for s in FIRST)} |", "|---" * (1 + len(FIRST)) + "|"]
+    for title, keep in groups.items():
+        own = [s for r, s in zip(runs, found, strict=True) if r.searched and keep(r)]
+        lines.append(f"| {title} | {' | '.join(f'{x:.0%}' for x in first_off(own, FIRST))} |")
     return lines
 
 
