@@ -1,0 +1,71 @@
+"""Print the errors of first poses against reference joints: `python tests/recipes/start_errors.py SESSION TRC...`.
+
+For each person of the session one TRC file. Rows: every few frames, the mean distance of the 12 limb joints before and
+after the fit in mm, whether left is left, the distance of the head, and what was not resolved. `--method axis` takes
+the axes of the silhouettes (GD96 Sect. 4.1) instead of voxels.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from tracker.errors import TrackerError
+from tracker.evaluation.references import read_joints
+from tracker.evidence.observer import Observer
+from tracker.footage.recording import Recording
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.pipeline.first_pose import find_first_pose
+from tracker.session.session import load_session
+
+
+def main() -> None:
+    options = argparse.ArgumentParser()
+    options.add_argument("session", type=Path)
+    options.add_argument("references", type=Path, nargs="+")
+    options.add_argument("--method", default="voxels")
+    options.add_argument("--every", type=int, default=5)
+    arguments = options.parse_args()
+    session = load_session(arguments.session)
+    references = [read_joints(path, session.fps, None, "x,y,z") for path in arguments.references]
+    with Recording(session.cameras) as recording:
+        observer = Observer(session.cameras, recording)
+        rows = []
+        for frame in range(0, session.n_frames, arguments.every):
+            for person in range(len(session.people)):
+                try:
+                    found = find_first_pose(session, observer, person, [frame], arguments.method)
+                except TrackerError as error:
+                    print(f"{frame:4d} {session.people[person].name}: {error}")
+                    continue
+                rows.append(_row(found, references, frame))
+    before, after, sides = np.array([r[:3] for r in rows]).T
+    print(f"{len(rows)} starts: before {before.mean():.0f} mm, worst {before.max():.0f}; ", end="")
+    print(f"after {after.mean():.0f} mm, worst {after.max():.0f}; left right in {sides.mean():.0%}")
+
+
+def _row(found, references, frame):
+    """Errors of one start against the reference that it is nearest to."""
+    errors = []
+    for reference in references:
+        row = int(np.flatnonzero(reference.frames == frame)[0])
+        points = dict(zip(reference.names, reference.points[row], strict=True))
+        before, after = (_errors(found.model, pose, points) for pose in (found.start, found.fitted.pose))
+        left = points["left_shoulder"] - points["right_shoulder"] + points["left_hip"] - points["right_hip"]
+        own = dict(zip(found.model.point_names, found.model.points_world(found.fitted.pose), strict=True))
+        mine = own["left_shoulder"] - own["right_shoulder"] + own["left_hip"] - own["right_hip"]
+        errors.append((np.mean(before), np.mean(after), float(mine @ left > 0)))
+    best = min(errors)
+    listed = " ".join(found.notes)
+    print(f"{frame:4d} before {best[0]:4.0f} after {best[1]:4.0f} left {'right' if best[2] else 'WRONG'}", end=" ")
+    print(f"{found.model.height_m:.2f} m {found.fitted.status} {found.fitted.cost_px:.2f} px {listed[:150]}")
+    return best
+
+
+def _errors(model, pose, points):
+    own = dict(zip(model.point_names, model.joint_centers_world(pose), strict=True))
+    return [1000 * float(np.linalg.norm(own[n] - points[n])) for n in LIMB_JOINTS if np.isfinite(points[n]).all()]
+
+
+if __name__ == "__main__":
+    main()
