@@ -34,7 +34,7 @@ def main() -> None:
         for frame in range(0, session.n_frames, arguments.every):
             for person in range(len(session.people)):
                 try:
-                    found = find_first_pose(session, observer, person, [frame], arguments.method)
+                    found = find_first_pose(session, observer, person, [frame], arguments.method.split(","))
                 except TrackerError as error:
                     print(f"{frame:4d} {session.people[person].name}: {error}")
                     continue
@@ -50,7 +50,7 @@ def _row(found, references, frame):
     for reference in references:
         row = int(np.flatnonzero(reference.frames == frame)[0])
         points = dict(zip(reference.names, reference.points[row], strict=True))
-        before, after = (_errors(found.model, pose, points) for pose in (found.start, found.fitted.pose))
+        before, after = (_errors(found.model, pose, points) for pose in (found.candidate.pose, found.fitted.pose))
         left = points["left_shoulder"] - points["right_shoulder"] + points["left_hip"] - points["right_hip"]
         own = dict(zip(found.model.point_names, found.model.points_world(found.fitted.pose), strict=True))
         mine = own["left_shoulder"] - own["right_shoulder"] + own["left_hip"] - own["right_hip"]
@@ -58,6 +58,9 @@ def _row(found, references, frame):
     best = min(errors)
     listed = " ".join(found.notes)
     print(f"{frame:4d} before {best[0]:4.0f} after {best[1]:4.0f} left {'right' if best[2] else 'WRONG'}", end=" ")
+    print(
+        f"{found.candidate.method} {'sure' if found.is_facing_sure else 'unsure'} {found.candidate.cues:.1f}", end=" "
+    )
     print(f"{found.model.height_m:.2f} m {found.fitted.status} {found.fitted.cost_px:.2f} px {listed[:150]}")
     return best
 

@@ -51,35 +51,49 @@ class AxisStart(NamedTuple):
     """Chamfer distance between the outlines of the silhouettes and of the body, working px."""
 
 
-def search_on_axis(model: BodyModel, views: Sequence[ViewEvidence], axis: BodyAxis) -> list[AxisStart]:
-    """Return start poses of a body on its axis, the cheapest first, one for each way of facing.
+def search_on_axes(model: BodyModel, views: Sequence[ViewEvidence], axes: Sequence[BodyAxis]) -> list[AxisStart]:
+    """Return start poses of a body on one of some axes, the cheapest first, at most one for each way of facing.
 
     Args:
         model: the body.
         views: outlines of the silhouettes.
-        axis: of the body, with its head.
+        axes: places of the head that are tried; at least one.
     """
-    frames = [_frame(axis.up, 2 * np.pi * i / _N_TWISTS) for i in range(_N_TWISTS)]
-    trunks = [_trunk(model, axis, R) for R in frames]
-    cost = _cost(model, views, trunks[0])
-    coarse = [_searched(cost, model, pose, (None,)) for pose in trunks]
-    order = np.argsort([c for _, c in coarse], kind="stable")
-    chosen = list(order[:_N_KEPT])
+    coarse = [_Coarse(axis, *start) for axis in axes for start in _coarse(model, views, axis)]
+    coarse.sort(key=lambda c: c.cost_px)
+    chosen = coarse[:_N_KEPT]
     # A body looks nearly the same from behind: the best twist that faces the other way is searched on too.
-    facing = [R[:, 0] for R in frames]
-    chosen += [i for i in order if facing[i] @ facing[order[0]] < np.cos(_APART_RAD)][:1]
-    found = []
-    for i in dict.fromkeys(int(i) for i in chosen):
-        pose, _ = _searched(cost, model, coarse[i][0], _FINER_RAD)
-        for step in search(cost, [pose], _LAST):
-            pose, px = step.best[0], step.best_px
-        found.append(AxisStart(axis, pose, facing[i], px))
+    chosen += [c for c in coarse[_N_KEPT:] if c.forward @ coarse[0].forward < np.cos(_APART_RAD)][:1]
+    cost, found = _cost(model, views, coarse[0].pose), []
+    for start in chosen:
+        pose, _ = _searched(cost, model, start.pose, _FINER_RAD)
+        *_, last = search(cost, [pose], _LAST)
+        found.append(AxisStart(start.axis, last.best[0], start.forward, last.best_px))
     found.sort(key=lambda f: f.cost_px)
     kept: list[AxisStart] = []
-    for start in found:
-        if all(start.forward @ other.forward < np.cos(_APART_RAD) for other in kept):
-            kept.append(start)
+    for own in found:
+        if all(own.forward @ other.forward < np.cos(_APART_RAD) for other in kept):
+            kept.append(own)
     return kept
+
+
+class _Coarse(NamedTuple):
+    axis: BodyAxis
+    pose: Array
+    forward: Array
+    cost_px: float
+
+
+def _coarse(model: BodyModel, views: Sequence[ViewEvidence], axis: BodyAxis) -> list[tuple[Array, Array, float]]:
+    """Return for each twist on an axis the best pose among a few, its direction forwards and its cost, px."""
+    found, near, cost = [], None, None
+    for i in range(_N_TWISTS):
+        R = _frame(axis.up, 2 * np.pi * i / _N_TWISTS)
+        near = _trunk(model, axis, R, near)
+        cost = cost or _cost(model, views, near)
+        pose, px = _searched(cost, model, near, (None,))
+        found.append((pose, R[:, 0], px))
+    return found
 
 
 def _cost(model: BodyModel, views: Sequence[ViewEvidence], pose: Array) -> ChamferCost:
@@ -97,19 +111,24 @@ def _frame(up: Array, twist: float) -> Array:
     return np.column_stack([forward, np.cross(up, forward), up])
 
 
-def _trunk(model: BodyModel, axis: BodyAxis, R: Array) -> Array:
-    """Return the pose with a straight trunk in a frame and hanging limbs, (n_values,)."""
+def _trunk(model: BodyModel, axis: BodyAxis, R: Array, near: Array | None) -> Array:
+    """Return the pose with a straight trunk in a frame and hanging limbs, (n_values,).
+
+    Args:
+        model: the body.
+        axis: where the head is.
+        R: the frame, (3, 3).
+        near: pose at a twist nearby, (n_values,), if there is one.
+    """
     own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
     middle = (own["left_shoulder"] + own["right_shoulder"]) / 2
     place = rigid.transform(R, axis.top - SHOULDERS * model.height_m * axis.up)
     known = {n: rigid.apply(place, p - middle) for n, p in own.items()}
-    near = fit_to_points(model, {n: known[n] for n in _TRUNK if n in known}).pose
-    return fit_to_points(model, known, near).pose
+    start = near if near is not None else fit_to_points(model, {n: known[n] for n in _TRUNK if n in known}).pose
+    return fit_to_points(model, known, start).pose
 
 
-def _searched(
-    cost: ChamferCost, model: BodyModel, pose: Array, spreads: Sequence[float | None]
-) -> tuple[Array, float]:
+def _searched(cost: ChamferCost, model: BodyModel, pose: Array, spreads: Sequence[float | None]) -> tuple[Array, float]:
     """Search the limbs one after the other, round by round; return the best pose and its cost, px.
 
     Args:

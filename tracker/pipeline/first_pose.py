@@ -1,4 +1,9 @@
-"""Find the first pose of a person in a session with nobody's help (MTHC01 Sect. 3), and store it."""
+"""Find the first pose of a person in a session with nobody's help, and store it.
+
+On each frame that is tried every method gives start poses (`tracker.initialization.candidates`), one for each way of
+facing. Each is fitted to the contours. The best are tracked over a few frames in both directions, and the cheapest track
+is kept.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -13,20 +18,32 @@ from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
-from tracker.initialization.start_fit import FittedStart, fit_starts
-from tracker.initialization.voxel_start import FigureParts, locate_parts, measured_height, start_pose, turned_round
+from tracker.initialization.candidates import METHODS, Candidate, Scene, StartMethod
+from tracker.initialization.start_fit import FittedStart, fit_start
+from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
 from tracker.session.session import Session, save_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 from tracker.store.stored_poses import read_stored_poses
+from tracker.voxels.figure_masks import figure_masks
 from tracker.voxels.visual_hull import VisualHull, carve_people
 from tracker.voxels.voxel_grid import Voxels
 
 VOXEL_M = 0.025
 """Edge of a voxel, metres."""
-_TRACK_FRAMES = (3, 6)
-"""Frames after (or before) the first pose over which starts are compared."""
+_TRACK_STEPS = (2, 4, 6)
+"""Frames after and before the first pose over which starts are compared."""
+_MOTION_FRAMES = 6
+"""Frames over which the motion of a figure is measured."""
+_N_TRACKED = 4
+"""Starts of a frame that are tracked."""
+_CUES_PX = 0.05
+"""What a cue for the direction counts against the cost of a track, px."""
+_SURE_RATIO = 1.05
+"""Ratio of the cost of the cheapest track that faces the other way above which left and right are known."""
+_OPPOSITE = 0.0
+"""Largest cosine of the angle between two directions that count as opposite."""
 _OWN_M = 0.4
 """A figure that is closer to the trunk of another person with a pose is that person, metres."""
 _MAX_HULL_M3 = 0.25
@@ -39,32 +56,36 @@ class FirstPose(NamedTuple):
     """A first pose and how it was found."""
 
     frame: int
-    model: BodyModel
-    """The body; of another height than before where it was measured."""
-    parts: FigureParts
-    """What the voxels show."""
-    start: Array
-    """Pose before the fit to contours, (n_values,)."""
+    candidate: Candidate
+    """The start before the fit to contours, and the body; of another height than before where it was measured."""
     fitted: FittedStart
+    is_facing_sure: bool
+    """Whether cues or costs tell left from right."""
     notes: tuple[str, ...]
     """Sentences on what is not sure."""
 
+    @property
+    def model(self) -> BodyModel:
+        """The body."""
+        return self.candidate.model
+
 
 def find_first_pose(
-    session: Session, observer: Observer, person: int, frames: Sequence[int], size_m: float = VOXEL_M,
-    say: Say = lambda text: None,
+    session: Session, observer: Observer, person: int, frames: Sequence[int],
+    methods: Sequence[StartMethod] = ("voxels",), size_m: float = VOXEL_M, say: Say = lambda text: None,
 ) -> FirstPose:  # fmt: skip
-    """Find the pose of a person on one of some frames from the voxels of the silhouettes.
+    """Find the pose of a person on one of some frames.
 
-    Where several frames are given, the one whose short track costs least is kept.
+    The frame and the start whose short track costs least are kept.
 
     Args:
         session: the session; nothing is stored.
         observer: of its recording.
         person: index of the person.
         frames: the frames to try; at least one.
+        methods: to try.
         size_m: edge of a voxel, metres.
-        say: receives a sentence on each frame that is tried.
+        say: receives a sentence on each frame that is tried. What it raises ends the search.
 
     Raises:
         TrackerError: no frame shows the person well enough. The message is that of the first frame.
@@ -74,13 +95,16 @@ def find_first_pose(
     try:
         for frame in frames:
             try:
-                found.append(_on_frame(session, observer, finder, person, frame, size_m))
+                found.append(_on_frame(_Task(session, observer, finder, person, size_m), frame, methods))
             except TrackerError as error:
                 errors.append(error)
                 say(f"frame {frame}: {error}")
                 continue
             last = found[-1]
-            say(f"frame {frame}: {last.fitted.status}, cost {last.fitted.cost_px:.2f} px over a short track")
+            say(
+                f"frame {frame}: {last.candidate.method} start, {last.fitted.status}, "
+                f"cost {last.fitted.cost_px:.2f} px over a short track"
+            )
     finally:
         finder.close()
     if not found:
@@ -111,26 +135,72 @@ def store_first_pose(session: Session, store: AnnotationStore, person: int, foun
     store.commit(f"init from {method}, frame {found.frame}", [PoseChange(who.name, found.frame, record)])
 
 
-def _on_frame(
-    session: Session, observer: Observer, finder: SilhouetteFinder, person: int, frame: int, size_m: float
-) -> FirstPose:
-    last = session.n_frames - 1
-    step = 1 if frame + _TRACK_FRAMES[-1] <= last else -1
-    track = [k for k in (frame, *(frame + step * d for d in _TRACK_FRAMES)) if 0 <= k <= last]
+class _Task(NamedTuple):
+    session: Session
+    observer: Observer
+    finder: SilhouetteFinder
+    person: int
+    size_m: float
+
+
+def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod]) -> FirstPose:
+    session, observer, finder, person, size_m = task
     silhouettes = finder.silhouettes(frame, person)
     hull = carve_people(silhouettes, size_m)
     others = _others(session, person, frame)
     figure = _own_figure(session, person, hull, others)
-    parts = locate_parts(figure, _motion(finder, figure, person, track, size_m) if len(track) > 1 else None)
-    model, height_note = _sized(session, person, parts)
-    both = [parts] if parts.is_facing_sure else [parts, turned_round(parts)]
-    starts = [start_pose(model, p) for p in both]
-    models = [model, *(b.model for b in others)]
-    poses = [starts[0], *(b.values for b in others)]
-    fitted = fit_starts(observer, models, 0, starts, track, poses)
-    kept = both[fitted.start]
-    notes = (*_notes(kept, hull, silhouettes), *height_note)
-    return FirstPose(frame, model, kept, starts[fitted.start], fitted, notes)
+    masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
+    up = up_rotation(session.up, session.floor)[:, 2]
+    scene = Scene(figure, silhouettes, masks, up, _motion(task, figure, frame))
+    candidates = _candidates(scene, session.people[person].model, methods)
+    poses, bodies = [b.values for b in others], [b.model for b in others]
+
+    def fitted(candidate: Candidate, later: Sequence[Sequence[int]]) -> FittedStart:
+        return fit_start(observer, [candidate.model, *bodies], candidate.pose, frame, later, poses)
+
+    tried = [(c, fitted(c, ())) for c in candidates]
+    kept = _kept(tried)
+    steps = _track_frames(frame, session.n_frames)
+    tracked = sorted(((c, fitted(c, steps)) for c, _ in kept), key=_weighed)
+    best, fit = tracked[0]
+    opposite = [_weighed(t) for t in tracked if t[0].forward @ best.forward < _OPPOSITE]
+    opposite += [_weighed(t) for t in tried if t[0].forward @ best.forward < _OPPOSITE and not opposite]
+    is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > _SURE_RATIO * _weighed(tracked[0]))
+    return FirstPose(frame, best, fit, is_sure, _notes(best, is_sure, hull, silhouettes))
+
+
+def _candidates(scene: Scene, model: BodyModel, methods: Sequence[StartMethod]) -> list[Candidate]:
+    """Return the starts of all methods; those that fail are left out unless all do."""
+    found, errors = list[Candidate](), list[TrackerError]()
+    is_known = not has_preset_sizes(model)
+    for method in methods:
+        try:
+            found += METHODS[method](scene, model, is_known)
+        except TrackerError as error:
+            errors.append(error)
+    if not found:
+        raise errors[0]
+    return found
+
+
+def _weighed(start: tuple[Candidate, FittedStart]) -> float:
+    """Return the cost of a start, px, less what the cues say for its direction."""
+    return start[1].cost_px - _CUES_PX * start[0].cues
+
+
+def _kept(tried: Sequence[tuple[Candidate, FittedStart]]) -> list[tuple[Candidate, FittedStart]]:
+    """Return the starts to track: the cheapest ones, and the cheapest that faces the other way than the first."""
+    order = sorted(tried, key=_weighed)
+    kept, rest = order[:_N_TRACKED], order[_N_TRACKED:]
+    if all(c.forward @ kept[0][0].forward >= _OPPOSITE for c, _ in kept):
+        kept += [t for t in rest if t[0].forward @ kept[0][0].forward < _OPPOSITE][:1]
+    return kept
+
+
+def _track_frames(frame: int, n_frames: int) -> list[list[int]]:
+    """Return the frames of the short tracks, forward and backward."""
+    both = [[frame + sign * d for d in _TRACK_STEPS] for sign in (1, -1)]
+    return [own for frames in both if (own := [k for k in frames if 0 <= k < n_frames])]
 
 
 def _others(session: Session, person: int, frame: int) -> list[PosedBody]:
@@ -179,43 +249,40 @@ def _is_in(figure: Voxels, body: PosedBody) -> bool:
     return bool(np.linalg.norm(figure.points_world.mean(axis=0) - trunk) < _OWN_M)
 
 
-def _motion(finder: SilhouetteFinder, figure: Voxels, person: int, track: Sequence[int], size_m: float) -> Array | None:
-    """Return the way of a figure from the first to the last frame of a track, (3,); None if it cannot be found."""
+def _motion(task: _Task, figure: Voxels, frame: int) -> Array | None:
+    """Return the way of a figure to a later frame, (3,); None if it cannot be found."""
+    ahead = frame + _MOTION_FRAMES < task.session.n_frames
+    later = frame + (_MOTION_FRAMES if ahead else -_MOTION_FRAMES)
+    if later < 0:
+        return None
     try:
-        later = carve_people(finder.silhouettes(track[-1], person), 2 * size_m).figures
+        found = carve_people(task.finder.silhouettes(later, task.person), 2 * task.size_m).figures
     except TrackerError:
         return None
     begin = figure.points_world.mean(axis=0)
-    ways = [f.points_world.mean(axis=0) - begin for f in later]
-    return min(ways, key=lambda way: float(np.linalg.norm(way))) * np.sign(track[-1] - track[0])
+    ways = [f.points_world.mean(axis=0) - begin for f in found]
+    return min(ways, key=lambda way: float(np.linalg.norm(way))) * (1.0 if ahead else -1.0)
 
 
-def _sized(session: Session, person: int, parts: FigureParts) -> tuple[BodyModel, tuple[str, ...]]:
-    """Return the body with the measured height where nobody has said how tall the person is, and a note without it."""
-    model = session.people[person].model
-    if not has_preset_sizes(model):
-        return model, ()
-    height_m = measured_height(parts, up_rotation(session.up, session.floor)[:, 2])
-    if height_m is None:
-        return model, (f"the height stays {model.height_m:.2f} m: the person does not stand upright",)
-    return model.with_height(height_m), ()
-
-
-def _notes(parts: FigureParts, hull: VisualHull, silhouettes: Sequence[ViewSilhouette]) -> tuple[str, ...]:
+def _notes(best: Candidate, is_sure: bool, hull: VisualHull, silhouettes: Sequence[ViewSilhouette]) -> tuple[str, ...]:
     notes = []
-    if not parts.is_facing_sure:
-        notes.append("left and right are not sure: feet, bends and motion do not tell them apart")
-    if parts.unresolved:
-        listed = ", ".join(n.replace("_", " ") for n in parts.unresolved)
+    if not is_sure:
+        notes.append("left and right are not sure: feet, bends, motion and joint limits do not tell them apart")
+    if best.unresolved:
+        listed = ", ".join(n.replace("_", " ") for n in best.unresolved)
         notes.append(f"not resolved by the voxels, which show them as one with the body: {listed}")
-    if parts.straight:
-        listed = ", ".join(n.replace("_", " ") for n in parts.straight)
+    if best.straight:
+        listed = ", ".join(n.replace("_", " ") for n in best.straight)
         notes.append(f"straight, with the middle joint by usual proportions: {listed}")
     if hull.broken:
         notes.append(f"view {hull.broken[0]} was left out: the others agree without it; check whether it has moved")
+    if best.axis is not None and best.axis.left_out:
+        notes.append(f"the axis contradicts the others in view {', '.join(best.axis.left_out)}")
     cut = [s.camera.name for s in silhouettes if _is_cut_off(s)]
     if cut:
         notes.append(f"cut off by the image in view {', '.join(cut)}")
+    if not best.is_measured:
+        notes.append(f"the height stays {best.model.height_m:.2f} m: the person does not stand upright")
     return tuple(notes)
 
 
