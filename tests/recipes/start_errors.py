@@ -15,7 +15,7 @@ from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.pipeline.first_pose import find_first_pose
+from tracker.pipeline.first_pose import find_first_poses
 from tracker.session.session import load_session
 
 
@@ -32,13 +32,13 @@ def main() -> None:
         observer = Observer(session.cameras, recording)
         rows = []
         for frame in range(0, session.n_frames, arguments.every):
-            for person in range(len(session.people)):
-                try:
-                    found = find_first_pose(session, observer, person, [frame], arguments.method.split(","))
-                except TrackerError as error:
-                    print(f"{frame:4d} {session.people[person].name}: {error}")
-                    continue
-                rows.append(_row(found, references, frame))
+            try:
+                people, methods = range(len(session.people)), arguments.method.split(",")
+                found = find_first_poses(session, observer, people, [frame], methods)
+            except TrackerError as error:
+                print(f"{frame:4d} {error}")
+                continue
+            rows += [_row(pose, references, frame) for pose in found.poses.values()]
     before, after, sides = np.array([r[:3] for r in rows]).T
     print(f"{len(rows)} starts: before {before.mean():.0f} mm, worst {before.max():.0f}; ", end="")
     print(f"after {after.mean():.0f} mm, worst {after.max():.0f}; left right in {sides.mean():.0%}")

@@ -1,4 +1,4 @@
-"""Search the torso's twist and the limbs of a body on its axis, coarse to fine, by the chamfer measure (GD96 Sect. 4.1).
+"""Search the twist and the limbs of a body on its axis, coarse to fine, by the chamfer measure (GD96 Sect. 4.1).
 
 The outlines of the silhouettes are the scene. At each of some twists the limbs are searched one after the other among
 poses spread over their joint limits. The best twists are searched on at ever smaller spreads, the trunk too at the end.

@@ -127,7 +127,7 @@ def _along(axis: MajorAxis, center: Array, direction: Array) -> tuple[Array, Arr
 
 
 def _profile(axes: Sequence[MajorAxis], center: Array, direction: Array, height_m: float) -> tuple[Array, Array]:
-    """Return the mean width of the silhouettes along the axis: the middles of bins and the widths, (n,) each, metres."""
+    """Return the mean width of the silhouettes along the axis: the middles of bins and the widths, (n,), metres."""
     edges = np.arange(-1.2 * height_m, 1.2 * height_m, _BIN_M)
     widths = []
     for axis in axes:

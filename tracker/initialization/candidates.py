@@ -140,7 +140,8 @@ def silhouette_axes(scene: Scene) -> list[MajorAxis]:
     axes = [a for m, s in chosen if (a := major_axis(m.mask, s.camera)) is not None]
     if len(axes) < 2:
         raise TrackerError(
-            f"expected the person in at least 2 views, found {len(axes)}; choose another --frame, or check the background"
+            f"expected the person in at least 2 views, found {len(axes)}; choose another --frame, or check the "
+            "background"
         )
     return axes
 

@@ -1,11 +1,11 @@
 """Find the first pose of a person in a session with nobody's help, and store it.
 
 On each frame that is tried every method gives start poses (`tracker.initialization.candidates`), one for each way of
-facing. Each is fitted to the contours. The best are tracked over a few frames in both directions, and the cheapest track
-is kept.
+facing. Each is fitted to the contours. The best are tracked over a few frames in both directions, and the cheapest
+track is kept.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -36,6 +36,8 @@ _TRACK_STEPS = (2, 4, 6)
 """Frames after and before the first pose over which starts are compared."""
 _MOTION_FRAMES = 6
 """Frames over which the motion of a figure is measured."""
+_ENOUGH_FRAMES, _AXIS_FRAMES = 5, 2
+"""Number of frames with starts from voxels, and with starts on the axis, among which `auto` chooses."""
 _N_TRACKED = 4
 """Starts of a frame that are tracked."""
 _CUES_PX = 0.05
@@ -70,46 +72,112 @@ class FirstPose(NamedTuple):
         return self.candidate.model
 
 
-def find_first_pose(
-    session: Session, observer: Observer, person: int, frames: Sequence[int],
-    methods: Sequence[StartMethod] = ("voxels",), size_m: float = VOXEL_M, say: Say = lambda text: None,
-) -> FirstPose:  # fmt: skip
-    """Find the pose of a person on one of some frames.
+class FirstPoses(NamedTuple):
+    """The first poses of several people on one frame."""
 
-    The frame and the start whose short track costs least are kept.
+    frame: int
+    poses: dict[int, FirstPose]
+    """By index of the person."""
+
+    @property
+    def cost_px(self) -> float:
+        """Mean cost of their short tracks, px of the footage."""
+        return float(np.mean([p.fitted.cost_px for p in self.poses.values()]))
+
+    @property
+    def is_good(self) -> bool:
+        """Whether the fits of all are good."""
+        return all(p.fitted.status == "good" for p in self.poses.values())
+
+
+def find_first_poses(
+    session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int],
+    methods: Sequence[StartMethod] = ("voxels",), size_m: float = VOXEL_M, say: Say = lambda text: None,
+) -> FirstPoses:  # fmt: skip
+    """Find the poses of some people on one of some frames, on which all stand apart.
+
+    The frame and the starts whose short tracks cost least are kept.
 
     Args:
         session: the session; nothing is stored.
         observer: of its recording.
-        person: index of the person.
+        people: indices of the people. Others are where their stored poses are.
         frames: the frames to try; at least one.
-        methods: to try.
+        methods: to try on each frame.
         size_m: edge of a voxel, metres.
         say: receives a sentence on each frame that is tried. What it raises ends the search.
 
     Raises:
-        TrackerError: no frame shows the person well enough. The message is that of the first frame.
+        TrackerError: no frame shows the people well enough. The message is that of the first frame.
     """
-    finder = SilhouetteFinder(session.cameras, observer.recording)
-    found, errors = list[FirstPose](), list[TrackerError]()
-    try:
+    with _Trial(session, observer, people, size_m, say) as trial:
         for frame in frames:
-            try:
-                found.append(_on_frame(_Task(session, observer, finder, person, size_m), frame, methods))
-            except TrackerError as error:
-                errors.append(error)
-                say(f"frame {frame}: {error}")
-                continue
-            last = found[-1]
-            say(
-                f"frame {frame}: {last.candidate.method} start, {last.fitted.status}, "
-                f"cost {last.fitted.cost_px:.2f} px over a short track"
-            )
-    finally:
-        finder.close()
-    if not found:
-        raise errors[0]
-    return min(found, key=lambda f: f.fitted.cost_px)
+            trial.add(frame, methods)
+        return trial.best()
+
+
+def find_first_poses_anywhere(
+    session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int], size_m: float = VOXEL_M,
+    say: Say = lambda text: None,
+) -> FirstPoses:  # fmt: skip
+    """Find first poses by whatever method and on whatever of some frames tracks best; see `find_first_poses`.
+
+    Voxels are tried until they succeed on enough frames. The axis is tried on the best of these, and a search along the
+    figure where neither finds a good start.
+    """
+    with _Trial(session, observer, people, size_m, say) as trial:
+        for frame in frames:
+            if len(trial.found) < _ENOUGH_FRAMES:
+                trial.add(frame, ("voxels",))
+        by_cost = sorted(trial.found, key=lambda f: f.cost_px)
+        chosen = [f.frame for f in by_cost[:_AXIS_FRAMES]] or list(frames)[:_ENOUGH_FRAMES]
+        for frame in chosen:
+            trial.add(frame, ("axis",))
+        for frame in chosen:
+            if not any(f.is_good for f in trial.found):
+                trial.add(frame, ("search",))
+        return trial.best()
+
+
+class _Trial:
+    """First poses on the frames that were tried."""
+
+    def __init__(self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say) -> None:
+        self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
+        self._finder = SilhouetteFinder(session.cameras, observer.recording)
+        self.found, self._errors = list[FirstPoses](), list[TrackerError]()
+
+    def __enter__(self) -> "_Trial":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._finder.close()
+
+    def add(self, frame: int, methods: Sequence[StartMethod]) -> None:
+        """Try a frame."""
+        own: dict[int, FirstPose] = {}
+        try:
+            for person in self._people:
+                task = _Task(self._session, self._observer, self._finder, person, self._size_m)
+                own[person] = _on_frame(task, frame, methods, own)
+        except TrackerError as error:
+            self._errors.append(error)
+            self._say(f"frame {frame}, {' and '.join(methods)}: {error}")
+            return
+        self.found.append(FirstPoses(frame, own))
+        statuses = ", ".join(p.fitted.status for p in own.values())
+        cost = f"cost {self.found[-1].cost_px:.2f} px over a short track"
+        self._say(f"frame {frame}, {' and '.join(methods)}: {statuses}, {cost}")
+
+    def best(self) -> FirstPoses:
+        """Return the first poses that cost least; those whose fits are good go before.
+
+        Raises:
+            TrackerError: there are none.
+        """
+        if not self.found:
+            raise self._errors[0]
+        return min(self.found, key=lambda f: (not f.is_good, f.cost_px))
 
 
 def store_first_pose(session: Session, store: AnnotationStore, person: int, found: FirstPose, method: str) -> None:
@@ -143,11 +211,11 @@ class _Task(NamedTuple):
     size_m: float
 
 
-def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod]) -> FirstPose:
+def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Mapping[int, FirstPose]) -> FirstPose:
     session, observer, finder, person, size_m = task
     silhouettes = finder.silhouettes(frame, person)
     hull = carve_people(silhouettes, size_m)
-    others = _others(session, person, frame)
+    others = _others(session, person, frame, found)
     figure = _own_figure(session, person, hull, others)
     masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
     up = up_rotation(session.up, session.floor)[:, 2]
@@ -203,14 +271,19 @@ def _track_frames(frame: int, n_frames: int) -> list[list[int]]:
     return [own for frames in both if (own := [k for k in frames if 0 <= k < n_frames])]
 
 
-def _others(session: Session, person: int, frame: int) -> list[PosedBody]:
-    """Return the other people who have a pose on a frame."""
-    found = []
+def _others(session: Session, person: int, frame: int, found: Mapping[int, FirstPose]) -> list[PosedBody]:
+    """Return the other people who have a pose on a frame, found just now or stored."""
+    bodies = []
     for i, other in enumerate(session.people):
+        if i == person:
+            continue
+        if i in found:
+            bodies.append(PosedBody(found[i].model, found[i].fitted.pose))
+            continue
         stored = read_stored_poses(session.annotations_path, other.name, other.model, range(frame, frame + 1))
-        if i != person and frame in stored:
-            found.append(stored[frame].body)
-    return found
+        if frame in stored:
+            bodies.append(stored[frame].body)
+    return bodies
 
 
 def _own_figure(session: Session, person: int, hull: VisualHull, others: Sequence[PosedBody]) -> Voxels:
