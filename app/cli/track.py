@@ -29,6 +29,11 @@ class TrackArguments:
     method: Literal["chamfer", "contour"] = "chamfer"
     """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice. contour: extremal
     contours, refined by Gauss-Newton until it converges, without a search of whole bodies."""
+    init: Literal["auto"] | None = None
+    """auto finds people who have no pose first, on the frame where they track best, and tracks from there in both
+    directions."""
+    acquire: bool = False
+    """with --init auto: acquire the sizes of those people from the contours before tracking."""
     frames: OptionalRange = None
     """A:B, half open; all by default."""
     stride: int = 1
@@ -66,15 +71,36 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     Ctrl+C stops it and keeps the poses found so far; run it again to resume.
     """
     at = load_target(arguments.session, arguments.person, several=True)
-    frames: Sequence[int] = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
-    frames = frames[::-1] if arguments.backward else frames
+    ascending = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
+    frames = ascending[::-1] if arguments.backward else ascending
+    _check_chain(arguments)
     settings = _SETTINGS[arguments.method](arguments)
     if arguments.paper and arguments.method == "chamfer":
         _require_paper_body(at)
-    found = track(at, frames, settings, Reporter(silent=arguments.json), arguments.cameras)
+    progress = Reporter(silent=arguments.json)
+    if arguments.init is None:
+        found = track(at, frames, settings, progress, arguments.cameras)
+    else:
+        from app.cli.track_found import track_found
+
+        try:
+            found = track_found(at, ascending, settings, arguments.acquire, progress, arguments.cameras)
+        except KeyboardInterrupt:
+            print("stopped before anybody was found; nothing was stored", file=sys.stderr)
+            sys.exit(130)
     print(format_json(found) if arguments.json else _format(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
+
+
+def _check_chain(arguments: TrackArguments) -> None:
+    """Raise a `TrackerError` where options contradict `--init`."""
+    if arguments.init is not None and arguments.backward:
+        raise TrackerError("expected --init without --backward, found both; it tracks in both directions by itself")
+    if arguments.acquire and arguments.init is None:
+        raise TrackerError(
+            "expected --acquire with --init auto, found it alone; add --init auto, or run quadrille acquire first"
+        )
 
 
 def _chamfer_settings(arguments: TrackArguments) -> "TrackerSettings":

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from tracker.tracking.tracker import TrackingRun
 
 SIZES_EDITS = "sizes_edits"
 """Setting of the session: for each entry of the history that changed sizes, the name of the person and the revisions
-before and after it."""
+before and after it; a list of such triples for several people."""
 PLACED_M = 0.02
 """Standard deviation of a joint that a user has placed in the images, metres."""
 _HAND = 3.0
@@ -59,6 +59,7 @@ def acquire_body(
     frames: Sequence[int],
     settings: AcquisitionSettings | TwoViewSettings,
     report: Report = lambda stage, share: None,
+    known: PosedFrames | None = None,
 ) -> Acquisition:
     """Acquire the body of a person from stored poses; where they are too few, from frames tracked for it.
 
@@ -71,11 +72,12 @@ def acquire_body(
         frames: the frames that may be used, ascending.
         settings: of the acquisition; their type is the method.
         report: shows progress. What it raises ends the acquisition.
+        known: poses to begin from, in the present bodies; those that the session stores by default.
 
     Raises:
         TrackerError: the person has no pose on these frames, or the views show nothing of them.
     """
-    known = posed_frames(session, person, frames)
+    known = known or posed_frames(session, person, frames)
     begun = 0.0
     if len(known.bodies) < settings.n_frames < len(frames):
         begun = _TRACKING
@@ -158,6 +160,18 @@ def store_body(
     edit = store.commit(label, changes).edit
     store.set_setting(SIZES_EDITS, {**store.setting(SIZES_EDITS, {}), str(edit): [name, before, revision]})
     return changed
+
+
+def sizes_changed(edits: Mapping[str, Any], edit: int) -> list[tuple[str, int, int]]:
+    """Return whose sizes an entry of the history changed, with the revisions before and after it.
+
+    Args:
+        edits: the setting `SIZES_EDITS`.
+        edit: number of the entry.
+    """
+    found = edits.get(str(edit), [])
+    rows = found if found and isinstance(found[0], list) else [found] if found else []
+    return [(str(name), int(before), int(after)) for name, before, after in rows]
 
 
 def refitted_record(record: PoseRecord, pose: Array, revision: int) -> PoseRecord:

@@ -6,7 +6,7 @@ track is kept.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -15,16 +15,13 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
-from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.initialization.candidates import METHODS, Candidate, Scene, StartMethod
 from tracker.initialization.start_fit import FittedStart, fit_start
 from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
-from tracker.session.session import Session, save_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.session import Session
 from tracker.store.stored_poses import read_stored_poses
 from tracker.voxels.figure_masks import figure_masks
 from tracker.voxels.visual_hull import VisualHull, carve_people
@@ -65,6 +62,9 @@ class FirstPose(NamedTuple):
     """Whether cues or costs tell left from right."""
     notes: tuple[str, ...]
     """Sentences on what is not sure."""
+    lines_px: Mapping[str, Array] = MappingProxyType({})
+    """Successive approximations to the major axis in each view that is used (GD96 Fig. 5), ends in undistorted px of
+    the footage, (n_rounds, 2, 2) each; empty for a start that was not found on an axis."""
 
     @property
     def model(self) -> BodyModel:
@@ -180,29 +180,6 @@ class _Trial:
         return min(self.found, key=lambda f: (not f.is_good, f.cost_px))
 
 
-def store_first_pose(session: Session, store: AnnotationStore, person: int, found: FirstPose, method: str) -> None:
-    """Store a first pose, and make the measured height that of the person.
-
-    Args:
-        session: the session, which this process has locked.
-        store: its annotations.
-        person: index of the person.
-        found: the pose.
-        method: name of the method, for the history.
-    """
-    who = session.people[person]
-    if found.model is not who.model:
-        people = tuple(replace(p, model=found.model) if i == person else p for i, p in enumerate(session.people))
-        save_session(replace(session, people=people))
-    revision = store.add_model_revision(who.name, format_model(found.model))
-    pose = found.fitted.pose
-    record = PoseRecord(
-        pose, ("searched",) * len(pose), revision, status=found.fitted.status, settings={"method": method},
-        remark="; ".join(found.notes),
-    )  # fmt: skip
-    store.commit(f"init from {method}, frame {found.frame}", [PoseChange(who.name, found.frame, record)])
-
-
 class _Task(NamedTuple):
     session: Session
     observer: Observer
@@ -234,7 +211,7 @@ def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Ma
     opposite = [_weighed(t) for t in tracked if t[0].forward @ best.forward < _OPPOSITE]
     opposite += [_weighed(t) for t in tried if t[0].forward @ best.forward < _OPPOSITE and not opposite]
     is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > _SURE_RATIO * _weighed(tracked[0]))
-    return FirstPose(frame, best, fit, is_sure, _notes(best, is_sure, hull, silhouettes))
+    return FirstPose(frame, best, fit, is_sure, _notes(best, is_sure, hull, silhouettes), _lines_px(session, best))
 
 
 def _candidates(scene: Scene, model: BodyModel, methods: Sequence[StartMethod]) -> list[Candidate]:
@@ -254,6 +231,14 @@ def _candidates(scene: Scene, model: BodyModel, methods: Sequence[StartMethod]) 
 def _weighed(start: tuple[Candidate, FittedStart]) -> float:
     """Return the cost of a start, px, less what the cues say for its direction."""
     return start[1].cost_px - _CUES_PX * start[0].cues
+
+
+def _lines_px(session: Session, best: Candidate) -> dict[str, Array]:
+    """Return the axes of the silhouettes by view, undistorted px of the footage."""
+    if best.axis is None:
+        return {}
+    widths = {c.camera.name: c.camera.width for c in session.cameras}
+    return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in best.axis.views}
 
 
 def _kept(tried: Sequence[tuple[Candidate, FittedStart]]) -> list[tuple[Candidate, FittedStart]]:
