@@ -111,9 +111,8 @@ def find_people(
         def report_sizes(stage: str, share: float, begin: float = begin) -> None:
             report("acquiring sizes", begin + (1 - end) * share / len(people), "")
 
-        found = _acquired(
-            session, observer, person, frames, settings, FoundPeople(first, bodies, poses, {}), report_sizes
-        )
+        so_far = FoundPeople(first, bodies, poses, {})
+        found = _acquired(session, observer, person, whole, settings, so_far, report_sizes)
         if found.cost_after_px < found.cost_before_px:
             acquired[person] = found
             poses[person] = retarget_pose(poses[person], bodies[person], found.body)
