@@ -24,7 +24,7 @@ _TICKS = 100
 def track_found(
     at: Target, frames: range, settings: "TrackerSettings", acquire: bool, progress: Reporter, cameras: Sequence[str]
 ) -> dict[str, Any]:
-    """Find the people who have no pose, and track from there to both ends of a range.
+    """Find the people who have no pose, track from there to the begin of a range, and then over the whole range.
 
     Each stage is stored when it is done. An interrupted run goes on where it was when it is run again.
 
@@ -37,7 +37,7 @@ def track_found(
         cameras: names of those to track with; all if empty.
 
     Returns:
-        What `track` returns of both directions together, and `first_frame`.
+        What `track` returns of the last direction, and `first_frame`.
 
     Raises:
         TrackerError: no frame shows the people well enough; nothing is stored then.
@@ -46,10 +46,10 @@ def track_found(
     # Bodies may have changed.
     name = at.session.people[at.people[0]].name if len(at.people) < len(at.session.people) else None
     at = load_target(at.session.folder, name, several=True)
-    ways = {
-        "forward": [k for k in frames if k >= first_frame],
-        "backward": [k for k in frames if k < first_frame][::-1],
-    }
+    # The way back only leads to the first frame. The way forward then covers the whole range as one motion.
+    ways = {"backward": [k for k in frames if k <= first_frame][::-1], "forward": list(frames)}
+    if len(ways["backward"]) < 2:
+        del ways["backward"]
     results: list[dict[str, Any]] = []
     for way, own in ways.items():
         if not own or way in done:
@@ -61,7 +61,9 @@ def track_found(
             break
         done = [*done, way]
         _note(at.session, {"frame": first_frame, "done": done} if set(done) < set(ways) else None)
-    return {**_together(results), "first_frame": first_frame}
+    if not results:
+        raise TrackerError("expected frames to track, found none; give a longer range with --frames")
+    return {**results[-1], "first_frame": first_frame}
 
 
 def _track(
@@ -148,26 +150,3 @@ def _note(session: "Session", chain: Mapping[str, Any] | None) -> None:
 
     with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
         store.set_setting(_CHAIN, chain)
-
-
-def _together(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Add up the results of both directions."""
-    if not results:
-        raise TrackerError("expected frames to track, found none; give a longer range with --frames")
-    frames = sum(r["frames"] for r in results)
-    costs = [(r["mean_cost_px"], r["frames"]) for r in results if r["mean_cost_px"] is not None]
-    statuses: dict[str, dict[str, int]] = {}
-    for result in results:
-        for name, counts in result["statuses"].items():
-            own = statuses.setdefault(name, {})
-            for status, n in counts.items():
-                own[status] = own.get(status, 0) + n
-    return {
-        "frames": frames,
-        "resumed_at": next((r["resumed_at"] for r in results if r["resumed_at"] is not None), None),
-        "stopped_at": results[-1]["stopped_at"],
-        "improved_backward": sum(r["improved_backward"] for r in results),
-        "people": results[0]["people"],
-        "mean_cost_px": sum(c * n for c, n in costs) / sum(n for _, n in costs) if costs else None,
-        "statuses": statuses,
-    }

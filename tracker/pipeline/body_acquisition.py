@@ -36,7 +36,7 @@ PLACED_M = 0.02
 _HAND = 3.0
 """Standard deviation of where a hand puts a point, in that of a pin that pulls a pose."""
 _MOST_TRACKED = 90
-"""Number of frames that are tracked for an acquisition where too few poses are stored."""
+"""Largest number of frames that are tracked for an acquisition where too few poses are stored."""
 _TRACKING = 0.4
 """Share of the work up to the end of that tracking."""
 
@@ -228,18 +228,21 @@ def _with_tracked(
     session: Session, observer: Observer, person: int, frames: Sequence[int], known: PosedFrames,
     report: Callable[[float], None],
 ) -> PosedFrames:  # fmt: skip
-    """Track the person on from the first known frame, and add the good frames."""
+    """Track the person from the first known frame, in both directions, and add the good frames."""
     first = min(known.bodies)
     ahead, behind = [k for k in frames if k >= first], [k for k in frames if k <= first][::-1]
-    run_frames = (ahead if len(ahead) >= len(behind) else behind)[:_MOST_TRACKED]
-    own, model = known.bodies[first], session.people[person].model
+    room = max(_MOST_TRACKED // 2, _MOST_TRACKED - min(len(ahead), len(behind)))
+    ways = [way[:room] for way in (ahead, behind) if len(way) > 1]
+    own, done, total = known.bodies[first], 0, max(1, sum(map(len, ways)))
     subjects = Subjects.of([b.model for b in own], keyframes={k: {0: known.bodies[k][0].values} for k in known.placed})
-    run = TrackingRun(observer, subjects, [b.values for b in own], run_frames)
     bodies = dict(known.bodies)
-    for i, found in enumerate(ChamferTracker(TrackSettings()).estimates(run)):
-        report((i + 1) / len(run_frames))
-        if found.statuses[0] == "good":
-            people = zip(subjects.models, found.poses, strict=True)
-            bodies.setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))
-    assert all(b[0].model is model for b in bodies.values())
+    for way in ways:
+        run = TrackingRun(observer, subjects, [b.values for b in own], way)
+        for found in ChamferTracker(TrackSettings()).estimates(run):
+            done += 1
+            report(done / total)
+            if found.statuses[0] == "good":
+                people = zip(subjects.models, found.poses, strict=True)
+                bodies.setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))
+    assert all(b[0].model is session.people[person].model for b in bodies.values())
     return PosedFrames(bodies, known.placed, known.seen)
