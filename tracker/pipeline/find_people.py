@@ -23,6 +23,10 @@ _FRAMES = 12
 _STARTING = 0.5
 """Share of the work up to the end of the first poses, where sizes are acquired too."""
 
+AXES = "silhouette_axes"
+"""Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera: for
+each person the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
+
 Report = Callable[[str, float, str], None]
 """Is given a stage, the share of all work that is done, 0 to 1, and a sentence, which may be empty. What it raises ends
 the work."""
@@ -144,19 +148,20 @@ def first_record(found: FoundPeople, person: int, revision: int) -> PoseRecord:
     """
     first: FirstPose = found.first.poses[person]
     pose = found.poses[person]
-    settings: dict[str, Any] = {"method": first.candidate.method, "axes": axis_lines(first)}
+    settings: dict[str, Any] = {"method": first.candidate.method}
     return PoseRecord(
         pose, ("searched",) * len(pose), revision, status=first.fitted.status, settings=settings,
         remark="; ".join(first.notes),
     )  # fmt: skip
 
 
-def axis_lines(first: FirstPose) -> dict[str, list[list[list[float]]]]:
-    """Return the successive major axes of the silhouettes by view (GD96 Fig. 5), undistorted px of the footage.
-
-    It is empty for a start that was not found on an axis.
-    """
-    return {name: np.round(lines, 1).tolist() for name, lines in first.lines_px.items()}
+def axes_record(found: FoundPeople) -> dict[str, Any]:
+    """Return the frame and the major axes of all silhouettes on it, as the setting `AXES` holds them."""
+    lines: dict[str, list[Any]] = {}
+    for first in found.first.poses.values():
+        for name, own in first.lines_px.items():
+            lines.setdefault(name, []).append(np.round(own, 1).tolist())
+    return {"frame": found.frame, "lines": lines}
 
 
 def store_found(session: Session, store: AnnotationStore, found: FoundPeople, label: str = "find people") -> Session:
@@ -179,6 +184,7 @@ def store_found(session: Session, store: AnnotationStore, found: FoundPeople, la
         if revision != before:
             sizes.append([who.name, before, revision])
     edit = store.commit(f"{label}, frame {found.frame}", changes).edit
+    store.set_setting(AXES, axes_record(found))
     if sizes:
         store.set_setting(SIZES_EDITS, {**store.setting(SIZES_EDITS, {}), str(edit): sizes})
     return session

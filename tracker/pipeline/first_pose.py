@@ -17,7 +17,7 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
-from tracker.initialization.candidates import METHODS, Candidate, Scene, StartMethod
+from tracker.initialization.candidates import METHODS, Candidate, Scene, StartMethod, silhouette_axes
 from tracker.initialization.start_fit import FittedStart, fit_start
 from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
@@ -63,8 +63,8 @@ class FirstPose(NamedTuple):
     notes: tuple[str, ...]
     """Sentences on what is not sure."""
     lines_px: Mapping[str, Array] = MappingProxyType({})
-    """Successive approximations to the major axis in each view that is used (GD96 Fig. 5), ends in undistorted px of
-    the footage, (n_rounds, 2, 2) each; empty for a start that was not found on an axis."""
+    """Successive approximations to the major axis of the silhouette in each view that shows the person alone (GD96
+    Fig. 5): ends in undistorted px of the footage, (n_rounds, 2, 2) each."""
 
     @property
     def model(self) -> BodyModel:
@@ -211,7 +211,7 @@ def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Ma
     opposite = [_weighed(t) for t in tracked if t[0].forward @ best.forward < _OPPOSITE]
     opposite += [_weighed(t) for t in tried if t[0].forward @ best.forward < _OPPOSITE and not opposite]
     is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > _SURE_RATIO * _weighed(tracked[0]))
-    return FirstPose(frame, best, fit, is_sure, _notes(best, is_sure, hull, silhouettes), _lines_px(session, best))
+    return FirstPose(frame, best, fit, is_sure, _notes(best, is_sure, hull, silhouettes), _lines_px(session, scene))
 
 
 def _candidates(scene: Scene, model: BodyModel, methods: Sequence[StartMethod]) -> list[Candidate]:
@@ -233,12 +233,14 @@ def _weighed(start: tuple[Candidate, FittedStart]) -> float:
     return start[1].cost_px - _CUES_PX * start[0].cues
 
 
-def _lines_px(session: Session, best: Candidate) -> dict[str, Array]:
-    """Return the axes of the silhouettes by view, undistorted px of the footage."""
-    if best.axis is None:
+def _lines_px(session: Session, scene: Scene) -> dict[str, Array]:
+    """Return the axes of the silhouettes by view, undistorted px of the footage; empty if fewer than two have one."""
+    try:
+        axes = silhouette_axes(scene)
+    except TrackerError:
         return {}
     widths = {c.camera.name: c.camera.width for c in session.cameras}
-    return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in best.axis.views}
+    return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in axes}
 
 
 def _kept(tried: Sequence[tuple[Candidate, FittedStart]]) -> list[tuple[Candidate, FittedStart]]:
