@@ -24,8 +24,8 @@ _STARTING = 0.5
 """Share of the work up to the end of the first poses, where sizes are acquired too."""
 
 AXES = "silhouette_axes"
-"""Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera: for
-each person the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
+"""Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera,
+for each person the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
 
 Report = Callable[[str, float, str], None]
 """Is given a stage, the share of all work that is done, 0 to 1, and a sentence, which may be empty. What it raises ends
