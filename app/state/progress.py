@@ -1,8 +1,7 @@
 """Progress of long work: tracking, work on ranges of frames, indexing of footage."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+from dataclasses import dataclass, field
 
 Line = tuple[float, float, float, float]
 """x0, y0, x1, y1, undistorted px."""
@@ -54,7 +53,7 @@ class FindState:
     """Whether it ended with an error."""
     frame: int | None = None
     """Frame on which people were found; None before."""
-    axes: Mapping[str, tuple[tuple[Line, ...], ...]] = MappingProxyType({})
+    axes: Mapping[str, tuple[tuple[Line, ...], ...]] = field(default_factory=dict)
     """By camera, for each person the successive major axes of the silhouette on that frame (GD96 Fig. 5)."""
 
 
