@@ -84,7 +84,10 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
         from app.cli.track_found import track_found
 
         try:
-            found = track_found(at, ascending, settings, arguments.acquire, progress, arguments.cameras)
+            found = track_found(
+                at, ascending, arguments.acquire, progress,
+                lambda people, own: track(people, own, settings, progress, arguments.cameras),
+            )  # fmt: skip
         except KeyboardInterrupt:
             print("stopped before anybody was found; nothing was stored", file=sys.stderr)
             sys.exit(130)

@@ -1,6 +1,6 @@
 """`quadrille track --init auto --acquire`: find people, acquire their sizes, and track in both directions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from tracker.pipeline.find_people import FoundPeople
     from tracker.session.session import Session
     from tracker.store.annotation_store import AnnotationStore
-    from tracker.tracking.tracker import TrackerSettings
 
 _CHAIN = "find people"
 """Setting of the store: the first frame of a chain that was interrupted while tracking, and the directions that are
@@ -21,9 +20,11 @@ done."""
 _TICKS = 100
 
 
-def track_found(
-    at: Target, frames: range, settings: "TrackerSettings", acquire: bool, progress: Reporter, cameras: Sequence[str]
-) -> dict[str, Any]:
+Track = Callable[[Target, Sequence[int]], dict[str, Any]]
+"""Tracks people over frames, given in the order of tracking; see `app.cli.track.track`."""
+
+
+def track_found(at: Target, frames: range, acquire: bool, progress: Reporter, track: Track) -> dict[str, Any]:
     """Find the people who have no pose, track from there to the begin of a range, and then over the whole range.
 
     Each stage is stored when it is done. An interrupted run goes on where it was when it is run again.
@@ -31,10 +32,9 @@ def track_found(
     Args:
         at: the session and the people.
         frames: to track, ascending.
-        settings: of the tracker.
         acquire: whether sizes are acquired from the contours before tracking.
         progress: shows how far it is, with a sentence for each stage.
-        cameras: names of those to track with; all if empty.
+        track: tracks people who were found.
 
     Returns:
         What `track` returns of the last direction, and `first_frame`.
@@ -55,7 +55,7 @@ def track_found(
         if not own or way in done:
             continue
         progress.say(f"tracking {way} from frame {own[0]} to {own[-1]}")
-        found = _track(at, own, settings, progress, cameras)
+        found = track(at, own)
         results.append(found)
         if found["stopped_at"] is not None:
             break
@@ -64,14 +64,6 @@ def track_found(
     if not results:
         raise TrackerError("expected frames to track, found none; give a longer range with --frames")
     return {**results[-1], "first_frame": first_frame}
-
-
-def _track(
-    at: Target, frames: Sequence[int], settings: "TrackerSettings", progress: Reporter, cameras: Sequence[str]
-) -> dict[str, Any]:
-    from app.cli.track import track
-
-    return track(at, frames, settings, progress, cameras)
 
 
 def _find(at: Target, frames: range, acquire: bool, progress: Reporter) -> tuple[int, list[str]]:

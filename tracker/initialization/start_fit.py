@@ -47,7 +47,8 @@ def fit_start(
         later: for each direction the frames of a short track, without the first.
         others: pose of each other person on that frame, (n_values,) each.
     """
-    pose, costs, status = start, list[float](), "lost"
+    pose, costs = start, list[float]()
+    status: Status = "lost"
     for number, frames in enumerate([(), *later]):
         own = [frame, *frames]
         run = TrackingRun(observer, Subjects.of(models, [0]), [pose, *others], own)

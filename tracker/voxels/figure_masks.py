@@ -81,19 +81,19 @@ def needed_figures(silhouettes: Sequence[ViewSilhouette], figures: Sequence[Voxe
         figures: of a visual hull, the largest first.
         least: smallest share of a figure's silhouette, in one view at least, that no other figure covers.
     """
-    kept = list(figures)
-    painted = {id(f): [_painted(f, s, 0.0) & s.mask for s in silhouettes] for f in figures}
-    for figure in reversed(figures):
-        own = painted[id(figure)]
-        rest = (
-            [np.any([painted[id(f)][i] for f in kept if f is not figure], axis=0) for i in range(len(own))]
-            if (len(kept) > 1)
-            else [np.zeros_like(m) for m in own]
-        )
-        shares = [np.count_nonzero(m & ~r) / max(1, np.count_nonzero(m)) for m, r in zip(own, rest, strict=True)]
-        if max(shares) < least:
-            kept = [f for f in kept if f is not figure]
-    return kept
+    kept = [[_painted(f, s, 0.0) & s.mask for s in silhouettes] for f in figures]
+    indices = list(range(len(figures)))
+    for i in reversed(range(len(figures))):
+        others = [kept[j] for j in indices if j != i]
+        if others and max(_own_share(own, [o[v] for o in others]) for v, own in enumerate(kept[i])) < least:
+            indices.remove(i)
+    return [figures[i] for i in indices]
+
+
+def _own_share(own: Mask, others: Sequence[Mask]) -> float:
+    """Return the share of a mask that no other mask covers."""
+    alone = own & ~np.any(others, axis=0)
+    return int(np.count_nonzero(alone)) / max(1, int(np.count_nonzero(own)))
 
 
 def _painted(figure: Voxels, silhouette: ViewSilhouette, margin: float) -> Mask:
