@@ -31,7 +31,7 @@ def joints_of(arms_deg=35.0, legs_deg=12.0, turn_deg=0.0):
 def figure(size_m=0.025, noise=0.0, **pose):
     """Voxels of such a person, and the true joints. `noise` is the share of surface voxels that are missing."""
     joints, R = joints_of(**pose)
-    grid = VoxelGrid.over(np.array([-0.9, -0.9, -0.05]), np.array([0.9, 0.9, 1.85]), size_m)
+    grid = VoxelGrid.over(np.array([-0.9, -0.9, -0.05]), np.array([0.9, 0.9, 2.25]), size_m)
     points = grid.centers(np.argwhere(np.ones(grid.shape, bool)))
     trunk = (points - (0, 0, 1.16)) @ R
     inside = np.linalg.norm((points - joints["head"]) / (0.09, 0.09, 0.125), axis=1) <= 1

@@ -82,22 +82,36 @@ def find_body_axes(axes: Sequence[MajorAxis], up: Array, height_m: float) -> lis
 
 
 def _direction(axes: Sequence[MajorAxis]) -> tuple[tuple[MajorAxis, ...], Array]:
-    """Return the direction that lies in the planes of the views, (3,), and the views that agree with it."""
+    """Return the direction that lies in the planes of the views, (3,), and the views that agree with it.
+
+    The view is left out without which the others agree best, until all that are left agree.
+    """
     used = tuple(axes)
     while len(used) >= 2:
-        planes = np.array([a.elongation * a.normal_world for a in used])
-        _, spreads, directions = np.linalg.svd(planes)
-        if spreads[1] < _MIN_APART * spreads[0]:
+        found = _common_direction(used)
+        if found is None:
             break
-        direction = directions[2]
-        off = np.abs([np.arcsin(np.clip(a.normal_world @ direction, -1, 1)) for a in used])
-        if off.max() <= _MAX_OFF_RAD or len(used) == 2:
+        direction, off = found
+        if off <= _MAX_OFF_RAD or len(used) == 2:
             return used, direction
-        used = tuple(a for i, a in enumerate(used) if i != int(off.argmax()))
+        rests = [tuple(a for a in used if a is not left_out) for left_out in used]
+        offs = [np.inf if (common := _common_direction(rest)) is None else common[1] for rest in rests]
+        used = rests[int(np.argmin(offs))]
     raise TrackerError(
         f"expected the person in at least 2 views from different sides, found {len(used)} that agree; choose another "
         "--frame, or add a camera from another side"
     )
+
+
+def _common_direction(axes: Sequence[MajorAxis]) -> tuple[Array, float] | None:
+    """Return the direction nearest to the planes of views, (3,), and its largest angle to one, rad; None where the
+    planes are nearly the same."""
+    planes = np.array([a.elongation * a.normal_world for a in axes])
+    _, spreads, directions = np.linalg.svd(planes)
+    if spreads[1] < _MIN_APART * spreads[0]:
+        return None
+    off = max(abs(float(np.arcsin(np.clip(a.normal_world @ directions[2], -1, 1)))) for a in axes)
+    return directions[2], off
 
 
 def _center(axes: Sequence[MajorAxis], direction: Array) -> Array:

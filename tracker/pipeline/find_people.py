@@ -20,6 +20,8 @@ from tracker.store.records import PoseChange, PoseRecord
 
 _FRAMES = 12
 """Largest number of frames on which first poses are looked for."""
+_MEASURED = 0.02
+"""Standard deviation of the logarithm of a height that was measured: shoes, hair and a voxel at both ends."""
 _STARTING = 0.5
 """Share of the work up to the end of the first poses, where sizes are acquired too."""
 
@@ -135,7 +137,10 @@ def _acquired(
     models = [found.bodies.get(i, p.model) for i, p in enumerate(session.people)]
     sized = replace(session, people=tuple(replace(p, model=m) for p, m in zip(session.people, models, strict=True)))
     known = PosedFrames({found.frame: on_frame}, {}, {})
-    return acquire_body(sized, observer, person, frames, settings.acquisition, report, known)
+    how = settings.acquisition
+    if person in found.first.poses and found.first.poses[person].candidate.is_measured:
+        how = replace(how, priors=replace(how.priors, height=min(_MEASURED, how.priors.height)))
+    return acquire_body(sized, observer, person, frames, how, report, known)
 
 
 def first_record(found: FoundPeople, person: int, revision: int) -> PoseRecord:

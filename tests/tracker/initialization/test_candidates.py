@@ -8,7 +8,6 @@ from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.initialization.candidates import from_axis, from_search, from_voxels, silhouette_axes, standing_height
-from tracker.voxels.voxel_grid import Voxels
 
 CAMERAS = cameras_about_a_figure()
 MODEL = load_model("gavrila34")
@@ -40,12 +39,8 @@ def check_axis(pose):
     assert error_mm(found[-1], joints) < 80
 
 
-def test_the_axis_gives_a_start():
-    check_axis(POSES[0])
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("pose", POSES[1:])
+@pytest.mark.parametrize("pose", POSES)
 def test_the_axis_gives_starts(pose):
     check_axis(pose)
 
@@ -64,18 +59,10 @@ def test_a_known_height_stays():
     assert from_voxels(scene(figure()[0]), MODEL, True)[0].model is MODEL
 
 
+@pytest.mark.slow
 def test_a_search_needs_no_head_that_stands_out():
-    voxels, joints = figure(arms_deg=35)
-    beside = np.linalg.norm(voxels.points_world - joints["head"] - (0, 0.16, 0), axis=1) > 0.14
-    grid = voxels.grid
-    occupied = voxels.occupied.copy()
-    points = grid.centers(np.argwhere(np.ones(grid.shape, bool)))
-    occupied |= (np.linalg.norm(points - joints["head"] - (0.0, 0.14, 0.0), axis=1) < 0.13).reshape(grid.shape)
-    covered = Voxels(grid, occupied)
-    assert beside.any()
-    with pytest.raises(TrackerError, match="a head"):
-        from_voxels(scene(covered), MODEL, True)
-    found = from_search(scene(covered), MODEL, True)
+    voxels, joints = figure(arms_deg=150)  # the upper arms lie beside the head
+    found = from_search(scene(voxels), MODEL, True)
     assert min(error_mm(c, joints) for c in found) < 150
 
 
