@@ -18,10 +18,11 @@ from tracker.fitting.pins import PinBlock, pin_block
 from tracker.formats.model_toml import PRESETS, format_model, load_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.pipeline.seen_points import seen_points
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import SEEN, Change, Pin, PoseChange, PoseRecord
+from tracker.store.records import SEEN, Change, PoseChange, PoseRecord
 from tracker.store.stored_poses import StoredPose, read_stored_poses
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
@@ -125,7 +126,7 @@ def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedF
     keyframes = {k: s for k, s in usable.items() if s.record.keyframe}
     with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
         pins = {k: store.pins(session.people[person].name, k) for k in keyframes}
-    observed = {k: _observed(session, model, s, pins[k]) for k, s in keyframes.items()}
+    observed = {k: seen_points(session.cameras, model, s.record, pins[k]) for k, s in keyframes.items()}
     cameras = [c.camera for c in session.cameras]
     seen = {k: pin_block(model, cameras, o).widened(_HAND) for k, o in observed.items() if o}
     placed = {k: t for k, s in keyframes.items() if (t := _placed(s, observed[k])) is not None and len(t.points)}
@@ -193,19 +194,6 @@ def refitted_record(record: PoseRecord, pose: Array, revision: int) -> PoseRecor
 def _pose_in(body: BodyModel, stored: StoredPose, known: Array | None) -> Array:
     """Return a stored pose in another body: a known one, or the stored one retargeted by its joints."""
     return retarget_pose(stored.body.values, stored.body.model, body) if known is None else known
-
-
-def _observed(session: Session, model: BodyModel, stored: StoredPose, pins: Sequence[Pin]) -> list[PointObservation]:
-    """Return where somebody has seen points of a person on a frame: the ends of drags, and pins, which go before."""
-    index = {c.camera.name: i for i, c in enumerate(session.cameras)}
-    found = {(p, c): uv for p, views in stored.record.settings.get(SEEN, {}).items() for c, uv in views.items()}
-    found |= {(pin.point, pin.camera): pin.position_px for pin in pins}
-    out = []
-    for (point, camera), (u, v) in sorted(found.items()):
-        if camera in index and point in model.point_names:
-            x, y = session.cameras[index[camera]].camera.undistort_points(np.array([u, v]))
-            out.append(PointObservation(point, index[camera], (float(x), float(y))))
-    return out
 
 
 def _placed(stored: StoredPose, observed: Sequence[PointObservation]) -> PointTargets | None:
