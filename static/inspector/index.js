@@ -51,7 +51,7 @@ export function mount(context, { panes, posing, scene }) {
         context.send({ type: "find_people", action: "start" });
       },
     },
-    ...sections.map(({ id, title, hint }) => ({
+    ...sections.filter(({ id }) => id !== "find").map(({ id, title, hint }) => ({
       keys: [],
       label: id === "view" ? "View settings: theme, 3-D view" : title,
       words: `${hint} inspector settings`,

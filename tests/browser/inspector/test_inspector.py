@@ -148,8 +148,8 @@ async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
 FOUND = {
     "body": ("Body sizes", "Height, cm"),
     "sizes": ("Body sizes", "Height, cm"),
-    "settings": ("Track settings", "How the pose"),
-    "track settings": ("Track settings", "How the pose"),
+    "settings": ("Track settings", "Chamfer matching"),
+    "track settings": ("Track settings", "Chamfer matching"),
     "search settings": ("Search settings", "Angle bound, °"),
     "angle bound": ("Angle bound", "Angle bound, °"),
 }

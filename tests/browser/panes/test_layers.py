@@ -255,7 +255,7 @@ async def test_the_axes_of_the_silhouettes_are_drawn_on_their_frame_alone(page, 
         "failed": False,
         "axes": [{"camera": camera, "people": [[[u + 30, v - 40, u + 30, v + 40], line]]}],
     }  # fmt: skip
-    frame = (await state_of(page))["frame"]
+    frame = await page.evaluate("quadrille.state.state.frame")
     await endpoint.broadcast(found | {"frame": frame + 1})
     await shows(page, "quadrille.state.finding !== null")
     assert await color_at(page) == plain
