@@ -131,17 +131,16 @@ def _contour_settings(arguments: TrackArguments) -> "TrackerSettings":
 
 
 def _shared_settings(settings: "EstimationSettings", arguments: TrackArguments) -> "TrackerSettings":
-    paper, stride = arguments.paper, arguments.stride
+    from tracker.tracking.estimation.settings import at_stride
+
     motion, order, window = settings.predict, arguments.order, arguments.window
-    # Bodies move farther between frames that are farther apart.
     motion = replace(
-        motion, order=motion.order if order is None else order, window=motion.window if window is None else window,
-        bound_rad=stride * motion.bound_rad, bound_m=stride * motion.bound_m,
-    )  # fmt: skip
-    return replace(
-        settings, predict=motion, theta_px=arguments.theta, trust_rad=stride * settings.trust_rad,
-        trust_m=stride * settings.trust_m, smooth=arguments.smooth and not paper,
-    )  # fmt: skip
+        motion, order=motion.order if order is None else order, window=motion.window if window is None else window
+    )
+    chosen = replace(
+        settings, predict=motion, theta_px=arguments.theta, smooth=arguments.smooth and not arguments.paper
+    )
+    return at_stride(chosen, arguments.stride)
 
 
 def _require_paper_body(at: Target) -> None:

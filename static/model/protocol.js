@@ -65,8 +65,8 @@
  * @typedef {{type: "stop_range"}} StopRange
  * @typedef {{type: "mark", toggle: "keyframe" | "reviewed"}} ToggleMark
  * @typedef {{type: "follow", follow: boolean}} FollowTracking
- * @typedef {{method?: "chamfer" | "contour", estimate?: "refine" | "search", order?: number, past_poses?: number,
- *   recover?: boolean, backward_pass?: boolean, smooth?: boolean}} TrackChanges
+ * @typedef {{method?: "chamfer" | "contour", stride?: number, cameras?: string[], estimate?: "refine" | "search",
+ *   order?: number, past_poses?: number, recover?: boolean, backward_pass?: boolean, smooth?: boolean}} TrackChanges
  * @typedef {{type: "track_settings", changes: TrackChanges}} SetTrackSettings
  * @typedef {{bodies?: boolean, colors?: "parts" | "people", opacity?: number, cameras?: boolean, images?: boolean,
  *   floor?: boolean, gizmos?: boolean, ghost?: boolean, trail_points?: string[], trail_frames?: number}} View3dChanges
@@ -135,8 +135,8 @@
  * @typedef {{run: number, step: number, stage: string | null, candidate_px: number | null, best_px: number | null,
  *   evaluations: number}} Replay
  * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
- * @typedef {{method: "chamfer" | "contour", estimate: "refine" | "search", order: number, past_poses: number, recover:
- *   boolean, backward_pass: boolean, smooth: boolean}} TrackValues
+ * @typedef {{method: "chamfer" | "contour", stride: number, cameras: string[], estimate: "refine" | "search", order:
+ *   number, past_poses: number, recover: boolean, backward_pass: boolean, smooth: boolean}} TrackValues
  * @typedef {{theta_px: number | null, outliers: "truncated" | "paper", passes: number[], patience: number,
  *   max_expansions: number, limbs_apart: boolean, bound_rad: number, bound_m: number, step_rad: number, step_m:
  *   number}} SearchValues
