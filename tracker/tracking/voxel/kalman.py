@@ -1,0 +1,68 @@
+"""The update of an extended Kalman filter in Joseph's form, which keeps covariances positive definite."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.geometry.arrays import Array
+from tracker.tracking.voxel.state import FilterState
+
+
+class LinearizedMeasurement(NamedTuple):
+    """A measurement linearized at a state."""
+
+    residual: Array
+    """Measured less expected, (m,)."""
+    jacobian: Array
+    """Derivative of what is expected by the error state, (m, n)."""
+    noise: Array
+    """Covariance of the measurement, (m, m)."""
+
+
+class Update(NamedTuple):
+    """The result of an update."""
+
+    state: FilterState
+    normalized_innovation: float
+    """Squared innovation in units of its covariance; chi-square distributed with `n_rows` degrees of freedom."""
+    n_rows: int
+
+
+def update(
+    predicted: FilterState, measure: Callable[[FilterState], LinearizedMeasurement | None], iterations: int = 1
+) -> Update:
+    """Update a predicted state by a measurement.
+
+    Several iterations linearize, and measure, at the state of the iteration before (iterated extended Kalman filter).
+    The innovation is that of the first one.
+
+    Args:
+        predicted: the prediction, with its covariance.
+        measure: returns the measurement at a state; None if there is none.
+        iterations: number of linearizations.
+    """
+    P, state, innovation, n_rows = predicted.covariance, predicted, 0.0, 0
+    gain, found = np.zeros((len(P), 0)), None
+    for i in range(iterations):
+        there = measure(state)
+        if there is None or not len(there.residual):
+            break
+        found = there
+        H, HP = found.jacobian, found.jacobian @ P
+        S = HP @ H.T + found.noise
+        gain = np.linalg.solve((S + S.T) / 2, HP).T
+        residual = found.residual + H @ state.difference(predicted)
+        if i == 0:
+            innovation, n_rows = float(residual @ np.linalg.solve(S, residual)), len(residual)
+        state = predicted.retract(gain @ residual)
+    if found is None:
+        return Update(predicted, 0.0, 0)
+    return Update(state.with_covariance(joseph(P, gain, found)), innovation, n_rows)
+
+
+def joseph(P: Array, gain: Array, measurement: LinearizedMeasurement) -> Array:
+    """Return the updated covariance, (n, n): (I - KH) P (I - KH)^T + K R K^T is positive definite for any gain."""
+    rest = np.eye(len(P)) - gain @ measurement.jacobian
+    out = rest @ P @ rest.T + gain @ measurement.noise @ gain.T
+    return (out + out.T) / 2

@@ -1,0 +1,177 @@
+"""What labelled voxels measure of a figure: centre, orientation and sizes of its parts (MTHC01 Sect. 4)."""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array, IntArray
+from tracker.tracking.voxel.figure import N_PARTS, PARENTS, TORSO
+from tracker.tracking.voxel.kalman import LinearizedMeasurement
+from tracker.tracking.voxel.labels import PartClouds
+from tracker.tracking.voxel.motion_model import left_jacobian_inverse
+from tracker.tracking.voxel.state import FilterState
+
+MIN_VOXELS = 4
+"""Fewest voxels of a part that is measured: fewer have no three principal axes."""
+_ORDERS = np.array(list(itertools.permutations(range(3))))
+_MAX_TURN_VARIANCE = 1.0
+"""Largest variance of a measured angle, rad^2: axes are matched with the predicted ones to within 45 degrees."""
+
+
+class MeasurementNoise(NamedTuple):
+    """Standard deviations of what voxels measure."""
+
+    across_m: float
+    """Centre of a part across its axis, metres."""
+    along: float
+    """Centre along its axis, as a share of its half size: labels end where the prediction has the joint."""
+    turn: float
+    """Angles, rad; beyond the paper those of distinct axes, see `independent`."""
+    size_m: float
+    """Half sizes, metres."""
+    independent: float | None
+    """Share of the voxels whose errors are independent, from which follows how well the axes of similar spread are
+    told apart. None: all angles have the same noise."""
+
+
+class PartAxes(NamedTuple):
+    """Centres, turns and sizes of parts as measured, about the predicted parts."""
+
+    is_measured: NDArray[np.bool_]
+    """Whether a part has enough voxels, (10,)."""
+    offsets: Array
+    """From the predicted to the measured centre in the frame of the part, (10, 3), metres."""
+    turns: Array
+    """Rotation vector from the predicted to the measured axes, (10, 3), rad."""
+    sizes: Array
+    """Half sizes, (10, 3), metres."""
+    variances: Array
+    """Variances of the voxels along the measured axes, (10, 3), square metres."""
+    counts: Array
+    """Number of voxels, (10,)."""
+
+
+def measure_parts(state: FilterState, clouds: PartClouds, by_size: bool) -> PartAxes:
+    """Measure centre, axes and sizes of the parts from their voxels.
+
+    Args:
+        state: the state with which the voxels were labelled.
+        clouds: the voxels of each part, (10,).
+        by_size: whether axes are told apart by their order of size, as in the paper; else each is the one closest to
+            the predicted axis. Both turn an axis that points the wrong way.
+    """
+    variances, axes = np.linalg.eigh(clouds.covariances)
+    order = _order_by_size(state.figure.order) if by_size else _closest_order(axes)
+    axes = np.take_along_axis(axes, order[:, None, :], axis=2)
+    variances = np.take_along_axis(variances, order, axis=1)
+    axes = axes * np.where(np.einsum("mii->mi", axes) < 0, -1.0, 1.0)[:, None, :]
+    odd = np.linalg.det(axes) < 0
+    if odd.any():  # the axis that is farthest from the predicted one is turned
+        worst = np.einsum("mii->mi", axes)[odd].argmin(axis=1)
+        axes[np.flatnonzero(odd), :, worst] *= -1
+    sizes = np.sqrt(np.maximum(variances, 1e-8)) / state.figure.sigma_shares
+    return PartAxes(
+        clouds.counts >= MIN_VOXELS, clouds.means, rigid.so3_log(axes), sizes, np.maximum(variances, 1e-8), clouds.counts
+    )
+
+
+def linearize(
+    state: FilterState, found: PartAxes, noise: MeasurementNoise, used: NDArray[np.bool_], with_sizes: bool
+) -> LinearizedMeasurement | None:
+    """Linearize the measurement of some parts at the state that they were measured with.
+
+    Args:
+        state: the state.
+        found: the measured parts.
+        noise: standard deviations.
+        used: which parts count, (10,).
+        with_sizes: whether measured sizes count; only where the state has them.
+    """
+    parts = np.flatnonzero(used & found.is_measured)
+    if not len(parts):
+        return None
+    n_rows = 9 if with_sizes else 6
+    residual, H = np.zeros((len(parts), n_rows)), np.zeros((len(parts), n_rows, state.layout.n))
+    R = np.zeros((len(parts) * n_rows,) * 2)
+    by_center, by_turn = center_jacobian(state), left_jacobian_inverse(found.turns)
+    turn_variances = _turn_variances(found, noise)
+    for row, i in enumerate(parts):
+        rotation, at = state.rotations[i], row * n_rows
+        residual[row, :3] = rotation @ found.offsets[i]
+        residual[row, 3:6] = found.turns[i]
+        H[row, :3] = by_center[i]
+        H[row, 3:6, 3 * i : 3 * i + 3] = by_turn[i]
+        spread = np.array([noise.across_m, noise.across_m, max(noise.across_m, noise.along * state.sizes[i, 2])])
+        R[at : at + 3, at : at + 3] = (rotation * spread**2) @ rotation.T
+        R[at + 3 : at + 6, at + 3 : at + 6] = np.diag(turn_variances[i])
+        if with_sizes:
+            first = state.layout.sizes_at.start + 3 * i
+            residual[row, 6:] = found.sizes[i] - state.sizes[i]
+            H[row, 6:, first : first + 3] = np.eye(3)
+            R[at + 6 : at + 9, at + 6 : at + 9] = np.eye(3) * noise.size_m**2
+    return LinearizedMeasurement(residual.ravel(), H.reshape(-1, state.layout.n), R)
+
+
+def center_jacobian(state: FilterState) -> Array:
+    """Return the derivative of the centres of all parts by the error state, (10, 3, n) (MTHC01 Sect. 4)."""
+    at = state.layout
+    out = np.zeros((N_PARTS, 3, at.n))
+    out[TORSO, :, at.center_at] = np.eye(3)
+    for i in range(1, N_PARTS):
+        p = PARENTS[i]
+        out[i] = out[p] + _point(state, p, state.figure.parent_shares[i])
+        out[i] -= _point(state, i, state.figure.own_shares[i])
+    return out
+
+
+def point_jacobian(state: FilterState, by_center: Array, part: int, shares: Array) -> Array:
+    """Return the derivative of a point of a part by the error state, (3, n).
+
+    Args:
+        state: the state.
+        by_center: derivatives of the centres, see `center_jacobian`.
+        part: index of the part.
+        shares: position of the point in half sizes of the part, (3,).
+    """
+    return np.asarray(by_center[part] + _point(state, part, shares))
+
+
+def _point(state: FilterState, part: int, shares: Array) -> Array:
+    """Return the derivative of a point of a part relative to the part's centre, (3, n)."""
+    at, R = state.layout, state.rotations[part]
+    out = np.zeros((3, at.n))
+    out[:, 3 * part : 3 * part + 3] = -R @ rigid.skew(shares * state.sizes[part])
+    if at.sizes:
+        first = at.sizes_at.start + 3 * part
+        out[:, first : first + 3] = R * shares
+    return out
+
+
+def _order_by_size(order: IntArray) -> IntArray:
+    """Return the index of the principal axis, ascending, for each axis of the parts, (10, 3)."""
+    return np.argsort(order, axis=1)
+
+
+def _closest_order(axes: Array) -> IntArray:
+    """Return the index of the principal axis that is closest to each axis of the parts, (10, 3)."""
+    # fits[m, k]: how well the axes of part m agree with its own in the k-th order
+    fits = np.abs(axes[:, np.arange(3), _ORDERS]).sum(axis=2)
+    return np.asarray(_ORDERS[fits.argmax(axis=1)])
+
+
+def _turn_variances(found: PartAxes, noise: MeasurementNoise) -> Array:
+    """Return the variance of each measured angle, (10, 3), rad^2.
+
+    The axes i and j of n independent points mix by an angle of variance s_i s_j / (n (s_i - s_j)^2), with the variances
+    s along them: where both are alike, nothing tells them apart.
+    """
+    base = np.full((N_PARTS, 3), noise.turn**2)
+    if noise.independent is None:
+        return base
+    s = found.variances
+    one, other = s[:, [1, 2, 0]], s[:, [2, 0, 1]]
+    n = np.maximum(noise.independent * found.counts, 1.0)[:, None]
+    return np.asarray(np.minimum(base + one * other / (n * np.maximum((one - other) ** 2, 1e-16)), _MAX_TURN_VARIANCE))
