@@ -11,7 +11,7 @@ from tracker.fitting.gauss_newton import PointTargets, PosePrior, covariance, so
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
-from tracker.tracking.voxel.measurement import center_jacobian, point_jacobian
+from tracker.tracking.voxel.chain_jacobian import center_jacobian, point_jacobian
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState, Layout
 

@@ -67,7 +67,7 @@ class VoxelEstimator:
                 updates[p] = self._update(p, states, points, first)
                 states[p] = updates[p].state
         self.states, self.voxels = states, found
-        self.labels = label_voxels(points, states, settings.voxel_m, np.inf if settings.gate is None else settings.gate)
+        self.labels = label_voxels(points, states, settings.voxel_m, settings.label_rule)
         return self._estimate(frame, found, points, updates)
 
     def _predicted(self, p: int, frame: int, keyframe: Array | None) -> FilterState:
@@ -83,12 +83,11 @@ class VoxelEstimator:
 
     def _update(self, p: int, states: Sequence[FilterState], points: Array, first: bool) -> Update:
         settings = self._settings
-        gate = np.inf if settings.gate is None else settings.gate
         others = list(states)
 
         def measure(state: FilterState) -> LinearizedMeasurement | None:
             others[p] = state
-            clouds = label_voxels(points, others, settings.voxel_m, gate).clouds.of_person(p)
+            clouds = label_voxels(points, others, settings.voxel_m, settings.label_rule).clouds.of_person(p)
             parts = measure_parts(state, clouds, settings.by_size)
             with_sizes = settings.sizes == "always" or (settings.sizes == "first" and first)
             return linearize(state, parts, settings.measurement, np.ones(N_PARTS, dtype=bool), with_sizes)

@@ -43,22 +43,18 @@ def update(
         iterations: number of linearizations.
     """
     P, state, innovation, n_rows = predicted.covariance, predicted, 0.0, 0
-    gain, found = np.zeros((len(P), 0)), None
     for i in range(iterations):
-        there = measure(state)
-        if there is None or not len(there.residual):
+        found = measure(state)
+        if found is None or not len(found.residual):
             break
-        found = there
         H, HP = found.jacobian, found.jacobian @ P
         S = HP @ H.T + found.noise
-        gain = np.linalg.solve((S + S.T) / 2, HP).T
+        gain = np.asarray(np.linalg.solve((S + S.T) / 2, HP).T)
         residual = found.residual + H @ state.difference(predicted)
         if i == 0:
             innovation, n_rows = float(residual @ np.linalg.solve(S, residual)), len(residual)
-        state = predicted.retract(gain @ residual)
-    if found is None:
-        return Update(predicted, 0.0, 0)
-    return Update(state.with_covariance(joseph(P, gain, found)), innovation, n_rows)
+        state = predicted.retract(gain @ residual).with_covariance(joseph(P, gain, found))
+    return Update(state, innovation, n_rows)
 
 
 def joseph(P: Array, gain: Array, measurement: LinearizedMeasurement) -> Array:

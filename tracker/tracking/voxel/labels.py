@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.figure import N_PARTS
+from tracker.tracking.voxel.chain_jacobian import center_jacobian
 from tracker.tracking.voxel.label_kernels import N_MOMENTS, label_and_sum
 from tracker.tracking.voxel.state import FilterState
 
@@ -39,29 +40,43 @@ class Labels(NamedTuple):
     clouds: PartClouds
 
 
-def label_voxels(points: Array, states: Sequence[FilterState], size_m: float, gate: float = np.inf) -> Labels:
+class LabelRule(NamedTuple):
+    """How voxels are assigned to parts."""
+
+    gate: float = np.inf
+    """Squared Mahalanobis distance from which on a voxel belongs to no part; the paper has none."""
+    widened: bool = False
+    """Whether parts are widened by the uncertainty of their centres; the paper does not say so."""
+
+
+def label_voxels(points: Array, states: Sequence[FilterState], size_m: float, rule: LabelRule) -> Labels:
     """Assign each voxel to the part from which its Mahalanobis distance is least.
+
+    A part that is widened gets thinner: the logarithm of its volume is added to the squared distance, so that the
+    label is the likeliest one of parts that are filled evenly.
 
     Args:
         points: centres of the voxels, (N, 3), metres.
-        states: predicted figures of all people.
+        states: predicted figures of all people, with their covariances.
         size_m: edge of a voxel, metres; it widens the parts.
-        gate: squared distance from which on a voxel belongs to no part; the paper has none.
+        rule: how they are assigned.
     """
-    centers, rotations, sigmas = _parts(states, size_m)
+    centers, rotations, metrics = _parts(states, size_m, rule.widened)
     labels = np.empty(len(points), dtype=np.int16)
     moments = np.zeros((len(centers), N_MOMENTS))
-    label_and_sum(np.ascontiguousarray(points), centers, rotations, sigmas, gate, labels, moments)
+    packed = np.column_stack([metrics[0][:, *np.triu_indices(3)], metrics[1]])
+    label_and_sum(np.ascontiguousarray(points), centers, rotations, packed, rule.gate, labels, moments)
     return Labels(labels, _clouds(moments, size_m))
 
 
-def label_voxels_plainly(points: Array, states: Sequence[FilterState], size_m: float, gate: float = np.inf) -> Labels:
+def label_voxels_plainly(points: Array, states: Sequence[FilterState], size_m: float, rule: LabelRule) -> Labels:
     """Return the same without a compiled kernel: the oracle of `label_voxels`."""
-    centers, rotations, sigmas = _parts(states, size_m)
+    centers, rotations, (inverses, added) = _parts(states, size_m, rule.widened)
     local = np.einsum("mji,nmj->nmi", rotations, points[:, None] - centers)
-    distances = np.sum((local / sigmas) ** 2, axis=2)
+    squared = np.einsum("nmi,mij,nmj->nm", local, inverses, local)
+    distances = np.where(squared < rule.gate, squared + added, np.inf)
     labels = distances.argmin(axis=1).astype(np.int16)
-    labels[distances.min(axis=1) >= gate] = NO_PART
+    labels[~np.isfinite(distances.min(axis=1))] = NO_PART
     moments = np.zeros((len(centers), N_MOMENTS))
     for m in range(len(centers)):
         own = local[labels == m, m]
@@ -69,13 +84,26 @@ def label_voxels_plainly(points: Array, states: Sequence[FilterState], size_m: f
     return Labels(labels, _clouds(moments, size_m))
 
 
-def _parts(states: Sequence[FilterState], size_m: float) -> tuple[Array, Array, Array]:
-    sigmas = [np.sqrt((s.figure.sigma_shares * s.sizes) ** 2 + size_m**2 / 12) for s in states]
-    return (
-        np.concatenate([s.centers for s in states]),
-        np.concatenate([s.rotations for s in states]),
-        np.concatenate(sigmas),
-    )
+def _parts(
+    states: Sequence[FilterState], size_m: float, widened: bool
+) -> tuple[Array, Array, tuple[Array, Array]]:
+    """Return centres and rotations of all parts, and inverse covariances in their frames with what each adds."""
+    shapes = np.concatenate([(s.figure.sigma_shares * s.sizes) ** 2 + size_m**2 / 12 for s in states])
+    centers = np.concatenate([s.centers for s in states])
+    rotations = np.concatenate([s.rotations for s in states])
+    covariances = shapes[:, :, None] * np.eye(3)
+    if not widened:
+        return centers, rotations, (np.linalg.inv(covariances), np.zeros(len(centers)))
+    of_centers = np.concatenate([_center_covariances(s) for s in states])
+    covariances += np.einsum("mji,mjk,mkl->mil", rotations, of_centers, rotations)
+    added = np.log(np.linalg.det(covariances)) - np.log(shapes).sum(axis=1)
+    return centers, rotations, (np.linalg.inv(covariances), added)
+
+
+def _center_covariances(state: FilterState) -> Array:
+    """Return the covariance of the centre of each part, (10, 3, 3), square metres."""
+    J = center_jacobian(state)
+    return np.asarray(J @ state.covariance @ np.swapaxes(J, 1, 2))
 
 
 def _clouds(moments: Array, size_m: float) -> PartClouds:

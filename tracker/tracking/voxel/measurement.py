@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
-from tracker.tracking.voxel.figure import N_PARTS, PARENTS, TORSO
+from tracker.tracking.voxel.chain_jacobian import center_jacobian
+from tracker.tracking.voxel.figure import N_PARTS
 from tracker.tracking.voxel.kalman import LinearizedMeasurement
 from tracker.tracking.voxel.labels import PartClouds
 from tracker.tracking.voxel.motion_model import left_jacobian_inverse
@@ -113,41 +114,6 @@ def linearize(
             H[row, 6:, first : first + 3] = np.eye(3)
             R[at + 6 : at + 9, at + 6 : at + 9] = np.eye(3) * noise.size_m**2
     return LinearizedMeasurement(residual.ravel(), H.reshape(-1, state.layout.n), R)
-
-
-def center_jacobian(state: FilterState) -> Array:
-    """Return the derivative of the centres of all parts by the error state, (10, 3, n) (MTHC01 Sect. 4)."""
-    at = state.layout
-    out = np.zeros((N_PARTS, 3, at.n))
-    out[TORSO, :, at.center_at] = np.eye(3)
-    for i in range(1, N_PARTS):
-        p = PARENTS[i]
-        out[i] = out[p] + _point(state, p, state.figure.parent_shares[i])
-        out[i] -= _point(state, i, state.figure.own_shares[i])
-    return out
-
-
-def point_jacobian(state: FilterState, by_center: Array, part: int, shares: Array) -> Array:
-    """Return the derivative of a point of a part by the error state, (3, n).
-
-    Args:
-        state: the state.
-        by_center: derivatives of the centres, see `center_jacobian`.
-        part: index of the part.
-        shares: position of the point in half sizes of the part, (3,).
-    """
-    return np.asarray(by_center[part] + _point(state, part, shares))
-
-
-def _point(state: FilterState, part: int, shares: Array) -> Array:
-    """Return the derivative of a point of a part relative to the part's centre, (3, n)."""
-    at, R = state.layout, state.rotations[part]
-    out = np.zeros((3, at.n))
-    out[:, 3 * part : 3 * part + 3] = -R @ rigid.skew(shares * state.sizes[part])
-    if at.sizes:
-        first = at.sizes_at.start + 3 * part
-        out[:, first : first + 3] = R * shares
-    return out
 
 
 def _order_by_size(order: IntArray) -> IntArray:

@@ -34,6 +34,7 @@ def paper_settings(voxel_m: float = PAPER_VOXEL_M) -> VoxelSettings:
         iterations=1,
         start_iterations=1,
         gate=None,
+        widened=False,
         by_size=True,
         levels=False,
         smooth=False,

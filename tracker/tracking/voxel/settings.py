@@ -3,7 +3,10 @@
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from tracker.errors import TrackerError
+from tracker.tracking.voxel.labels import LabelRule
 from tracker.tracking.voxel.measurement import MeasurementNoise
 from tracker.tracking.voxel.motion_model import ProcessNoise
 
@@ -42,6 +45,8 @@ class VoxelSettings:
     """The same on the first frame."""
     gate: float | None = 16.0
     """Squared Mahalanobis distance from which on a voxel belongs to no part; None: each has one, as in the paper."""
+    widened: bool = True
+    """Whether parts are widened by the uncertainty of their prediction when voxels are labelled."""
     by_size: bool = False
     """Whether measured axes are told apart by size, as in the paper, else by the prediction."""
     levels: bool = True
@@ -58,3 +63,8 @@ class VoxelSettings:
                 f"expected voxels of {1000 * MIN_VOXEL_M:g} to {1000 * MAX_VOXEL_M:g} mm, found "
                 f"{1000 * self.voxel_m:g} mm; 25 to 50 mm are usual"
             )
+
+    @property
+    def label_rule(self) -> LabelRule:
+        """How voxels are assigned to parts."""
+        return LabelRule(np.inf if self.gate is None else self.gate, self.widened)
