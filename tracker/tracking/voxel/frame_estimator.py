@@ -88,7 +88,7 @@ class VoxelEstimator:
         def measure(state: FilterState) -> LinearizedMeasurement | None:
             others[p] = state
             clouds = label_voxels(points, others, settings.voxel_m, settings.label_rule).clouds.of_person(p)
-            parts = measure_parts(state, clouds, settings.by_size)
+            parts = measure_parts(state, clouds, settings.voxel_m, settings.by_size)
             with_sizes = settings.sizes == "always" or (settings.sizes == "first" and first)
             return linearize(state, parts, settings.measurement, np.ones(N_PARTS, dtype=bool), with_sizes)
 

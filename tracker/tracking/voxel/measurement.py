@@ -33,9 +33,9 @@ class MeasurementNoise(NamedTuple):
     """Angles, rad; beyond the paper those of distinct axes, see `independent`."""
     size_m: float
     """Half sizes, metres."""
-    independent: float | None
-    """Share of the voxels whose errors are independent, from which follows how well the axes of similar spread are
-    told apart. None: all angles have the same noise."""
+    independent_m3: float | None
+    """Volume of voxels whose errors are as one, cubic metres. From it follows how well axes of similar spread are told
+    apart. None: all angles have the same noise."""
 
 
 class PartAxes(NamedTuple):
@@ -51,16 +51,17 @@ class PartAxes(NamedTuple):
     """Half sizes, (10, 3), metres."""
     variances: Array
     """Variances of the voxels along the measured axes, (10, 3), square metres."""
-    counts: Array
-    """Number of voxels, (10,)."""
+    volumes: Array
+    """Volume of the voxels, (10,), cubic metres."""
 
 
-def measure_parts(state: FilterState, clouds: PartClouds, by_size: bool) -> PartAxes:
+def measure_parts(state: FilterState, clouds: PartClouds, size_m: float, by_size: bool) -> PartAxes:
     """Measure centre, axes and sizes of the parts from their voxels.
 
     Args:
         state: the state with which the voxels were labelled.
         clouds: the voxels of each part, (10,).
+        size_m: edge of a voxel, metres.
         by_size: whether axes are told apart by their order of size, as in the paper; else each is the one closest to
             the predicted axis. Both turn an axis that points the wrong way.
     """
@@ -75,7 +76,8 @@ def measure_parts(state: FilterState, clouds: PartClouds, by_size: bool) -> Part
         axes[np.flatnonzero(odd), :, worst] *= -1
     sizes = np.sqrt(np.maximum(variances, 1e-8)) / state.figure.sigma_shares
     return PartAxes(
-        clouds.counts >= MIN_VOXELS, clouds.means, rigid.so3_log(axes), sizes, np.maximum(variances, 1e-8), clouds.counts
+        clouds.counts >= MIN_VOXELS, clouds.means, rigid.so3_log(axes), sizes, np.maximum(variances, 1e-8),
+        clouds.counts * size_m**3,
     )
 
 
@@ -135,9 +137,9 @@ def _turn_variances(found: PartAxes, noise: MeasurementNoise) -> Array:
     s along them: where both are alike, nothing tells them apart.
     """
     base = np.full((N_PARTS, 3), noise.turn**2)
-    if noise.independent is None:
+    if noise.independent_m3 is None:
         return base
     s = found.variances
     one, other = s[:, [1, 2, 0]], s[:, [2, 0, 1]]
-    n = np.maximum(noise.independent * found.counts, 1.0)[:, None]
+    n = np.maximum(found.volumes / noise.independent_m3, 1.0)[:, None]
     return np.asarray(np.minimum(base + one * other / (n * np.maximum((one - other) ** 2, 1e-16)), _MAX_TURN_VARIANCE))

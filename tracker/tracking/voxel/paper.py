@@ -30,7 +30,7 @@ def paper_settings(voxel_m: float = PAPER_VOXEL_M) -> VoxelSettings:
         sizes="always",
         turn_rates=False,
         process=ProcessNoise(turn=1.0, turn_rate=0.0, size=0.01, center=0.02, velocity=2.0, damping=0.0),
-        measurement=MeasurementNoise(across_m=0.03, along=0.0, turn=0.15, size_m=0.03, independent=None),
+        measurement=MeasurementNoise(across_m=0.03, along=0.0, turn=0.15, size_m=0.03, independent_m3=None),
         iterations=1,
         start_iterations=1,
         gate=None,

@@ -25,13 +25,13 @@ class VoxelSettings:
     """Name of the method, which the store keeps with the settings."""
     voxel_m: float = 0.05
     """Edge of a voxel, metres."""
-    sizes: SizeEstimation = "frozen"
+    sizes: SizeEstimation = "first"
     """When part sizes are estimated. Frozen sizes are those of the person's body."""
     turn_rates: bool = True
     """Whether the state has the angular velocities of all parts; the paper has the torso's velocity alone."""
     process: ProcessNoise = field(default_factory=lambda: ProcessNoise(0.1, 12.0, 0.0, 0.02, 4.0, 4.0))
     """How the state may change by itself."""
-    measurement: MeasurementNoise = field(default_factory=lambda: MeasurementNoise(0.02, 0.3, 0.08, 0.02, 0.05))
+    measurement: MeasurementNoise = field(default_factory=lambda: MeasurementNoise(0.02, 0.3, 0.08, 0.02, 0.0003))
     """Noise of what voxels measure."""
     start_turn: float = 0.25
     """Standard deviation of the rotations of the start, rad."""
@@ -43,7 +43,7 @@ class VoxelSettings:
     """Number of times that voxels are labelled on a frame, each time by the state found last; once in the paper."""
     start_iterations: int = 6
     """The same on the first frame."""
-    gate: float | None = 16.0
+    gate: float | None = 25.0
     """Squared Mahalanobis distance from which on a voxel belongs to no part; None: each has one, as in the paper."""
     widened: bool = True
     """Whether parts are widened by the uncertainty of their prediction when voxels are labelled."""
