@@ -12,10 +12,11 @@ from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.voxel.assessment import assess
 from tracker.tracking.voxel.body_pose import pose_of, state_of
-from tracker.tracking.voxel.figure import N_PARTS
+from tracker.tracking.voxel.figure import LIMBS, N_PARTS
 from tracker.tracking.voxel.frame_voxels import FrameVoxels, carve_around
 from tracker.tracking.voxel.kalman import LinearizedMeasurement, Update, update
 from tracker.tracking.voxel.labels import Labels, label_voxels
+from tracker.tracking.voxel.limb_search import MIN_FREE, MIN_GAIN, SUSPICIOUS, LimbProblem, explained_by_others, with_limb
 from tracker.tracking.voxel.measurement import linearize, measure_parts
 from tracker.tracking.voxel.motion_model import predict
 from tracker.tracking.voxel.settings import VoxelSettings
@@ -66,6 +67,8 @@ class VoxelEstimator:
             if p not in keyframes:
                 updates[p] = self._update(p, states, points, first)
                 states[p] = updates[p].state
+                if settings.search:
+                    states[p] = self._recovered(p, states, found)
         self.states, self.voxels = states, found
         self.labels = label_voxels(points, states, settings.voxel_m, settings.label_rule)
         return self._estimate(frame, found, points, updates)
@@ -93,6 +96,24 @@ class VoxelEstimator:
             return linearize(state, parts, settings.measurement, np.ones(N_PARTS, dtype=bool), with_sizes)
 
         return update(states[p], measure, settings.start_iterations if first else settings.iterations)
+
+    def _recovered(self, p: int, states: list[FilterState], found: FrameVoxels) -> FilterState:
+        """Return the state of a person with the limbs that were lost where voxels show them."""
+        points, own = found.voxels.points_world, list(states)
+        if not len(points):
+            return own[p]
+        for limb, parts in LIMBS.items():
+            others = explained_by_others(points, own, p, parts, self._settings.voxel_m)
+            problem = LimbProblem(own[p], limb, found.voxels, ~others)
+            before = problem.fit()
+            if before.cost < SUSPICIOUS or before.n_free < MIN_FREE:
+                continue
+            directions, after = problem.search()
+            if after.cost > before.cost - MIN_GAIN:
+                continue
+            own[p] = with_limb(own[p], limb, directions, 0.3, 2.0)
+            own[p] = self._update(p, own, points, False).state
+        return own[p]
 
     def _estimate(
         self, frame: int, found: FrameVoxels, points: Array, updates: dict[int, Update]

@@ -51,6 +51,8 @@ class VoxelSettings:
     """Whether measured axes are told apart by size, as in the paper, else by the prediction."""
     levels: bool = True
     """Whether parts that the voxels do not resolve are measured on a coarser level (MTHC01 Sect. 6)."""
+    search: bool = True
+    """Whether limbs that the filter has lost are searched."""
     smooth: bool = True
     """Whether the poses are smoothed at the end of a run."""
     paper: bool = False
