@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from tracker.body.model import PosedBody
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import Status
@@ -12,12 +13,12 @@ from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.voxel.assessment import assess
 from tracker.tracking.voxel.body_pose import pose_of, state_of
-from tracker.tracking.voxel.figure import LIMBS, N_PARTS
+from tracker.tracking.voxel.figure import LIMBS, N_PARTS, figure_of, part_rotations
 from tracker.tracking.voxel.frame_voxels import FrameVoxels, carve_around
 from tracker.tracking.voxel.kalman import LinearizedMeasurement, Update, update
 from tracker.tracking.voxel.labels import Labels, label_voxels
 from tracker.tracking.voxel.limb_search import MIN_FREE, MIN_GAIN, SUSPICIOUS, LimbProblem, explained_by_others, with_limb
-from tracker.tracking.voxel.measurement import linearize, measure_parts
+from tracker.tracking.voxel.measurement import linearize, linearize_rotations, measure_parts
 from tracker.tracking.voxel.motion_model import predict
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState
@@ -67,6 +68,8 @@ class VoxelEstimator:
             if p not in keyframes:
                 updates[p] = self._update(p, states, points, first)
                 states[p] = updates[p].state
+                if settings.limit_rad is not None:
+                    states[p] = self._within_limits(p, states[p])
                 if settings.search:
                     states[p] = self._recovered(p, states, found)
         self.states, self.voxels = states, found
@@ -96,6 +99,14 @@ class VoxelEstimator:
             return linearize(state, parts, settings.measurement, np.ones(N_PARTS, dtype=bool), with_sizes)
 
         return update(states[p], measure, settings.start_iterations if first else settings.iterations)
+
+    def _within_limits(self, p: int, state: FilterState) -> FilterState:
+        """Return the state drawn to the closest pose of the body, whose joints have limits and fewer axes."""
+        model, sigma = self._run.subjects.models[p], self._settings.limit_rad
+        assert sigma is not None
+        body = PosedBody(model, pose_of(model, state, self._poses[p], self._run.subjects.active_dofs[p]).values)
+        allowed = part_rotations(body, figure_of(model))
+        return update(state, lambda s: linearize_rotations(s, allowed, sigma)).state
 
     def _recovered(self, p: int, states: list[FilterState], found: FrameVoxels) -> FilterState:
         """Return the state of a person with the limbs that were lost where voxels show them."""

@@ -32,11 +32,13 @@ _PLACES = np.linspace(0.1, 1.0, 8)
 """Places along a segment that must lie in voxels."""
 _OUTSIDE = 3.0
 """Weight of the share of a limb outside of the voxels, against the share of voxels that it leaves unexplained."""
+_SKIN = 1.2
+"""Factor by which other parts are wider than their sizes: a visual hull is."""
 _PRIOR, _PRIOR_RAD = 0.02, 0.5
 """Weight of the squared angle from the prediction, in this unit, rad."""
 
 
-SUSPICIOUS, MIN_GAIN, MIN_FREE = 0.35, 0.15, 6
+SUSPICIOUS, MIN_GAIN, MIN_FREE = 0.4, 0.2, 12
 """Cost above which a limb is searched, least gain of a place that is taken, and fewest voxels to search in."""
 
 
@@ -141,8 +143,8 @@ def explained_by_others(
     found = np.zeros(len(points), dtype=bool)
     for p, state in enumerate(states):
         local = np.einsum("mji,nmj->nmi", state.rotations, points[:, None] - state.centers)
-        inside = np.abs(local[..., 2]) <= state.sizes[:, 2] + size_m / 2
-        inside &= np.sum((local[..., :2] / (state.sizes[:, :2] + size_m / 2)) ** 2, axis=2) <= 1.0
+        inside = np.abs(local[..., 2]) <= state.sizes[:, 2] + size_m
+        inside &= np.sum((local[..., :2] / (_SKIN * state.sizes[:, :2] + size_m)) ** 2, axis=2) <= 1.0
         if p == person:
             inside[:, list(limb)] = False
         found |= inside.any(axis=1)

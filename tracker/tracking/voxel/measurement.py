@@ -118,6 +118,22 @@ def linearize(
     return LinearizedMeasurement(residual.ravel(), H.reshape(-1, state.layout.n), R)
 
 
+def linearize_rotations(state: FilterState, rotations: Array, sigma_rad: float) -> LinearizedMeasurement:
+    """Linearize a measurement of the rotations of all parts, (10, 3, 3).
+
+    Args:
+        state: the state.
+        rotations: as measured.
+        sigma_rad: standard deviation of each angle, rad.
+    """
+    turns = rigid.so3_log(np.swapaxes(state.rotations, 1, 2) @ rotations)
+    by_turn, H = left_jacobian_inverse(turns), np.zeros((3 * N_PARTS, state.layout.n))
+    for i in range(N_PARTS):
+        own = slice(3 * i, 3 * i + 3)
+        H[own, own] = by_turn[i]
+    return LinearizedMeasurement(turns.ravel(), H, np.eye(3 * N_PARTS) * sigma_rad**2)
+
+
 def _order_by_size(order: IntArray) -> IntArray:
     """Return the index of the principal axis, ascending, for each axis of the parts, (10, 3)."""
     return np.argsort(order, axis=1)

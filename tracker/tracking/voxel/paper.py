@@ -37,6 +37,7 @@ def paper_settings(voxel_m: float = PAPER_VOXEL_M) -> VoxelSettings:
         widened=False,
         by_size=True,
         levels=False,
+        limit_rad=None,
         search=False,
         smooth=False,
         paper=True,

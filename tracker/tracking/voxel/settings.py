@@ -51,6 +51,9 @@ class VoxelSettings:
     """Whether measured axes are told apart by size, as in the paper, else by the prediction."""
     levels: bool = True
     """Whether parts that the voxels do not resolve are measured on a coarser level (MTHC01 Sect. 6)."""
+    limit_rad: float | None = 0.15
+    """Standard deviation of the parts' rotations from the closest pose of the body, whose joints have limits, rad; None:
+    the figure's joints are balls without limits, as in the paper."""
     search: bool = True
     """Whether limbs that the filter has lost are searched."""
     smooth: bool = True
