@@ -18,6 +18,10 @@ from tracker.tracking.voxel.state import FilterState
 MIN_VOXELS = 4
 """Fewest voxels of a part that is measured: fewer have no three principal axes."""
 _ORDERS = np.array(list(itertools.permutations(range(3))))
+_SKIN_M = 0.01
+"""Spread that the skin of a visual hull adds across a part, metres."""
+_IMPROBABLE = 16.8
+"""Normalized innovation of the six rows of a part that one in a hundred exceeds."""
 _MAX_TURN_VARIANCE = 1.0
 """Largest variance of a measured angle, rad^2: axes are matched with the predicted ones to within 45 degrees."""
 
@@ -101,6 +105,7 @@ def linearize(
     R = np.zeros((len(parts) * n_rows,) * 2)
     by_center, by_turn = center_jacobian(state), left_jacobian_inverse(found.turns)
     turn_variances = _turn_variances(found, noise)
+    doubt = _doubt(state, found, noise) if noise.independent_m3 is not None else np.ones(N_PARTS)
     for row, i in enumerate(parts):
         rotation, at = state.rotations[i], row * n_rows
         residual[row, :3] = rotation @ found.offsets[i]
@@ -108,13 +113,15 @@ def linearize(
         H[row, :3] = by_center[i]
         H[row, 3:6, 3 * i : 3 * i + 3] = by_turn[i]
         spread = np.array([noise.across_m, noise.across_m, max(noise.across_m, noise.along * state.sizes[i, 2])])
-        R[at : at + 3, at : at + 3] = (rotation * spread**2) @ rotation.T
-        R[at + 3 : at + 6, at + 3 : at + 6] = np.diag(turn_variances[i])
+        R[at : at + 3, at : at + 3] = (rotation * spread**2 * doubt[i]) @ rotation.T
+        R[at + 3 : at + 6, at + 3 : at + 6] = np.diag(np.minimum(turn_variances[i] * doubt[i], _MAX_TURN_VARIANCE))
         if with_sizes:
             first = state.layout.sizes_at.start + 3 * i
             residual[row, 6:] = found.sizes[i] - state.sizes[i]
             H[row, 6:, first : first + 3] = np.eye(3)
             R[at + 6 : at + 9, at + 6 : at + 9] = np.eye(3) * noise.size_m**2
+        if noise.independent_m3 is not None:
+            _limit_influence(state, residual[row, :6], H[row, :6], R[at : at + 6, at : at + 6])
     return LinearizedMeasurement(residual.ravel(), H.reshape(-1, state.layout.n), R)
 
 
@@ -144,6 +151,26 @@ def _closest_order(axes: Array) -> IntArray:
     # fits[m, k]: how well the axes of part m agree with its own in the k-th order
     fits = np.abs(axes[:, np.arange(3), _ORDERS]).sum(axis=2)
     return np.asarray(_ORDERS[fits.argmax(axis=1)])
+
+
+def _doubt(state: FilterState, found: PartAxes, noise: MeasurementNoise) -> Array:
+    """Return the factor by which the variances of each part grow, (10,), at least 1.
+
+    A cloud that is thicker than its part is merged with another one; one with fewer voxels is only a piece of it.
+    """
+    expected = np.sum((state.figure.sigma_shares * state.sizes)[:, :2] ** 2, axis=1) + 2 * _SKIN_M**2
+    thick = np.sum(found.variances[:, :2], axis=1) / expected
+    volumes = np.pi * 2 * np.prod(state.sizes, axis=1) * np.where(state.figure.is_ellipsoid, 2 / 3, 1.0)
+    missing = volumes / np.maximum(found.volumes, 1e-9)
+    return np.asarray(np.clip(thick, 1.0, 3.0) ** 2 * np.clip(missing, 1.0, 10.0))
+
+
+def _limit_influence(state: FilterState, residual: Array, H: Array, R: Array) -> None:
+    """Enlarge the noise, (6, 6), of a part whose innovation is improbable, so that its influence is bounded."""
+    S = H @ state.covariance @ H.T + R
+    squared = float(residual @ np.linalg.solve(S, residual))
+    if squared > _IMPROBABLE:
+        R *= squared / _IMPROBABLE
 
 
 def _turn_variances(found: PartAxes, noise: MeasurementNoise) -> Array:
