@@ -12,6 +12,7 @@ from tracker.tracking.chamfer.settings import Estimation, TrackSettings
 from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.estimation.settings import EstimationSettings, RecoverSettings
 from tracker.tracking.tracker import TrackerSettings
+from tracker.tracking.voxel.settings import VoxelSettings
 
 SETTING = "track_settings"
 """Setting of the session."""
@@ -62,6 +63,8 @@ def of_method(settings: TrackSettings, method: MethodName) -> TrackerSettings:
     """Return the settings of a run by a method: the chosen ones, as far as it has them."""
     if method == "chamfer":
         return settings
+    if method == "voxel":
+        return VoxelSettings(smooth=settings.smooth)
     shared = {f.name: getattr(settings, f.name) for f in fields(EstimationSettings) if f.name in _SHARED}
     return ContourSettings(**shared)
 
