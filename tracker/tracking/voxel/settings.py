@@ -23,7 +23,7 @@ class VoxelSettings:
 
     method: ClassVar[str] = "voxel"
     """Name of the method, which the store keeps with the settings."""
-    voxel_m: float = 0.05
+    voxel_m: float = 0.03
     """Edge of a voxel, metres."""
     sizes: SizeEstimation = "first"
     """When part sizes are estimated. Frozen sizes are those of the person's body."""
@@ -54,7 +54,7 @@ class VoxelSettings:
     limit_rad: float | None = 0.15
     """Standard deviation of the parts' rotations from the closest pose of the body, whose joints have limits, rad; None:
     the figure's joints are balls without limits, as in the paper."""
-    search: bool = True
+    search: bool = False
     """Whether limbs that the filter has lost are searched."""
     smooth: bool = True
     """Whether the poses are smoothed at the end of a run."""
