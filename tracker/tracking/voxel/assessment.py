@@ -8,10 +8,10 @@ import numpy as np
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import Status
 from tracker.tracking.voxel.figure import LIMBS
-from tracker.tracking.voxel.frame_voxels import FrameVoxels, axis_points, occupied_at
+from tracker.tracking.voxel.frame_voxels import FrameVoxels, axis_points, occupied_near
 from tracker.tracking.voxel.state import FilterState
 
-_AXIS = np.linspace(-0.9, 0.9, 10)
+_AXIS = np.linspace(-0.75, 0.75, 10)
 """Places along the axis of a part that are looked up, in half sizes."""
 _LOST_SHARE, _DOUBTFUL_SHARE = 0.5, 0.85
 """A limb of whose axis less lies in voxels is lost, or doubtful."""
@@ -43,7 +43,7 @@ def assess(
     """
     if frame.n_views < 2:
         return FigureAssessment("lost", "fewer than two views show anybody: the body is where it was predicted")
-    inside = occupied_at(frame.voxels, axis_points(state, _AXIS)).mean(axis=1)
+    inside = occupied_near(frame.voxels, axis_points(state, _AXIS)).mean(axis=1)
     if inside.max() == 0.0:
         return FigureAssessment(
             "lost", "no voxels near the body: the silhouettes are empty or disagree; check that no camera has moved"

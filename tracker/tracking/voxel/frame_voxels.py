@@ -81,6 +81,12 @@ def occupied_at(voxels: Voxels, points: Array) -> Array:
     return np.asarray(voxels.occupied[at[..., 0], at[..., 1], at[..., 2]] & inside)
 
 
+def occupied_near(voxels: Voxels, points: Array) -> Array:
+    """Return whether points, (..., 3), lie in occupied voxels or beside their faces, (...)."""
+    steps = voxels.grid.size_m * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    return np.asarray(occupied_at(voxels, points[..., None, :] + steps).any(axis=-1))
+
+
 def _share_inside(silhouette: ViewSilhouette, points: Array) -> float:
     """Return the share of points, (N, 3), in the silhouette; of those in the image. 1 if none is in the image."""
     camera = silhouette.camera

@@ -39,7 +39,7 @@ class VoxelSettings:
     """Standard deviation of the place of the start, metres."""
     start_size_m: float = 0.02
     """Standard deviation of the half sizes of the start, metres."""
-    iterations: int = 3
+    iterations: int = 2
     """Number of times that voxels are labelled on a frame, each time by the state found last; once in the paper."""
     start_iterations: int = 6
     """The same on the first frame."""

@@ -39,6 +39,7 @@ def test_a_pose_comes_back(name):
     step = np.where(np.isfinite(model.spreads), 0.0, 0.35 * rng.normal(size=model.n_dofs))
     pose = model.clip(model.retract(model.neutral(), step))
     state = state_of(model, [pose], 0.1, VoxelSettings())
+    state = state.with_covariance(1e-4 * np.eye(state.layout.n))
     found = pose_of(model, state, model.neutral())
     names = [model.point_names.index(n) for n in LIMB_JOINTS]
     errors = np.linalg.norm(model.points_world(found.values)[names] - model.points_world(pose)[names], axis=1)

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from filter_states import some_state
 
+from tracker.formats.model_toml import load_model
+from tracker.tracking.voxel.body_pose import state_of
 from tracker.tracking.voxel.labels import NO_PART, LabelRule, label_voxels, label_voxels_plainly
+from tracker.tracking.voxel.settings import VoxelSettings
 
 
 @pytest.mark.parametrize("rule", [LabelRule(), LabelRule(9.0), LabelRule(9.0, True)])
@@ -26,14 +29,14 @@ def test_the_middle_of_each_part_belongs_to_it():
 
 def test_an_uncertain_part_is_found_farther_away():
     """A forearm whose elbow may have bent takes voxels that would lie outside of its gate."""
-    state = some_state(2)
+    model = load_model("mikic10", 1.75)
+    state = state_of(model, [model.neutral()], 0.1, VoxelSettings())
     P = 1e-6 * np.eye(state.layout.n)
-    own = slice(18, 21)  # rotation of the left forearm
     sure = state.with_covariance(P)
     P = P.copy()
-    P[own, own] = np.eye(3)
+    P[18:21, 18:21] = np.eye(3)  # rotation of the left forearm
     unsure = state.with_covariance(P)
-    aside = state.centers[6] + 0.2 * state.rotations[6, :, 0]
+    aside = state.centers[6] + (0.0, 0.25, 0.0)
     rule = LabelRule(16.0, True)
-    assert label_voxels(aside[None], [sure], 0.03, rule).labels[0] != 6
+    assert label_voxels(aside[None], [sure], 0.03, rule).labels[0] == NO_PART
     assert label_voxels(aside[None], [unsure], 0.03, rule).labels[0] == 6
