@@ -10,13 +10,21 @@ from tracker.tracking.voxel.state import FilterState
 
 def center_jacobian(state: FilterState) -> Array:
     """Return the derivative of the centres of all parts by the error state, (10, 3, n) (MTHC01 Sect. 4)."""
-    at = state.layout
+    at, R, parents = state.layout, state.rotations, list(PARENTS)
+    figure, sizes = state.figure, state.sizes
+    by_parent = -R[parents] @ rigid.skew(figure.parent_shares * sizes[parents])
+    by_own = R @ rigid.skew(figure.own_shares * sizes)
     out = np.zeros((N_PARTS, 3, at.n))
     out[TORSO, :, at.center_at] = np.eye(3)
     for i in range(1, N_PARTS):
         p = PARENTS[i]
-        out[i] = out[p] + _point(state, p, state.figure.parent_shares[i])
-        out[i] -= _point(state, i, state.figure.own_shares[i])
+        out[i] = out[p]
+        out[i, :, 3 * p : 3 * p + 3] += by_parent[i]
+        out[i, :, 3 * i : 3 * i + 3] += by_own[i]
+        if at.sizes:
+            first = at.sizes_at.start
+            out[i, :, first + 3 * p : first + 3 * p + 3] += R[p] * figure.parent_shares[i]
+            out[i, :, first + 3 * i : first + 3 * i + 3] -= R[i] * figure.own_shares[i]
     return out
 
 

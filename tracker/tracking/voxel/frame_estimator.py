@@ -68,6 +68,8 @@ class VoxelEstimator:
             if p not in keyframes:
                 updates[p] = self._update(p, states, points, first)
                 states[p] = updates[p].state
+                if settings.sizes == "first" and states[p].layout.sizes:
+                    states[p] = states[p].with_frozen_sizes()
                 if settings.limit_rad is not None:
                     states[p] = self._within_limits(p, states[p])
                 if settings.search:
@@ -95,8 +97,8 @@ class VoxelEstimator:
             others[p] = state
             clouds = label_voxels(points, others, settings.voxel_m, settings.label_rule).clouds.of_person(p)
             parts = measure_parts(state, clouds, settings.voxel_m, settings.by_size)
-            with_sizes = settings.sizes == "always" or (settings.sizes == "first" and first)
-            return linearize(state, parts, settings.measurement, np.ones(N_PARTS, dtype=bool), with_sizes)
+            used = np.ones(N_PARTS, dtype=bool)
+            return linearize(state, parts, settings.measurement, used, state.layout.sizes)
 
         return update(states[p], measure, settings.start_iterations if first else settings.iterations)
 

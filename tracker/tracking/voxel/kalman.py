@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.geometry.arrays import Array
+from tracker.tracking.voxel.small_products import product
 from tracker.tracking.voxel.state import FilterState
 
 
@@ -47,8 +48,8 @@ def update(
         found = measure(state)
         if found is None or not len(found.residual):
             break
-        H, HP = found.jacobian, found.jacobian @ P
-        S = HP @ H.T + found.noise
+        H, HP = found.jacobian, product(found.jacobian, P)
+        S = product(HP, H.T) + found.noise
         gain = np.asarray(np.linalg.solve((S + S.T) / 2, HP).T)
         residual = found.residual + H @ state.difference(predicted)
         if i == 0:
@@ -59,6 +60,6 @@ def update(
 
 def joseph(P: Array, gain: Array, measurement: LinearizedMeasurement) -> Array:
     """Return the updated covariance, (n, n): (I - KH) P (I - KH)^T + K R K^T is positive definite for any gain."""
-    rest = np.eye(len(P)) - gain @ measurement.jacobian
-    out = rest @ P @ rest.T + gain @ measurement.noise @ gain.T
+    rest = np.eye(len(P)) - product(gain, measurement.jacobian)
+    out = product(product(rest, P), rest.T) + product(product(gain, measurement.noise), gain.T)
     return (out + out.T) / 2

@@ -7,6 +7,7 @@ import numpy as np
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.figure import N_PARTS
+from tracker.tracking.voxel.small_products import product
 from tracker.tracking.voxel.state import FilterState
 
 
@@ -37,7 +38,7 @@ def predict(state: FilterState, dt: float, noise: ProcessNoise) -> FilterState:
     """
     F, step = transition(state, dt, noise.damping)
     moved = state.retract(step)
-    P = F @ state.covariance @ F.T + process_covariance(state, dt, noise)
+    P = product(product(F, state.covariance), F.T) + process_covariance(state, dt, noise)
     return moved.with_covariance((P + P.T) / 2)
 
 

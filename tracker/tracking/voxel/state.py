@@ -121,6 +121,14 @@ class FilterState:
             step[at.turn_rates_at] = (self.turn_rates - other.turn_rates).ravel()
         return step
 
+    def with_frozen_sizes(self) -> "FilterState":
+        """Return the same state without sizes in the error state."""
+        at = self.layout
+        kept = np.delete(np.arange(at.n), np.r_[at.sizes_at])
+        return replace(
+            self, layout=replace(at, sizes=False), covariance=np.ascontiguousarray(self.covariance[kept[:, None], kept])
+        )
+
     def with_covariance(self, covariance: Array) -> "FilterState":
         """Return the same state with another covariance, (n, n)."""
         return replace(self, covariance=covariance)
