@@ -15,13 +15,17 @@ from tracker.tracking.voxel.assessment import assess
 from tracker.tracking.voxel.body_pose import pose_of, state_of
 from tracker.tracking.voxel.figure import LIMBS, N_PARTS, figure_of, part_rotations
 from tracker.tracking.voxel.frame_voxels import FrameVoxels, carve_around
-from tracker.tracking.voxel.kalman import LinearizedMeasurement, Update, update
+from tracker.tracking.voxel.kalman import LinearizedMeasurement, Update, joined, update
 from tracker.tracking.voxel.labels import Labels, label_voxels
+from tracker.tracking.voxel.levels import Levels, carried, find_levels, measure_together
 from tracker.tracking.voxel.limb_search import MIN_FREE, MIN_GAIN, SUSPICIOUS, LimbProblem, explained_by_others, with_limb
 from tracker.tracking.voxel.measurement import linearize, linearize_rotations, measure_parts
 from tracker.tracking.voxel.motion_model import predict
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState
+
+_CARRIED_RAD = 0.2
+"""Standard deviation with which an unresolved part keeps its place on another, rad."""
 
 
 class VoxelEstimator:
@@ -47,6 +51,7 @@ class VoxelEstimator:
             state_of(m, list(s), self._dt, settings) for m, s in zip(run.subjects.models, starts, strict=True)
         ]
         self._has_motion = [len(s) > 1 for s in starts]
+        self._levels = [Levels.finest()] * len(starts)
         self.labels: Labels | None = None
         self.voxels: FrameVoxels | None = None
 
@@ -66,10 +71,15 @@ class VoxelEstimator:
         updates: dict[int, Update] = {}
         for p in subjects.tracked:
             if p not in keyframes:
+                if settings.levels:
+                    labels = label_voxels(points, states, settings.voxel_m, settings.label_rule).labels
+                    self._levels[p] = find_levels(self._levels[p], states[p], found.voxels, labels, N_PARTS * p)
                 updates[p] = self._update(p, states, points, first)
                 states[p] = updates[p].state
                 if settings.sizes == "first" and states[p].layout.sizes:
                     states[p] = states[p].with_frozen_sizes()
+                if not self._levels[p].is_resolved.all():
+                    states[p] = self._carried(p, states[p])
                 if settings.limit_rad is not None:
                     states[p] = self._within_limits(p, states[p])
                 if settings.search:
@@ -97,10 +107,18 @@ class VoxelEstimator:
             others[p] = state
             clouds = label_voxels(points, others, settings.voxel_m, settings.label_rule).clouds.of_person(p)
             parts = measure_parts(state, clouds, settings.voxel_m, settings.by_size)
-            used = np.ones(N_PARTS, dtype=bool)
-            return linearize(state, parts, settings.measurement, used, state.layout.sizes)
+            levels = self._levels[p]
+            return joined(
+                linearize(state, parts, settings.measurement, levels.is_resolved, state.layout.sizes),
+                measure_together(state, clouds, levels.pairs),
+            )
 
         return update(states[p], measure, settings.start_iterations if first else settings.iterations)
+
+    def _carried(self, p: int, state: FilterState) -> FilterState:
+        """Return the state in which unresolved parts keep their place on the part that they hang on."""
+        rotations = carried(self.states[p], state, self._levels[p])
+        return update(state, lambda s: linearize_rotations(s, rotations, _CARRIED_RAD)).state
 
     def _within_limits(self, p: int, state: FilterState) -> FilterState:
         """Return the state drawn to the closest pose of the body, whose joints have limits and fewer axes."""
@@ -146,7 +164,7 @@ class VoxelEstimator:
             assert self.labels is not None
             free = points[self.labels.labels < 0]
             per_row = updates[p].normalized_innovation / max(1, updates[p].n_rows)
-            verdict = assess(state, found, free, per_row, ())
+            verdict = assess(state, found, free, per_row, self._levels[p].notes)
             statuses.append(verdict.status)
             notes.append(verdict.note)
             covariances.append(body.covariance)

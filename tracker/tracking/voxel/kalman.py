@@ -30,6 +30,20 @@ class Update(NamedTuple):
     n_rows: int
 
 
+def joined(*measurements: LinearizedMeasurement | None) -> LinearizedMeasurement | None:
+    """Return independent measurements as one; None if there is none."""
+    found = [m for m in measurements if m is not None]
+    if len(found) < 2:
+        return found[0] if found else None
+    sizes = np.cumsum([0, *(len(m.residual) for m in found)])
+    R = np.zeros((sizes[-1], sizes[-1]))
+    for m, first, end in zip(found, sizes, sizes[1:], strict=False):
+        R[first:end, first:end] = m.noise
+    return LinearizedMeasurement(
+        np.concatenate([m.residual for m in found]), np.concatenate([m.jacobian for m in found]), R
+    )
+
+
 def update(
     predicted: FilterState, measure: Callable[[FilterState], LinearizedMeasurement | None], iterations: int = 1
 ) -> Update:
