@@ -61,6 +61,7 @@ class View3dChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     floor: bool | UnsetType = UNSET
     gizmos: bool | UnsetType = UNSET
     ghost: bool | UnsetType = UNSET
+    voxels: bool | UnsetType = UNSET
     trail_points: Annotated[list[Name], Meta(max_length=1000)] | UnsetType = UNSET
     trail_frames: Annotated[int, Meta(ge=1, le=MAX_TRAIL_FRAMES)] | UnsetType = UNSET
 
