@@ -86,7 +86,7 @@ def test_empty_silhouettes_lose_the_person(body, settings):
 @mode
 def test_parts_behind_a_camera_take_no_part(body, settings):
     """A camera between the person's arms: some parts are before it, some behind, and some around it."""
-    within = camera_at("within", body.points_world.mean(axis=0) + (0.05, 0.0, 0.2), (3.0, 0.0, 0.5))
+    within = camera_at("within", body.points_world.mean(axis=0) + np.array([0.05, 0.0, 0.2]), (3.0, 0.0, 0.5))
     views = (*own_evidence([body], cameras_around(3)), *own_evidence([body], [within]))
     depths = (body.points_world - within.center_world) @ within.T_world_camera[:3, 2]
     assert depths.min() < -0.1
