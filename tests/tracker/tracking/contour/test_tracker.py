@@ -56,6 +56,9 @@ def test_a_body_beside_its_contours_is_found(gavrila_cones, truth, settings):
     found = run(gavrila_cones, start, shown(gavrila_cones, truth, cameras_around(4)), settings)
     assert off_m(gavrila_cones, found[-1].poses[0], truth) < 0.5 * off_m(gavrila_cones, start, truth)
     matrix = found[-1].normal_matrices[0]
+    if not settings.paper:
+        assert matrix is None
+        return
     assert (matrix.rank, matrix.n_dofs) == (gavrila_cones.n_dofs, gavrila_cones.n_dofs)
     assert 1 < matrix.condition < np.inf
 
@@ -75,7 +78,8 @@ def test_nothing_seen_is_lost(gavrila_cones, truth, settings):
     found = run(gavrila_cones, truth, shown(gavrila_cones, truth, away), settings)
     assert [f.statuses[0] for f in found] == ["lost", "lost"]
     assert f"fewer than the {gavrila_cones.n_dofs} degrees of freedom" in found[-1].notes[0]
-    assert found[-1].normal_matrices[0].rank == 0
+    if settings.paper:
+        assert found[-1].normal_matrices[0].rank == 0
 
 
 def test_fewer_residuals_than_degrees_of_freedom_are_lost(gavrila_cones, truth, settings):

@@ -130,7 +130,7 @@ def test_a_keyframe_beside_the_person_stays_and_the_next_frames_are_good(gavrila
 @pytest.mark.slow
 @pytest.mark.parametrize("settings", [
     pytest.param(TrackSettings(), id="chamfer"),
-    pytest.param(ContourSettings(), id="contour", marks=pytest.mark.xfail(strict=True, reason="seed 19 is 30.7 mm off")),
+    pytest.param(ContourSettings(), id="contour", marks=pytest.mark.xfail(strict=True, reason="seed 19: 30.7 mm")),
 ])  # fmt: skip
 def test_twenty_bad_starts(data_folder, tmp_path, settings):
     """From keyframes 10 degrees and 6 cm beside the reference: at most 30 mm at frame 5, and good at frame 10."""
