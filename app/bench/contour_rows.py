@@ -1,13 +1,13 @@
 """The rows of `quadrille bench` about the contour tracker: an iteration, a complete solve and scipy's, the pipeline."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 
 import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
-from app.bench.rows import Row, Scene, Yardstick, descended, pipeline_row
+from app.bench.rows import BenchScene, Row, Yardstick, descended, pipeline_row
 from app.bench.sample_frames import BenchFrame
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
@@ -75,8 +75,8 @@ def _solves(six: BenchFrame, match: ContourResiduals, what: str, yardstick: Yard
     yield by_scipy
 
 
-def nearest_distances(views: tuple[ViewEvidence, ...], edges_px: list[FloatArray], body: PosedBody) -> list[Array]:
-    """Return the distance of each edge point, (n, 2) px, to the nearest visible contour, cut off, (n,) for each view."""
+def nearest_distances(views: Sequence[ViewEvidence], edges_px: Sequence[FloatArray], body: PosedBody) -> list[Array]:
+    """Return the distances of edge points, (n, 2) px, to the nearest visible contour, cut off, (n,) for each view."""
     out = list[Array]()
     for view, points_px in zip(views, edges_px, strict=True):
         seen = occluding_contours.trace([body], view.camera)
@@ -96,7 +96,7 @@ def nearest_distances(views: tuple[ViewEvidence, ...], edges_px: list[FloatArray
 
 def pipelines(frame: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
     """From video to overlay with `gavrila34`: by the chamfer tracker, and by the contour tracker at least as fast."""
-    scene = Scene(frame.session, (frame.model,), (frame.joints,))
+    scene = BenchScene(frame.session, (frame.model,), (frame.joints,))
     by_chamfer = pipeline_row("pipeline_gavrila34", scene, TrackSettings(), yardstick)
     yield by_chamfer
     row = pipeline_row("pipeline_gavrila34_contour", scene, _SETTINGS, yardstick)

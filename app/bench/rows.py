@@ -244,7 +244,7 @@ def evolution(cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
     yield Row("search_alone_hard", "hard frame by best-first search alone, cones", *timed)
 
 
-class Scene(NamedTuple):
+class BenchScene(NamedTuple):
     """A session of which the people are tracked from the poses that fit their joints."""
 
     session: Session
@@ -256,13 +256,13 @@ class Scene(NamedTuple):
 
 def pipeline(frame: BenchFrame, yardstick: Yardstick) -> Row:
     """From video to overlay: decode, undistort, edges, predict, refine, assess, trace contours; per frame."""
-    scene = Scene(frame.session, [frame.model], [frame.joints])
+    scene = BenchScene(frame.session, [frame.model], [frame.joints])
     return _required(pipeline_row("pipeline", scene, _SETTINGS, yardstick), 45, 90)
 
 
 def pipeline_of_two(crowd: BenchCrowd, yardstick: Yardstick) -> Row:
     """The same with two people."""
-    scene = Scene(crowd.session, crowd.models, crowd.joints)
+    scene = BenchScene(crowd.session, crowd.models, crowd.joints)
     return _required(pipeline_row("pipeline_of_2", scene, _SETTINGS, yardstick), 25, 50)
 
 
@@ -271,7 +271,7 @@ def _required(row: Row, fps: float, desired_fps: float) -> Row:
     return row._replace(must=1e3 / fps / 1.5, aim=1e3 / desired_fps / 1.5)
 
 
-def pipeline_row(name: str, scene: Scene, settings: TrackerSettings, yardstick: Yardstick) -> Row:
+def pipeline_row(name: str, scene: BenchScene, settings: TrackerSettings, yardstick: Yardstick) -> Row:
     """Track a scene from the fitted poses; the time is that of a frame."""
     session, models, joints = scene
     wanted = [k for k in _PIPELINE_FRAMES if k < session.n_frames]

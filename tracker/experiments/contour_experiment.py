@@ -8,7 +8,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
-from tracker.experiments.contour_run import RunResult, Scene, track_as_paper, track_scene
+from tracker.experiments.contour_run import RunResult, Scene, track_scene
 from tracker.experiments.convergence import Convergence, measure_convergence
 from tracker.experiments.smooth_motion import smooth_motion
 from tracker.experiments.staged_views import ModelActor, SkinActor
@@ -79,10 +79,8 @@ class ExperimentResult(NamedTuple):
     """True poses of the main run, (n_frames, n_values)."""
     runs: Sequence[Comparison]
     """All runs, for each actor, method and number of cameras."""
-    paper: RunResult
-    """The main run by the paper's minimization alone, with the sliding term."""
     convergence: Sequence[Convergence]
-    """Fits with and without the sliding term, on the main run's scene."""
+    """Fits of single frames with and without the sliding term, on the main run's scene."""
 
     def main(self, method: str) -> RunResult:
         """Return the main run of a method: the model's own shape, with the paper's number of cameras."""
@@ -113,17 +111,13 @@ def run_contour_experiment(
         scene = make_scene(experiment, actor, n)
         runs.append(Comparison(actor, n, name, track_scene(scene, methods[name], experiment.seed)))
         if progress is not None:
-            progress(len(runs), len(wanted) + 2)
-    scene = make_scene(experiment, "own shape", experiment.n_cameras)
-    paper = track_as_paper(scene, seed=experiment.seed)
+            progress(len(runs), len(wanted) + 1)
+    convergence = measure_convergence(make_scene(experiment, "own shape", experiment.n_cameras), experiment.seed)
     if progress is not None:
-        progress(len(wanted) + 1, len(wanted) + 2)
-    convergence = measure_convergence(scene, experiment.seed)
-    if progress is not None:
-        progress(len(wanted) + 2, len(wanted) + 2)
+        progress(len(wanted) + 1, len(wanted) + 1)
     models = {actor: load_model(_BODIES[actor], _HEIGHT_M) for actor in ACTORS}
     truth = _truth(experiment, models["own shape"])
-    return ExperimentResult(experiment, models, truth, runs, paper, convergence)
+    return ExperimentResult(experiment, models, truth, runs, convergence)
 
 
 def make_scene(experiment: ContourExperiment, actor: ActorKind, n_cameras: int) -> Scene:

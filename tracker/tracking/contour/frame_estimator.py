@@ -21,7 +21,7 @@ from tracker.tracking.estimation.incremental_fit import fit_by_chains
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
 
-_NO_LIMIT_PX = 1e5
+NO_LIMIT_PX = 1e5
 """An outlier distance that no residual reaches, px of the footage."""
 
 
@@ -87,7 +87,7 @@ class ContourEstimator(FrameEstimator):
     def _paper_residuals(self, person: int) -> ContourResiduals:
         around, index = self.problem.around(person, self.bodies)
         motion: Literal["rigid", "sliding"] = "sliding" if self._contour_settings.sliding else "rigid"
-        return ContourResiduals(self._unlimited, around, index, paper_match(motion), _NO_LIMIT_PX, everywhere=True)
+        return ContourResiduals(self._unlimited, around, index, paper_match(motion), NO_LIMIT_PX, everywhere=True)
 
 
 def conditioning(linear: NormalEquations, active_dofs: NDArray[np.bool_] | None) -> NormalMatrix:

@@ -1,8 +1,4 @@
-"""The minimization of KRH08 Sect. 5.3 as printed: model to image, without robust weights, prior or prediction.
-
-It serves the convergence experiment (Fig. 13), where the sliding term is switched. Trackers use the compiled kernels of
-`tracker.fitting`, which leave that term out: it moves a contour along itself only.
-"""
+"""The distances of KRH08 Eq. 59 and their derivatives, row by row with numpy: the reference of the compiled kernels."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,32 +8,13 @@ import numpy as np
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.gauss_newton import INITIAL_DAMPING, damped_step
 from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.shapes import EllipticalCone
 
-MAX_ITERATIONS = 15
-MIN_GAIN = 0.01
-"""Relative decrease of the RMS distance below which an iteration is the last."""
 SINGULAR = 0.02
 """Conditioning of a ruling below which its sliding term is weighted down: the two rulings of a cone nearly meet."""
-_MAX_DAMPING = 1e4
 _ON_SIDE = 0.999
 """Largest height of a point on the curved surface, in half its length. Points beyond lie on the rim of an end."""
-
-
-class ExtremalFit(NamedTuple):
-    """A fit of one frame."""
-
-    pose: Array
-    """(n_values,)."""
-    rms_px: tuple[float, ...]
-    """RMS distance of the contours before the first iteration and after each one, px."""
-
-    @property
-    def iterations(self) -> int:
-        """Number of iterations."""
-        return len(self.rms_px) - 1
 
 
 class Linearization(NamedTuple):
@@ -49,44 +26,6 @@ class Linearization(NamedTuple):
     """(m, n_dofs), px per radian or metre."""
     lengths: Array
     """Length of the piece of contour around each point, (m,), px."""
-
-    @property
-    def rms_px(self) -> float:
-        """RMS distance, px; NaN where nothing is visible."""
-        return float(np.sqrt(np.mean(self.distances**2))) if len(self.distances) else np.nan
-
-
-def fit_extremal_contours(
-    model: BodyModel, start: Array, views: Sequence[ViewEvidence], sliding: bool = True
-) -> ExtremalFit:
-    """Minimize the sum of squared chamfer distances (KRH08 Eq. 60) by damped Gauss-Newton from a start pose.
-
-    The paper does not say how degrees of freedom that nothing constrains are treated. Here the diagonal is damped.
-
-    Args:
-        model: the body, whose parts are elliptical cones.
-        start: initial pose, (n_values,).
-        views: the evidence.
-        sliding: whether the sliding term B of Eq. 31 is part of the Jacobian.
-    """
-    pose, here = start, linearize(model, start, views, sliding)
-    rms, damping = [here.rms_px], INITIAL_DAMPING
-    while len(rms) <= MAX_ITERATIONS and len(here.distances):
-        H, g = here.jacobian.T @ here.jacobian, here.jacobian.T @ here.distances
-        scale = np.diag(H) + 1e-6 * float(np.trace(H)) / len(H)
-        while True:
-            trial = model.clip(model.retract(pose, damped_step(H, g, damping * scale)))
-            there = linearize(model, trial, views, sliding)
-            if there.rms_px < here.rms_px or damping > _MAX_DAMPING:
-                break
-            damping *= 10
-        if not there.rms_px < here.rms_px:
-            break
-        pose, here, damping = trial, there, damping / 10
-        rms.append(here.rms_px)
-        if rms[-1] > (1 - MIN_GAIN) * rms[-2]:
-            break
-    return ExtremalFit(pose, tuple(rms))
 
 
 def linearize(model: BodyModel, pose: Array, views: Sequence[ViewEvidence], sliding: bool) -> Linearization:
