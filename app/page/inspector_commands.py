@@ -64,6 +64,13 @@ def _acquire(controller: Controller, _: int, message: wire.AcquireSizes) -> None
         controller.body_acquisition.stop()
 
 
+def _find_people(controller: Controller, _: int, message: wire.FindPeople) -> None:
+    if message.action == "start":
+        controller.finding.start()
+    else:
+        controller.finding.stop()
+
+
 INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetTrackSettings: _track_settings,
     wire.SetView3d: _view_3d,
@@ -74,4 +81,5 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.ApplySizes: lambda controller, _, m: controller.body_sizes.apply(m.person, m.refit),
     wire.DraftSizes: _draft,
     wire.AcquireSizes: _acquire,
+    wire.FindPeople: _find_people,
 }

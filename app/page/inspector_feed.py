@@ -1,5 +1,7 @@
 """Updates for the inspector of a page: only what changed since the last ones (docs/protocol.md)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from app.control.controller import Controller
@@ -8,6 +10,7 @@ from app.page.message_types import Message
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.people import AcquisitionState
+from app.state.progress import FindState
 from app.state.run_choices import RunChoices
 from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
@@ -32,7 +35,7 @@ class InspectorFeed:
         self._made_from = _ingredients(state)
         now: list[Message] = [
             settings(state.settings, state.run_choices), view_3d(controller, state), body_sizes(controller, state),
-            acquisition(state.acquisition),
+            acquisition(state.acquisition), finding(state.finding, [c.camera.name for c in controller.session.cameras]),
         ]  # fmt: skip
         changed = [message for message in now if message not in self._sent]
         self._sent = now
@@ -44,6 +47,7 @@ def _ingredients(state: State) -> tuple[Identity, ...]:
     made_from = (
         state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
+        state.finding,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
 
@@ -121,6 +125,19 @@ def acquisition(found: AcquisitionState) -> wire.AcquisitionMessage:
             side=wire.OutlinePair(outlines.side.before, outlines.side.after),
         )
     return wire.AcquisitionMessage(found.person, found.running, found.stage, found.share, found.message, result)
+
+
+def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
+    """Describe the search for people.
+
+    Args:
+        found: its state.
+        cameras: names of all cameras.
+    """
+    axes = tuple(wire.SilhouetteAxes(cameras.index(n), people) for n, people in found.axes.items() if n in cameras)
+    return wire.FindingMessage(
+        found.running, found.stage, found.share, found.notes, found.message, found.failed, found.frame, axes
+    )
 
 
 def _floor(floor: FloorState) -> wire.FloorInfo:

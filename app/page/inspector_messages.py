@@ -61,6 +61,7 @@ class View3dChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     floor: bool | UnsetType = UNSET
     gizmos: bool | UnsetType = UNSET
     ghost: bool | UnsetType = UNSET
+    voxels: bool | UnsetType = UNSET
     trail_points: Annotated[list[Name], Meta(max_length=1000)] | UnsetType = UNSET
     trail_frames: Annotated[int, Meta(ge=1, le=MAX_TRAIL_FRAMES)] | UnsetType = UNSET
 
@@ -127,6 +128,12 @@ class AcquireSizes(Command, frozen=True, tag="acquire"):
 
     action: Literal["start", "stop"]
     person: Index
+
+
+class FindPeople(Command, frozen=True, tag="find_people"):
+    """Find the people whom nobody has placed, acquire their sizes and track them, or stop that."""
+
+    action: Literal["start", "stop"]
 
 
 # --- to the page ----------------------------------------------------------------------------------------------------
@@ -288,3 +295,31 @@ class AcquisitionMessage(Message, frozen=True, tag="acquisition"):
     message: str
     """Why there is no result, or empty."""
     result: AcquisitionResult | None
+
+
+class SilhouetteAxes(Part, frozen=True):
+    """The major axes of the silhouettes of people in one view."""
+
+    camera: int
+    people: tuple[tuple[tuple[float, float, float, float], ...], ...]
+    """For each person the successive approximations x0, y0, x1, y1, undistorted px; the last is the axis."""
+
+
+class FindingMessage(Message, frozen=True, tag="finding"):
+    """The search for people whom nobody has placed: its progress, and who was found."""
+
+    running: bool
+    stage: str
+    """The kind of work."""
+    share: float
+    """Share of the work before tracking that is done, 0 to 1."""
+    notes: tuple[str, ...]
+    """Sentences on what was tried, then on who was found and how."""
+    message: str
+    """How the last one ended, or empty."""
+    failed: bool
+    """Whether it ended with an error."""
+    frame: int | None
+    """The frame on which people were found last."""
+    axes: tuple[SilhouetteAxes, ...]
+    """The axes of the silhouettes on that frame, of each view that has some."""

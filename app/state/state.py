@@ -8,7 +8,7 @@ import numpy as np
 from app.state.comparison import PoseComparison
 from app.state.floor_picking import FloorState
 from app.state.people import AcquisitionState, DragState, HeldPoint, ShownPose, SizeDraft, Visibility
-from app.state.progress import FootageState, RangeState, TrackState
+from app.state.progress import FindState, FootageState, RangeState, TrackState
 from app.state.run_choices import RunChoices
 from app.state.search import CostLandscape, SearchState, SearchView
 from app.state.view_3d import View3d
@@ -55,6 +55,8 @@ class State:
     landscape: CostLandscape | None = None
     """Of the shown pose or one shortly before; None until a page displays it."""
     track: TrackState = field(default_factory=TrackState)
+    finding: FindState = field(default_factory=FindState)
+    """Search for people whom nobody has placed."""
     follow: bool = True
     """Whether each frame is shown as it is tracked."""
     locked: tuple[frozenset[int], ...] = ()
@@ -194,6 +196,7 @@ class StateChanges(TypedDict, total=False):
     search_view: SearchView
     landscape: CostLandscape | None
     track: TrackState
+    finding: FindState
     follow: bool
     locked: tuple[frozenset[int], ...]
     ranges: RangeState

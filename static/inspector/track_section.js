@@ -16,10 +16,11 @@ export function trackSection({ store, send, notify }) {
   const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
   const method = choiceRow({
     label: "Method",
-    title: "Chamfer matching searches whole bodies where refinement fails. Extremal contours (KRH08) refine until they converge",
+    title: "Chamfer matching searches whole bodies where refinement fails. Extremal contours (KRH08) refine until they converge. Voxels (MTHC01) are carved from the silhouettes and filtered over time",
     options: [
       ["chamfer", "Chamfer matching"],
       ["contour", "Extremal contours"],
+      ["voxel", "Voxels"],
     ],
     change: (value) => set({ method: value }),
   });
@@ -91,6 +92,7 @@ export function trackSection({ store, send, notify }) {
     stride.show(track.stride, track.stride !== initial.stride);
     cameras.show(store.facts.session?.cameras.map((camera) => camera.name) ?? [], track.cameras);
     estimate.element.hidden = track.method !== "chamfer";
+    for (const row of [order, past, recover, backward]) row.element.hidden = track.method === "voxel";
     estimate.show(track.estimate, track.estimate !== initial.estimate);
     order.show(/** @type {"0"} */ (String(track.order)), track.order !== initial.order);
     past.show(track.past_poses, track.past_poses !== initial.past_poses);

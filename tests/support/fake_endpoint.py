@@ -84,7 +84,7 @@ SEARCH = {
 }  # fmt: skip
 VIEW_3D = {
     "bodies": True, "colors": "parts", "opacity": 1.0, "cameras": True, "images": True, "floor": True, "gizmos": True,
-    "ghost": False, "trail_points": [], "trail_frames": 25,
+    "ghost": False, "voxels": False, "trail_points": [], "trail_frames": 25,
 }  # fmt: skip
 BODY_SIZES = {
     "type": "body_sizes", "person": 0, "height_m": 1.7, "sides_alike": True, "edited": False, "has_former": False,

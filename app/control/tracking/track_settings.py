@@ -14,6 +14,7 @@ from tracker.tracking.chamfer.settings import Estimation, TrackSettings
 from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.estimation.settings import EstimationSettings, RecoverSettings, at_stride
 from tracker.tracking.tracker import TrackerSettings
+from tracker.tracking.voxel.settings import VoxelSettings
 
 SETTING = "track_settings"
 """Setting of the session."""
@@ -86,6 +87,8 @@ def of_run(settings: TrackSettings, choices: RunChoices) -> TrackerSettings:
     """Return the settings of a run: the chosen ones, as far as its method has them."""
     if choices.method == "chamfer":
         return at_stride(settings, choices.stride)
+    if choices.method == "voxel":
+        return VoxelSettings(smooth=settings.smooth)
     shared = {f.name: getattr(settings, f.name) for f in fields(EstimationSettings) if f.name in _SHARED}
     return at_stride(ContourSettings(**shared), choices.stride)
 

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -34,6 +34,8 @@ class _Run(NamedTuple):
 
     session: TrackSession
     job: Job[Step]
+    on_end: Callable[[bool], None]
+    """Is told at its end whether it did all its work."""
 
     @property
     def subjects(self) -> Subjects:
@@ -44,13 +46,15 @@ class _Run(NamedTuple):
 class _SaverSink:
     """Saves the poses of a run through the saver, which retries failed writes."""
 
-    def __init__(self, session_state: SessionState) -> None:
-        self._session_state = session_state
+    def __init__(self, session_state: SessionState, edit: int | None) -> None:
+        """Add to an entry of the history, or make one at the first write if `edit` is None."""
+        self._session_state, self._first_edit = session_state, edit
 
     def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
         """See `Sink.write`. What cannot be written waits in the saver's queue."""
         self._session_state.last_save = time.monotonic()
-        return self._session_state.saver.write(label, changes, edit, by_program=True)
+        amended = self._first_edit if edit is None else edit
+        return self._session_state.saver.write(label, changes, amended, by_program=True)
 
 
 class Tracking:
@@ -90,12 +94,17 @@ class Tracking:
         """Choose method, frames and cameras of the next run."""
         self._session_state.set(run_choices=choices)
 
-    def start(self, backward: bool, until: int | None) -> None:
+    def start(
+        self, backward: bool, until: int | None, edit: int | None = None,
+        on_end: Callable[[bool], None] = lambda is_done: None,
+    ) -> None:  # fmt: skip
         """Begin a run from the shown poses; a former run must have been ended.
 
         Args:
             backward: towards the first frame.
             until: last frame to track; None for the end of the recording.
+            edit: entry of the history that the run belongs to; None for one of its own.
+            on_end: is told at the end whether the run did all its work. It must return quickly.
 
         Raises:
             TrackerError: no person has been placed, or there is no frame to track.
@@ -120,7 +129,7 @@ class Tracking:
                     session_state.session.fps,
                 ),
                 [StoredPerson(p.name, saver.revisions.current(i)) for i, p in enumerate(session_state.session.people)],
-                _SaverSink(session_state),
+                _SaverSink(session_state, edit),
                 f"track {way} from frame {frames[0]}",
             )
             job = Job(
@@ -129,7 +138,7 @@ class Tracking:
                 lambda error: self._ended(run, error),
                 lambda: self._paused(run),
             )
-            run = _Run(session, job)
+            run = _Run(session, job, on_end)
             self._run, session_state.open_edit_owner = run, None
             track = TrackState(running=True, first=frames[0], last=frames[-1], total=len(frames))
             session_state.set(track=track, follow=True)
@@ -316,6 +325,7 @@ class Tracking:
         self._session_state.set(
             track=TrackState(message=f"{how}: {_summary(len(run.session.tracked), track)}", failed=failed)
         )
+        run.on_end(how == "done")
 
 
 def _summary(frames: int, track: TrackState) -> str:

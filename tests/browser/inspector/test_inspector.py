@@ -235,6 +235,34 @@ async def test_a_theme_is_chosen_kept_and_recolours_the_3d_view_as_it_stands(pag
     assert endpoint.received == []
 
 
+async def test_people_are_found_with_progress_and_a_stop(page, endpoint):
+    await opened(page, "find")
+    section = page.locator("[data-section=find]")
+    await section.get_by_role("button", name="Find people").click()
+    await until(lambda: endpoint.heard("find_people") == [{"type": "find_people", "action": "start"}])
+    work = {"type": "finding", "running": True, "stage": "acquiring sizes", "share": 0.6, "notes": ["frame 7: good"]}
+    ends = {"message": "", "failed": False, "frame": None, "axes": []}
+    await endpoint.broadcast(work | ends)
+    await shows(page, "document.querySelector('[data-section=find] progress').value === 0.6")
+    assert "acquiring sizes" in await section.get_by_role("status").inner_text()
+    assert await section.locator("li").all_inner_texts() == ["frame 7: good"]
+    assert await section.get_by_role("button", name="Find people").is_hidden()
+    await section.get_by_role("button", name="Stop").click()
+    await until(lambda: endpoint.heard("find_people")[-1]["action"] == "stop")
+    text = "Expected somebody in the silhouettes, found none."
+    await endpoint.broadcast(work | ends | {"running": False, "message": text, "failed": True})
+    await section.get_by_role("button", name="Find people").wait_for()
+    assert await section.get_by_role("status").inner_text() == text
+
+
+async def test_the_palette_finds_people(page, endpoint):
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("find people")
+    await page.keyboard.press("Enter")
+    await until(lambda: endpoint.heard("find_people") == [{"type": "find_people", "action": "start"}])
+    await page.locator("[data-section=find]").wait_for()
+
+
 async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page, endpoint):
     await opened(page, "body")
     await page.get_by_role("button", name="Acquire from footage").click()

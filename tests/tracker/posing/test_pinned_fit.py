@@ -110,6 +110,26 @@ def test_edges_leave_points_that_were_placed_near_their_places(two_people):
     assert moved_m(dict.fromkeys(names, CAMERAS), pins)[0] > held[0]
 
 
+def test_a_held_point_belongs_where_the_user_saw_it():
+    """A later drag has moved the wrist; what was seen counts if the point is held and no pin overrules it."""
+    truth = posed(GAVRILA, 3)
+    start = truth.copy()
+    start[GAVRILA.dof_names.index("left_elbow.extension")] += 0.6
+    at = GAVRILA.point_names.index("left_wrist")
+    put = tuple(seen(GAVRILA, truth, ["left_wrist"], CAMERAS[:2]))
+
+    def off_seen_m(constraints, pins=()):
+        found = fit_frame([PosedBody(GAVRILA, start)], [list(pins)], CAMERAS, None, SETTINGS, [0], [constraints])
+        return off_m(GAVRILA, found.poses[0], truth)[at]
+
+    begun = off_m(GAVRILA, start, truth)[at]
+    assert begun > 0.1
+    assert off_seen_m(Constraints(seen=put)) == pytest.approx(begun, rel=0.05)
+    held = Constraints(held={"left_wrist": CAMERAS[:2]}, seen=put)
+    assert off_seen_m(held) < 0.03
+    assert off_seen_m(held, seen(GAVRILA, start, ["left_wrist"], CAMERAS)) == pytest.approx(begun, rel=0.1)
+
+
 def test_pins_of_the_trunk_leave_limbs_that_were_placed():
     """The trunk turns by 20 degrees to its pins; limbs that were placed do not turn with it, the others do."""
     placed = posed(GAVRILA, 1)
