@@ -17,7 +17,7 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
-from tracker.initialization.candidates import METHODS, StartCandidate, PersonScene, StartMethod, silhouette_axes
+from tracker.initialization.candidates import METHODS, PersonScene, StartCandidate, StartMethod, silhouette_axes
 from tracker.initialization.start_fit import FittedStart, fit_start
 from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
