@@ -165,6 +165,11 @@ def standing_height(scene: PersonScene, trunk_up: Array, neck: Array) -> float |
     return height_m if is_standing else None
 
 
+def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:
+    """Return the direction from the feet upwards, (3,): who stands has the soles on the ground, however the trunk leans."""
+    return scene.up if axis.up @ scene.up > _UPRIGHT else axis.up
+
+
 def _on_axes(
     method: StartMethod, scene: PersonScene, model: BodyModel, axes: Sequence[BodyAxis], is_measured: bool
 ) -> list[StartCandidate]:
@@ -176,7 +181,7 @@ def _on_axes(
     return [
         StartCandidate(
             method, model, start.pose, start.forward,
-            facing_cues(scene.figure, start.forward, start.axis.up, scene.motion),
+            facing_cues(scene.figure, start.forward, _feet_up(scene, start.axis), scene.motion),
             axis=start.axis, is_measured=is_measured,
         )
         for start in starts
