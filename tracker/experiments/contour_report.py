@@ -140,8 +140,8 @@ def _convergence(found: ExperimentResult, figures: dict[str, str]) -> str:
         "## Convergence with and without the sliding term",
         "",
         f"Every fifth frame is fitted in the paper's mode from the true pose of an earlier frame. An iteration that "
-        f"lowers the RMS distance by less than {100 * MIN_GAIN:.0f}% is the last. The paper reports 3 to 5 iterations and "
-        "1.5 px with the sliding term, twice as many iterations and 2.3 px without it.",
+        f"lowers the RMS distance by less than {100 * MIN_GAIN:.0f}% is the last. The paper reports 3 to 5 "
+        "iterations and 1.5 px with the sliding term, twice as many iterations and 2.3 px without it.",
         "",
         "| start | sliding term | iterations | contours before, px | after, px |",
         "|---|---|---|---|---|",
