@@ -26,9 +26,10 @@ class TrackArguments:
 
     session: SessionArg
     """session folder."""
-    method: Literal["chamfer", "contour"] = "chamfer"
+    method: Literal["chamfer", "contour", "voxel"] = "chamfer"
     """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice. contour: extremal
-    contours, refined by Gauss-Newton until it converges, without a search of whole bodies."""
+    contours, refined by Gauss-Newton until it converges, without a search of whole bodies. voxel: a Kalman filter on
+    the parts of the body, measured by the voxels of the silhouettes."""
     init: Literal["auto"] | None = None
     """auto finds people who have no pose first, on the frame where they track best, and tracks from there in both
     directions."""
@@ -52,11 +53,16 @@ class TrackArguments:
     """past frames that the motion is estimated from; 3 by default, 8 with --paper."""
     paper: bool = False
     """as the method's paper: chamfer as Gavrila and Davis 1996, in a session made with --model gavrila22; contour as
-    Knossow, Ronfard and Horaud 2008. See docs/trackers.md."""
+    Knossow, Ronfard and Horaud 2008; voxel as Mikic and others 2001, in a session made with --model mikic10. See
+    docs/trackers.md."""
     image_contours: Literal["edges", "silhouettes"] | None = None
     """contour: what the model's contours are compared with; edges by default, silhouettes with --paper."""
     sliding: bool = True
     """contour: whether the Jacobian has the term of contours that slide on the surface."""
+    voxel_size: OptionalNumber = None
+    """voxel: edge of a voxel, mm; 30 by default, 50 with --paper."""
+    sizes: Literal["frozen", "first", "always"] | None = None
+    """voxel: when part sizes are estimated: never, on the first frame (default), or on all frames (with --paper)."""
     backward_pass: bool = True
     """at the end, track lost people backward from the first trusted poses after the loss."""
     smooth: bool = True
@@ -75,8 +81,8 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     frames = ascending[::-1] if arguments.backward else ascending
     _check_chain(arguments)
     settings = _SETTINGS[arguments.method](arguments)
-    if arguments.paper and arguments.method == "chamfer":
-        _require_paper_body(at)
+    if arguments.paper:
+        _require_paper_body(at, arguments.method)
     progress = Reporter(silent=arguments.json)
     if arguments.init is None:
         found = track(at, frames, settings, progress, arguments.cameras)
@@ -115,6 +121,7 @@ def _chamfer_settings(arguments: TrackArguments) -> "TrackerSettings":
             "expected --image-contours and --no-sliding with the contour method, found the method 'chamfer'; "
             "add --method contour, or leave them out"
         )
+    _reject(arguments, "chamfer", voxel_size=arguments.voxel_size, sizes=arguments.sizes)
     settings = paper_settings() if arguments.paper else TrackSettings(backward_pass=arguments.backward_pass)
     return _shared_settings(settings, arguments)
 
@@ -123,6 +130,7 @@ def _contour_settings(arguments: TrackArguments) -> "TrackerSettings":
     from tracker.tracking.contour.paper import paper_settings
     from tracker.tracking.contour.settings import ContourSettings, with_sliding
 
+    _reject(arguments, "contour", voxel_size=arguments.voxel_size, sizes=arguments.sizes)
     wanted = arguments.image_contours
     if arguments.paper:
         return _shared_settings(paper_settings(wanted or "silhouettes", arguments.sliding), arguments)
@@ -131,29 +139,57 @@ def _contour_settings(arguments: TrackArguments) -> "TrackerSettings":
 
 
 def _shared_settings(settings: "EstimationSettings", arguments: TrackArguments) -> "TrackerSettings":
-    paper, stride = arguments.paper, arguments.stride
+    from tracker.tracking.estimation.settings import at_stride
+
     motion, order, window = settings.predict, arguments.order, arguments.window
-    # Bodies move farther between frames that are farther apart.
     motion = replace(
-        motion, order=motion.order if order is None else order, window=motion.window if window is None else window,
-        bound_rad=stride * motion.bound_rad, bound_m=stride * motion.bound_m,
-    )  # fmt: skip
-    return replace(
-        settings, predict=motion, theta_px=arguments.theta, trust_rad=stride * settings.trust_rad,
-        trust_m=stride * settings.trust_m, smooth=arguments.smooth and not paper,
-    )  # fmt: skip
+        motion, order=motion.order if order is None else order, window=motion.window if window is None else window
+    )
+    chosen = replace(
+        settings, predict=motion, theta_px=arguments.theta, smooth=arguments.smooth and not arguments.paper
+    )
+    return at_stride(chosen, arguments.stride)
 
 
-def _require_paper_body(at: Target) -> None:
-    from tracker.tracking.chamfer.paper import require_paper_body
+def _voxel_settings(arguments: TrackArguments) -> "TrackerSettings":
+    from tracker.tracking.voxel.paper import paper_settings
+    from tracker.tracking.voxel.settings import VoxelSettings
 
-    people = [at.session.people[i] for i in at.people]
-    require_paper_body({p.name: p.model for p in people})
+    _reject(arguments, "voxel", theta=arguments.theta, order=arguments.order, window=arguments.window)
+    settings = paper_settings() if arguments.paper else VoxelSettings(smooth=arguments.smooth)
+    if arguments.voxel_size is not None:
+        settings = replace(settings, voxel_m=arguments.voxel_size / 1000)
+    return settings if arguments.sizes is None else replace(settings, sizes=arguments.sizes)
+
+
+def _reject(arguments: TrackArguments, method: str, **values: object) -> None:
+    """Refuse options that a method does not have.
+
+    Raises:
+        TrackerError: one of them is given.
+    """
+    given = ", ".join(f"--{name.replace('_', '-')}" for name, value in values.items() if value is not None)
+    if given:
+        raise TrackerError(
+            f"expected options of the method '{method}', found {given}; leave them out, or choose another --method"
+        )
+
+
+def _require_paper_body(at: Target, method: str) -> None:
+    from tracker.tracking.chamfer import paper as chamfer
+    from tracker.tracking.voxel import paper as voxel
+
+    bodies = {p.name: p.model for p in (at.session.people[i] for i in at.people)}
+    if method == "chamfer":
+        chamfer.require_paper_body(bodies)
+    elif method == "voxel":
+        voxel.require_paper_body(bodies)
 
 
 _SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {
     "chamfer": _chamfer_settings,
     "contour": _contour_settings,
+    "voxel": _voxel_settings,
 }
 """Makes the settings of each method (`METHODS`) from the arguments."""
 

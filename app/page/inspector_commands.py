@@ -17,10 +17,11 @@ from tracker.validation import quoted
 def _track_settings(controller: Controller, _: int, message: wire.SetTrackSettings) -> None:
     before, changes = controller.state, msgspec.to_builtins(message.changes)
     after = track_settings.changed(before.settings, changes)
+    choices = track_settings.with_choices(before.run_choices, changes, controller.session.camera_names)
     if after != before.settings:
         controller.search.set_settings(after)
-    controller.tracking.set_method(changes.get("method", before.method))
-    if after != before.settings or controller.state.method != before.method:
+    controller.tracking.choose(choices)
+    if (after, choices) != (before.settings, before.run_choices):
         controller.tracking.store_settings()
 
 

@@ -7,6 +7,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from app.page.message_types import Command, Index, Message, Name, Part
 from app.page.search_messages import OutlierMode
+from app.state.run_choices import MAX_STRIDE
 from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
 from tracker.motion.prediction import MAX_ORDER
 from tracker.pipeline.methods import MethodName
@@ -26,6 +27,10 @@ class TrackChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     method: MethodName | UnsetType = UNSET
     """The tracking method."""
+    stride: Annotated[int, Meta(ge=1, le=MAX_STRIDE)] | UnsetType = UNSET
+    """Every so many frames are tracked."""
+    cameras: Annotated[list[Name], Meta(max_length=1000)] | UnsetType = UNSET
+    """Names of the cameras to track with; all if empty."""
     estimate: EstimationMode | UnsetType = UNSET
     """How the pose of a frame is found."""
     order: Annotated[int, Meta(ge=0, le=MAX_ORDER)] | UnsetType = UNSET
@@ -56,6 +61,7 @@ class View3dChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     floor: bool | UnsetType = UNSET
     gizmos: bool | UnsetType = UNSET
     ghost: bool | UnsetType = UNSET
+    voxels: bool | UnsetType = UNSET
     trail_points: Annotated[list[Name], Meta(max_length=1000)] | UnsetType = UNSET
     trail_frames: Annotated[int, Meta(ge=1, le=MAX_TRAIL_FRAMES)] | UnsetType = UNSET
 
@@ -138,6 +144,10 @@ class TrackValues(Part, frozen=True):
 
     method: MethodName
     """The tracking method: chamfer matching, or extremal contours."""
+    stride: int
+    """Every so many frames are tracked; the frames between get no pose."""
+    cameras: tuple[str, ...]
+    """Names of the cameras to track with; all if empty."""
     estimate: EstimationMode
     """How chamfer matching finds the pose of a frame: refined, and searched where that does not suffice; or searched
     alone."""

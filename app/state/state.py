@@ -9,13 +9,13 @@ from app.state.comparison import PoseComparison
 from app.state.floor_picking import FloorState
 from app.state.people import AcquisitionState, DragState, HeldPoint, ShownPose, SizeDraft, Visibility
 from app.state.progress import FindState, FootageState, RangeState, TrackState
+from app.state.run_choices import RunChoices
 from app.state.search import CostLandscape, SearchState, SearchView
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import STAGES
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
-from tracker.pipeline.methods import MethodName
 from tracker.tracking.chamfer.settings import TrackSettings
 
 
@@ -86,8 +86,8 @@ class State:
     """Index of the camera through which the 3-D view looks; None for a free view."""
     settings: TrackSettings = field(default_factory=TrackSettings)
     """Settings of searches and trackers."""
-    method: MethodName = "chamfer"
-    """The method of the next tracking run."""
+    run_choices: RunChoices = field(default_factory=RunChoices)
+    """Method, frames and cameras of the next tracking run."""
     undo: str | None = None
     """Label of the edit that undo would revert."""
     redo: str | None = None
@@ -214,7 +214,7 @@ class StateChanges(TypedDict, total=False):
     compiled: frozenset[str]
     snapped: int | None
     settings: TrackSettings
-    method: MethodName
+    run_choices: RunChoices
     undo: str | None
     redo: str | None
     saved: bool

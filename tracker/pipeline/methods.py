@@ -7,9 +7,14 @@ from tracker.errors import TrackerError
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.contour.tracker import ContourTracker
 from tracker.tracking.tracker import Tracker, TrackerSettings
+from tracker.tracking.voxel.tracker import VoxelTracker
 
-MethodName: TypeAlias = Literal["chamfer", "contour"]
-METHODS: Mapping[str, Callable[[Any], Tracker]] = {"chamfer": ChamferTracker, "contour": ContourTracker}
+MethodName: TypeAlias = Literal["chamfer", "contour", "voxel"]
+METHODS: Mapping[str, Callable[[Any], Tracker]] = {
+    "chamfer": ChamferTracker,
+    "contour": ContourTracker,
+    "voxel": VoxelTracker,
+}
 """Makes the tracker of each method from its settings."""
 
 

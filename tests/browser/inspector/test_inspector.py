@@ -1,6 +1,7 @@
 """The inspector: sections, fields, what they ask of the program, and its room beside the views."""
 
 import pytest
+from fake_endpoint import CAMERA_NAMES
 from page_driver import shows, until
 
 
@@ -40,6 +41,32 @@ async def test_settings_are_changed_marked_and_reset(page, endpoint):
     await page.locator("[data-section=search] button", has_text="Reset").click()
     await until(lambda: len(endpoint.received) == 5)
     assert endpoint.received[-1]["changes"] == endpoint.settings["search_default"]
+
+
+async def test_stride_and_cameras_of_a_run_are_chosen(page, endpoint):
+    await opened(page, "track")
+    await row(page, "Stride").locator("input").fill("3")
+    await page.keyboard.press("Enter")
+    cameras = page.get_by_role("group", name="Cameras to track with")
+    names = await cameras.locator("label").all_inner_texts()
+    assert names == list(CAMERA_NAMES)
+    assert await cameras.locator("input:checked").count() == len(names)
+    await cameras.get_by_label(names[1]).uncheck()
+    await until(lambda: len(endpoint.received) == 2)
+    chosen = [n for n in names if n != names[1]]
+    assert [m["changes"] for m in endpoint.received] == [{"stride": 3}, {"cameras": chosen}]
+    endpoint.settings["track"] |= {"stride": 3, "cameras": names[:1]}
+    await endpoint.broadcast(endpoint.settings)
+    await shows(page, "document.querySelectorAll('[data-section=track] .row-label.is-changed').length === 2")
+    assert await row(page, "Stride").locator("input").input_value() == "3"
+    only = cameras.get_by_label(names[0])
+    await only.click()
+    await shows(page, "document.querySelector('#notices').textContent.includes('expected at least one')")
+    assert await only.is_checked()
+    for name in names[1:]:
+        await cameras.get_by_label(name).check()
+    await until(lambda: len(endpoint.received) == 1 + len(names))
+    assert endpoint.received[-1]["changes"] == {"cameras": []}  # all of them
 
 
 async def test_a_value_out_of_range_is_refused_with_its_range(page, endpoint):
