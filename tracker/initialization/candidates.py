@@ -22,10 +22,9 @@ StartMethod: TypeAlias = Literal["voxels", "axis", "search"]
 
 _UPRIGHT = 0.9
 """Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
-_MIN_FOLDED = 0.87
-"""Smallest height of the neck of a person who stands, as a share of what it is with straight legs."""
-_NECK = 0.835
-"""Height of the neck of a person who stands, as a fraction of the body's height."""
+_NECK, _NECK_SPREAD = 0.88, 0.04
+"""Height of the base of the head of a person who stands, as a fraction of the body's height, and its largest relative
+difference from that: folded legs make it lower."""
 _AXES_TRIED = 3
 _RAISED = (0.0, 0.10, 0.20)
 """Tops of the head that a search tries, below the end of the figure, as fractions of the height: hands may be above."""
@@ -80,7 +79,9 @@ def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[St
         TrackerError: no head is found.
     """
     parts = locate_parts(scene.figure, scene.motion)
-    height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], parts.head.neck)
+    head = scene.figure.points_world[parts.head.is_head]
+    top = head[int(np.argmax(head @ scene.up))] + scene.figure.grid.size_m / 2 * scene.up
+    height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], top, parts.head.neck)
     own = model if height_m is None else model.with_height(height_m)
     return [
         StartCandidate(
@@ -101,7 +102,7 @@ def from_axis(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Star
     """
     axes = find_body_axes(silhouette_axes(scene), scene.up, model.height_m)[:_AXES_TRIED]
     best = axes[0]
-    height_m = None if is_known else standing_height(scene, best.up, best.top - 0.165 * model.height_m * best.up)
+    height_m = None if is_known else standing_height(scene, best.up, best.top)
     own = model if height_m is None else model.with_height(height_m)
     return _on_axes("axis", scene, own, axes, is_known or height_m is not None)
 
@@ -146,27 +147,27 @@ def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
     return axes
 
 
-def standing_height(scene: PersonScene, trunk_up: Array, neck: Array) -> float | None:
+def standing_height(scene: PersonScene, trunk_up: Array, top: Array, neck: Array | None = None) -> float | None:
     """Return the height of a person who stands upright, metres; None if the person does not.
 
     Args:
         scene: the person on a frame.
         trunk_up: direction of the trunk towards the head, (3,).
-        neck: base of the head, (3,), metres.
+        top: top of the head, (3,), metres; raised hands are above it.
+        neck: base of the head, (3,), metres, where it was found.
     """
     if trunk_up @ scene.up < _UPRIGHT:
         return None
-    along = scene.figure.points_world @ scene.up
-    low, high = along.min(), along.max()
-    height_m = float(high - low) + scene.figure.grid.size_m
-    neck_m = float(neck @ scene.up - low)
-    # Raised arms make the figure higher, folded legs make it lower than the person.
-    is_standing = abs(neck_m / (_NECK * height_m) - 1) < 1 - _MIN_FOLDED
-    return height_m if is_standing else None
+    low = float((scene.figure.points_world @ scene.up).min()) - scene.figure.grid.size_m / 2
+    height_m = float(top @ scene.up) - low
+    if neck is None:
+        return height_m
+    share = (float(neck @ scene.up) - low) / height_m
+    return height_m if abs(share / _NECK - 1) < _NECK_SPREAD else None
 
 
 def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:
-    """Return the direction from the feet upwards, (3,): who stands has the soles on the ground, however the trunk leans."""
+    """Return the direction from the feet upwards, (3,): the soles of who stands are on the ground, bent or not."""
     return scene.up if axis.up @ scene.up > _UPRIGHT else axis.up
 
 
