@@ -24,6 +24,8 @@ from tracker.tracking.voxel.motion_model import predict
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState
 
+_PATIENCE = 8
+"""Number of frames in a row on which parts are merged before they are measured on a coarser level."""
 _CARRIED_RAD = 0.2
 """Standard deviation with which an unresolved part keeps its place on another, rad."""
 
@@ -71,9 +73,8 @@ class VoxelEstimator:
         updates: dict[int, Update] = {}
         for p in subjects.tracked:
             if p not in keyframes:
-                if settings.levels:
-                    labels = label_voxels(points, states, settings.voxel_m, settings.label_rule).labels
-                    self._levels[p] = find_levels(self._levels[p], states[p], found.voxels, labels, N_PARTS * p)
+                if settings.levels and first:
+                    self._find_levels(p, states, found, 1)
                 updates[p] = self._update(p, states, points, first)
                 states[p] = updates[p].state
                 if settings.sizes == "first" and states[p].layout.sizes:
@@ -86,7 +87,15 @@ class VoxelEstimator:
                     states[p] = self._recovered(p, states, found)
         self.states, self.voxels = states, found
         self.labels = label_voxels(points, states, settings.voxel_m, settings.label_rule)
+        if settings.levels:
+            for p in updates:
+                self._find_levels(p, states, found, _PATIENCE)
         return self._estimate(frame, found, points, updates)
+
+    def _find_levels(self, p: int, states: Sequence[FilterState], found: FrameVoxels, patience: int) -> None:
+        settings, voxels = self._settings, found.voxels
+        labels = label_voxels(voxels.points_world, states, settings.voxel_m, settings.label_rule).labels
+        self._levels[p] = find_levels(self._levels[p], states[p], voxels, labels, N_PARTS * p, patience)
 
     def _predicted(self, p: int, frame: int, keyframe: Array | None) -> FilterState:
         model, state = self._run.subjects.models[p], self.states[p]
