@@ -67,7 +67,8 @@ def assess(
         return FigureAssessment("doubtful", "moved farther than predicted")
     if frame.broken:
         return FigureAssessment(
-            "doubtful", f"view {', '.join(frame.broken)} left out: it contradicts the others; check whether it has moved"
+            "doubtful",
+            f"view {', '.join(frame.broken)} left out: it contradicts the others; check whether it has moved",
         )
     return FigureAssessment("good", "")
 

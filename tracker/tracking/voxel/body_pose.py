@@ -10,8 +10,8 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.gauss_newton import PointTargets, PosePrior, covariance, solve
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
 from tracker.tracking.voxel.chain_jacobian import center_jacobian, point_jacobian
+from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState, Layout
 
@@ -103,5 +103,3 @@ def pose_of(
     ]
     fit = solve(model, near, blocks, active_dofs, _MAX_ITERATIONS, _TOLERANCE)
     return BodyPose(fit.pose, covariance(model, fit))
-
-

@@ -32,9 +32,7 @@ class FrameVoxels(NamedTuple):
     """Number of views that show anybody and agree."""
 
 
-def carve_around(
-    silhouettes: Sequence[ViewSilhouette], states: Sequence[FilterState], size_m: float
-) -> FrameVoxels:
+def carve_around(silhouettes: Sequence[ViewSilhouette], states: Sequence[FilterState], size_m: float) -> FrameVoxels:
     """Carve the voxels of a frame within reach of some predicted figures.
 
     Views with an empty silhouette are left out, as are views that contradict the others. With fewer than two views

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.figure import N_PARTS
 from tracker.tracking.voxel.chain_jacobian import center_jacobian
+from tracker.tracking.voxel.figure import N_PARTS
 from tracker.tracking.voxel.label_kernels import N_MOMENTS, label_and_sum
 from tracker.tracking.voxel.state import FilterState
 
@@ -84,9 +84,7 @@ def label_voxels_plainly(points: Array, states: Sequence[FilterState], size_m: f
     return Labels(labels, _clouds(moments, size_m))
 
 
-def _parts(
-    states: Sequence[FilterState], size_m: float, widened: bool
-) -> tuple[Array, Array, tuple[Array, Array]]:
+def _parts(states: Sequence[FilterState], size_m: float, widened: bool) -> tuple[Array, Array, tuple[Array, Array]]:
     """Return centres and rotations of all parts, and inverse covariances in their frames with what each adds."""
     shapes = np.concatenate([(s.figure.sigma_shares * s.sizes) ** 2 + size_m**2 / 12 for s in states])
     centers = np.concatenate([s.centers for s in states])

@@ -80,7 +80,11 @@ def measure_parts(state: FilterState, clouds: PartClouds, size_m: float, by_size
         axes[np.flatnonzero(odd), :, worst] *= -1
     sizes = np.sqrt(np.maximum(variances, 1e-8)) / state.figure.sigma_shares
     return PartAxes(
-        clouds.counts >= MIN_VOXELS, clouds.means, rigid.so3_log(axes), sizes, np.maximum(variances, 1e-8),
+        clouds.counts >= MIN_VOXELS,
+        clouds.means,
+        rigid.so3_log(axes),
+        sizes,
+        np.maximum(variances, 1e-8),
         clouds.counts * size_m**3,
     )
 

@@ -38,7 +38,6 @@ def paper_settings(voxel_m: float = PAPER_VOXEL_M) -> VoxelSettings:
         by_size=True,
         levels=False,
         limit_rad=None,
-        search=False,
         smooth=False,
         paper=True,
     )

@@ -19,7 +19,9 @@ from tracker.tracking.voxel.settings import VoxelSettings
 FPS = 30.0
 
 
-def tracked(sizes=ADULT, n=12, stride=1, model="gavrila34", height_m=1.72, settings=None, change=lambda k, views: views):
+def tracked(
+    sizes=ADULT, n=12, stride=1, model="gavrila34", height_m=1.72, settings=None, change=lambda k, views: views
+):
     """Estimates and errors of all limb joints, (n, 12), metres, of a person tracked from the true joints."""
     body = load_model(model, height_m)
     start = fit_to_points(body, joints_at(0.0, sizes)).pose
