@@ -83,8 +83,8 @@ def find_levels(
     size_m, sizes = voxels.grid.size_m, state.sizes
     volumes = np.bincount(grid[at][grid[at] >= 0], minlength=N_PARTS) * size_m**3 / (2 * np.pi * sizes.prod(axis=1))
     shares = np.zeros(N_PARTS)
-    for own, other in (pair for a, b in _LEG_PAIRS for pair in ((a, b), (b, a))):
-        shares[own] = _touching(grid, own, other) * size_m**2 / (4 * sizes[own, 1] * sizes[own, 2])
+    for leg, other in (pair for a, b in _LEG_PAIRS for pair in ((a, b), (b, a))):
+        shares[leg] = _touching(grid, leg, other) * size_m**2 / (4 * sizes[leg, 1] * sizes[leg, 2])
     finer, coarser = (shares < _APART) & (volumes > _WHOLE), (shares > _MERGED) | (volumes < _SWALLOWED)
     n_merged = np.where(coarser, before.n_merged + 1, 0)
     resolved = np.where(before.is_resolved, n_merged < patience, finer)

@@ -45,7 +45,7 @@ def predict(state: FilterState, dt: float, noise: ProcessNoise) -> FilterState:
 def transition(state: FilterState, dt: float, damping: float = 0.0) -> tuple[Array, Array]:
     """Return the derivative of the predicted error state by the present one, (n, n), and the step, (n,).
 
-    Rotations turn by exp(rate dt) on the right. The derivative by the rate is exact: the right Jacobian of the rotation.
+    Rotations turn by exp(rate dt) on the right. The derivative by the rate has the right Jacobian.
     """
     at = state.layout
     F, step = np.eye(at.n), np.zeros(at.n)

@@ -86,7 +86,7 @@ class FilterState:
 
     @cached_property
     def centers(self) -> Array:
-        """Centre of each part, (10, 3), metres (MTHC01 Eq. 3). A state is a valid articulated body whatever it holds."""
+        """Centre of each part, (10, 3), metres (MTHC01 Eq. 3). Parts are connected whatever the state holds."""
         return chain_centers(self.figure, self.sizes, self.rotations, self.center)
 
     def retract(self, step: Array) -> "FilterState":
