@@ -65,11 +65,12 @@
  * @typedef {{type: "stop_range"}} StopRange
  * @typedef {{type: "mark", toggle: "keyframe" | "reviewed"}} ToggleMark
  * @typedef {{type: "follow", follow: boolean}} FollowTracking
- * @typedef {{method?: "chamfer" | "contour", estimate?: "refine" | "search", order?: number, past_poses?: number,
- *   recover?: boolean, backward_pass?: boolean, smooth?: boolean}} TrackChanges
+ * @typedef {{method?: "chamfer" | "contour" | "voxel", estimate?: "refine" | "search", order?: number, past_poses?:
+ *   number, recover?: boolean, backward_pass?: boolean, smooth?: boolean}} TrackChanges
  * @typedef {{type: "track_settings", changes: TrackChanges}} SetTrackSettings
  * @typedef {{bodies?: boolean, colors?: "parts" | "people", opacity?: number, cameras?: boolean, images?: boolean,
- *   floor?: boolean, gizmos?: boolean, ghost?: boolean, trail_points?: string[], trail_frames?: number}} View3dChanges
+ *   floor?: boolean, gizmos?: boolean, ghost?: boolean, voxels?: boolean, trail_points?: string[], trail_frames?:
+ *   number}} View3dChanges
  * @typedef {{type: "view_3d", changes: View3dChanges}} SetView3d
  * @typedef {{type: "body_sizes", action: "height", person: number, height_m: number}} SetHeight
  * @typedef {{type: "body_sizes", action: "part", person: number, part: string, length_m?: number, half_depth_m?:
@@ -134,15 +135,15 @@
  * @typedef {{run: number, step: number, stage: string | null, candidate_px: number | null, best_px: number | null,
  *   evaluations: number}} Replay
  * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
- * @typedef {{method: "chamfer" | "contour", estimate: "refine" | "search", order: number, past_poses: number, recover:
- *   boolean, backward_pass: boolean, smooth: boolean}} TrackValues
+ * @typedef {{method: "chamfer" | "contour" | "voxel", estimate: "refine" | "search", order: number, past_poses: number,
+ *   recover: boolean, backward_pass: boolean, smooth: boolean}} TrackValues
  * @typedef {{theta_px: number | null, outliers: "truncated" | "paper", passes: number[], patience: number,
  *   max_expansions: number, limbs_apart: boolean, bound_rad: number, bound_m: number, step_rad: number, step_m:
  *   number}} SearchValues
  * @typedef {{type: "settings", track: TrackValues, search: SearchValues, track_default: TrackValues, search_default:
  *   SearchValues}} SettingsMessage
  * @typedef {{bodies: boolean, colors: "parts" | "people", opacity: number, cameras: boolean, images: boolean, floor:
- *   boolean, gizmos: boolean, ghost: boolean, trail_points: string[], trail_frames: number}} View3d
+ *   boolean, gizmos: boolean, ghost: boolean, voxels: boolean, trail_points: string[], trail_frames: number}} View3d
  * @typedef {{up: string, tilt_deg: number | null, height_m: number | null, has_former: boolean}} FloorInfo
  * @typedef {{type: "view_3d", view: View3d, floor: FloorInfo, prediction: string, trail_points: string[]}}
  *   View3dMessage
