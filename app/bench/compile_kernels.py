@@ -48,9 +48,9 @@ def main(background: bool = False) -> None:
     """Compile the missing kernels. While another program compiles them, wait for it.
 
     Args:
-        background: work at the lowest priority beside a page, and on two cores.
+        background: work beside a page: at the lowest priority after what its first pictures need, and on two cores.
     """
-    _prepare(background)
+    gc.set_threshold(*_GC_THRESHOLDS)
     mark = compiled_mark()
     if mark.exists():
         mark.touch()  # the versions used last stay in the cache
@@ -64,29 +64,23 @@ def main(background: bool = False) -> None:
             time.sleep(_WAIT_S)
 
 
-def _prepare(background: bool) -> None:
-    if background and hasattr(os, "nice"):
-        os.nice(19)
-    gc.set_threshold(*_GC_THRESHOLDS)
-
-
 def _call_kernels(background: bool) -> None:
     """Call the kernels stage by stage on the bundled tango: two people in four views.
 
-    In the background, a second process compiles the kernels of the evidence and those that measure contours, which need
-    none of the kernels that trace contours. It is a fork: importing the program takes as long as a tenth of its work.
+    In the background, those of posing are compiled at the priority of the page, which waits for them. Then a second
+    process compiles the kernels of the evidence and those that measure contours, which need none of the kernels that
+    trace contours. It is a fork: importing the program takes as long as a tenth of its work.
     """
     session = load_session(bundled("tango"))
-    cameras = [c.camera for c in session.cameras]
+    bodies = _compile_posing(session)
+    if background and hasattr(os, "nice"):
+        os.nice(19)
     fork = multiprocessing.get_context("fork")
     beside = fork.Process(target=_compile_evidence, args=(session,), daemon=True) if background else None
     if beside is not None:
         beside.start()
     try:
-        bodies = [PosedBody(p.model, default_pose(p.model, cameras, np.eye(3), 0.0)) for p in session.people]
-        held = grab(bodies[0].model, bodies[0].values, cameras[0], "left_wrist", np.zeros(2))
-        drag(held, np.ones(2), bodies[0].values)
-        record_stage("posing")
+        cameras = [c.camera for c in session.cameras]
         occluding_contours.trace(bodies, cameras[0].pinhole)
         points_occluded(bodies, [cameras[0].pinhole], bodies[0].points_world)
         record_stage("contours")
@@ -99,6 +93,16 @@ def _call_kernels(background: bool) -> None:
         ChamferCost(Observer(session.cameras, recording).evidence(_FRAME), bodies).at_prediction()
     record_stage("cost")
     _call_tracking(session)
+
+
+def _compile_posing(session: Session) -> list[PosedBody]:
+    """Compile the kernels that place and drag a body; return the people in their default poses."""
+    cameras = [c.camera for c in session.cameras]
+    bodies = [PosedBody(p.model, default_pose(p.model, cameras, np.eye(3), 0.0)) for p in session.people]
+    held = grab(bodies[0].model, bodies[0].values, cameras[0], "left_wrist", np.zeros(2))
+    drag(held, np.ones(2), bodies[0].values)
+    record_stage("posing")
+    return bodies
 
 
 def _compile_evidence(session: Session) -> None:

@@ -22,12 +22,12 @@ from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.footage.recording import Recording
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array, FloatArray
+from tracker.pipeline.methods import make_tracker
 from tracker.search.best_first import COARSE_SEARCH, SearchSettings, search
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
+from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
 _CANDIDATES = 100
 _PIPELINE_FRAMES = range(5, 45)
@@ -178,7 +178,7 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
         steps = np.random.default_rng(3).normal(scale=0.005, size=(50, of.model.n_dofs))
         poses = [of.model.retract(start, step) for step in steps]
         # The difference between long and short descents leaves out what a descent costs besides its iterations.
-        few, many = (partial(_descended, of.model, match, poses, n) for n in (2, 6))
+        few, many = (partial(descended, of.model, match, poses, n) for n in (2, 6))
         n, timed = many() - few(), yardstick.beside_difference(many, few, 30)
         timed = timed._replace(work_us=timed.work_us / n)
         yield Row(f"iteration_{name}_views", f"Gauss-Newton iteration, cones, {name} views", *timed, 1 / must, 1 / aim)
@@ -193,7 +193,7 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
     yield Row("iteration_scipy", "the same by scipy's least_squares with numeric Jacobian, edges to contour", *timed)
 
 
-def _descended(model: BodyModel, match: ContourResiduals, poses: Sequence[Array], most: int) -> int:
+def descended(model: BodyModel, match: ContourResiduals, poses: Sequence[Array], most: int) -> int:
     """Descend from some poses, (n_values,) each, and return the number of iterations, at most `most`."""
     return sum(solve_compiled(model, pose, [match], max_iterations=most, tolerance=0.0).iterations for pose in poses)
 
@@ -266,6 +266,19 @@ def _pipeline(
     yardstick: Yardstick,
 ) -> Row:
     """Track a session from the fitted poses; `per_second` are the required and the desired frames per second."""
+    timed, note = tracked_pipeline(_SETTINGS, session, models, joints, yardstick)
+    must, aim = (1e3 / fps / 1.5 for fps in per_second)
+    return Row(name, what, *timed, must, aim, note)
+
+
+def tracked_pipeline(
+    settings: TrackerSettings,
+    session: Session,
+    models: Sequence[BodyModel],
+    joints: Sequence[MarkerTable],
+    yardstick: Yardstick,
+) -> tuple[Timed, str]:
+    """Track a session from the fitted poses, and return the time of a frame and the frames per second in words."""
     wanted = [k for k in _PIPELINE_FRAMES if k < session.n_frames]
     first = [pose_at(j, m, wanted[0]) for j, m in zip(joints, models, strict=True)]
     n, spent = len(wanted), list[float]()
@@ -273,7 +286,7 @@ def _pipeline(
     def run() -> None:
         with Recording(session.cameras) as recording:
             observer = Observer(session.cameras, recording)
-            tracked = ChamferTracker(_SETTINGS).estimates(TrackingRun(observer, Subjects.of(models), first, wanted))
+            tracked = make_tracker(settings).estimates(TrackingRun(observer, Subjects.of(models), first, wanted))
             next(tracked)  # opening the videos does not count
             start = time.perf_counter()
             for found in islice(tracked, n - 1):
@@ -284,5 +297,4 @@ def _pipeline(
 
     timed = yardstick.beside(run, 3)
     frame_us = 1e6 * float(np.median(spent[1:])) / (n - 1)
-    must, aim = (1e3 / fps / 1.5 for fps in per_second)
-    return Row(name, what, frame_us, timed.yardstick_us, must, aim, f"{1e6 / frame_us:.1f} frames per second")
+    return timed._replace(work_us=frame_us), f"{1e6 / frame_us:.1f} frames per second"

@@ -30,6 +30,11 @@ class TrackArguments:
     """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice. contour: extremal
     contours, refined by Gauss-Newton until it converges, without a search of whole bodies. voxel: a Kalman filter on
     the parts of the body, measured by the voxels of the silhouettes."""
+    init: Literal["auto"] | None = None
+    """auto finds people who have no pose first, on the frame where they track best, and tracks from there in both
+    directions."""
+    acquire: bool = False
+    """with --init auto: acquire the sizes of those people from the contours before tracking."""
     frames: OptionalRange = None
     """A:B, half open; all by default."""
     stride: int = 1
@@ -72,15 +77,39 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     Ctrl+C stops it and keeps the poses found so far; run it again to resume.
     """
     at = load_target(arguments.session, arguments.person, several=True)
-    frames: Sequence[int] = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
-    frames = frames[::-1] if arguments.backward else frames
+    ascending = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
+    frames = ascending[::-1] if arguments.backward else ascending
+    _check_chain(arguments)
     settings = _SETTINGS[arguments.method](arguments)
     if arguments.paper:
         _require_paper_body(at, arguments.method)
-    found = track(at, frames, settings, Reporter(silent=arguments.json), arguments.cameras)
+    progress = Reporter(silent=arguments.json)
+    if arguments.init is None:
+        found = track(at, frames, settings, progress, arguments.cameras)
+    else:
+        from app.cli.track_found import track_found
+
+        try:
+            found = track_found(
+                at, ascending, arguments.acquire, progress,
+                lambda people, own: track(people, own, settings, progress, arguments.cameras),
+            )  # fmt: skip
+        except KeyboardInterrupt:
+            print("stopped before anybody was found; nothing was stored", file=sys.stderr)
+            sys.exit(130)
     print(format_json(found) if arguments.json else _format(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
+
+
+def _check_chain(arguments: TrackArguments) -> None:
+    """Raise a `TrackerError` where options contradict `--init`."""
+    if arguments.init is not None and arguments.backward:
+        raise TrackerError("expected --init without --backward, found both; it tracks in both directions by itself")
+    if arguments.acquire and arguments.init is None:
+        raise TrackerError(
+            "expected --acquire with --init auto, found it alone; add --init auto, or run quadrille acquire first"
+        )
 
 
 def _chamfer_settings(arguments: TrackArguments) -> "TrackerSettings":
@@ -110,17 +139,16 @@ def _contour_settings(arguments: TrackArguments) -> "TrackerSettings":
 
 
 def _shared_settings(settings: "EstimationSettings", arguments: TrackArguments) -> "TrackerSettings":
-    paper, stride = arguments.paper, arguments.stride
+    from tracker.tracking.estimation.settings import at_stride
+
     motion, order, window = settings.predict, arguments.order, arguments.window
-    # Bodies move farther between frames that are farther apart.
     motion = replace(
-        motion, order=motion.order if order is None else order, window=motion.window if window is None else window,
-        bound_rad=stride * motion.bound_rad, bound_m=stride * motion.bound_m,
-    )  # fmt: skip
-    return replace(
-        settings, predict=motion, theta_px=arguments.theta, trust_rad=stride * settings.trust_rad,
-        trust_m=stride * settings.trust_m, smooth=arguments.smooth and not paper,
-    )  # fmt: skip
+        motion, order=motion.order if order is None else order, window=motion.window if window is None else window
+    )
+    chosen = replace(
+        settings, predict=motion, theta_px=arguments.theta, smooth=arguments.smooth and not arguments.paper
+    )
+    return at_stride(chosen, arguments.stride)
 
 
 def _voxel_settings(arguments: TrackArguments) -> "TrackerSettings":

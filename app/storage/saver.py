@@ -17,6 +17,7 @@ from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.pipeline.seen_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
@@ -187,7 +188,9 @@ class Saver:
                 revision,
                 keyframe=source in _BY_HAND or (stored is not None and stored.keyframe),
                 cost_px=state.cost_px,
-                settings=self._settings_of(stored, shown, asdict(state.settings) if source in _BY_PROGRAM else {}),
+                settings=self._settings_of(
+                    person, stored, shown, source, asdict(state.settings) if source in _BY_PROGRAM else {}
+                ),
                 view_costs_px=state.view_costs_px,
             )
             if vouched is not None and person not in vouched:
@@ -311,13 +314,15 @@ class Saver:
         except SessionError:
             return otherwise
 
-    def _settings_of(self, stored: PoseRecord | None, shown: ShownPose, settings: dict[str, Any]) -> dict[str, Any]:
+    def _settings_of(
+        self, person: int, stored: PoseRecord | None, shown: ShownPose, source: str, settings: dict[str, Any]
+    ) -> dict[str, Any]:
         """Return the settings of a pose with where a user saw its points, before and now."""
-        seen: dict[str, dict[str, Any]] = {} if stored is None else dict(stored.settings.get(SEEN, {}))
-        for at in shown.seen:
-            camera = self._session.cameras[at.camera].camera
-            u, v = camera.distort_points(np.array(at.position_px))
-            seen[at.point] = {**seen.get(at.point, {}), camera.name: [float(u), float(v)]}
+        seen = {} if stored is None else stored.settings.get(SEEN, {})
+        if shown.seen:
+            seen = with_drag_ends(self._session.cameras, seen, shown.seen)
+        elif stored is not None and source == "manual":
+            seen = without_moved(self._session.people[person].model, seen, stored.values, shown.values)
         return {**settings, SEEN: seen} if seen else settings
 
     def _pin_changes(self, state: State) -> list[Change]:

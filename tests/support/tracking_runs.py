@@ -1,7 +1,7 @@
-"""Run the chamfer tracker on staged evidence."""
+"""Run trackers on staged evidence, the chamfer tracker by default."""
 
+from tracker.pipeline.methods import make_tracker
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
@@ -9,10 +9,10 @@ from tracker.tracking.tracker import TrackingRun
 def track(observer, models, start, frames, settings=None, **subjects):
     """The estimates of the first pass; keywords as of `Subjects.of`."""
     run = TrackingRun(observer, Subjects.of(models, **subjects), start, frames)
-    return ChamferTracker(settings or TrackSettings()).estimates(run)
+    return make_tracker(settings or TrackSettings()).estimates(run)
 
 
 def track_back(observer, models, found, settings=None, **subjects):
     """The steps of the backward pass; keywords as of `Subjects.of`."""
     run = TrackingRun(observer, Subjects.of(models, **subjects), (), ())
-    return ChamferTracker(settings or TrackSettings()).backward_pass(run, found)
+    return make_tracker(settings or TrackSettings()).backward_pass(run, found)

@@ -118,9 +118,9 @@ def project_generator(
     W = Ts_world_unit
     for i in range(3):
         generator[i, n] = generator[i, 0]
-    a0, b0, c0, d0 = _image_row(0, part, P, W)
-    a1, b1, c1, d1 = _image_row(1, part, P, W)
-    a2, b2, c2, d2 = _image_row(2, part, P, W)
+    a0, b0, c0, d0 = _image_row(np.int64(0), part, P, W)  # literals would compile `_image_row` three times
+    a1, b1, c1, d1 = _image_row(np.int64(1), part, P, W)
+    a2, b2, c2, d2 = _image_row(np.int64(2), part, P, W)
     for k in range(np.uint64(n // LANES * LANES + LANES)):  # whole vectors; values beyond the generator are not used
         x, y, z = generator[0, k], generator[1, k], generator[2, k]
         w = a2 * x + b2 * y + c2 * z + d2

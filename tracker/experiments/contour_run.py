@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.experiments.extremal_fit import fit_extremal_contours
 from tracker.experiments.staged_views import Actor, StagedObserver
 from tracker.fitting.observability import EXACT_1PX, observe_pose
 from tracker.geometry.arrays import Array
@@ -86,21 +85,6 @@ def track_scene(scene: Scene, settings: TrackerSettings, seed: int = 0) -> RunRe
     model, frames = scene.model, range(len(scene.truth))
     run = TrackingRun(observer, Subjects.of([model]), [scene.truth[0]], frames, scene.fps)
     return compare(scene, np.array([e.poses[0] for e in make_tracker(settings).estimates(run)]), observer)
-
-
-def track_as_paper(scene: Scene, sliding: bool = True, seed: int = 0) -> RunResult:
-    """Track a scene by the paper's minimization alone, each frame from the pose of the frame before (KRH08 Sect. 5.3).
-
-    Args:
-        scene: the recording, of a body of elliptical cones.
-        sliding: whether the sliding term is part of the Jacobian.
-        seed: of the noise.
-    """
-    observer = StagedObserver(scene.actor, scene.truth, scene.cameras, scene.noise_px, seed)
-    poses = [scene.truth[0]]
-    for k in range(len(scene.truth)):
-        poses.append(fit_extremal_contours(scene.model, poses[-1], observer.evidence(k), sliding).pose)
-    return compare(scene, np.array(poses[1:]), observer)
 
 
 def compare(scene: Scene, poses: Array, observer: StagedObserver) -> RunResult:

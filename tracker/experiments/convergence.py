@@ -1,18 +1,45 @@
-"""Convergence of the paper's minimization with and without the sliding term (KRH08 Fig. 13)."""
+"""Convergence of the paper's minimization: with and without the sliding term (KRH08 Fig. 13), and from a rough guess by
+incremental pose estimation (Fig. 9)."""
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from tracker.body.model import PosedBody
 from tracker.experiments.contour_run import Scene
-from tracker.experiments.extremal_fit import MAX_ITERATIONS, ExtremalFit, fit_extremal_contours
 from tracker.experiments.staged_views import StagedObserver
 from tracker.geometry.arrays import Array
+from tracker.tracking.contour.paper import paper_settings
+from tracker.tracking.contour.paper_fit import (
+    FitIteration,
+    fit_by_iterations,
+    fit_incrementally,
+    paper_residuals,
+    unlimited_views,
+)
 
+MAX_ITERATIONS = 15
+MIN_GAIN = 0.01
+"""Relative decrease of the RMS distance below which an iteration is the last that counts."""
 _EVERY = 5
 """Every so many frames is fitted."""
 BACK = (1, 4)
 """Numbers of frames by which a start pose lies in the past."""
+ROUGH_RAD, ROUGH_M = float(np.radians(15)), 0.1
+"""Errors of the rough guess: standard deviation of each angle and of each coordinate of the root, rad and metres."""
+
+
+class TracedFit(NamedTuple):
+    """A fit of one frame."""
+
+    rms_px: tuple[float, ...]
+    """RMS distance of the contours before the first iteration and after each one, px."""
+
+    @property
+    def iterations(self) -> int:
+        """Number of iterations."""
+        return len(self.rms_px) - 1
 
 
 class Convergence(NamedTuple):
@@ -21,7 +48,7 @@ class Convergence(NamedTuple):
     back: int
     """Number of frames between the start pose and the frame that is fitted."""
     sliding: bool
-    fits: tuple[ExtremalFit, ...]
+    fits: tuple[TracedFit, ...]
 
     @property
     def mean_rms_px(self) -> Array:
@@ -35,6 +62,17 @@ class Convergence(NamedTuple):
         return float(np.mean([f.iterations for f in self.fits]))
 
 
+class RoughStep(NamedTuple):
+    """A step of the incremental fit of a rough guess."""
+
+    name: str
+    """What moved."""
+    rms_px: float
+    """RMS distance of the contours after it, px."""
+    off_m: float
+    """Mean distance of the body's points from the true ones after it, metres."""
+
+
 def measure_convergence(scene: Scene, seed: int = 0) -> tuple[Convergence, ...]:
     """Fit every fifth frame of a scene from true poses of earlier frames, with and without the sliding term.
 
@@ -43,10 +81,48 @@ def measure_convergence(scene: Scene, seed: int = 0) -> tuple[Convergence, ...]:
         seed: of the noise.
     """
     observer = StagedObserver(scene.actor, scene.truth, scene.cameras, scene.noise_px, seed)
-    found: dict[tuple[int, bool], list[ExtremalFit]] = {(back, on): [] for back in BACK for on in (True, False)}
+    found: dict[tuple[int, bool], list[TracedFit]] = {(back, on): [] for back in BACK for on in (True, False)}
     for k in range(min(max(BACK), len(scene.truth) - 1), len(scene.truth), _EVERY):
-        views = observer.evidence(k)
         for back, sliding in found:
-            start = scene.truth[max(k - back, 0)]
-            found[back, sliding].append(fit_extremal_contours(scene.model, start, views, sliding))
+            settings, start = paper_settings("edges", sliding), scene.truth[max(k - back, 0)]
+            unlimited = unlimited_views(observer.evidence(k), settings)
+            residuals = paper_residuals(unlimited, [PosedBody(scene.model, start)], 0, settings)
+            found[back, sliding].append(_traced([*fit_by_iterations(scene.model, start, residuals, MAX_ITERATIONS)]))
     return tuple(Convergence(back, sliding, tuple(fits)) for (back, sliding), fits in found.items())
+
+
+def fit_rough_guess(scene: Scene, seed: int = 0) -> tuple[tuple[RoughStep, ...], tuple[RoughStep, ...]]:
+    """Fit the first frame of a scene from a rough guess: chain by chain, and all degrees of freedom at once.
+
+    Args:
+        scene: of a body of elliptical cones.
+        seed: of the guess and the noise.
+
+    Returns:
+        The steps of each fit, the start first. Of the fit at once there is one step.
+    """
+    model, truth, rng = scene.model, scene.truth[0], np.random.default_rng([seed, 9])
+    step = np.where(model.dof_is_length, ROUGH_M, ROUGH_RAD) * rng.normal(size=model.n_dofs)
+    start, settings = model.clip(model.retract(truth, step)), paper_settings("edges")
+    observer = StagedObserver(scene.actor, scene.truth, scene.cameras, scene.noise_px, seed)
+    unlimited = unlimited_views(observer.evidence(0), settings)
+    residuals = paper_residuals(unlimited, [PosedBody(model, start)], 0, settings)
+    true_world = model.points_world(truth)
+
+    def measured(i: FitIteration, name: str) -> RoughStep:
+        off = np.linalg.norm(model.points_world(i.pose) - true_world, axis=1)
+        return RoughStep(name, i.rms_px, float(off.mean()))
+
+    steps = tuple(measured(i, i.name) for i in fit_incrementally(model, start, residuals))
+    *_, last = fit_by_iterations(model, start, residuals, settings.max_iterations)
+    return steps, (steps[0], measured(last, "all at once"))
+
+
+def _traced(iterations: list[FitIteration]) -> TracedFit:
+    """Return the iterations up to the first that gains little, that one included."""
+    rms = [iterations[0].rms_px]
+    for before, i in pairwise(iterations):
+        rms.append(i.rms_px)
+        if i.rms_px > (1 - MIN_GAIN) * before.rms_px:
+            break
+    return TracedFit(tuple(rms))

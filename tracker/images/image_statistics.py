@@ -48,6 +48,8 @@ class SampleGrid:
         """Measure a frame as filmed, (H, W, 3), at the samples."""
         n = len(self._rows) * len(self._columns)
         out = ImageStatistics(np.empty((n, 3), np.float32), np.empty(n, np.float32))
+        image = image.view()
+        image.flags.writeable = False  # images of the cache are not writable: one kernel reads both kinds
         _read(image, self._rows, self._columns, self._block, self._kernels, out)
         return out
 

@@ -16,6 +16,7 @@ from tracker.fitting.gauss_newton import NormalEquations, normal_equations
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
+from tracker.geometry.triangulation import PointObservation
 from tracker.posing.picking import point_on_part
 
 Role: TypeAlias = Literal["body", "heading", "lean", "trunk", "limb"]
@@ -33,6 +34,8 @@ class Constraints:
     held: Mapping[str, Sequence[Camera]] = field(default_factory=dict)
     """Points that stay where they are in space as far as the drag allows (see `holdable_points`), with the views in
     which they were placed. A point that was placed in one view may still move along its line of sight."""
+    seen: tuple[PointObservation, ...] = ()
+    """Where the user put points in the views by hand, undistorted px. A fit, not a drag, draws the held ones there."""
     up_world: tuple[float, float, float] = _UP
     """The vertical, a unit vector in the world."""
 

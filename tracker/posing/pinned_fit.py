@@ -1,9 +1,11 @@
-"""Fit the people on one frame to pins and edges.
+"""Fit the people on one frame to pins, to points that were placed by hand, and to edges.
 
-Pins alone first bring a body near. Then the edges are added, at first with twice the outlier distance.
+Pins and placed points alone first bring a body near. Then the edges are added, at first with twice the outlier
+distance.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -63,8 +65,9 @@ def fit_frame(
         views: evidence of each view. Without it only pins count, and people without pins stay.
         settings: settings of the contour residuals.
         people: indices of the people to fit.
-        constraints: locked degrees of freedom and held points of each person; none by default. Edges move a held point
-            by some centimetres at most. A pin of a point overrules it.
+        constraints: locked degrees of freedom and held points of each person; none by default. A held point stays
+            where it was put in the views, or else where it is; edges and pins of other points move it by some
+            centimetres at most. A pin of the point itself overrules it.
     """
     people = list(people)
     models, now = [b.model for b in bodies], [np.array(b.values) for b in bodies]
@@ -72,15 +75,16 @@ def fit_frame(
     active = [c.active_dofs for c in constraints]
     blocks = [pin_block(m, cameras, p) if p else None for m, p in zip(models, pins, strict=True)]
     pinned = [np.zeros(len(m.value_names), dtype=bool) for m in models]
-    for person in people:
-        block, model = blocks[person], models[person]
-        if block is not None:
-            sigma = np.where(model.dof_is_length, _PLACE_M, np.where(model.dof_joint == 0, _TRUNK_RAD, _LIMB_RAD))
-            now[person], pinned[person] = _fit_one(model, now[person], block, [], sigma, active[person])
-    holds = [
-        holds_at(m, v, {n: seen for n, seen in c.held.items() if n not in {pin.point for pin in p}}).scaled(1 / _HELD_M)
+    # Where they were placed: pins of the trunk must not carry placed limbs away.
+    held = [
+        _held_blocks(PosedBody(m, v), cameras, c, {pin.point for pin in p})
         for m, v, c, p in zip(models, now, constraints, pins, strict=True)
     ]
+    for person in people:
+        block, model = blocks[person], models[person]
+        if block is not None or held[person]:
+            sigma = np.where(model.dof_is_length, _PLACE_M, np.where(model.dof_joint == 0, _TRUNK_RAD, _LIMB_RAD))
+            now[person], pinned[person] = _fit_one(model, now[person], block, held[person], sigma, active[person])
     for reach in _REACHES if views is not None else ():
         for person in people:
             assert views is not None
@@ -91,9 +95,31 @@ def fit_frame(
             match = ContourResiduals(views, posed, person, settings.match, theta_px, everywhere=True)
             sigma = np.where(model.dof_is_length, _TRUST_M, _TRUST_RAD)
             now[person], pinned[person] = _fit_one(
-                model, now[person], blocks[person], [match, holds[person]], sigma, active[person]
+                model, now[person], blocks[person], [match, *held[person]], sigma, active[person]
             )  # fmt: skip
     return FrameFit(tuple(now), tuple(pinned))
+
+
+def _held_blocks(
+    body: PosedBody, cameras: Sequence[Camera], constraints: Constraints, pinned: Set[str]
+) -> list[ResidualBlock]:
+    """Return the residuals of the held points that no pin overrules.
+
+    Those that were put somewhere in some views belong there, because a later drag may have moved them. The others
+    belong where they are.
+    """
+    held = {name: views for name, views in constraints.held.items() if name not in pinned}
+    seen = [at for at in constraints.seen if at.point in held]
+    here = {name: views for name, views in held.items() if name not in {at.point for at in seen}}
+    blocks: list[ResidualBlock] = []
+    if here:
+        blocks.append(holds_at(body.model, body.values, here).scaled(1 / _HELD_M))
+    if seen:
+        block = pin_block(body.model, cameras, seen)
+        places = body.points_world[block.points]
+        held_px = [c.K[0, 0] * _HELD_M / abs(float(c.depths(at))) for c, at in zip(block.cameras, places, strict=True)]
+        blocks.append(replace(block, sigmas_px=np.hypot(block.sigmas_px, held_px)))
+    return blocks
 
 
 def _fit_one(

@@ -29,7 +29,14 @@ from tracker.geometry.segment_distance import (
     stack_rows,
     within_reach,
 )
-from tracker.search.chamfer_kernels import ScoreBuffers, ScoredViews, TracedContours, measure_view, score_candidates
+from tracker.search.chamfer_kernels import (
+    ScoreBuffers,
+    ScoredViews,
+    TracedContours,
+    measure_view,
+    score_candidates,
+    score_traced,
+)
 
 Outliers = Literal["truncated", "paper"]
 
@@ -85,7 +92,7 @@ class ChamferCost:
         thetas = [v.outlier_px(theta_px) for v in views]
         widest = max((v.camera for v in views), key=lambda camera: camera.width)
         room = occluding_contours.contour_room(widest, len(self.models))
-        self._predicted, self._contours = tuple(b.values for b in predicted), self._traced(views, predicted, room)
+        self._contours = self._traced(views, predicted, room)
         self._seen = np.array([bool(len(v.points_px)) for v in views], dtype=bool)
         self._arrays = scored_views(views, thetas, self._pieces_by_view())
         self._room = max(room, self._arrays.points.shape[1])
@@ -97,7 +104,9 @@ class ChamferCost:
 
     def at_prediction(self) -> Cost:
         """Return the cost of the predicted poses, whose contours are already traced."""
-        return self._cost(self._directed(0, self._predicted[0][None], self._predicted, self._contours)[0])
+        directed = np.empty((len(self._seen), 2))
+        score_traced(self._contours, self._arrays, self.outliers == "paper", self._scratch(), directed)
+        return self._cost(directed)
 
     def _cost(self, directed: Array) -> Cost:
         directed_px = directed / self._scales[:, None]
@@ -150,24 +159,18 @@ class ChamferCost:
         firsts = np.cumsum([0, *map(len, edges)]).astype(np.int64)
         return TracedContours(np.concatenate(ends, axis=1), np.concatenate(occluded), np.concatenate(edges), firsts)
 
-    def _directed(
-        self, person: int, candidates: Array, poses: Sequence[Array], contours: TracedContours | None = None
-    ) -> Array:
-        """Return the directed costs of candidates of a person, see `of_person`, (C, V, 2), working px.
-
-        All callers use one kernel: another would sum single-precision numbers in another order.
-        """
+    def _directed(self, person: int, candidates: Array, poses: Sequence[Array]) -> Array:
+        """Return the directed costs of candidates of a person, see `of_person`, (C, V, 2), working px."""
         model = self.models[person]
         first = parts_of(self.models, person).start
         directed = np.empty((len(candidates), len(self._seen), 2))
         poses_of = np.ascontiguousarray(candidates, dtype=np.float64)
         Ts, paper = self._part_poses(poses), self.outliers == "paper"
-        traced = contours or _no_contours()
 
         def score(share: slice) -> None:
             score_candidates(
-                poses_of[share], first, model.tree, Ts.copy(), self._surfaces, self._arrays, paper, traced,
-                self._scratch(), directed[share],
+                poses_of[share], first, model.tree, Ts.copy(), self._surfaces, self._arrays, paper, self._scratch(),
+                directed[share],
             )  # fmt: skip
 
         if self._threads > 1 and len(candidates) >= _MIN_SHARED_CANDIDATES:
@@ -250,14 +253,6 @@ def measure_nothing(views: Sequence[ViewEvidence], models: tuple[BodyModel, ...]
 def _distances(views: tuple[ViewEvidence, ...]) -> FloatArray:
     """Return the distance images, one after the other, row by row."""
     return np.concatenate([v.distance.ravel() for v in views])
-
-
-@lru_cache(maxsize=1)
-def _no_contours() -> TracedContours:
-    """Return no contours, so that poses are traced."""
-    return TracedContours(
-        np.empty((4, 0), np.float32), np.empty(0, np.bool_), np.empty(0, np.int32), np.empty(0, np.int64)
-    )
 
 
 def _near(view: ViewEvidence, pieces_px: FloatArray, occluded: NDArray[np.bool_], theta: float) -> RowSortedPoints:

@@ -67,7 +67,7 @@ class ScoreBuffers(NamedTuple):
 
 
 class TracedContours(NamedTuple):
-    """Contours of predicted bodies in all views, one view after the other; empty where poses are to be traced."""
+    """Contours of predicted bodies in all views, one view after the other."""
 
     ends: FloatArray
     """u0, v0, u1, v1 of each piece, (4, N), undistorted working px."""
@@ -76,7 +76,7 @@ class TracedContours(NamedTuple):
     edges: NDArray[np.int32]
     """Index of the straight edge that each piece is cut from, (N,)."""
     firsts: NDArray[np.int64]
-    """Index of the first piece of each view, then the number of all, (V + 1,); (0,) without contours."""
+    """Index of the first piece of each view, then the number of all, (V + 1,)."""
 
 
 @njit(**FAST_MATH)
@@ -144,7 +144,7 @@ def _forward_paper(n: int, image: FloatArray, width: int, height: int, theta: fl
 
 
 @njit(**FAST_MATH)
-def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segments) -> tuple[int, int]:
+def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segments) -> tuple[np.int64, np.int64]:
     """Pack the visible ones of n pieces and join them to segments; return both numbers."""
     ends, occluded, edges = pieces.ends, pieces.occluded, pieces.edges
     su, sv, du, dv = segments.u, segments.v, segments.du, segments.dv
@@ -164,7 +164,7 @@ def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segment
         visible[0, m], visible[1, m] = _HALF * (x0 + x1), _HALF * (y0 + y1)
         visible[2, m] = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)
         m += np.uint64(1)
-    return int(m), int(k)
+    return np.int64(m), np.int64(k)
 
 
 @njit(**FAST_MATH)
@@ -214,9 +214,20 @@ def measure_view(
 
 
 @njit(**FAST_MATH)
+def score_traced(
+    contours: TracedContours, views: ScoredViews, paper: bool, scratch: ScoreBuffers, directed: Array
+) -> None:
+    """Fill the directed costs of contours that are traced already, (V, 2), see `score_candidates`."""
+    pixel = np.int64(0)  # a literal would compile `measure_view` once more
+    for view in range(views.P.shape[0]):
+        n = _take_traced(view, contours, scratch.pieces)
+        pixel = measure_view(view, n, pixel, views, paper, scratch, directed[view])
+
+
+@njit(**FAST_MATH)
 def score_candidates(
     candidates: Array, first: int, tree: Tree, Ts: Array, surfaces: Surfaces, views: ScoredViews, paper: bool,
-    contours: TracedContours, scratch: ScoreBuffers, directed: Array,
+    scratch: ScoreBuffers, directed: Array,
 ) -> None:  # fmt: skip
     """Fill the directed costs of many poses of the person whose parts begin at `first`, see `measure_view`.
 
@@ -228,19 +239,14 @@ def score_candidates(
         surfaces: of all people.
         views: the evidence.
         paper: whether outliers are those of the paper, see `ChamferCost`.
-        contours: of the only candidate, if they are traced already.
         scratch: of this thread.
         directed: to fill, (C, V, 2), working px.
     """
-    own, traced = Ts[first : first + tree.parents.shape[0]], contours.firsts.shape[0] > 0
+    own = Ts[first : first + tree.parents.shape[0]]
     for c in range(candidates.shape[0]):
-        if not traced:
-            forward_kinematics(candidates[c], tree, own, scratch.axes, scratch.origins)
-            place_parts(Ts, surfaces, scratch.pieces)
-        pixel = np.int64(0)  # a literal would compile `measure_view` once more
+        forward_kinematics(candidates[c], tree, own, scratch.axes, scratch.origins)
+        place_parts(Ts, surfaces, scratch.pieces)
+        pixel = np.int64(0)
         for view in range(views.P.shape[0]):
-            if traced:
-                n = _take_traced(view, contours, scratch.pieces)
-            else:
-                n = trace_pieces(views.P[view], views.eyes[view], surfaces, PIECE_PX, scratch.pieces)
+            n = trace_pieces(views.P[view], views.eyes[view], surfaces, PIECE_PX, scratch.pieces)
             pixel = measure_view(view, n, pixel, views, paper, scratch, directed[c, view])

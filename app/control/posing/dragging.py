@@ -132,8 +132,8 @@ class Dragging:
             self._scores_moves = not is_last
             if not is_last:
                 self._costs.offer(session_state.state)
-            if time.monotonic() - session_state.last_save > _CHECKPOINT_S:
-                session_state.save(f"drag {display_name(drag.point)}", "manual", self._gesture_grab, drag.person)
+            if self._gesture_grab is not None and time.monotonic() - session_state.last_save > _CHECKPOINT_S:
+                self._save(replace(drag, pointer_px=pointer_px), self._gesture_grab)
 
     def end(self, page: int) -> None:
         """Release the point; the gesture is one entry of the history, on disk when this returns."""
@@ -158,15 +158,20 @@ class Dragging:
         self._scores_moves = False
         has_moved = not np.array_equal(grab.pose, session_state.state.poses[drag.person])
         if has_moved or session_state.open_edit_owner is grab:
-            people = list(session_state.state.people)
-            people[drag.person] = replace(people[drag.person], seen=self._seen(drag))
-            session_state.set(people=tuple(people))
-            session_state.save(f"drag {display_name(drag.point)}", "manual", grab, drag.person)
+            self._save(drag, grab)
             self._hold(drag)
         elif not session_state.is_shown_stored(session_state.state):
             session_state.show_frame(session_state.state.frame)  # moved back: the pose has its former source
         self._gesture_grab = self._mode_grab = session_state.open_edit_owner = None
         session_state.set(drag=None, **session_state.costs(session_state.state.poses))
+
+    def _save(self, drag: DragState, grab: Grab) -> None:
+        """Save the dragged pose, and where the user put the point."""
+        session_state = self._session_state
+        people = list(session_state.state.people)
+        people[drag.person] = replace(people[drag.person], seen=self._seen(drag))
+        session_state.set(people=tuple(people))
+        session_state.save(f"drag {display_name(drag.point)}", "manual", grab, drag.person)
 
     def _seen(self, drag: DragState) -> tuple[PointObservation, ...]:
         """Return where the user has put the dragged point: the body may not reach it."""

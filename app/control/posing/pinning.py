@@ -199,7 +199,7 @@ class Pinning:
         fitted = list(fitted)
         views = session_state.frames.cached_evidence(session_state.state.frame)
         cameras = [c.camera for c in session_state.session.cameras]
-        constraints = [session_state.drag_constraints(person) for person in range(len(session_state.models))]
+        constraints = [session_state.fit_constraints(person) for person in range(len(session_state.models))]
         found = fit_frame(
             [PosedBody(m, p.values) for m, p in zip(session_state.models, start, strict=True)],
             pins,

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Unpack
 
@@ -16,11 +17,12 @@ from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_no
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import STAGES
-from tracker.errors import TrackerError
+from tracker.errors import SessionError, TrackerError
 from tracker.fitting.gauss_newton import value_mask, with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
+from tracker.pipeline.seen_points import seen_points
 from tracker.posing.default_pose import default_pose
 from tracker.posing.grab import Constraints
 from tracker.posing.retarget import retarget_pose
@@ -107,7 +109,17 @@ class SessionState:
             for point in {h.point for h in here}
         }
         x, y, z = (float(c) for c in self._R_world_up[:, 2])
-        return Constraints(self.active_dofs(person), held, (x, y, z))
+        return Constraints(self.active_dofs(person), held, up_world=(x, y, z))
+
+    def fit_constraints(self, person: int) -> Constraints:
+        """Return what a fit of a person leaves alone, and where the user put points, if that can be read."""
+        constraints = self.drag_constraints(person)
+        with suppress(SessionError):
+            record = self.saver.record(person, self.state.frame)
+            if record is not None:
+                seen = seen_points(self.session.cameras, self.models[person], record)
+                return replace(constraints, seen=tuple(seen))
+        return constraints
 
     def within_locks(self, poses: Sequence[Array]) -> tuple[Array, ...]:
         """Return poses, (n_values,) each, with locked degrees of freedom as in the shown poses."""

@@ -137,11 +137,13 @@ def acquisition():
     return acquire_from_contours(_Staged(person, poses), bodies, 0, {}, settings)
 
 
+@pytest.mark.slow
 def test_an_acquisition_fits_better_than_the_body_before(acquisition):
     assert len(acquisition.frames) == len(acquisition.poses) == 3
     assert acquisition.cost_after_px < 0.7 * acquisition.cost_before_px
 
 
+@pytest.mark.slow
 def test_sizes_are_reported_with_their_uncertainty(acquisition):
     listed = size_changes(acquisition)
     rows = {r.name: r for r in listed}

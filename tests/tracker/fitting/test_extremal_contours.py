@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from bodies import MODELS
+from krh08_plain import linearize
 from krh08_reference import SINGULAR, Cone, ZeroReference, distance, project, ruling
 from staging import camera_at, cameras_around, own_evidence, posed
 
 from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import trace
 from tracker.contours.surfaces import surfaces_of
-from tracker.experiments.extremal_fit import linearize
 from tracker.fitting.contour_residuals import ContourResiduals, paper_match
 from tracker.fitting.sliding import add_sliding_twists
 from tracker.fitting.twists import add_twists, twists_to_dofs

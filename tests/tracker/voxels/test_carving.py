@@ -20,8 +20,10 @@ def carved(silhouettes, size_m, **settings):
     return Carver(silhouettes).carve(grid, CarveSettings(**settings))
 
 
-@pytest.mark.parametrize("size_m", [0.02, 0.01])
-@pytest.mark.parametrize("lens", [(), LENS])
+@pytest.mark.parametrize(
+    ("size_m", "lens"),
+    [(0.02, ()), *(pytest.param(*p, marks=pytest.mark.slow) for p in ((0.02, LENS), (0.01, ()), (0.01, LENS)))],
+)
 def test_sizes_of_solids_within_half_a_voxel(size_m, lens):
     cameras = cameras_around(30, lens)
     for solid, measure, expected in (

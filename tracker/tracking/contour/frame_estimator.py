@@ -1,7 +1,6 @@
 """Estimate a frame by the extremal contours of KRH08, made robust and symmetric, or as the paper does."""
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +8,10 @@ from numpy.typing import NDArray
 from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import ContourResiduals, paper_match
+from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import NormalEquations
-from tracker.tracking.contour.image_contours import select_contours, with_unlimited_distances
+from tracker.tracking.contour.image_contours import select_contours
+from tracker.tracking.contour.paper_fit import paper_residuals, unlimited_views
 from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.estimate import NormalMatrix
 from tracker.tracking.estimation.assessment import PersonEstimate
@@ -20,9 +20,6 @@ from tracker.tracking.estimation.frame_problem import PersonFit, with_body
 from tracker.tracking.estimation.incremental_fit import fit_by_chains
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
-
-_NO_LIMIT_PX = 1e5
-"""An outlier distance that no residual reaches, px of the footage."""
 
 
 class ContourEstimator(FrameEstimator):
@@ -48,8 +45,7 @@ class ContourEstimator(FrameEstimator):
         """Find the poses of some people and move them there."""
         if not self._contour_settings.paper:
             return super().estimate(people)
-        wanted = self._contour_settings.image_contours
-        self._unlimited = [with_unlimited_distances(v, wanted) for v in self.problem.views]
+        self._unlimited = unlimited_views(self.problem.views, self._contour_settings)
         return {p: self.finalize(p, self.move(p, self._minimize(p))) for p in people}
 
     def finalize(self, person: int, found: PersonFit) -> PersonEstimate:
@@ -87,8 +83,7 @@ class ContourEstimator(FrameEstimator):
 
     def _paper_residuals(self, person: int) -> ContourResiduals:
         around, index = self.problem.around(person, self.bodies)
-        motion: Literal["rigid", "sliding"] = "sliding" if self._contour_settings.sliding else "rigid"
-        return ContourResiduals(self._unlimited, around, index, paper_match(motion), _NO_LIMIT_PX, everywhere=True)
+        return paper_residuals(self._unlimited, around, index, self._contour_settings)
 
 
 def conditioning(linear: NormalEquations, active_dofs: NDArray[np.bool_] | None) -> NormalMatrix:

@@ -33,7 +33,11 @@ def with_unlimited_distances(view: ViewEvidence, wanted: ImageContours) -> ViewE
         view: the evidence, see `select_contours`.
         wanted: what its edges are.
     """
-    pixels = view.points_px if view.segments is None else view.segments.points_px
+    if view.segments is None:
+        rows, columns = np.nonzero(view.distance == 0)
+        pixels = np.stack([columns, rows], axis=1).astype(np.float32)
+    else:
+        pixels = view.segments.points_px
     if wanted == "silhouettes" and view.silhouette is not None:
         pixels = view.silhouette.contour.points_px
     return replace(view, distance=_distances(view, pixels, None))

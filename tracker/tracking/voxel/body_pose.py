@@ -10,10 +10,9 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, covariance, solve
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.chain_jacobian import center_jacobian, point_jacobian
 from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
 from tracker.tracking.voxel.settings import VoxelSettings
-from tracker.tracking.voxel.state import FilterState, Layout
+from tracker.tracking.voxel.state import FilterState, Layout, center_jacobian, point_jacobian
 
 _PLACE_M = 0.015
 """Standard deviation between the joints of a figure and those of a body whose trunk bends, metres."""

@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.chain_jacobian import center_jacobian
 from tracker.tracking.voxel.figure import N_PARTS
 from tracker.tracking.voxel.label_kernels import N_MOMENTS, label_and_sum
-from tracker.tracking.voxel.state import FilterState
+from tracker.tracking.voxel.state import FilterState, center_jacobian
 
 NO_PART = -1
 """Label of a voxel that belongs to no part."""

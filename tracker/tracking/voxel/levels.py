@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.chain_jacobian import center_jacobian
 from tracker.tracking.voxel.figure import LIMBS, N_PARTS, PARENTS
 from tracker.tracking.voxel.kalman import LinearizedMeasurement
 from tracker.tracking.voxel.labels import PartClouds
-from tracker.tracking.voxel.state import FilterState
+from tracker.tracking.voxel.state import FilterState, center_jacobian
 from tracker.voxels.voxel_grid import Voxels
 
 _MERGED, _APART = 0.4, 0.25

@@ -7,7 +7,7 @@ import numpy as np
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.figure import N_PARTS
-from tracker.tracking.voxel.small_products import product
+from tracker.tracking.voxel.kalman import product
 from tracker.tracking.voxel.state import FilterState
 
 

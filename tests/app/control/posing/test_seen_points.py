@@ -44,3 +44,24 @@ def test_turning_or_pushing_places_nothing(opened):
     controller.dragging.move(PAGE, tuple(at + 20.0), 1, "push", is_last=True)
     controller.dragging.end(PAGE)
     assert seen(controller) == before
+
+
+def test_an_edit_that_is_no_drag_drops_what_it_moves(opened):
+    controller = opened()
+    for point in ("left_wrist", "right_knee"):
+        drag(controller, point, (6.0, -9.0))
+    model = controller.session.people[0].model
+    elbow = next(i for i, name in enumerate(model.dof_names) if name.startswith("left_elbow"))
+    controller.pose_edits.set_dof(0, elbow, float(controller.state.poses[0][elbow]) + 0.4)
+    assert set(seen(controller)) == {"right_knee"}
+    controller.history.undo()
+    assert set(seen(controller)) == {"left_wrist", "right_knee"}
+
+
+def test_fits_know_where_points_were_put(opened):
+    controller = opened()
+    put = np.add(pixel_of(controller, "left_wrist", 0), (30.0, -20.0))
+    drag(controller, "left_wrist", (30.0, -20.0))
+    constraints = controller._session_state.fit_constraints(0)
+    assert [(at.point, at.camera) for at in constraints.seen] == [("left_wrist", 0)]
+    np.testing.assert_allclose(constraints.seen[0].position_px, put, atol=0.5)

@@ -380,14 +380,14 @@ def test_contours_are_traced_once_per_pose(gavrila, monkeypatch, segments):
     trace, trace_views, score = (
         occluding_contours.trace,
         chamfer_cost.ChamferCost._traced,
-        chamfer_cost.score_candidates,
+        chamfer_cost.score_traced,
     )
     monkeypatch.setattr(occluding_contours, "trace", lambda *a: predicted.append(a) or trace(*a))
     monkeypatch.setattr(chamfer_cost.ChamferCost, "_traced", lambda *a: found.append(a) or trace_views(*a))
-    monkeypatch.setattr(chamfer_cost, "score_candidates", lambda *a: scored.append(a) or score(*a))
+    monkeypatch.setattr(chamfer_cost, "score_traced", lambda *a: scored.append(a) or score(*a))
     for estimate in track(Shown(views), [gavrila], truth[:1], range(3), TrackSettings(segments=segments)):
         assert estimate.statuses == ("good",)
         assert (len(predicted), len(found), len(scored)) == (3, 1, 1)  # of three views, at one and all at once
-        assert len(scored[0][7].firsts) == 3 + 1  # it is handed the contours of all views
+        assert len(scored[0][0].firsts) == 3 + 1  # it is given the contours of all views
         for calls in (predicted, found, scored):
             calls.clear()

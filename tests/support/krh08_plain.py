@@ -1,95 +1,29 @@
-"""The minimization of KRH08 Sect. 5.3 as printed: model to image, without robust weights, prior or prediction.
+"""The derivatives of KRH08 Eq. 55 and 61 over all visible contour points, in numpy, to check the kernels with."""
 
-It serves the convergence experiment (Fig. 13), where the sliding term is switched. Trackers use the compiled kernels of
-`tracker.fitting`, which leave that term out: it moves a contour along itself only.
-"""
-
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
-from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.gauss_newton import INITIAL_DAMPING, damped_step
-from tracker.geometry.arrays import Array, FloatArray, IntArray
+from tracker.fitting.sliding import SINGULAR
 from tracker.geometry.shapes import EllipticalCone
 
-MAX_ITERATIONS = 15
-MIN_GAIN = 0.01
-"""Relative decrease of the RMS distance below which an iteration is the last."""
-SINGULAR = 0.02
-"""Conditioning of a ruling below which its sliding term is weighted down: the two rulings of a cone nearly meet."""
-_MAX_DAMPING = 1e4
 _ON_SIDE = 0.999
-"""Largest height of a point on the curved surface, in half its length. Points beyond lie on the rim of an end."""
-
-
-class ExtremalFit(NamedTuple):
-    """A fit of one frame."""
-
-    pose: Array
-    """(n_values,)."""
-    rms_px: tuple[float, ...]
-    """RMS distance of the contours before the first iteration and after each one, px."""
-
-    @property
-    def iterations(self) -> int:
-        """Number of iterations."""
-        return len(self.rms_px) - 1
 
 
 class Linearization(NamedTuple):
     """Distances of all visible contour points, and their derivatives."""
 
-    distances: Array
+    distances: np.ndarray
     """(m,), px."""
-    jacobian: Array
+    jacobian: np.ndarray
     """(m, n_dofs), px per radian or metre."""
-    lengths: Array
+    lengths: np.ndarray
     """Length of the piece of contour around each point, (m,), px."""
 
-    @property
-    def rms_px(self) -> float:
-        """RMS distance, px; NaN where nothing is visible."""
-        return float(np.sqrt(np.mean(self.distances**2))) if len(self.distances) else np.nan
 
-
-def fit_extremal_contours(
-    model: BodyModel, start: Array, views: Sequence[ViewEvidence], sliding: bool = True
-) -> ExtremalFit:
-    """Minimize the sum of squared chamfer distances (KRH08 Eq. 60) by damped Gauss-Newton from a start pose.
-
-    The paper does not say how degrees of freedom that nothing constrains are treated. Here the diagonal is damped.
-
-    Args:
-        model: the body, whose parts are elliptical cones.
-        start: initial pose, (n_values,).
-        views: the evidence.
-        sliding: whether the sliding term B of Eq. 31 is part of the Jacobian.
-    """
-    pose, here = start, linearize(model, start, views, sliding)
-    rms, damping = [here.rms_px], INITIAL_DAMPING
-    while len(rms) <= MAX_ITERATIONS and len(here.distances):
-        H, g = here.jacobian.T @ here.jacobian, here.jacobian.T @ here.distances
-        scale = np.diag(H) + 1e-6 * float(np.trace(H)) / len(H)
-        while True:
-            trial = model.clip(model.retract(pose, damped_step(H, g, damping * scale)))
-            there = linearize(model, trial, views, sliding)
-            if there.rms_px < here.rms_px or damping > _MAX_DAMPING:
-                break
-            damping *= 10
-        if not there.rms_px < here.rms_px:
-            break
-        pose, here, damping = trial, there, damping / 10
-        rms.append(here.rms_px)
-        if rms[-1] > (1 - MIN_GAIN) * rms[-2]:
-            break
-    return ExtremalFit(pose, tuple(rms))
-
-
-def linearize(model: BodyModel, pose: Array, views: Sequence[ViewEvidence], sliding: bool) -> Linearization:
+def linearize(model, pose, views, sliding):
     """Return the chamfer distances of all visible contour points (Eq. 59) and their derivatives (Eq. 55, 61)."""
     body = PosedBody(model, pose)
     kinematics = body.kinematics
@@ -120,7 +54,7 @@ def linearize(model: BodyModel, pose: Array, views: Sequence[ViewEvidence], slid
     return Linearization(np.concatenate(distances), jacobian, np.concatenate(lengths))
 
 
-def _bilinear(image: FloatArray, x: Array) -> tuple[Array, Array]:
+def _bilinear(image, x):
     """Return distances (N,) and their gradients (N, 2) at points (N, 2) within an image, px (Eq. 59, corrected)."""
     u, v = np.floor(x).astype(np.int64).T
     r1, r2 = (x - np.floor(x)).T
@@ -131,7 +65,7 @@ def _bilinear(image: FloatArray, x: Array) -> tuple[Array, Array]:
     return C00 + r1 * (C10 - C00) + r2 * ((1 - r1) * (C01 - C00) + r1 * (C11 - C10)), np.stack([along_u, along_v], 1)
 
 
-def _sliding_rows(body: PosedBody, parts: IntArray, points: Array, eye: Array, spatial: Array) -> Array:
+def _sliding_rows(body, parts, points, eye, spatial):
     """Return the sliding part of the derivatives of distances by spatial twists, `spatial . B` of Eq. 31, (N, 6).
 
     Points on the rim of an end do not slide. Where the two rulings of a cone nearly meet, the weight falls to 0.

@@ -1,0 +1,61 @@
+"""Where users have seen points of people in the images: the ends of drags, which are stored with the pose."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tracker.body.model import BodyModel
+from tracker.footage.camera_source import CameraSource
+from tracker.geometry.arrays import Array
+from tracker.geometry.triangulation import PointObservation
+from tracker.store.records import SEEN, Pin, PoseRecord
+
+_MOVED_M = 0.01
+"""An edit other than a drag that moves a point by more says that it was not where it was seen."""
+_Seen = dict[str, dict[str, Any]]
+"""Position in each camera, original px, by point."""
+
+
+def seen_points(
+    cameras: Sequence[CameraSource], model: BodyModel, record: PoseRecord, pins: Sequence[Pin] = ()
+) -> list[PointObservation]:
+    """Return where somebody has seen points of a person on a frame, ascending by point and name of the camera.
+
+    Args:
+        cameras: the session's views. What was seen in other views is left out.
+        model: the person's body. Points that it does not have are left out.
+        record: the stored pose, with the ends of drags.
+        pins: pins of the person on the frame, which go before the ends of drags.
+    """
+    index = {c.camera.name: i for i, c in enumerate(cameras)}
+    found = {(p, c): uv for p, views in record.settings.get(SEEN, {}).items() for c, uv in views.items()}
+    found |= {(pin.point, pin.camera): pin.position_px for pin in pins}
+    out = []
+    for (point, camera), position_px in sorted(found.items()):
+        if camera in index and point in model.point_names:
+            u, v = cameras[index[camera]].camera.undistort_points(np.array(position_px))
+            out.append(PointObservation(point, index[camera], (float(u), float(v))))
+    return out
+
+
+def with_drag_ends(cameras: Sequence[CameraSource], seen: _Seen, ends: Sequence[PointObservation]) -> _Seen:
+    """Return what is stored of seen points with the ends of drags, which replace former ones in their views."""
+    seen = dict(seen)
+    for at in ends:
+        camera = cameras[at.camera].camera
+        u, v = camera.distort_points(np.array(at.position_px))
+        seen[at.point] = {**seen.get(at.point, {}), camera.name: [float(u), float(v)]}
+    return seen
+
+
+def without_moved(model: BodyModel, seen: _Seen, before: Array, after: Array) -> _Seen:
+    """Return what is stored of seen points without those that an edit of the pose, (n_values,) each, moves.
+
+    Nothing stays where the body has other values.
+    """
+    if not seen or len(before) != len(after):
+        return {}
+    off_m = np.linalg.norm(model.points_world(after) - model.points_world(before), axis=1)
+    stays = {name for name, off in zip(model.point_names, off_m, strict=True) if off <= _MOVED_M}
+    return {name: views for name, views in seen.items() if name in stays}
