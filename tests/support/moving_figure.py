@@ -1,4 +1,4 @@
-"""A person of ellipsoids who swings arms and legs, unlike any body model of the program: true joints and silhouettes."""
+"""True joints and silhouettes of a person of ellipsoids who swings arms and legs, unlike any body model."""
 
 import numpy as np
 from solids import cameras_around, ellipsoid, silhouettes_of

@@ -95,7 +95,7 @@ def figure_of(model: BodyModel) -> FigureOfBody:
     own[TORSO] = 0.0
     figure = Figure(
         at_parent, own, (ends - centers) / sizes,
-        np.array([isinstance(model.shapes[m[0]], Ellipsoid) or n == "head" for m, n in zip(members, PARTS, strict=True)]),
+        np.array([isinstance(model.shapes[m[0]], Ellipsoid) or k == HEAD for k, m in enumerate(members)]),
         np.argsort(sizes, axis=1, kind="stable"),
     )  # fmt: skip
     firsts = [int(m[0]) for m in members]
