@@ -254,7 +254,8 @@ class PageConnection:
 
     async def _send_overlay(self, state: State, view: View) -> None:
         views = self._evidence(state, view)
-        if view.layers.isdisjoint(_EDGES) or "contours" not in state.compiled:
+        needs = not view.layers.isdisjoint(_EDGES) or state.search_view.replays_fit
+        if not needs or "contours" not in state.compiled:
             views = None
         drawn = (*_drawn(state), view, views is None)
         if drawn == self._sent_overlay:
@@ -267,7 +268,7 @@ class PageConnection:
 
     def _evidence(self, state: State, view: View) -> tuple[ViewEvidence, ...] | None:
         """Return the cached evidence of the shown frame if the page shows any; request it if it is not cached."""
-        if view.layers.isdisjoint(page_view.EVIDENCE):
+        if view.layers.isdisjoint(page_view.EVIDENCE) and not state.search_view.replays_fit:
             return None
         frames, views = self._controller.frames, self._controller.frames.cached_evidence(state.frame)
         if views is None and "evidence" in state.compiled:

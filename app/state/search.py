@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from tracker.geometry.arrays import Array
+from tracker.pipeline.methods import MethodName
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,8 @@ class ReplayState:
     """Cost of the best poses in each view, px; empty where unknown."""
     evaluations: int
     """Poses scored so far."""
+    method: MethodName = "chamfer"
+    """`contour` for the iterations of a fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +82,11 @@ class SearchView:
     """Result of another run, drawn over the stored poses."""
     compared_run: int | None = None
     """Number of that run."""
+
+    @property
+    def replays_fit(self) -> bool:
+        """Whether the iterations of a fit by contours are replayed, with vectors to the image contours."""
+        return self.replay is not None and self.replay.method == "contour"
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,8 @@
  * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
  * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |
- *   "new_sizes" | "result" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight"} PathKind
+ *   "new_sizes" | "result" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight" | "residual"}
+ *   PathKind
  * @typedef {"running" | "paused" | "over"} RunState
  * @typedef {"left" | "right" | ""} Side
  * @typedef {{type: "seek", frame: number}} Seek

@@ -53,6 +53,7 @@ export const LINE_STYLES = {
   accepted: { width: 1.5, dash: [], layer: "accepted", hasOutline: false },
   floor: { width: 1.25, dash: [], layer: null, hasOutline: true },
   floor_sight: { width: 1.5, dash: [5, 4], layer: null, hasOutline: true },
+  residual: { width: 1.25, dash: [], layer: "contours", hasOutline: false },
   rejected: { width: 1, dash: [], layer: "rejected", hasOutline: false },
 };
 

@@ -1,7 +1,7 @@
 """Search the poses of the shown frame, step by step or to the end, and save the best ones."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,14 +10,18 @@ from app.control.search.search_runs import SearchRun, SearchRuns
 from app.control.session.activities import Activities
 from app.control.session.comparing import note_comparison
 from app.control.session.session_state import SessionState
+from app.control.tracking.track_settings import of_method
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
 from app.state.search import SearchState, SearchView
-from app.state.state import Costs, finite_or_none
+from app.state.state import Costs, State, finite_or_none
 from tracker.errors import TrackerError
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
 from tracker.search.best_first import SearchStep, Stage, stages
 from tracker.tracking.chamfer.settings import TrackSettings, search_frame
+from tracker.tracking.contour.fit_steps import fit_frame, fit_stages
+from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.subjects import Subjects
 
 _SAVE_S = 0.5
@@ -146,10 +150,13 @@ class SearchRunner:
         """Return the paused search of the same people, or a new one from given poses, by default the shown ones."""
         session_state, state = self._session_state, self._session_state.state
         if self._job is None or self._job.ended or self._person != person:
-            frame, settings, models = state.frame, state.settings, session_state.models
+            frame, models = state.frame, session_state.models
             poses = state.poses if start is None else session_state.within_locks(start)
             free = [session_state.active_dofs(i) & (person is None or i == person) for i in range(len(models))]
-            if not stages(models, settings.search, active_dofs=free):
+            subjects = Subjects.of(models, active_dofs=free)
+            chosen = _settings_of(state)
+            planned = _planned(subjects, chosen)
+            if not planned:
                 raise TrackerError("expected degrees of freedom to search, found all of them locked; unlock some")
             if self._run is not None:
                 self._run.over = True
@@ -158,10 +165,9 @@ class SearchRunner:
                 p if p.values is v else ShownPose(v, p.source) for p, v in zip(state.people, poses, strict=True)
             )
             known_px = np.nan if costs["cost_px"] is None else costs["cost_px"]
-            run = self._runs.begin(frame, models, poses, known_px, settings, free)
-            subjects = Subjects.of(models, active_dofs=free)
+            run = self._runs.begin(frame, models, poses, known_px, chosen, planned)
             job: Job[SearchStep] = Job(
-                lambda: search_frame(session_state.frames.evidence(frame), subjects, poses, settings),
+                lambda: _steps(session_state.frames.evidence(frame), subjects, poses, chosen, planned),
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),
@@ -273,3 +279,32 @@ class SearchRunner:
 def _rest_s(speed: float | None) -> float:
     """Rest after each expansion, seconds; none at full speed."""
     return 0.0 if speed is None else 1.0 / speed
+
+
+def _settings_of(state: State) -> TrackSettings | ContourSettings:
+    """Return the settings of the chosen method."""
+    found = of_method(state.settings, state.method)
+    return found if isinstance(found, ContourSettings) else state.settings
+
+
+def _planned(subjects: Subjects, settings: TrackSettings | ContourSettings) -> list[Stage]:
+    """Return the stages of a search, or of a fit by contours."""
+    if isinstance(settings, ContourSettings):
+        return fit_stages(subjects)
+    free = [np.ones(m.n_dofs, bool) if a is None else a for m, a in zip(
+        subjects.models, subjects.active_dofs, strict=True
+    )]  # fmt: skip
+    return stages(subjects.models, settings.search, active_dofs=free)
+
+
+def _steps(
+    views: Sequence[ViewEvidence],
+    subjects: Subjects,
+    poses: tuple[Array, ...],
+    settings: TrackSettings | ContourSettings,
+    planned: Sequence[Stage],
+) -> Iterator[SearchStep]:
+    """Search from some poses, or fit them by contours, where that is the chosen method."""
+    if isinstance(settings, ContourSettings):
+        return fit_frame(views, subjects, poses, settings, planned)
+    return search_frame(views, subjects, poses, settings)
