@@ -10,14 +10,14 @@ from app.control.search.search_runs import SearchRun, SearchRuns
 from app.control.session.activities import Activities
 from app.control.session.comparing import note_comparison
 from app.control.session.session_state import SessionState
-from app.control.tracking.track_settings import of_method
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
 from app.state.search import SearchState, SearchView
-from app.state.state import Costs, State, finite_or_none
+from app.state.state import Costs, finite_or_none
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
+from tracker.pipeline.methods import of_method
 from tracker.search.best_first import SearchStep, Stage, stages
 from tracker.tracking.chamfer.settings import TrackSettings, search_frame
 from tracker.tracking.contour.fit_steps import fit_frame, fit_stages
@@ -154,7 +154,7 @@ class SearchRunner:
             poses = state.poses if start is None else session_state.within_locks(start)
             free = [session_state.active_dofs(i) & (person is None or i == person) for i in range(len(models))]
             subjects = Subjects.of(models, active_dofs=free)
-            chosen = _settings_of(state)
+            chosen = of_method(state.settings, state.method)
             planned = _planned(subjects, chosen)
             if not planned:
                 raise TrackerError("expected degrees of freedom to search, found all of them locked; unlock some")
@@ -279,12 +279,6 @@ class SearchRunner:
 def _rest_s(speed: float | None) -> float:
     """Rest after each expansion, seconds; none at full speed."""
     return 0.0 if speed is None else 1.0 / speed
-
-
-def _settings_of(state: State) -> TrackSettings | ContourSettings:
-    """Return the settings of the chosen method."""
-    found = of_method(state.settings, state.method)
-    return found if isinstance(found, ContourSettings) else state.settings
 
 
 def _planned(subjects: Subjects, settings: TrackSettings | ContourSettings) -> list[Stage]:

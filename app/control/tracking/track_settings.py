@@ -1,7 +1,7 @@
 """Edit the settings of the tracker, and keep them with the session."""
 
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any, TypedDict
 
 import msgspec
@@ -9,14 +9,10 @@ import msgspec
 from tracker.errors import TrackerError
 from tracker.pipeline.methods import MethodName
 from tracker.tracking.chamfer.settings import Estimation, TrackSettings
-from tracker.tracking.contour.settings import ContourSettings
-from tracker.tracking.estimation.settings import EstimationSettings, RecoverSettings
-from tracker.tracking.tracker import TrackerSettings
+from tracker.tracking.estimation.settings import RecoverSettings
 
 SETTING = "track_settings"
 """Setting of the session."""
-_SHARED = ("predict", "recover", "theta_px", "outliers", "backward_pass", "smooth")
-"""Settings that a user chooses for every method."""
 
 
 class _Kept(TypedDict, total=False):
@@ -56,14 +52,6 @@ def changed(before: TrackSettings, changes: Mapping[str, Any]) -> TrackSettings:
         backward_pass=changes.get("backward_pass", before.backward_pass),
         smooth=changes.get("smooth", before.smooth),
     )
-
-
-def of_method(settings: TrackSettings, method: MethodName) -> TrackerSettings:
-    """Return the settings of a run by a method: the chosen ones, as far as it has them."""
-    if method == "chamfer":
-        return settings
-    shared = {f.name: getattr(settings, f.name) for f in fields(EstimationSettings) if f.name in _SHARED}
-    return ContourSettings(**shared)
 
 
 def stored(settings: TrackSettings, method: MethodName = "chamfer") -> dict[str, Any]:

@@ -14,7 +14,7 @@ from app.state.people import ShownPose
 from app.state.progress import TrackState
 from app.state.state import StateChanges, finite_or_none
 from tracker.errors import TrackerError
-from tracker.pipeline.methods import MethodName, make_tracker
+from tracker.pipeline.methods import MethodName, make_tracker, of_method
 from tracker.pipeline.track_session import SmoothedRows, Step, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson
 from tracker.store.records import PoseChange
@@ -108,7 +108,7 @@ class Tracking:
             way = "backward" if backward else "forward"
             free = [session_state.active_dofs(person) for person in range(len(models))]
             session = TrackSession(
-                make_tracker(track_settings.of_method(state.settings, state.method)),
+                make_tracker(of_method(state.settings, state.method)),
                 TrackingRun(
                     session_state.frames.observer,
                     Subjects.of(models, people, free, saver.keyframes(frames)),
