@@ -15,7 +15,7 @@ _AXIS = np.linspace(-0.75, 0.75, 10)
 """Places along the axis of a part that are looked up, in half sizes."""
 _LOST_SHARE, _DOUBTFUL_SHARE = 0.5, 0.85
 """A limb of whose axis less lies in voxels is lost, or doubtful."""
-_LOST_VOLUME, _DOUBTFUL_VOLUME = 1.0, 0.5
+_LOST_VOLUME, _DOUBTFUL_VOLUME = 0.75, 0.4
 """Volume that no part explains, in volumes of a forearm, above which a limb is lost, or doubtful: it is elsewhere."""
 _BESIDE_M, _FOOT_M = 0.07, 0.30
 """Distance from the surface of a part beyond which voxels are not its skin, and from a calf's end within which they are
