@@ -11,12 +11,13 @@ import numpy as np
 from app.drawing import overlay_colors, overlays
 from app.drawing.outlined_lines import draw_lines
 from app.drawing.pictures import placeholder
+from app.export.characters import Characters, draw_bodies
 from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
 from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions
+from tracker.export.options import ExportOptions, load_character
 from tracker.footage.recording import Recording
 from tracker.footage.video_writer import VideoWriter
 from tracker.geometry.arrays import Array, FloatArray, Image
@@ -38,7 +39,8 @@ def write_overlay_video(
 
     Args:
         motion: the poses; people who are not exported occlude, but are not drawn.
-        options: `view` names one camera; without it, all views are tiles of a grid.
+        options: `view` names one camera; without it, all views are tiles of a grid. `character` is a body that moves as
+            the people do, beside each view.
         path: the file.
         tick: called after each frame.
 
@@ -48,8 +50,10 @@ def write_overlay_video(
     session = motion.session
     shown = [i for i, c in enumerate(session.cameras) if options.view in (None, c.camera.name)]
     cameras = [session.cameras[i].camera for i in shown]
-    tile = _tile_size(cameras)
-    columns, rows = _grid(cameras)
+    cast = None if options.character is None else Characters(motion, load_character(options.character))
+    sizes = [(c.width * (1 if cast is None else 2), c.height) for c in cameras]
+    tile = _tile_size(sizes)
+    columns, rows = _grid(sizes)
     size = (columns * tile[0], rows * tile[1])
     even = (size[0] + size[0] % 2, size[1] + size[1] % 2)  # as H.264 requires
     with ExitStack() as stack:
@@ -62,6 +66,8 @@ def write_overlay_video(
                 image = recording.read_view(index, frame)
                 view = placeholder(camera.size, "frame damaged") if image is None else image.copy()
                 _draw(view, camera, [p for p in drawn if p.camera == index])
+                if cast is not None:
+                    view = np.hstack([view, draw_bodies(cast.bodies(frame), camera)])
                 _label(view, f"{camera.name}  {frame}" if len(shown) > 1 else str(frame))
                 at = (k % columns * tile[0], k // columns * tile[1])
                 _place(picture, view, at, tile)
@@ -110,26 +116,26 @@ def _label(image: Image, text: str) -> None:
         cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, scale, color, max(1, round(width * scale)), cv2.LINE_AA)
 
 
-def _grid(cameras: Sequence[Camera]) -> tuple[int, int]:
+def _grid(sizes: Sequence[tuple[int, int]]) -> tuple[int, int]:
     """Return the number of columns and rows in which the views are largest, with as few empty tiles as possible."""
-    grids = [(columns, -(-len(cameras) // columns)) for columns in range(1, len(cameras) + 1)]
+    grids = [(columns, -(-len(sizes) // columns)) for columns in range(1, len(sizes) + 1)]
     return min(
-        grids, key=lambda grid: (-round(_share(cameras, grid), 6), grid[0] * grid[1], abs(grid[0] - grid[1]), -grid[0])
+        grids, key=lambda grid: (-round(_share(sizes, grid), 6), grid[0] * grid[1], abs(grid[0] - grid[1]), -grid[0])
     )
 
 
-def _share(cameras: Sequence[Camera], grid: tuple[int, int]) -> float:
-    """Return the scale, at most 1, at which views fit into a grid of columns and rows."""
-    width, height = max(c.width for c in cameras), max(c.height for c in cameras)
-    return min(1.0, _GRID_PX[0] / (grid[0] * width), _GRID_PX[1] / (grid[1] * height))
+def _share(sizes: Sequence[tuple[int, int]], grid: tuple[int, int]) -> float:
+    """Return the scale, at most 1, at which views of some widths and heights fit into a grid of columns and rows."""
+    width, height = np.max(sizes, axis=0)
+    return float(min(1.0, _GRID_PX[0] / (grid[0] * width), _GRID_PX[1] / (grid[1] * height)))
 
 
-def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
+def _tile_size(sizes: Sequence[tuple[int, int]]) -> tuple[int, int]:
     """Return the width and height of each view in the video: its own, or what a grid has room for."""
-    width, height = max(c.width for c in cameras), max(c.height for c in cameras)
-    if len(cameras) == 1:
+    width, height = (int(n) for n in np.max(sizes, axis=0))
+    if len(sizes) == 1:
         return width, height
-    share = _share(cameras, _grid(cameras))
+    share = _share(sizes, _grid(sizes))
     return round(width * share) // 2 * 2, round(height * share) // 2 * 2
 
 

@@ -52,6 +52,8 @@ class ReplayState:
     """Cost of the best poses in each view, px; empty where unknown."""
     evaluations: int
     """Poses scored so far."""
+    fitted_from: tuple[Array, ...] | None = None
+    """Of a fit of contours the pose of each person at its start; None for a search."""
 
 
 @dataclass(frozen=True, eq=False)

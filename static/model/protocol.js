@@ -12,7 +12,8 @@
  * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
  * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |
- *   "new_sizes" | "result" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight"} PathKind
+ *   "new_sizes" | "result" | "residual" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight"}
+ *   PathKind
  * @typedef {"running" | "paused" | "over"} RunState
  * @typedef {"left" | "right" | ""} Side
  * @typedef {{type: "seek", frame: number}} Seek
@@ -44,7 +45,8 @@
  *   v: number, live: boolean}} DragPin
  * @typedef {{type: "unpin", frame: number, person: number, point: string | null, camera: number | null}} RemovePins
  * @typedef {{type: "fit", frame: number, person?: number | null}} FitPose
- * @typedef {{type: "search", action: "step" | "stage" | "frame" | "stop", person?: number | null}} RunSearch
+ * @typedef {{type: "search", action: "step" | "stage" | "frame" | "contours" | "stop", person?: number | null}}
+ *   RunSearch
  * @typedef {{type: "search", action: "again", run?: number | null, person?: number | null}} RepeatSearch
  * @typedef {{type: "search_speed", per_second: number | null}} SetSearchSpeed
  * @typedef {{person: number, name: string, bound_rad?: number | null, bound_m?: number | null, step_rad?: number |

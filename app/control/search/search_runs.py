@@ -77,6 +77,7 @@ class SearchRun:
         start_px: float,
         settings: TrackSettings,
         free: Sequence[NDArray[np.bool_]] | None = None,
+        planned: Sequence[Stage] | None = None,
     ) -> None:
         """Begin without steps.
 
@@ -88,9 +89,12 @@ class SearchRun:
             start_px: their cost, px; NaN if unknown.
             settings: of the search.
             free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
+            planned: stages of a fit of contours; None for those of a search.
         """
         self.number, self.frame, self.start, self.settings = number, frame, start, settings
-        self.stages: list[Stage] = stages(models, settings.search, active_dofs=free)
+        self.is_contour_fit = planned is not None
+        """Whether the steps are iterations of a fit of contours."""
+        self.stages = stages(models, settings.search, active_dofs=free) if planned is None else list(planned)
         self.counts = [StageCount(0, 0, 0.0, False) for _ in self.stages]
         self.steps: list[RecordedStep] = []
         self.best, self.best_px = start, start_px
@@ -182,10 +186,11 @@ class SearchRuns:
         start_px: float,
         settings: TrackSettings,
         free: Sequence[NDArray[np.bool_]] | None = None,
+        planned: Sequence[Stage] | None = None,
     ) -> SearchRun:
         """Add a run, in place of the oldest if there are too many. Arguments as for `SearchRun`."""
         self._number += 1
-        run = SearchRun(self._number, frame, models, start, start_px, settings, free)
+        run = SearchRun(self._number, frame, models, start, start_px, settings, free, planned)
         of_frame = self._runs.pop(frame, [])
         self._runs[frame] = [*of_frame, run][-_MAX_RUNS:]  # as the newest frame of the dict
         while len(self._runs) > _MAX_FRAMES:

@@ -1,7 +1,7 @@
 """Search the poses of the shown frame, step by step or to the end, and save the best ones."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.search.best_first import SearchStep, Stage, stages
 from tracker.tracking.chamfer.settings import TrackSettings, search_frame
+from tracker.tracking.contour.fit_steps import FitPlan, contour_steps
 from tracker.tracking.subjects import Subjects
 
 _SAVE_S = 0.5
@@ -74,6 +75,17 @@ class SearchRunner:
     def run(self, person: int | None = None) -> None:
         """Search to the end; continues a paused search of the same people, see `step`."""
         self._go(lambda _: False, person)
+
+    def fit_contours(self, person: int | None = None) -> None:
+        """Fit people to the image contours as KRH08 does, one iteration after the other; see `step`.
+
+        Every iteration is recorded, so that the replay shows it.
+        """
+        self.halt()
+        with self._activities.starting(self):
+            if not self.running:
+                self.forget()
+                self._go(lambda _: False, person, contours=True)
 
     def run_again(self, number: int | None = None, person: int | None = None) -> None:
         """Search again from the start of a recorded run of this frame, with the present settings.
@@ -134,15 +146,21 @@ class SearchRunner:
                 self._end()
 
     def _go(
-        self, until: Callable[[SearchStep], bool], person: int | None, start: tuple[Array, ...] | None = None
+        self,
+        until: Callable[[SearchStep], bool],
+        person: int | None,
+        start: tuple[Array, ...] | None = None,
+        contours: bool = False,
     ) -> None:
         with self._activities.starting(self):
             if not self.running:
-                job = self._paused_job(person, start)
+                job = self._paused_job(person, start, contours)
                 self._session_state.set(search=replace(self._session_state.state.search, running=True))
                 job.run(until)
 
-    def _paused_job(self, person: int | None, start: tuple[Array, ...] | None = None) -> Job[SearchStep]:
+    def _paused_job(
+        self, person: int | None, start: tuple[Array, ...] | None = None, contours: bool = False
+    ) -> Job[SearchStep]:
         """Return the paused search of the same people, or a new one from given poses, by default the shown ones."""
         session_state, state = self._session_state, self._session_state.state
         if self._job is None or self._job.ended or self._person != person:
@@ -157,11 +175,21 @@ class SearchRunner:
             people = tuple(
                 p if p.values is v else ShownPose(v, p.source) for p, v in zip(state.people, poses, strict=True)
             )
-            known_px = np.nan if costs["cost_px"] is None else costs["cost_px"]
-            run = self._runs.begin(frame, models, poses, known_px, settings, free)
+            plan = FitPlan(models, free) if contours else None
+            known_px = np.nan if contours or costs["cost_px"] is None else costs["cost_px"]
+            run = self._runs.begin(
+                frame, models, poses, known_px, settings, free, None if plan is None else plan.stages
+            )
             subjects = Subjects.of(models, active_dofs=free)
+
+            def steps() -> Iterator[SearchStep]:
+                views = session_state.frames.evidence(frame)
+                if plan is not None:
+                    return contour_steps(views, poses, plan)
+                return search_frame(views, subjects, poses, settings)
+
             job: Job[SearchStep] = Job(
-                lambda: search_frame(session_state.frames.evidence(frame), subjects, poses, settings),
+                steps,
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),

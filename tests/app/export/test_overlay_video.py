@@ -3,7 +3,6 @@
 import av
 import numpy as np
 import pytest
-from staging import cameras_around
 from stored_motions import distorted_cameras, random_poses
 
 from app.export import overlay_video
@@ -75,9 +74,9 @@ def test_a_grid_shows_all_views(session, tmp_path):
     ],
 )
 def test_the_views_of_a_grid_are_as_large_as_can_be(n, size, grid, tile):
-    cameras = cameras_around(n, size=size)
-    assert overlay_video._grid(cameras) == grid
-    assert overlay_video._tile_size(cameras) == tile
+    sizes = [size] * n
+    assert overlay_video._grid(sizes) == grid
+    assert overlay_video._tile_size(sizes) == tile
 
 
 def test_contours_are_drawn_where_the_lens_shows_them():
@@ -102,3 +101,17 @@ def test_nothing_is_left_of_a_video_that_was_stopped(session, tmp_path):
     (tmp_path / "out.mp4").mkdir()
     with pytest.raises(TrackerError, match="found a folder"):
         export(FORMATS["mp4"], motion, ExportOptions(), tmp_path / "out.mp4", overwrite=True)
+
+
+def test_a_character_moves_beside_the_footage(session, tmp_path):
+    """Each view has twice its width: the footage with the person, and the character as the same camera sees it."""
+    motion = posed_motion(load_session(session), range(2, 4), gaps=(3,))
+    options = ExportOptions(view="FRONT", character="gavrila22_cones:1.2")
+    overlay_video.write_overlay_video(motion, options, tmp_path / "a.mp4")
+    _, images = frames_of(tmp_path / "a.mp4")
+    camera = next(c.camera for c in motion.session.cameras if c.camera.name == "FRONT")
+    assert images[0].shape == (camera.height, 2 * camera.width, 3)
+    character = np.abs(images[0][:, camera.width :] - images[1][:, camera.width :]).max(axis=-1) > 60
+    assert np.count_nonzero(character) > 2000  # frame 3 has no pose
+    body = motion.people[0].poses[2].body
+    assert np.ptp(np.nonzero(character)[0]) < 0.9 * np.ptp(camera.project(body.points_world)[:, 1])

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
@@ -28,6 +29,8 @@ class FitIteration(NamedTuple):
     """(n_values,)."""
     rms_px: float
     """RMS distance of the contours to the image contours, px; NaN where nothing is visible."""
+    cost: float
+    """Half the sum of squared distances over the length of the contours, px^3."""
 
 
 def unlimited_views(views: Sequence[ViewEvidence], settings: ContourSettings) -> list[ViewEvidence]:
@@ -50,7 +53,13 @@ def paper_residuals(
     return ContourResiduals(unlimited, bodies, person, paper_match(motion), _NO_LIMIT_PX, everywhere=True)
 
 
-def fit_by_iterations(model: BodyModel, start: Array, residuals: ContourResiduals, most: int) -> Iterator[FitIteration]:
+def fit_by_iterations(
+    model: BodyModel,
+    start: Array,
+    residuals: ContourResiduals,
+    most: int,
+    active_dofs: NDArray[np.bool_] | None = None,
+) -> Iterator[FitIteration]:
     """Minimize from a start pose, one Gauss-Newton iteration after the other.
 
     Args:
@@ -58,24 +67,25 @@ def fit_by_iterations(model: BodyModel, start: Array, residuals: ContourResidual
         start: (n_values,).
         residuals: see `paper_residuals`.
         most: largest number of iterations.
+        active_dofs: degrees of freedom that may change, (n_dofs,); all by default.
 
     Yields:
         The start, then the pose after each iteration that lowers the cost.
     """
     last = None
-    for fit in iterate(model, start, [residuals], None, most, TOLERANCE):
+    for fit in iterate(model, start, [residuals], active_dofs, most, TOLERANCE):
         if last is None or fit.cost < last:
             name = "start" if last is None else f"iteration {fit.iterations}"
-            yield FitIteration(name, fit.pose, _rms_px(residuals, fit.pose, fit.cost))
+            yield FitIteration(name, fit.pose, _rms_px(residuals, fit.pose, fit.cost), fit.cost)
         last = fit.cost
 
 
 def fit_incrementally(model: BodyModel, start: Array, residuals: ContourResiduals) -> Iterator[FitIteration]:
     """Fit a rough guess chain by chain (KRH08 Sect. 6, Fig. 9). Yields the start, then each step."""
     cost = residuals.linearize(model, start, model.kinematics(start)).cost
-    yield FitIteration("start", start, _rms_px(residuals, start, cost))
+    yield FitIteration("start", start, _rms_px(residuals, start, cost), cost)
     for step in fit_by_chains(model, start, [residuals]):
-        yield FitIteration(step.name, step.fit.pose, _rms_px(residuals, step.fit.pose, step.fit.cost))
+        yield FitIteration(step.name, step.fit.pose, _rms_px(residuals, step.fit.pose, step.fit.cost), step.fit.cost)
 
 
 def _rms_px(residuals: ContourResiduals, pose: Array, cost: float) -> float:
