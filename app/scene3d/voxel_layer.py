@@ -1,4 +1,4 @@
-"""Draw the voxels of the shown frame in the 3-D view, in the colours of the parts that they belong to (MTHC01 Fig. 7)."""
+"""Draw the voxels of the shown frame in the 3-D view, in the colours of their parts (MTHC01 Fig. 7)."""
 
 from collections.abc import Sequence
 

@@ -4,7 +4,7 @@ import numpy as np
 from staging import camera_at
 
 from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.initialization.candidates import Scene
+from tracker.initialization.candidates import PersonScene
 from tracker.voxels.figure_masks import figure_masks, paint
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
@@ -77,4 +77,4 @@ def cameras_about_a_figure(n=4):
 
 def scene_of(voxels, silhouettes, motion=None):
     """What is known of a figure that is alone."""
-    return Scene(voxels, silhouettes, figure_masks(silhouettes, voxels), UP, motion)
+    return PersonScene(voxels, silhouettes, figure_masks(silhouettes, voxels), UP, motion)

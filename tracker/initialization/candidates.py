@@ -22,16 +22,15 @@ StartMethod: TypeAlias = Literal["voxels", "axis", "search"]
 
 _UPRIGHT = 0.9
 """Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
-_MIN_FOLDED = 0.87
-"""Smallest height of the neck of a person who stands, as a share of what it is with straight legs."""
-_NECK = 0.835
-"""Height of the neck of a person who stands, as a fraction of the body's height."""
+_NECK, _NECK_SPREAD = 0.88, 0.04
+"""Height of the base of the head of a person who stands, as a fraction of the body's height, and its largest relative
+difference from that: folded legs make it lower."""
 _AXES_TRIED = 3
 _RAISED = (0.0, 0.10, 0.20)
 """Tops of the head that a search tries, below the end of the figure, as fractions of the height: hands may be above."""
 
 
-class Scene(NamedTuple):
+class PersonScene(NamedTuple):
     """What is known of one person on a frame before any pose is."""
 
     figure: Voxels
@@ -46,7 +45,7 @@ class Scene(NamedTuple):
     """The way of the person to later frames, (3,), metres; None if it is not known."""
 
 
-class Candidate(NamedTuple):
+class StartCandidate(NamedTuple):
     """A start pose before the fit to contours."""
 
     method: StartMethod
@@ -68,7 +67,7 @@ class Candidate(NamedTuple):
     """Whether the height of the body was measured, or was known."""
 
 
-def from_voxels(scene: Scene, model: BodyModel, is_known: bool) -> list[Candidate]:
+def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
     """Return starts from the parts that voxels show (MTHC01 Sect. 3), one for each way of facing.
 
     Args:
@@ -80,10 +79,12 @@ def from_voxels(scene: Scene, model: BodyModel, is_known: bool) -> list[Candidat
         TrackerError: no head is found.
     """
     parts = locate_parts(scene.figure, scene.motion)
-    height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], parts.head.neck)
+    head = scene.figure.points_world[parts.head.is_head]
+    top = head[int(np.argmax(head @ scene.up))] + scene.figure.grid.size_m / 2 * scene.up
+    height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], top, parts.head.neck)
     own = model if height_m is None else model.with_height(height_m)
     return [
-        Candidate(
+        StartCandidate(
             "voxels", own, start_pose(own, p), p.torso.axes[:, 0], sign * p.facing, p.unresolved, p.straight,
             None, is_known or height_m is not None,
         )
@@ -91,7 +92,7 @@ def from_voxels(scene: Scene, model: BodyModel, is_known: bool) -> list[Candidat
     ]  # fmt: skip
 
 
-def from_axis(scene: Scene, model: BodyModel, is_known: bool) -> list[Candidate]:
+def from_axis(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
     """Return starts on the axis of the silhouettes (GD96 Sect. 4.1), one for each way of facing.
 
     Views in which others cover the person are left out if two remain. See `from_voxels`.
@@ -101,12 +102,12 @@ def from_axis(scene: Scene, model: BodyModel, is_known: bool) -> list[Candidate]
     """
     axes = find_body_axes(silhouette_axes(scene), scene.up, model.height_m)[:_AXES_TRIED]
     best = axes[0]
-    height_m = None if is_known else standing_height(scene, best.up, best.top - 0.165 * model.height_m * best.up)
+    height_m = None if is_known else standing_height(scene, best.up, best.top)
     own = model if height_m is None else model.with_height(height_m)
     return _on_axes("axis", scene, own, axes, is_known or height_m is not None)
 
 
-def from_search(scene: Scene, model: BodyModel, is_known: bool) -> list[Candidate]:
+def from_search(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
     """Return starts from a search along the figure's longest axis, with the head near either end.
 
     It needs no head that stands out. See `from_voxels`.
@@ -120,7 +121,7 @@ def from_search(scene: Scene, model: BodyModel, is_known: bool) -> list[Candidat
     return _on_axes("search", scene, model, axes, is_known)
 
 
-METHODS: Mapping[StartMethod, Callable[[Scene, BodyModel, bool], list[Candidate]]] = {
+METHODS: Mapping[StartMethod, Callable[[PersonScene, BodyModel, bool], list[StartCandidate]]] = {
     "voxels": from_voxels,
     "axis": from_axis,
     "search": from_search,
@@ -128,7 +129,7 @@ METHODS: Mapping[StartMethod, Callable[[Scene, BodyModel, bool], list[Candidate]
 """Each method by name, in the order in which they are tried."""
 
 
-def silhouette_axes(scene: Scene) -> list[MajorAxis]:
+def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
     """Return the major axes of a person's silhouettes in the views that show the person alone.
 
     Raises:
@@ -146,37 +147,42 @@ def silhouette_axes(scene: Scene) -> list[MajorAxis]:
     return axes
 
 
-def standing_height(scene: Scene, trunk_up: Array, neck: Array) -> float | None:
+def standing_height(scene: PersonScene, trunk_up: Array, top: Array, neck: Array | None = None) -> float | None:
     """Return the height of a person who stands upright, metres; None if the person does not.
 
     Args:
         scene: the person on a frame.
         trunk_up: direction of the trunk towards the head, (3,).
-        neck: base of the head, (3,), metres.
+        top: top of the head, (3,), metres; raised hands are above it.
+        neck: base of the head, (3,), metres, where it was found.
     """
     if trunk_up @ scene.up < _UPRIGHT:
         return None
-    along = scene.figure.points_world @ scene.up
-    low, high = along.min(), along.max()
-    height_m = float(high - low) + scene.figure.grid.size_m
-    neck_m = float(neck @ scene.up - low)
-    # Raised arms make the figure higher, folded legs make it lower than the person.
-    is_standing = abs(neck_m / (_NECK * height_m) - 1) < 1 - _MIN_FOLDED
-    return height_m if is_standing else None
+    low = float((scene.figure.points_world @ scene.up).min()) - scene.figure.grid.size_m / 2
+    height_m = float(top @ scene.up) - low
+    if neck is None:
+        return height_m
+    share = (float(neck @ scene.up) - low) / height_m
+    return height_m if abs(share / _NECK - 1) < _NECK_SPREAD else None
+
+
+def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:
+    """Return the direction from the feet upwards, (3,): the soles of who stands are on the ground, bent or not."""
+    return scene.up if axis.up @ scene.up > _UPRIGHT else axis.up
 
 
 def _on_axes(
-    method: StartMethod, scene: Scene, model: BodyModel, axes: Sequence[BodyAxis], is_measured: bool
-) -> list[Candidate]:
+    method: StartMethod, scene: PersonScene, model: BodyModel, axes: Sequence[BodyAxis], is_measured: bool
+) -> list[StartCandidate]:
     pairs = list(zip(scene.masks, scene.silhouettes, strict=True))
     apart = sum(m.is_apart and bool(m.mask.any()) for m, _ in pairs) >= 2
     masks = [m.mask if m.is_apart or not apart else np.zeros_like(m.mask) for m, _ in pairs]
     views = outline_evidence(masks, [s.camera for _, s in pairs])
     starts: list[AxisStart] = search_on_axes(model, views, axes)
     return [
-        Candidate(
+        StartCandidate(
             method, model, start.pose, start.forward,
-            facing_cues(scene.figure, start.forward, start.axis.up, scene.motion),
+            facing_cues(scene.figure, start.forward, _feet_up(scene, start.axis), scene.motion),
             axis=start.axis, is_measured=is_measured,
         )
         for start in starts

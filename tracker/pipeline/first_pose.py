@@ -17,7 +17,7 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
-from tracker.initialization.candidates import METHODS, Candidate, Scene, StartMethod, silhouette_axes
+from tracker.initialization.candidates import METHODS, PersonScene, StartCandidate, StartMethod, silhouette_axes
 from tracker.initialization.start_fit import FittedStart, fit_start
 from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
@@ -55,7 +55,7 @@ class FirstPose(NamedTuple):
     """A first pose and how it was found."""
 
     frame: int
-    candidate: Candidate
+    candidate: StartCandidate
     """The start before the fit to contours, and the body; of another height than before where it was measured."""
     fitted: FittedStart
     is_facing_sure: bool
@@ -196,11 +196,11 @@ def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Ma
     figure = _own_figure(session, person, hull, others)
     masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
     up = up_rotation(session.up, session.floor)[:, 2]
-    scene = Scene(figure, silhouettes, masks, up, _motion(task, figure, frame))
+    scene = PersonScene(figure, silhouettes, masks, up, _motion(task, figure, frame))
     candidates = _candidates(scene, session.people[person].model, methods)
     poses, bodies = [b.values for b in others], [b.model for b in others]
 
-    def fitted(candidate: Candidate, later: Sequence[Sequence[int]]) -> FittedStart:
+    def fitted(candidate: StartCandidate, later: Sequence[Sequence[int]]) -> FittedStart:
         return fit_start(observer, [candidate.model, *bodies], candidate.pose, frame, later, poses)
 
     tried = [(c, fitted(c, ())) for c in candidates]
@@ -214,9 +214,9 @@ def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Ma
     return FirstPose(frame, best, fit, is_sure, _notes(best, is_sure, hull, silhouettes), _lines_px(session, scene))
 
 
-def _candidates(scene: Scene, model: BodyModel, methods: Sequence[StartMethod]) -> list[Candidate]:
+def _candidates(scene: PersonScene, model: BodyModel, methods: Sequence[StartMethod]) -> list[StartCandidate]:
     """Return the starts of all methods; those that fail are left out unless all do."""
-    found, errors = list[Candidate](), list[TrackerError]()
+    found, errors = list[StartCandidate](), list[TrackerError]()
     is_known = not has_preset_sizes(model)
     for method in methods:
         try:
@@ -228,12 +228,12 @@ def _candidates(scene: Scene, model: BodyModel, methods: Sequence[StartMethod]) 
     return found
 
 
-def _weighed(start: tuple[Candidate, FittedStart]) -> float:
+def _weighed(start: tuple[StartCandidate, FittedStart]) -> float:
     """Return the cost of a start, px, less what the cues say for its direction."""
     return start[1].cost_px - _CUES_PX * start[0].cues
 
 
-def _lines_px(session: Session, scene: Scene) -> dict[str, Array]:
+def _lines_px(session: Session, scene: PersonScene) -> dict[str, Array]:
     """Return the axes of the silhouettes by view, undistorted px of the footage; empty if fewer than two have one."""
     try:
         axes = silhouette_axes(scene)
@@ -243,7 +243,7 @@ def _lines_px(session: Session, scene: Scene) -> dict[str, Array]:
     return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in axes}
 
 
-def _kept(tried: Sequence[tuple[Candidate, FittedStart]]) -> list[tuple[Candidate, FittedStart]]:
+def _kept(tried: Sequence[tuple[StartCandidate, FittedStart]]) -> list[tuple[StartCandidate, FittedStart]]:
     """Return the starts to track: the cheapest ones, and the cheapest that faces the other way than the first."""
     order = sorted(tried, key=_weighed)
     kept, rest = order[:_N_TRACKED], order[_N_TRACKED:]
@@ -324,7 +324,9 @@ def _motion(task: _Task, figure: Voxels, frame: int) -> Array | None:
     return min(ways, key=lambda way: float(np.linalg.norm(way))) * (1.0 if ahead else -1.0)
 
 
-def _notes(best: Candidate, is_sure: bool, hull: VisualHull, silhouettes: Sequence[ViewSilhouette]) -> tuple[str, ...]:
+def _notes(
+    best: StartCandidate, is_sure: bool, hull: VisualHull, silhouettes: Sequence[ViewSilhouette]
+) -> tuple[str, ...]:
     notes = []
     if not is_sure:
         notes.append("left and right are not sure: feet, bends, motion and joint limits do not tell them apart")

@@ -45,7 +45,7 @@ def _odds(probability: float) -> float:
     return float(np.log(probability / (1.0 - probability)))
 
 
-OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.3)
+OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.15)
 """A limb is doubtful above these log odds that a joint is off by more than 100 mm, and lost above these that one is by
 more than 150 mm. To call a wrong pose good is the worse error."""
 _DOUBTFUL_ODDS = OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT

@@ -12,7 +12,7 @@ from solids import ellipsoid, silhouettes_of
 
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
-from tracker.initialization.candidates import Candidate
+from tracker.initialization.candidates import StartCandidate
 from tracker.initialization.start_fit import FittedStart
 from tracker.pipeline import first_pose
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
@@ -117,7 +117,7 @@ def test_both_ways_of_facing_are_compared(session, silhouettes, fits):
 def found_people(session, scale):
     model = session.people[0].model
     body = model.with_height(scale * model.height_m)
-    candidate = Candidate("axis", body, body.neutral(), np.array([1.0, 0.0, 0.0]), 2.0)
+    candidate = StartCandidate("axis", body, body.neutral(), np.array([1.0, 0.0, 0.0]), 2.0)
     lines = {"FRONT": np.array([[[1.0, 2.0], [3.0, 4.0]]])}
     first = FirstPose(7, candidate, FittedStart(body.neutral(), "good", 1.0), True, ("a note",), lines)
     return FoundPeople(FirstPoses(7, {0: first}), {0: body}, {0: body.neutral()}, {})

@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.fitting.gauss_newton import PointTargets, PosePrior, covariance, solve
+from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, covariance, solve
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.chain_jacobian import center_jacobian, point_jacobian
 from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
 from tracker.tracking.voxel.settings import VoxelSettings
-from tracker.tracking.voxel.state import FilterState, Layout
+from tracker.tracking.voxel.state import FilterState, Layout, center_jacobian, point_jacobian
 
 _PLACE_M = 0.015
 """Standard deviation between the joints of a figure and those of a body whose trunk bends, metres."""
@@ -96,7 +95,7 @@ def pose_of(
         targets.append(state.centers[part] + state.rotations[part] @ (shares * state.sizes[part]))
         weights.append(1 / np.sqrt(variance + _PLACE_M**2))
     rest = np.where(model.dof_is_length, 1 / _NEAR_M, 1 / _NEAR_RAD)
-    blocks = [
+    blocks: list[ResidualBlock] = [
         PointTargets(np.array(indices), np.array(targets), np.array(weights)),
         PosePrior(model.neutral(), 1 / model.spreads),
         PosePrior(near, rest),

@@ -12,24 +12,18 @@ from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.voxel.assessment import assess
 from tracker.tracking.voxel.body_pose import pose_of, state_of
-from tracker.tracking.voxel.figure import LIMBS, N_PARTS, figure_of, part_rotations
+from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations
 from tracker.tracking.voxel.frame_voxels import FrameVoxels, carve_around
 from tracker.tracking.voxel.kalman import LinearizedMeasurement, Update, joined, update
 from tracker.tracking.voxel.labels import Labels, label_voxels
-from tracker.tracking.voxel.levels import Levels, carried, find_levels, measure_together
-from tracker.tracking.voxel.limb_search import (
-    MIN_FREE,
-    MIN_GAIN,
-    SUSPICIOUS,
-    LimbProblem,
-    explained_by_others,
-    with_limb,
-)
+from tracker.tracking.voxel.levels import DetailLevels, carried, find_levels, measure_together
 from tracker.tracking.voxel.measurement import linearize, linearize_rotations, measure_parts
 from tracker.tracking.voxel.motion_model import predict
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState
 
+_PATIENCE = 8
+"""Number of frames in a row on which parts are merged before they are measured on a coarser level."""
 _CARRIED_RAD = 0.2
 """Standard deviation with which an unresolved part keeps its place on another, rad."""
 
@@ -57,7 +51,7 @@ class VoxelEstimator:
             state_of(m, list(s), self._dt, settings) for m, s in zip(run.subjects.models, starts, strict=True)
         ]
         self._has_motion = [len(s) > 1 for s in starts]
-        self._levels = [Levels.finest()] * len(starts)
+        self._levels = [DetailLevels.finest()] * len(starts)
         self.labels: Labels | None = None
         self.voxels: FrameVoxels | None = None
 
@@ -77,22 +71,36 @@ class VoxelEstimator:
         updates: dict[int, Update] = {}
         for p in subjects.tracked:
             if p not in keyframes:
-                if settings.levels:
-                    labels = label_voxels(points, states, settings.voxel_m, settings.label_rule).labels
-                    self._levels[p] = find_levels(self._levels[p], states[p], found.voxels, labels, N_PARTS * p)
-                updates[p] = self._update(p, states, points, first)
-                states[p] = updates[p].state
-                if settings.sizes == "first" and states[p].layout.sizes:
-                    states[p] = states[p].with_frozen_sizes()
-                if not self._levels[p].is_resolved.all():
-                    states[p] = self._carried(p, states[p])
-                if settings.limit_rad is not None:
-                    states[p] = self._within_limits(p, states[p])
-                if settings.search:
-                    states[p] = self._recovered(p, states, found)
+                updates[p] = self._adjusted(p, states, found) if first else self._update(p, states, points, first)
+                states[p] = self._constrained(p, updates[p].state)
         self.states, self.voxels = states, found
         self.labels = label_voxels(points, states, settings.voxel_m, settings.label_rule)
+        if settings.levels:
+            for p in updates:
+                self._find_levels(p, states, found, _PATIENCE)
         return self._estimate(frame, found, points, updates)
+
+    def _adjusted(self, p: int, states: list[FilterState], found: FrameVoxels) -> Update:
+        """Return the adjustment of a person in the first frame, with the levels that its result shows."""
+        points = found.voxels.points_world
+        result = self._update(p, states, points, True)
+        if not self._settings.levels:
+            return result
+        self._find_levels(p, [*states[:p], result.state, *states[p + 1 :]], found, 1)
+        return result if self._levels[p].is_resolved.all() else self._update(p, states, points, True)
+
+    def _constrained(self, p: int, state: FilterState) -> FilterState:
+        """Return an updated state within the limits of the body, with unresolved parts carried along."""
+        if self._settings.sizes == "first" and state.layout.sizes:
+            state = state.with_frozen_sizes()
+        if not self._levels[p].is_resolved.all():
+            state = self._carried(p, state)
+        return state if self._settings.limit_rad is None else self._within_limits(p, state)
+
+    def _find_levels(self, p: int, states: Sequence[FilterState], found: FrameVoxels, patience: int) -> None:
+        settings, voxels = self._settings, found.voxels
+        labels = label_voxels(voxels.points_world, states, settings.voxel_m, settings.label_rule).labels
+        self._levels[p] = find_levels(self._levels[p], states[p], voxels, labels, N_PARTS * p, patience)
 
     def _predicted(self, p: int, frame: int, keyframe: Array | None) -> FilterState:
         model, state = self._run.subjects.models[p], self.states[p]
@@ -133,24 +141,6 @@ class VoxelEstimator:
         body = PosedBody(model, pose_of(model, state, self._poses[p], self._run.subjects.active_dofs[p]).values)
         allowed = part_rotations(body, figure_of(model))
         return update(state, lambda s: linearize_rotations(s, allowed, sigma)).state
-
-    def _recovered(self, p: int, states: list[FilterState], found: FrameVoxels) -> FilterState:
-        """Return the state of a person with the limbs that were lost where voxels show them."""
-        points, own = found.voxels.points_world, list(states)
-        if not len(points):
-            return own[p]
-        for limb, parts in LIMBS.items():
-            others = explained_by_others(points, own, p, parts, self._settings.voxel_m)
-            problem = LimbProblem(own[p], limb, found.voxels, ~others)
-            before = problem.fit()
-            if before.cost < SUSPICIOUS or before.n_free < MIN_FREE:
-                continue
-            directions, after = problem.search()
-            if after.cost > before.cost - MIN_GAIN:
-                continue
-            own[p] = with_limb(own[p], limb, directions, 0.3, 2.0)
-            own[p] = self._update(p, own, points, False).state
-        return own[p]
 
     def _estimate(self, frame: int, found: FrameVoxels, points: Array, updates: dict[int, Update]) -> PoseEstimate:
         subjects = self._run.subjects

@@ -6,8 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.small_products import product
 from tracker.tracking.voxel.state import FilterState
+
+_MAX_MULTIPLICATIONS = 2**17
+"""Multiplications of a product that BLAS does on the calling thread. Where all cores are busy, its other threads make a
+product of two 96x96 matrices a hundred times slower."""
 
 
 class LinearizedMeasurement(NamedTuple):
@@ -77,3 +80,12 @@ def joseph(P: Array, gain: Array, measurement: LinearizedMeasurement) -> Array:
     rest = np.eye(len(P)) - product(gain, measurement.jacobian)
     out = product(product(rest, P), rest.T) + product(product(gain, measurement.noise), gain.T)
     return (out + out.T) / 2
+
+
+def product(a: Array, b: Array) -> Array:
+    """Return the product of matrices, (l, m) and (m, n), in blocks of rows."""
+    n_rows = max(1, _MAX_MULTIPLICATIONS // max(1, a.shape[1] * b.shape[1]))
+    out = np.empty((a.shape[0], b.shape[1]))
+    for first in range(0, a.shape[0], n_rows):
+        np.matmul(a[first : first + n_rows], b, out=out[first : first + n_rows])
+    return out

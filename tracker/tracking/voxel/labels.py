@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.chain_jacobian import center_jacobian
 from tracker.tracking.voxel.figure import N_PARTS
 from tracker.tracking.voxel.label_kernels import N_MOMENTS, label_and_sum
-from tracker.tracking.voxel.state import FilterState
+from tracker.tracking.voxel.state import FilterState, center_jacobian
 
 NO_PART = -1
 """Label of a voxel that belongs to no part."""
@@ -91,11 +90,11 @@ def _parts(states: Sequence[FilterState], size_m: float, widened: bool) -> tuple
     rotations = np.concatenate([s.rotations for s in states])
     covariances = shapes[:, :, None] * np.eye(3)
     if not widened:
-        return centers, rotations, (np.linalg.inv(covariances), np.zeros(len(centers)))
+        return centers, rotations, (np.asarray(np.linalg.inv(covariances), np.float64), np.zeros(len(centers)))
     of_centers = np.concatenate([_center_covariances(s) for s in states])
     covariances += np.einsum("mji,mjk,mkl->mil", rotations, of_centers, rotations)
     added = np.log(np.linalg.det(covariances)) - np.log(shapes).sum(axis=1)
-    return centers, rotations, (np.linalg.inv(covariances), added)
+    return centers, rotations, (np.asarray(np.linalg.inv(covariances), np.float64), np.asarray(added, np.float64))
 
 
 def _center_covariances(state: FilterState) -> Array:

@@ -12,39 +12,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.chain_jacobian import center_jacobian
-from tracker.tracking.voxel.figure import LIMBS, N_PARTS, PARENTS, TORSO
+from tracker.tracking.voxel.figure import LIMBS, N_PARTS, PARENTS
 from tracker.tracking.voxel.kalman import LinearizedMeasurement
 from tracker.tracking.voxel.labels import PartClouds
-from tracker.tracking.voxel.state import FilterState
+from tracker.tracking.voxel.state import FilterState, center_jacobian
 from tracker.voxels.voxel_grid import Voxels
 
-_MERGED, _APART = 0.5, 0.35
-"""Share of a part's voxels that touch a part beside it, above which the two are one, and below which they are two."""
+_MERGED, _APART = 0.4, 0.25
+"""Share of the side of a thigh or calf that touches that of the other leg, above which the two are one, and below
+which they are two."""
+_SWALLOWED, _WHOLE = 0.2, 0.35
+"""Share of a part's volume in its voxels, below which others have taken them, and above which it stands out."""
 _JOINT_M = 0.02
 """Standard deviation of the centre of parts that are measured together, metres."""
-_HIP_PAIRS = ((4, 5), (8, 9))
+_LEG_PAIRS = ((4, 5), (8, 9))
 """Parts of the left and the right leg that are measured together."""
-_ALONG = 1.2
-"""A joint's own parts touch there: contact with the parent counts beyond this many half widths from the joint."""
 
 
-class Levels(NamedTuple):
+class DetailLevels(NamedTuple):
     """Which parts the voxels resolve."""
 
     is_resolved: NDArray[np.bool_]
     """Whether a part is measured alone, (10,)."""
+    n_merged: NDArray[np.int64]
+    """Number of frames in a row on which a part was merged with another, (10,)."""
 
     @classmethod
-    def finest(cls) -> "Levels":
+    def finest(cls) -> "DetailLevels":
         """Return the levels where every part stands apart."""
-        return cls(np.ones(N_PARTS, dtype=bool))
+        return cls(np.ones(N_PARTS, dtype=bool), np.zeros(N_PARTS, dtype=np.int64))
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences on the limbs that are not resolved."""
         found = []
-        legs_closed = any(not self.is_resolved[[a, b]].any() for a, b in _HIP_PAIRS)
+        legs_closed = any(not self.is_resolved[[a, b]].any() for a, b in _LEG_PAIRS)
         if legs_closed:
             found.append("legs closed: measured as one")
         for name, parts in LIMBS.items():
@@ -55,13 +57,15 @@ class Levels(NamedTuple):
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
         """Parts of both legs that are measured together."""
-        return tuple((a, b) for a, b in _HIP_PAIRS if not self.is_resolved[[a, b]].any())
+        return tuple((a, b) for a, b in _LEG_PAIRS if not self.is_resolved[[a, b]].any())
 
 
 def find_levels(
-    before: Levels, state: FilterState, voxels: Voxels, labels: NDArray[np.int16], first_label: int
-) -> Levels:
+    before: DetailLevels, state: FilterState, voxels: Voxels, labels: NDArray[np.int16], first_label: int, patience: int
+) -> DetailLevels:
     """Return which parts stand apart from the parts beside them; a part changes its level clearly or not at all.
+
+    A coarser level waits: legs that pass each other touch for a few frames only, and the prediction tells them apart.
 
     Args:
         before: of the frame before.
@@ -69,41 +73,34 @@ def find_levels(
         voxels: of the frame.
         labels: of the occupied voxels, (N,).
         first_label: label of its torso.
+        patience: number of frames in a row on which a part must be merged before its level is coarser.
     """
     grid = np.full(voxels.grid.shape, -1, dtype=np.int16)
     at = tuple(voxels.indices.T)
     own = labels - first_label
     grid[at] = np.where((own >= 0) & (own < N_PARTS), own, -1)
-    counts = np.bincount(grid[at][grid[at] >= 0], minlength=N_PARTS)
+    size_m, sizes = voxels.grid.size_m, state.sizes
+    volumes = np.bincount(grid[at][grid[at] >= 0], minlength=N_PARTS) * size_m**3 / (2 * np.pi * sizes.prod(axis=1))
     shares = np.zeros(N_PARTS)
-    for part in range(2, N_PARTS):
-        if counts[part]:
-            shares[part] = _touching(grid, state, voxels, part) / counts[part]
-    resolved = np.where(before.is_resolved, shares <= _MERGED, shares <= _APART)
+    for leg, other in (pair for a, b in _LEG_PAIRS for pair in ((a, b), (b, a))):
+        shares[leg] = _touching(grid, leg, other) * size_m**2 / (4 * sizes[leg, 1] * sizes[leg, 2])
+    finer, coarser = (shares < _APART) & (volumes > _WHOLE), (shares > _MERGED) | (volumes < _SWALLOWED)
+    n_merged = np.where(coarser, before.n_merged + 1, 0)
+    resolved = np.where(before.is_resolved, n_merged < patience, finer)
+    for upper, lower in LIMBS.values():  # an upper arm beside the trunk still begins a forearm that stands out
+        resolved[upper] |= resolved[lower]
     resolved[:2] = True
-    return Levels(resolved)
+    return DetailLevels(resolved, n_merged)
 
 
-def _touching(grid: NDArray[np.int16], state: FilterState, voxels: Voxels, part: int) -> int:
-    """Return the number of voxels of a part that touch a part which it does not end at."""
-    own = np.argwhere(grid == part)
-    beside = {PARENTS[part], part, -1} | {i for i in range(N_PARTS) if PARENTS[i] == part}
-    foreign = np.array([i not in beside for i in range(-1, N_PARTS)])
-    trunk = np.zeros(N_PARTS + 1, dtype=bool)
-    trunk[TORSO + 1] = PARENTS[part] == TORSO
-    touches, touches_trunk = np.zeros(len(own), dtype=bool), np.zeros(len(own), dtype=bool)
+def _touching(grid: NDArray[np.int16], part: int, other: int) -> int:
+    """Return the number of voxels of a part with a face on another part."""
+    padded = np.pad(grid, 1, constant_values=-1)
+    own, beside = padded == part, padded == other
+    touches = np.zeros(own.shape, dtype=bool)
     for axis in range(3):
-        for step in (-1, 1):
-            there = own.copy()
-            there[:, axis] += step
-            valid = (there[:, axis] >= 0) & (there[:, axis] < grid.shape[axis])
-            label = np.where(valid, grid[tuple(np.where(valid[:, None], there, 0).T)], -1) + 1
-            touches |= foreign[label]
-            touches_trunk |= trunk[label]
-    # A limb meets the trunk at its joint; farther along, it lies on the trunk.
-    root = state.centers[part] + state.rotations[part] @ (state.figure.own_shares[part] * state.sizes[part])
-    far = np.linalg.norm(voxels.grid.centers(own) - root, axis=1) > _ALONG * 2 * state.sizes[part, :2].max()
-    return int(np.count_nonzero(touches | (touches_trunk & far)))
+        touches |= np.roll(beside, 1, axis) | np.roll(beside, -1, axis)
+    return int(np.count_nonzero(own & touches))
 
 
 def measure_together(
@@ -131,7 +128,7 @@ def measure_together(
     return LinearizedMeasurement(np.concatenate(rows), H, np.eye(len(H)) * _JOINT_M**2)
 
 
-def carried(before: FilterState, state: FilterState, levels: Levels) -> Array:
+def carried(before: FilterState, state: FilterState, levels: DetailLevels) -> Array:
     """Return the rotations of a state, (10, 3, 3), in which unresolved parts turn with the part that they hang on.
 
     Args:

@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
-from tracker.tracking.voxel.chain_jacobian import center_jacobian
 from tracker.tracking.voxel.figure import N_PARTS
 from tracker.tracking.voxel.kalman import LinearizedMeasurement
 from tracker.tracking.voxel.labels import PartClouds
 from tracker.tracking.voxel.motion_model import left_jacobian_inverse
-from tracker.tracking.voxel.state import FilterState
+from tracker.tracking.voxel.state import FilterState, center_jacobian
 
 MIN_VOXELS = 4
 """Fewest voxels of a part that is measured: fewer have no three principal axes."""

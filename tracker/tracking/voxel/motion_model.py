@@ -7,7 +7,7 @@ import numpy as np
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.figure import N_PARTS
-from tracker.tracking.voxel.small_products import product
+from tracker.tracking.voxel.kalman import product
 from tracker.tracking.voxel.state import FilterState
 
 
@@ -45,7 +45,7 @@ def predict(state: FilterState, dt: float, noise: ProcessNoise) -> FilterState:
 def transition(state: FilterState, dt: float, damping: float = 0.0) -> tuple[Array, Array]:
     """Return the derivative of the predicted error state by the present one, (n, n), and the step, (n,).
 
-    Rotations turn by exp(rate dt) on the right. The derivative by the rate is exact: the right Jacobian of the rotation.
+    Rotations turn by exp(rate dt) on the right. The derivative by the rate has the right Jacobian.
     """
     at = state.layout
     F, step = np.eye(at.n), np.zeros(at.n)

@@ -1,6 +1,6 @@
 """The tracker as MTHC01 describe it: its settings, and the body that it is for.
 
-The paper leaves some choices open; docs/trackers.md lists them with what is chosen here.
+The paper leaves some choices open; docs/trackers.md lists them.
 """
 
 from collections.abc import Mapping
@@ -38,7 +38,6 @@ def paper_settings(voxel_m: float = PAPER_VOXEL_M) -> VoxelSettings:
         by_size=True,
         levels=False,
         limit_rad=None,
-        search=False,
         smooth=False,
         paper=True,
     )

@@ -52,10 +52,8 @@ class VoxelSettings:
     levels: bool = True
     """Whether parts that the voxels do not resolve are measured on a coarser level (MTHC01 Sect. 6)."""
     limit_rad: float | None = 0.15
-    """Standard deviation of the parts' rotations from the closest pose of the body, whose joints have limits, rad; None:
-    the figure's joints are balls without limits, as in the paper."""
-    search: bool = False
-    """Whether limbs that the filter has lost are searched."""
+    """Standard deviation of the parts' rotations from the closest pose of the body, whose joints have limits, rad.
+    None: the figure's joints are balls without limits, as in the paper."""
     smooth: bool = True
     """Whether the poses are smoothed at the end of a run."""
     paper: bool = False

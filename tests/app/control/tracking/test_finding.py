@@ -9,7 +9,7 @@ from gestures import drag, wait_for
 from app.control.tracking import finding
 from app.page import inspector_feed
 from tracker.errors import TrackerError
-from tracker.initialization.candidates import Candidate
+from tracker.initialization.candidates import StartCandidate
 from tracker.initialization.start_fit import FittedStart
 from tracker.pipeline.find_people import FoundPeople
 from tracker.pipeline.first_pose import FirstPose, FirstPoses
@@ -29,7 +29,7 @@ def found(monkeypatch):
         model = session.people[0].model
         body = model.with_height(1.05 * model.height_m)
         pose = body.neutral()
-        candidate = Candidate("axis", body, pose, np.array([1.0, 0.0, 0.0]), 2.0)
+        candidate = StartCandidate("axis", body, pose, np.array([1.0, 0.0, 0.0]), 2.0)
         lines = {"FRONT": np.array([[[10.0, 20.0], [30.0, 40.0]], [[11.0, 20.0], [29.0, 40.0]]])}
         first = FirstPose(FRAME, candidate, FittedStart(pose, "good", 1.0), True, (), lines)
         return FoundPeople(FirstPoses(FRAME, dict.fromkeys(people, first)), {0: body}, {0: pose}, {})

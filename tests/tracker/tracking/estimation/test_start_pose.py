@@ -95,13 +95,19 @@ def test_who_was_tracked_before_or_may_not_be_searched_stays(gavrila, truth, vie
     assert settle(gavrila, start, views, estimate="search") is None
 
 
-@pytest.mark.parametrize(("n_people", "status", "searched"), [
-    (1, "good", False), (1, "doubtful", True), (1, "lost", True),
-    (2, "good", False), (2, "doubtful", False), (2, "lost", True),
+NOTHING, SUSPECT, MISSING = (
+    SimpleNamespace(missing_limbs=missing, is_body_lost=False, search_candidates=lambda alone, found=found: found)
+    for missing, found in (((), ()), ((), ("head",)), (("head",), ("head",)))
+)
+
+
+@pytest.mark.parametrize(("n_people", "quality", "searched"), [
+    (1, NOTHING, False), (1, SUSPECT, True), (1, MISSING, True),
+    (2, NOTHING, False), (2, SUSPECT, False), (2, MISSING, True),
 ])  # fmt: skip
-def test_whose_start_is_searched(gavrila, truth, views, monkeypatch, n_people, status, searched):
+def test_whose_start_is_searched(gavrila, truth, views, monkeypatch, n_people, quality, searched):
     bodies, asked = (PosedBody(gavrila, truth),) * n_people, []
-    monkeypatch.setattr(start_pose, "estimate_at", lambda *_: SimpleNamespace(status=status))
+    monkeypatch.setattr(start_pose, "estimate_at", lambda *_: SimpleNamespace(quality=quality))
     monkeypatch.setattr(start_pose, "_searched", lambda _, person, at, __: asked.append(person) or at[person])
     contours = [occluding_contours.trace(bodies, v.camera) for v in views]
     memories = [PersonMemory(gavrila, truth) for _ in bodies]

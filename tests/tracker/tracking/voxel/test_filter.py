@@ -6,13 +6,13 @@ from filter_states import some_state
 from scipy.stats import chi2
 
 from tracker.geometry import rigid
-from tracker.tracking.voxel.chain_jacobian import center_jacobian, point_jacobian
 from tracker.tracking.voxel.figure import N_PARTS, point_shares
 from tracker.tracking.voxel.kalman import LinearizedMeasurement, update
 from tracker.tracking.voxel.labels import PartClouds
 from tracker.tracking.voxel.measurement import MeasurementNoise, linearize, linearize_rotations, measure_parts
 from tracker.tracking.voxel.motion_model import ProcessNoise, predict, process_covariance, transition
 from tracker.tracking.voxel.settings import VoxelSettings
+from tracker.tracking.voxel.state import center_jacobian, point_jacobian
 
 STEP = 1e-6
 NOISE = MeasurementNoise(0.02, 0.2, 0.1, 0.02, None)
