@@ -27,7 +27,7 @@ class ExportFormat:
     """What follows the name in the name of each file; the first names the format."""
     write: Writer
     options: frozenset[str] = frozenset()
-    """Options that it has: `axes`, `units`, `keypoints`, `view`."""
+    """Options that it has: `axes`, `units`, `keypoints`, `view`, `character`."""
     one_person: bool = False
     """Whether each person gets files of their own."""
     axes: "AxesName" = "calibration"
@@ -58,7 +58,7 @@ def _mp4(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Pat
     write_overlay_video(motion, options, paths[0], tick)
 
 
-OPTIONS = ("axes", "units", "view", "keypoints")
+OPTIONS = ("axes", "units", "view", "keypoints", "character")
 """Options that a format may have, the fields of `ExportOptions`."""
 _PLACE = frozenset(("axes", "units"))
 FORMATS: Mapping[str, ExportFormat] = {
@@ -103,7 +103,7 @@ FORMATS: Mapping[str, ExportFormat] = {
             "overlay video (MP4)",
             (".mp4",),
             _mp4,
-            frozenset(("view",)),
+            frozenset(("view", "character")),
             gaps="shown without a body",
         ),
     )

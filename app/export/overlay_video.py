@@ -15,16 +15,25 @@ from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
+from tracker.body.model import BodyModel, PosedBody
+from tracker.contours import occluding_contours
+from tracker.contours.label_image import part_labels
 from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions
 from tracker.footage.recording import Recording
 from tracker.footage.video_writer import VideoWriter
+from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array, FloatArray, Image
 from tracker.geometry.cameras import Camera
+from tracker.posing.retarget import drive_pose
 
 _LAYERS = frozenset(("contours", "hidden"))
 _GRID_PX = (1920, 1080)
 """Largest width and height of a grid of views."""
+_GROUND_RGB = (32, 34, 38)
+"""Ground behind a character."""
+_FILL_SHARE = 0.7
+"""Brightness of a character, in that of its person's colour."""
 _HIDDEN_SHARE = 0.35
 """Opacity of occluded contours."""
 _FAR_PX = 30_000.0
@@ -38,7 +47,8 @@ def write_overlay_video(
 
     Args:
         motion: the poses; people who are not exported occlude, but are not drawn.
-        options: `view` names one camera; without it, all views are tiles of a grid.
+        options: `view` names one camera; without it, all views are tiles of a grid. `character` names a body that
+            moves as the people do; each view then has a second tile with it.
         path: the file.
         tick: called after each frame.
 
@@ -47,7 +57,9 @@ def write_overlay_video(
     """
     session = motion.session
     shown = [i for i, c in enumerate(session.cameras) if options.view in (None, c.camera.name)]
-    cameras = [session.cameras[i].camera for i in shown]
+    characters = _characters(motion, options.character)
+    tiles = [(i, is_character) for i in shown for is_character in ((False, True) if characters else (False,))]
+    cameras = [session.cameras[i].camera for i, _ in tiles]
     tile = _tile_size(cameras)
     columns, rows = _grid(cameras)
     size = (columns * tile[0], rows * tile[1])
@@ -58,15 +70,50 @@ def write_overlay_video(
         for frame in motion.frames:
             picture = np.zeros((even[1], even[0], 3), np.uint8)
             drawn = _drawn_paths(motion, frame, shown)
-            for k, (index, camera) in enumerate(zip(shown, cameras, strict=True)):
-                image = recording.read_view(index, frame)
-                view = placeholder(camera.size, "frame damaged") if image is None else image.copy()
-                _draw(view, camera, [p for p in drawn if p.camera == index])
+            driven = _driven(motion, frame, characters)
+            for k, ((index, is_character), camera) in enumerate(zip(tiles, cameras, strict=True)):
+                if is_character:
+                    view = _character_view(camera, driven)
+                else:
+                    image = recording.read_view(index, frame)
+                    view = placeholder(camera.size, "frame damaged") if image is None else image.copy()
+                    _draw(view, camera, [p for p in drawn if p.camera == index])
                 _label(view, f"{camera.name}  {frame}" if len(shown) > 1 else str(frame))
                 at = (k % columns * tile[0], k // columns * tile[1])
                 _place(picture, view, at, tile)
             writer.write(picture)
             tick()
+
+
+def _characters(motion: ExportedMotion, name: str | None) -> dict[int, BodyModel]:
+    """Return the body that each exported person drives, of the person's height, by index; none without a name."""
+    if name is None:
+        return {}
+    return {p.index: load_model(name, p.person.model.height_m) for p in motion.exported}
+
+
+def _driven(motion: ExportedMotion, frame: int, characters: dict[int, BodyModel]) -> list[tuple[PosedBody, str]]:
+    """Return the characters in the poses of a frame, with the colours of their people."""
+    found = [(p, body, characters[p.index]) for p, body in motion.bodies(frame) if p.index in characters]
+    return [(PosedBody(model, drive_pose(body.values, body.model, model)), p.person.color) for p, body, model in found]
+
+
+def _character_view(camera: Camera, driven: Sequence[tuple[PosedBody, str]]) -> Image:
+    """Draw characters before a plain ground as an ideal camera without lens distortion shows them."""
+    ideal = camera.pinhole
+    image = np.full((ideal.height, ideal.width, 3), _GROUND_RGB, np.uint8)
+    if not driven:
+        return image
+    bodies = [body for body, _ in driven]
+    labels = part_labels(bodies, ideal)
+    parts = [overlay_colors.rgb(color) for body, color in driven for _ in body.model.parts]
+    image[labels > 0] = (np.array(parts)[labels[labels > 0] - 1] * _FILL_SHARE).astype(np.uint8)
+    seen = occluding_contours.trace(bodies, ideal)
+    ends = seen.pieces_px[~seen.occluded]
+    width = max(2, round(max(ideal.size) / 640))
+    near = (np.abs(ends) < _FAR_PX).all(axis=1)
+    draw_lines(image, ends[near].reshape(-1, 2, 2).astype(np.float64), (255, 255, 255), width)
+    return image
 
 
 def _drawn_paths(motion: ExportedMotion, frame: int, shown: Sequence[int]) -> list[overlays.Path]:

@@ -96,7 +96,8 @@ class ExportRoutes:
         if person is not None and person not in names:
             raise TrackerError(f"expected a person of {', '.join(names)}, found '{person}'; reload the page")
         people = tuple(range(len(names))) if person is None else (names.index(person),)
-        options = check_options(chosen, session, {name: query.get(name) for name in OPTIONS})
+        given = {name: query.get(name) for name in OPTIONS if name != "character"}  # the page names no file to read
+        options = check_options(chosen, session, given)
         frames = None if not query.get("frames") else _frames(query["frames"], session.n_frames)
         motion = read_motion(session, people, frames, query.get("skip_lost") == "1")
         self._total = n_ticks(chosen, motion)

@@ -30,6 +30,8 @@ class ExportOptions:
     """COCO: the 17 keypoints of people, those of the body model, or both."""
     view: str | None = None
     """Overlay video: name of the camera; None for a grid of all."""
+    character: str | None = None
+    """Overlay video: body model that moves as the people do, beside the footage; None for the footage alone."""
 
     @property
     def per_metre(self) -> float:

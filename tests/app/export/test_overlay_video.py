@@ -102,3 +102,25 @@ def test_nothing_is_left_of_a_video_that_was_stopped(session, tmp_path):
     (tmp_path / "out.mp4").mkdir()
     with pytest.raises(TrackerError, match="found a folder"):
         export(FORMATS["mp4"], motion, ExportOptions(), tmp_path / "out.mp4", overwrite=True)
+
+
+@pytest.mark.parametrize("name", ["gavrila34", "knossow54"])
+def test_a_character_of_another_body_moves_beside_the_footage(session, tmp_path, name):
+    loaded = load_session(session)
+    motion = posed_motion(loaded, range(2, 4), gaps=(3,))
+    options = ExportOptions(view="FRONT", character=name)
+    overlay_video.write_overlay_video(motion, options, tmp_path / "a.mp4")
+    images = frames_of(tmp_path / "a.mp4")[1]
+    camera = next(c.camera for c in loaded.cameras if c.camera.name == "FRONT")
+    left, right = np.split(images[0], 2, axis=1)
+    assert painted(left).any()
+    height, width = right.shape[:2]
+    dark = (np.array((0x53, 0xA5, 0x04)) * 0.7).astype(int)
+    drawn = np.abs(right - dark).max(axis=-1) < 40
+    points_px = camera.pinhole.project(motion.people[0].poses[2].body.points_world)
+    points_px *= np.array([width, height]) / camera.size
+    rows, columns = np.nonzero(drawn)
+    assert len(rows) > 300
+    assert abs(np.median(columns) - np.median(points_px[:, 0])) < 30
+    assert abs(np.median(rows) - np.median(points_px[:, 1])) < 60
+    assert not (np.abs(np.split(images[1], 2, axis=1)[1] - dark).max(axis=-1) < 30).any()  # frame 3 has no body
