@@ -18,7 +18,7 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from app.bench import acquisition_rows, contour_rows
+from app.bench import acquisition_rows, contour_rows, voxel_rows
 from app.bench import rows as bench_rows
 from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import FRAME, read_crowd, read_frame
@@ -30,7 +30,7 @@ from tracker.text_files import TextKind, read_json
 from tracker.validation import Number, check
 
 BASELINE = Path(__file__).with_name("baseline.json")
-N_ROWS = 26
+N_ROWS = 27
 """Number of rows that `measure` yields if `cma` is installed."""
 _KIND = TextKind("baseline", 1_000_000, TrackerError, "make one with --save")
 _PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")
@@ -50,17 +50,20 @@ def measure() -> Iterator[Row]:
     cones = frame.with_model("gavrila22_cones")
     with TemporaryDirectory() as folder, _one_thread():
         simulate(Path(folder) / "six", Simulation("exercise", n_cameras=6, n_frames=2))
-        six = read_frame(Path(folder) / "six")
+        six_views = read_frame(Path(folder) / "six")
+        six, six_of_54 = (six_views.with_model(name) for name in ("gavrila22_cones", "knossow54"))
         yield from bench_rows.candidates(frame, cones, yardstick)
         yield from bench_rows.searches(frame, cones, yardstick)
-        yield from bench_rows.iterations(cones, six.with_model("gavrila22_cones"), yardstick)
-        yield from contour_rows.extremal_contours(six.with_model("knossow54"), yardstick)
+        yield from bench_rows.iterations(cones, six, yardstick)
+        yield contour_rows.iteration(six_of_54, yardstick)
+        yield from contour_rows.solves(six_of_54, yardstick)
         yield from bench_rows.evolution(cones, yardstick)
         simulate(Path(folder) / "crowd", Simulation("crowd_of_three", n_frames=1))
         yield from bench_rows.crowds(read_crowd(Path(folder) / "crowd", 0), yardstick)
+    yield voxel_rows.voxel_frame(frame, yardstick)
     yield bench_rows.pipeline(frame, yardstick)
-    yield bench_rows.pipeline_of_two(read_crowd(sample_copy("tango"), FRAME), yardstick)
     yield from contour_rows.pipelines(frame.with_model("gavrila34"), yardstick)
+    yield bench_rows.pipeline_of_two(read_crowd(sample_copy("tango"), FRAME), yardstick)
     yield from acquisition_rows.acquisitions(frame, yardstick)
 
 

@@ -244,36 +244,41 @@ def evolution(cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
     yield Row("search_alone_hard", "hard frame by best-first search alone, cones", *timed)
 
 
-class BenchScene(NamedTuple):
-    """A session of which the people are tracked from the poses that fit their joints."""
-
-    session: Session
-    models: Sequence[BodyModel]
-    """The body of each person."""
-    joints: Sequence[MarkerTable]
-    """The true joints of each person on all frames."""
-
-
 def pipeline(frame: BenchFrame, yardstick: Yardstick) -> Row:
     """From video to overlay: decode, undistort, edges, predict, refine, assess, trace contours; per frame."""
-    scene = BenchScene(frame.session, [frame.model], [frame.joints])
-    return _required(pipeline_row("pipeline", scene, _SETTINGS, yardstick), 45, 90)
+    what = "video to overlay, 4 views, per frame"
+    return _pipeline("pipeline", what, frame.session, [frame.model], [frame.joints], (45, 90), yardstick)
 
 
 def pipeline_of_two(crowd: BenchCrowd, yardstick: Yardstick) -> Row:
     """The same with two people."""
-    scene = BenchScene(crowd.session, crowd.models, crowd.joints)
-    return _required(pipeline_row("pipeline_of_2", scene, _SETTINGS, yardstick), 25, 50)
+    what = "video to overlay, two people, 4 views, per frame"
+    return _pipeline("pipeline_of_2", what, crowd.session, crowd.models, crowd.joints, (25, 50), yardstick)
 
 
-def _required(row: Row, fps: float, desired_fps: float) -> Row:
-    """Return a row with the required and the desired frames per second."""
-    return row._replace(must=1e3 / fps / 1.5, aim=1e3 / desired_fps / 1.5)
+def _pipeline(
+    name: str,
+    what: str,
+    session: Session,
+    models: Sequence[BodyModel],
+    joints: Sequence[MarkerTable],
+    per_second: tuple[float, float],
+    yardstick: Yardstick,
+) -> Row:
+    """Track a session from the fitted poses; `per_second` are the required and the desired frames per second."""
+    timed, note = tracked_pipeline(_SETTINGS, session, models, joints, yardstick)
+    must, aim = (1e3 / fps / 1.5 for fps in per_second)
+    return Row(name, what, *timed, must, aim, note)
 
 
-def pipeline_row(name: str, scene: BenchScene, settings: TrackerSettings, yardstick: Yardstick) -> Row:
-    """Track a scene from the fitted poses; the time is that of a frame."""
-    session, models, joints = scene
+def tracked_pipeline(
+    settings: TrackerSettings,
+    session: Session,
+    models: Sequence[BodyModel],
+    joints: Sequence[MarkerTable],
+    yardstick: Yardstick,
+) -> tuple[Timed, str]:
+    """Track a session from the fitted poses, and return the time of a frame and the frames per second in words."""
     wanted = [k for k in _PIPELINE_FRAMES if k < session.n_frames]
     first = [pose_at(j, m, wanted[0]) for j, m in zip(joints, models, strict=True)]
     n, spent = len(wanted), list[float]()
@@ -292,6 +297,4 @@ def pipeline_row(name: str, scene: BenchScene, settings: TrackerSettings, yardst
 
     timed = yardstick.beside(run, 3)
     frame_us = 1e6 * float(np.median(spent[1:])) / (n - 1)
-    people = f"{models[0].name}, {settings.method}" if len(models) == 1 else f"{len(models)} people"
-    what = f"video to overlay, {people}, {len(session.cameras)} views, per frame"
-    return Row(name, what, frame_us, timed.yardstick_us, note=f"{1e6 / frame_us:.1f} frames per second")
+    return timed._replace(work_us=frame_us), f"{1e6 / frame_us:.1f} frames per second"

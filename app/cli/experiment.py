@@ -34,13 +34,13 @@ def command(
         noise: noise of the contours across themselves, px.
         seed: of motion, cameras and noise.
     """
-    from tracker.experiments.contour_experiment import ACTORS, ContourExperiment, run_contour_experiment
+    from tracker.experiments.contour_experiment import ACTORS, N_PAPER_RUNS, ContourExperiment, run_contour_experiment
     from tracker.experiments.contour_report import write_contour_report
 
     experiment = ContourExperiment(frames, cameras, camera_counts, noise, seed)
     experiment.check()
     methods, reporter = _methods(), Reporter()
-    n_runs = len({*camera_counts, cameras}) * len(ACTORS) * len(methods) + 1  # and the convergence
+    n_runs = len({*camera_counts, cameras}) * len(ACTORS) * len(methods) + N_PAPER_RUNS
     with reporter.over(n_runs, "runs") as tick:
         found = run_contour_experiment(experiment, methods, lambda *_: tick())
     print(f"wrote {write_contour_report(out, found)}")
@@ -49,11 +49,6 @@ def command(
 def _methods() -> "Mapping[str, TrackerSettings]":
     """Return the settings that are compared, by their name in the report."""
     from tracker.tracking.chamfer.settings import TrackSettings
-    from tracker.tracking.contour.paper import paper_settings
     from tracker.tracking.contour.settings import ContourSettings
 
-    return {
-        "chamfer": TrackSettings(backward_pass=False),
-        "contour": ContourSettings(backward_pass=False),
-        "contour, as the paper": paper_settings("edges"),
-    }
+    return {"chamfer": TrackSettings(backward_pass=False), "contour": ContourSettings(backward_pass=False)}

@@ -42,8 +42,8 @@ class ExportArguments:
     """trc, csv, bvh: unit of lengths; m by default."""
     view: OptionalName = None
     """mp4: name of the camera; a grid of all views by default."""
-    character: OptionalName = None
-    """mp4: body model, a preset or a .toml file, that moves as the people do, beside each view."""
+    character: Annotated[str | None, tyro.conf.arg(metavar="BODY[:METRES]")] = None
+    """mp4: body that moves as the person, beside the footage: a preset or a .toml file, and its height."""
     keypoints: Annotated[Literal["all", "coco17", "body"] | None, _choice("all|coco17|body")] = None
     """coco: the 17 keypoints of people, all points of the body, or both, which is the default."""
     skip_lost: bool = False

@@ -35,15 +35,16 @@ class InitArguments:
     """TRC file of 3-D joints."""
     poses: OptionalPath = None
     """table of poses (CSV), as `simulate` writes it."""
-    method: Literal["joints", "poses", "voxels", "auto"] = "joints"
-    """joints fits the pose to known joints; poses copies it from a table; voxels finds it in the silhouettes; auto
-    tries voxels on several frames and keeps the start that tracks best."""
+    method: Literal["joints", "poses", "voxels", "axis", "auto"] = "joints"
+    """joints fits the pose to known joints; poses copies it from a table; voxels finds the parts of the body in the
+    visual hull; axis searches the body on the axis of the silhouettes; auto tries both on several frames and keeps the
+    start that tracks best."""
     frame: int = 0
     """frame to set; with auto the first one to try."""
     voxel_size: float = 25.0
     """edge of a voxel, mm."""
     person: OptionalName = None
-    """name; needed in a session of several people."""
+    """name; needed with joints and poses in a session of several people. The others find everybody who has no pose."""
     fit_sizes: bool = False
     """acquire the body's sizes too, from the joints and the contours of several frames."""
     joint_map: OptionalPath = None
@@ -60,12 +61,13 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
     from tracker.formats.pose_csv import read_pose_table
 
     method, frame = arguments.method, arguments.frame
-    at = load_target(arguments.session, arguments.person, several=False)
+    is_found = method in ("voxels", "axis", "auto")
+    at = load_target(arguments.session, arguments.person, several=is_found)
     if not 0 <= frame < at.session.n_frames:
         n = at.session.n_frames
         raise TrackerError(f"expected --frame within 0:{n} (from 0 to {n - 1}), found {frame}; correct it")
-    if method in ("voxels", "auto"):
-        _init_from_voxels(at, arguments)
+    if is_found:
+        _init_from_silhouettes(at, arguments)
         return
     path = arguments.joints if method == "joints" else arguments.poses
     if path is None:
@@ -93,14 +95,14 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
     print(format_json(found) if arguments.json else "\n".join(lines))
 
 
-def _init_from_voxels(at: Target, arguments: InitArguments) -> None:
-    from app.cli.init_voxels import auto_frames, format_found, init_from_voxels
+def _init_from_silhouettes(at: Target, arguments: InitArguments) -> None:
+    from app.cli.init_silhouettes import format_first_poses, init_from_silhouettes
 
-    method, frame = arguments.method, arguments.frame
-    frames = auto_frames(frame, at.session.n_frames) if method == "auto" else [frame]
-    progress = Reporter(silent=arguments.json or method == "voxels")
-    found = init_from_voxels(at, frames, arguments.voxel_size / 1000, method, progress)
-    print(format_json(found) if arguments.json else format_found(found))
+    progress = Reporter(silent=arguments.json or arguments.method != "auto")
+    found = init_from_silhouettes(
+        at, arguments.method, arguments.frame, arguments.voxel_size / 1000, arguments.person is None, progress
+    )
+    print(format_json(found) if arguments.json else format_first_poses(found))
 
 
 def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool) -> dict[str, Any]:

@@ -32,6 +32,7 @@ from app.control.session.kernel_warmup import KernelWarmup
 from app.control.session.save_retry import SaveRetry
 from app.control.session.session_state import SessionState
 from app.control.session.stored_poses import StoredPoses
+from app.control.tracking.finding import FindingPeople
 from app.control.tracking.inconsistent_frames import InconsistentFrames
 from app.control.tracking.ranges import Ranges
 from app.control.tracking.tracking import Tracking
@@ -72,6 +73,8 @@ class Controller:
         """Searches the shown frame."""
         self.tracking = Tracking(session_state, activities)
         """Tracks from the shown frame."""
+        self.finding = FindingPeople(session_state, activities, self.tracking, runs)
+        """Finds people whom nobody has placed, and tracks them."""
         self.ranges = Ranges(session_state, self.tracking, activities)
         """Interpolates, clears, marks and tracks ranges of frames."""
         self.dragging = Dragging(session_state, activities)
@@ -150,6 +153,7 @@ class Controller:
     def close(self) -> None:
         """Stop all work and save; the controller must not be used afterwards."""
         self.body_acquisition.stop()
+        self.finding.stop()
         self._save_retry.close()
         with self.activities.editing():
             self.history.save()

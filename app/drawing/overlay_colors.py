@@ -29,7 +29,7 @@ KIND_COLORS = {
     "floor_sight": MARK,
     "accepted": ACCEPTED,
     "rejected": REJECTED,
-    "residual": MARK,
+    "residual": NEUTRAL,
 }
 """Colours of the kinds of lines; all other kinds have the colour of their person."""
 OUTLINE_RGB = (0, 0, 0)

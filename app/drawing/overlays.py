@@ -25,7 +25,7 @@ from tracker.images.background_subtraction import Mask
 from tracker.images.edge_segments import accept_segments
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Person, Session
-from tracker.tracking.contour.fit_steps import residual_vectors
+from tracker.tracking.contour.fit_steps import residual_segments
 
 _PERSON_KINDS = (
     "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
@@ -39,7 +39,7 @@ _EDGE_STRIDE_PX = 3
 
 PathKind = Literal[
     "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
-    "result", "part_edge", "epipolar", "accepted", "rejected", "floor", "floor_sight", "residual",
+    "result", "residual", "part_edge", "epipolar", "accepted", "rejected", "floor", "floor_sight",
 ]  # fmt: skip
 Side = Literal["left", "right", ""]
 SIDES: tuple[Side, ...] = get_args(Side)
@@ -109,10 +109,11 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
     drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
     result = stored.poses if state is not stored and state.search_view.replay is None else None
-    preview = state.search_view.preview
+    preview, replay = state.search_view.preview, state.search_view.replay
     outlined: tuple[tuple[PathKind, tuple[Array, ...] | None], ...] = (
         ("candidate", tried if "contours" in view.layers else None),
         ("compared", state.search_view.compared),
+        ("compared", None if replay is None else replay.fitted_from),
         ("preview", None if preview is None else preview.poses),
         ("result", result),
     )
@@ -137,9 +138,9 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             out.append(Path(index, 0, "part_edge", KIND_COLORS["part_edge"], part_edges.part_edges(bodies, camera)))
         if views is not None:
             out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]
-            if stored.search_view.replays_fit and "contours" in view.layers:
-                vectors = residual_vectors(views[index], bodies)
-                out.append(Path(index, 0, "residual", KIND_COLORS["residual"], vectors))
+            if replay is not None and replay.fitted_from is not None:
+                lines = residual_segments(bodies, views[index])
+                out.append(Path(index, 0, "residual", KIND_COLORS["residual"], lines))
     if state.drag is not None and "epipolar" in view.layers:
         out += [line for line in _epipolar_lines(session, state) if line.camera in view.cameras]
     return [p for p in out if p.kind not in _PERSON_KINDS or p.person not in state.visibility.hidden]

@@ -38,10 +38,9 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
         given: value of each option; None for the default.
 
     Raises:
-        TrackerError: the format has no such option, or a value is not allowed, or there is no such character.
+        TrackerError: the format has no such option, or a value is not allowed.
     """
-    from tracker.export.options import AXES, KEYPOINT_SETS, UNITS
-    from tracker.formats.model_toml import load_model
+    from tracker.export.options import AXES, KEYPOINT_SETS, UNITS, load_character
 
     values = {name: value for name, value in given.items() if value is not None}
     allowed = {"axes": AXES, "units": UNITS, "keypoints": KEYPOINT_SETS, "view": _camera_names(session)}
@@ -50,7 +49,7 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
             can = f"its options are {', '.join(f'--{o}' for o in sorted(chosen.options))}"
             raise TrackerError(f"expected no --{name} with format {chosen.name}, found '{value}'; {can}")
         if name == "character":
-            load_model(value)
+            load_character(value)
         elif value not in allowed[name]:
             raise TrackerError(f"expected --{name} to be one of {', '.join(allowed[name])}, found '{value}'")
     return replace(ExportOptions(axes=chosen.axes), **values)  # type: ignore[arg-type]

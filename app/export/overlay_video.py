@@ -11,29 +11,21 @@ import numpy as np
 from app.drawing import overlay_colors, overlays
 from app.drawing.outlined_lines import draw_lines
 from app.drawing.pictures import placeholder
+from app.export.characters import Characters, draw_bodies
 from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
-from tracker.body.model import BodyModel, PosedBody
-from tracker.contours import occluding_contours
-from tracker.contours.label_image import part_labels
 from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions
+from tracker.export.options import ExportOptions, load_character
 from tracker.footage.recording import Recording
 from tracker.footage.video_writer import VideoWriter
-from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import Array, FloatArray, Image
 from tracker.geometry.cameras import Camera
-from tracker.posing.retarget import drive_pose
 
 _LAYERS = frozenset(("contours", "hidden"))
 _GRID_PX = (1920, 1080)
 """Largest width and height of a grid of views."""
-_GROUND_RGB = (32, 34, 38)
-"""Ground behind a character."""
-_FILL_SHARE = 0.7
-"""Brightness of a character, in that of its person's colour."""
 _HIDDEN_SHARE = 0.35
 """Opacity of occluded contours."""
 _FAR_PX = 30_000.0
@@ -47,8 +39,8 @@ def write_overlay_video(
 
     Args:
         motion: the poses; people who are not exported occlude, but are not drawn.
-        options: `view` names one camera; without it, all views are tiles of a grid. `character` names a body that
-            moves as the people do; each view then has a second tile with it.
+        options: `view` names one camera; without it, all views are tiles of a grid. `character` is a body that moves as
+            the people do, beside each view.
         path: the file.
         tick: called after each frame.
 
@@ -57,11 +49,11 @@ def write_overlay_video(
     """
     session = motion.session
     shown = [i for i, c in enumerate(session.cameras) if options.view in (None, c.camera.name)]
-    characters = _characters(motion, options.character)
-    tiles = [(i, is_character) for i in shown for is_character in ((False, True) if characters else (False,))]
-    cameras = [session.cameras[i].camera for i, _ in tiles]
-    tile = _tile_size(cameras)
-    columns, rows = _grid(cameras)
+    cameras = [session.cameras[i].camera for i in shown]
+    cast = None if options.character is None else Characters(motion, load_character(options.character))
+    sizes = [(c.width * (1 if cast is None else 2), c.height) for c in cameras]
+    tile = _tile_size(sizes)
+    columns, rows = _grid(sizes)
     size = (columns * tile[0], rows * tile[1])
     even = (size[0] + size[0] % 2, size[1] + size[1] % 2)  # as H.264 requires
     with ExitStack() as stack:
@@ -70,50 +62,17 @@ def write_overlay_video(
         for frame in motion.frames:
             picture = np.zeros((even[1], even[0], 3), np.uint8)
             drawn = _drawn_paths(motion, frame, shown)
-            driven = _driven(motion, frame, characters)
-            for k, ((index, is_character), camera) in enumerate(zip(tiles, cameras, strict=True)):
-                if is_character:
-                    view = _character_view(camera, driven)
-                else:
-                    image = recording.read_view(index, frame)
-                    view = placeholder(camera.size, "frame damaged") if image is None else image.copy()
-                    _draw(view, camera, [p for p in drawn if p.camera == index])
+            for k, (index, camera) in enumerate(zip(shown, cameras, strict=True)):
+                image = recording.read_view(index, frame)
+                view = placeholder(camera.size, "frame damaged") if image is None else image.copy()
+                _draw(view, camera, [p for p in drawn if p.camera == index])
+                if cast is not None:
+                    view = np.hstack([view, draw_bodies(cast.bodies(frame), camera)])
                 _label(view, f"{camera.name}  {frame}" if len(shown) > 1 else str(frame))
                 at = (k % columns * tile[0], k // columns * tile[1])
                 _place(picture, view, at, tile)
             writer.write(picture)
             tick()
-
-
-def _characters(motion: ExportedMotion, name: str | None) -> dict[int, BodyModel]:
-    """Return the body that each exported person drives, of the person's height, by index; none without a name."""
-    if name is None:
-        return {}
-    return {p.index: load_model(name, p.person.model.height_m) for p in motion.exported}
-
-
-def _driven(motion: ExportedMotion, frame: int, characters: dict[int, BodyModel]) -> list[tuple[PosedBody, str]]:
-    """Return the characters in the poses of a frame, with the colours of their people."""
-    found = [(p, body, characters[p.index]) for p, body in motion.bodies(frame) if p.index in characters]
-    return [(PosedBody(model, drive_pose(body.values, body.model, model)), p.person.color) for p, body, model in found]
-
-
-def _character_view(camera: Camera, driven: Sequence[tuple[PosedBody, str]]) -> Image:
-    """Draw characters before a plain ground as an ideal camera without lens distortion shows them."""
-    ideal = camera.pinhole
-    image = np.full((ideal.height, ideal.width, 3), _GROUND_RGB, np.uint8)
-    if not driven:
-        return image
-    bodies = [body for body, _ in driven]
-    labels = part_labels(bodies, ideal)
-    parts = [overlay_colors.rgb(color) for body, color in driven for _ in body.model.parts]
-    image[labels > 0] = (np.array(parts)[labels[labels > 0] - 1] * _FILL_SHARE).astype(np.uint8)
-    seen = occluding_contours.trace(bodies, ideal)
-    ends = seen.pieces_px[~seen.occluded]
-    width = max(2, round(max(ideal.size) / 640))
-    near = (np.abs(ends) < _FAR_PX).all(axis=1)
-    draw_lines(image, ends[near].reshape(-1, 2, 2).astype(np.float64), (255, 255, 255), width)
-    return image
 
 
 def _drawn_paths(motion: ExportedMotion, frame: int, shown: Sequence[int]) -> list[overlays.Path]:
@@ -157,26 +116,26 @@ def _label(image: Image, text: str) -> None:
         cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, scale, color, max(1, round(width * scale)), cv2.LINE_AA)
 
 
-def _grid(cameras: Sequence[Camera]) -> tuple[int, int]:
+def _grid(sizes: Sequence[tuple[int, int]]) -> tuple[int, int]:
     """Return the number of columns and rows in which the views are largest, with as few empty tiles as possible."""
-    grids = [(columns, -(-len(cameras) // columns)) for columns in range(1, len(cameras) + 1)]
+    grids = [(columns, -(-len(sizes) // columns)) for columns in range(1, len(sizes) + 1)]
     return min(
-        grids, key=lambda grid: (-round(_share(cameras, grid), 6), grid[0] * grid[1], abs(grid[0] - grid[1]), -grid[0])
+        grids, key=lambda grid: (-round(_share(sizes, grid), 6), grid[0] * grid[1], abs(grid[0] - grid[1]), -grid[0])
     )
 
 
-def _share(cameras: Sequence[Camera], grid: tuple[int, int]) -> float:
-    """Return the scale, at most 1, at which views fit into a grid of columns and rows."""
-    width, height = max(c.width for c in cameras), max(c.height for c in cameras)
-    return min(1.0, _GRID_PX[0] / (grid[0] * width), _GRID_PX[1] / (grid[1] * height))
+def _share(sizes: Sequence[tuple[int, int]], grid: tuple[int, int]) -> float:
+    """Return the scale, at most 1, at which views of some widths and heights fit into a grid of columns and rows."""
+    width, height = np.max(sizes, axis=0)
+    return float(min(1.0, _GRID_PX[0] / (grid[0] * width), _GRID_PX[1] / (grid[1] * height)))
 
 
-def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
+def _tile_size(sizes: Sequence[tuple[int, int]]) -> tuple[int, int]:
     """Return the width and height of each view in the video: its own, or what a grid has room for."""
-    width, height = max(c.width for c in cameras), max(c.height for c in cameras)
-    if len(cameras) == 1:
+    width, height = (int(n) for n in np.max(sizes, axis=0))
+    if len(sizes) == 1:
         return width, height
-    share = _share(cameras, _grid(cameras))
+    share = _share(sizes, _grid(sizes))
     return round(width * share) // 2 * 2, round(height * share) // 2 * 2
 
 

@@ -16,6 +16,7 @@ from app.page.inspector_messages import (
     ApplySizes,
     CoupleSides,
     DraftSizes,
+    FindPeople,
     SetGirdleWidth,
     SetHeight,
     SetPartSizes,
@@ -216,7 +217,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     TakeCandidate, ShowLandscape, SetLandscapeDof,
     StartTracking, ControlTracking, EditRange, StopRange, ToggleMark, FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, DraftSizes,
-    AcquireSizes,
+    AcquireSizes, FindPeople,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

@@ -17,10 +17,11 @@ from tracker.validation import quoted
 def _track_settings(controller: Controller, _: int, message: wire.SetTrackSettings) -> None:
     before, changes = controller.state, msgspec.to_builtins(message.changes)
     after = track_settings.changed(before.settings, changes)
+    choices = track_settings.with_choices(before.run_choices, changes, controller.session.camera_names)
     if after != before.settings:
         controller.search.set_settings(after)
-    controller.tracking.set_method(changes.get("method", before.method))
-    if after != before.settings or controller.state.method != before.method:
+    controller.tracking.choose(choices)
+    if (after, choices) != (before.settings, before.run_choices):
         controller.tracking.store_settings()
 
 
@@ -63,6 +64,13 @@ def _acquire(controller: Controller, _: int, message: wire.AcquireSizes) -> None
         controller.body_acquisition.stop()
 
 
+def _find_people(controller: Controller, _: int, message: wire.FindPeople) -> None:
+    if message.action == "start":
+        controller.finding.start()
+    else:
+        controller.finding.stop()
+
+
 INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetTrackSettings: _track_settings,
     wire.SetView3d: _view_3d,
@@ -73,4 +81,5 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.ApplySizes: lambda controller, _, m: controller.body_sizes.apply(m.person, m.refit),
     wire.DraftSizes: _draft,
     wire.AcquireSizes: _acquire,
+    wire.FindPeople: _find_people,
 }

@@ -1,5 +1,7 @@
 """Updates for the inspector of a page: only what changed since the last ones (docs/protocol.md)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from app.control.controller import Controller
@@ -8,9 +10,10 @@ from app.page.message_types import Message
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.people import AcquisitionState
+from app.state.progress import FindState
+from app.state.run_choices import RunChoices
 from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
-from tracker.pipeline.methods import MethodName
 from tracker.posing.grab import minor_points
 from tracker.tracking.chamfer.settings import TrackSettings
 
@@ -31,8 +34,8 @@ class InspectorFeed:
         """Return the messages that bring the page up to date."""
         self._made_from = _ingredients(state)
         now: list[Message] = [
-            settings(state.settings, state.method), view_3d(controller, state), body_sizes(controller, state),
-            acquisition(state.acquisition),
+            settings(state.settings, state.run_choices), view_3d(controller, state), body_sizes(controller, state),
+            acquisition(state.acquisition), finding(state.finding, [c.camera.name for c in controller.session.cameras]),
         ]  # fmt: skip
         changed = [message for message in now if message not in self._sent]
         self._sent = now
@@ -42,25 +45,26 @@ class InspectorFeed:
 def _ingredients(state: State) -> tuple[Identity, ...]:
     """Return what the messages are made from, for comparison."""
     made_from = (
-        state.settings, state.method, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
+        state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
+        state.finding,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
 
 
-def settings(found: TrackSettings, method: MethodName = "chamfer") -> wire.SettingsMessage:
+def settings(found: TrackSettings, choices: RunChoices) -> wire.SettingsMessage:
     """Describe the settings of tracker and search."""
     default = TrackSettings()
     return wire.SettingsMessage(
-        track_values(found, method), search_values(found), track_values(default, "chamfer"), search_values(default)
+        track_values(found, choices), search_values(found), track_values(default, RunChoices()), search_values(default)
     )
 
 
-def track_values(found: TrackSettings, method: MethodName) -> wire.TrackValues:
+def track_values(found: TrackSettings, choices: RunChoices) -> wire.TrackValues:
     """Describe the settings of the tracker."""
     return wire.TrackValues(
-        method, found.estimate, found.predict.order, found.predict.window, found.recover is not None,
-        found.backward_pass, found.smooth,
+        choices.method, choices.stride, choices.cameras, found.estimate, found.predict.order, found.predict.window,
+        found.recover is not None,        found.backward_pass, found.smooth,
     )  # fmt: skip
 
 
@@ -121,6 +125,19 @@ def acquisition(found: AcquisitionState) -> wire.AcquisitionMessage:
             side=wire.OutlinePair(outlines.side.before, outlines.side.after),
         )
     return wire.AcquisitionMessage(found.person, found.running, found.stage, found.share, found.message, result)
+
+
+def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
+    """Describe the search for people.
+
+    Args:
+        found: its state.
+        cameras: names of all cameras.
+    """
+    axes = tuple(wire.SilhouetteAxes(cameras.index(n), people) for n, people in found.axes.items() if n in cameras)
+    return wire.FindingMessage(
+        found.running, found.stage, found.share, found.notes, found.message, found.failed, found.frame, axes
+    )
 
 
 def _floor(floor: FloorState) -> wire.FloorInfo:

@@ -7,6 +7,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from app.page.message_types import Command, Index, Message, Name, Part
 from app.page.search_messages import OutlierMode
+from app.state.run_choices import MAX_STRIDE
 from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
 from tracker.motion.prediction import MAX_ORDER
 from tracker.pipeline.methods import MethodName
@@ -26,6 +27,10 @@ class TrackChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     method: MethodName | UnsetType = UNSET
     """The tracking method."""
+    stride: Annotated[int, Meta(ge=1, le=MAX_STRIDE)] | UnsetType = UNSET
+    """Every so many frames are tracked."""
+    cameras: Annotated[list[Name], Meta(max_length=1000)] | UnsetType = UNSET
+    """Names of the cameras to track with; all if empty."""
     estimate: EstimationMode | UnsetType = UNSET
     """How the pose of a frame is found."""
     order: Annotated[int, Meta(ge=0, le=MAX_ORDER)] | UnsetType = UNSET
@@ -56,6 +61,7 @@ class View3dChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     floor: bool | UnsetType = UNSET
     gizmos: bool | UnsetType = UNSET
     ghost: bool | UnsetType = UNSET
+    voxels: bool | UnsetType = UNSET
     trail_points: Annotated[list[Name], Meta(max_length=1000)] | UnsetType = UNSET
     trail_frames: Annotated[int, Meta(ge=1, le=MAX_TRAIL_FRAMES)] | UnsetType = UNSET
 
@@ -124,6 +130,12 @@ class AcquireSizes(Command, frozen=True, tag="acquire"):
     person: Index
 
 
+class FindPeople(Command, frozen=True, tag="find_people"):
+    """Find the people whom nobody has placed, acquire their sizes and track them, or stop that."""
+
+    action: Literal["start", "stop"]
+
+
 # --- to the page ----------------------------------------------------------------------------------------------------
 
 
@@ -132,6 +144,10 @@ class TrackValues(Part, frozen=True):
 
     method: MethodName
     """The tracking method: chamfer matching, or extremal contours."""
+    stride: int
+    """Every so many frames are tracked; the frames between get no pose."""
+    cameras: tuple[str, ...]
+    """Names of the cameras to track with; all if empty."""
     estimate: EstimationMode
     """How chamfer matching finds the pose of a frame: refined, and searched where that does not suffice; or searched
     alone."""
@@ -279,3 +295,31 @@ class AcquisitionMessage(Message, frozen=True, tag="acquisition"):
     message: str
     """Why there is no result, or empty."""
     result: AcquisitionResult | None
+
+
+class SilhouetteAxes(Part, frozen=True):
+    """The major axes of the silhouettes of people in one view."""
+
+    camera: int
+    people: tuple[tuple[tuple[float, float, float, float], ...], ...]
+    """For each person the successive approximations x0, y0, x1, y1, undistorted px; the last is the axis."""
+
+
+class FindingMessage(Message, frozen=True, tag="finding"):
+    """The search for people whom nobody has placed: its progress, and who was found."""
+
+    running: bool
+    stage: str
+    """The kind of work."""
+    share: float
+    """Share of the work before tracking that is done, 0 to 1."""
+    notes: tuple[str, ...]
+    """Sentences on what was tried, then on who was found and how."""
+    message: str
+    """How the last one ended, or empty."""
+    failed: bool
+    """Whether it ended with an error."""
+    frame: int | None
+    """The frame on which people were found last."""
+    axes: tuple[SilhouetteAxes, ...]
+    """The axes of the silhouettes on that frame, of each view that has some."""

@@ -19,6 +19,8 @@ def _search(controller: Controller, _: int, message: wire.RunSearch) -> None:
             controller.search.run_stage(message.person)
         case "frame":
             controller.search.run(message.person)
+        case "contours":
+            controller.search.fit_contours(message.person)
         case "stop":
             controller.activities.stop()
 

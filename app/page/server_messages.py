@@ -6,7 +6,13 @@ make them, `protocol_docs` writes the page's types and docs/protocol.md from the
 
 from typing import Literal, TypeAlias, Union, get_args
 
-from app.page.inspector_messages import AcquisitionMessage, BodySizesMessage, SettingsMessage, View3dMessage
+from app.page.inspector_messages import (
+    AcquisitionMessage,
+    BodySizesMessage,
+    FindingMessage,
+    SettingsMessage,
+    View3dMessage,
+)
 from app.page.message_types import Message, Part, Status
 from app.page.search_messages import SearchRunsMessage, SearchSetupMessage
 from app.state.comparison import ComparedWork
@@ -374,7 +380,7 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
     ObservabilityMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
-    AcquisitionMessage,
+    AcquisitionMessage, FindingMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -253,9 +253,9 @@ class PageConnection:
             await self._send(message)
 
     async def _send_overlay(self, state: State, view: View) -> None:
-        views = self._evidence(state, view)
-        needs = not view.layers.isdisjoint(_EDGES) or state.search_view.replays_fit
-        if not needs or "contours" not in state.compiled:
+        views, replay = self._evidence(state, view), state.search_view.replay
+        shows_residuals = replay is not None and replay.fitted_from is not None
+        if (view.layers.isdisjoint(_EDGES) and not shows_residuals) or "contours" not in state.compiled:
             views = None
         drawn = (*_drawn(state), view, views is None)
         if drawn == self._sent_overlay:
@@ -268,7 +268,8 @@ class PageConnection:
 
     def _evidence(self, state: State, view: View) -> tuple[ViewEvidence, ...] | None:
         """Return the cached evidence of the shown frame if the page shows any; request it if it is not cached."""
-        if view.layers.isdisjoint(page_view.EVIDENCE) and not state.search_view.replays_fit:
+        replay = state.search_view.replay
+        if view.layers.isdisjoint(page_view.EVIDENCE) and (replay is None or replay.fitted_from is None):
             return None
         frames, views = self._controller.frames, self._controller.frames.cached_evidence(state.frame)
         if views is None and "evidence" in state.compiled:

@@ -4,12 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
 from contextlib import suppress
 
 from tracker.compute.kernel_cache import STAGES, compiled_stages, is_compiled
 
 COMMAND = (sys.executable, "-m", "app.bench.compile_kernels", "--background")
+_POLL_S = 0.02
 
 
 class KernelCompiler:
@@ -37,6 +39,14 @@ class KernelCompiler:
         if self._process is None or self._process.poll() is not None:
             return frozenset(STAGES)
         return compiled_stages()
+
+    def wait_for(self, stage: str) -> None:
+        """Wait until the kernels of a stage are compiled or the process has ended.
+
+        For kernels that the caller would have to compile at once, beside the process that is at it.
+        """
+        while stage not in self.stages:
+            time.sleep(_POLL_S)
 
     def close(self) -> None:
         """End the process and what it has started. The kernels that it has compiled stay in the cache."""

@@ -13,6 +13,7 @@ from app.scene3d.camera_view import CameraView
 from app.scene3d.frusta import Frusta
 from app.scene3d.meshes import PeopleMeshes
 from app.scene3d.throttle import Throttle
+from app.scene3d.voxel_layer import VoxelLayer
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.state import State
@@ -56,6 +57,7 @@ class SceneView:
         controller.subscribe(latest.offer)
         latest.offer(controller.state)
         CameraView(server, controller)
+        VoxelLayer(server, controller)
 
     def _show(self, state: State) -> None:
         due = self._throttle.due(state)

@@ -87,6 +87,7 @@ class ExportRoutes:
         from app.export.export import check_options, export, n_ticks
         from tracker.export.motion import read_motion
         from tracker.formats.file_names import identifier
+        from tracker.formats.model_toml import PRESETS
         from tracker.session.session import load_session
 
         query = request.query
@@ -96,8 +97,12 @@ class ExportRoutes:
         if person is not None and person not in names:
             raise TrackerError(f"expected a person of {', '.join(names)}, found '{person}'; reload the page")
         people = tuple(range(len(names))) if person is None else (names.index(person),)
-        given = {name: query.get(name) for name in OPTIONS if name != "character"}  # the page names no file to read
-        options = check_options(chosen, session, given)
+        character = query.get("character")
+        if character is not None and character.partition(":")[0] not in PRESETS:
+            raise TrackerError(
+                f"expected a character among {', '.join(PRESETS)}, found '{character}'; choose one of them"
+            )
+        options = check_options(chosen, session, {name: query.get(name) for name in OPTIONS})
         frames = None if not query.get("frames") else _frames(query["frames"], session.n_frames)
         motion = read_motion(session, people, frames, query.get("skip_lost") == "1")
         self._total = n_ticks(chosen, motion)

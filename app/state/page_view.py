@@ -24,6 +24,7 @@ Layer = Literal[
     "joints",
     "observability",
     "epipolar",
+    "axes",
 ]
 LAYERS: tuple[Layer, ...] = get_args(Layer)
 """Every layer: pictures, then those that are sent as line segments and joints."""

@@ -1,6 +1,10 @@
 """Progress of long work: tracking, work on ranges of frames, indexing of footage."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+Line = tuple[float, float, float, float]
+"""x0, y0, x1, y1, undistorted px."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,27 @@ class TrackState:
     """How the last run ended."""
     failed: bool = False
     """Whether it ended with an error."""
+
+
+@dataclass(frozen=True)
+class FindState:
+    """The search for people whom nobody has placed: its progress, and how the last one ended."""
+
+    running: bool = False
+    stage: str = ""
+    """The kind of work, as text for the user."""
+    share: float = 0.0
+    """Share of the work that is done, 0 to 1, without tracking."""
+    notes: tuple[str, ...] = ()
+    """Sentences on who was found and how."""
+    message: str = ""
+    """How the last one ended."""
+    failed: bool = False
+    """Whether it ended with an error."""
+    frame: int | None = None
+    """Frame on which people were found; None before."""
+    axes: Mapping[str, tuple[tuple[Line, ...], ...]] = field(default_factory=dict)
+    """By camera, for each person the successive major axes of the silhouette on that frame (GD96 Fig. 5)."""
 
 
 @dataclass(frozen=True)

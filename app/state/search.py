@@ -3,7 +3,6 @@
 from dataclasses import dataclass, field
 
 from tracker.geometry.arrays import Array
-from tracker.pipeline.methods import MethodName
 
 
 @dataclass(frozen=True)
@@ -53,8 +52,8 @@ class ReplayState:
     """Cost of the best poses in each view, px; empty where unknown."""
     evaluations: int
     """Poses scored so far."""
-    method: MethodName = "chamfer"
-    """`contour` for the iterations of a fit."""
+    fitted_from: tuple[Array, ...] | None = None
+    """Of a fit of contours the pose of each person at its start; None for a search."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +81,6 @@ class SearchView:
     """Result of another run, drawn over the stored poses."""
     compared_run: int | None = None
     """Number of that run."""
-
-    @property
-    def replays_fit(self) -> bool:
-        """Whether the iterations of a fit by contours are replayed, with vectors to the image contours."""
-        return self.replay is not None and self.replay.method == "contour"
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,14 +8,14 @@ import numpy as np
 from app.state.comparison import PoseComparison
 from app.state.floor_picking import FloorState
 from app.state.people import AcquisitionState, DragState, HeldPoint, ShownPose, SizeDraft, Visibility
-from app.state.progress import FootageState, RangeState, TrackState
+from app.state.progress import FindState, FootageState, RangeState, TrackState
+from app.state.run_choices import RunChoices
 from app.state.search import CostLandscape, SearchState, SearchView
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import STAGES
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
-from tracker.pipeline.methods import MethodName
 from tracker.tracking.chamfer.settings import TrackSettings
 
 
@@ -55,6 +55,8 @@ class State:
     landscape: CostLandscape | None = None
     """Of the shown pose or one shortly before; None until a page displays it."""
     track: TrackState = field(default_factory=TrackState)
+    finding: FindState = field(default_factory=FindState)
+    """Search for people whom nobody has placed."""
     follow: bool = True
     """Whether each frame is shown as it is tracked."""
     locked: tuple[frozenset[int], ...] = ()
@@ -84,8 +86,8 @@ class State:
     """Index of the camera through which the 3-D view looks; None for a free view."""
     settings: TrackSettings = field(default_factory=TrackSettings)
     """Settings of searches and trackers."""
-    method: MethodName = "chamfer"
-    """The method of the next tracking run."""
+    run_choices: RunChoices = field(default_factory=RunChoices)
+    """Method, frames and cameras of the next tracking run."""
     undo: str | None = None
     """Label of the edit that undo would revert."""
     redo: str | None = None
@@ -194,6 +196,7 @@ class StateChanges(TypedDict, total=False):
     search_view: SearchView
     landscape: CostLandscape | None
     track: TrackState
+    finding: FindState
     follow: bool
     locked: tuple[frozenset[int], ...]
     ranges: RangeState
@@ -211,7 +214,7 @@ class StateChanges(TypedDict, total=False):
     compiled: frozenset[str]
     snapped: int | None
     settings: TrackSettings
-    method: MethodName
+    run_choices: RunChoices
     undo: str | None
     redo: str | None
     saved: bool

@@ -28,6 +28,8 @@ class View3d:
     """Whether the handles that turn bodies and joints in space are drawn."""
     ghost: bool = False
     """Whether the predicted pose of the shown frame is drawn."""
+    voxels: bool = False
+    """Whether the voxels of the shown frame's silhouettes are drawn, in the colours of their parts."""
     trail_points: frozenset[str] = frozenset()
     """Names of the points whose trails are drawn."""
     trail_frames: int = 25

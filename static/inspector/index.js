@@ -5,6 +5,7 @@
  */
 
 import { alt, inArea } from "../widgets/key_matching.js";
+import { findSection } from "./find_section.js";
 import { BodySection } from "./body_section.js";
 import { Inspector } from "./inspector.js";
 import { jointSection } from "./joint_section.js";
@@ -31,6 +32,7 @@ const THEMES = [
 export function mount(context, { panes, posing, scene }) {
   const sections = [
     jointSection(context, posing),
+    findSection(context),
     new BodySection(context),
     trackSection(context),
     searchSection(context),
@@ -39,7 +41,17 @@ export function mount(context, { panes, posing, scene }) {
   const inspector = new Inspector(context.store, sections);
   const bindings = inArea("Inspector", [
     { keys: ["Alt I"], label: "Inspector: body sizes and settings (toggle)", matches: alt("KeyI", false), run: () => inspector.toggle() },
-    ...sections.map(({ id, title, hint }) => ({
+    {
+      keys: [],
+      label: "Find people",
+      words: "start automatically initialize bootstrap first pose acquire track nobody placed",
+      matches: () => false,
+      run: () => {
+        inspector.reveal("find");
+        context.send({ type: "find_people", action: "start" });
+      },
+    },
+    ...sections.filter(({ id }) => id !== "find").map(({ id, title, hint }) => ({
       keys: [],
       label: id === "view" ? "View settings: theme, 3-D view" : title,
       words: `${hint} inspector settings`,

@@ -13,7 +13,7 @@ const THEMES = [
   ["light", "Light"],
 ];
 
-/** @typedef {"bodies" | "cameras" | "images" | "floor" | "gizmos" | "ghost"} Layer */
+/** @typedef {"bodies" | "cameras" | "images" | "floor" | "gizmos" | "ghost" | "voxels"} Layer */
 
 /** @type {{name: Layer, label: string, title: string}[]} */
 const LAYERS = [
@@ -23,6 +23,7 @@ const LAYERS = [
   { name: "floor", label: "Floor grid", title: "Draw a grid on the floor with a line every 50 cm" },
   { name: "gizmos", label: "Gizmos", title: "Draw the handles that move the body and turn the selected joint" },
   { name: "ghost", label: "Predicted pose", title: "Draw in grey the pose that the tracker predicts for this frame from the poses before it" },
+  { name: "voxels", label: "Voxels", title: "Draw the voxels that agree with the silhouettes of the shown frame, in the colours of the parts of the bodies" },
 ];
 
 /**

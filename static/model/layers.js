@@ -94,6 +94,14 @@ export const LAYERS = [
     shown: true,
     opacity: 0.9,
   },
+  {
+    id: "axes",
+    group: "Evidence",
+    label: "Silhouette axes",
+    title: "Major axes of the silhouettes on the frame on which people were found, later approximations lighter (GD96 Fig. 5)",
+    shown: true,
+    opacity: 0.9,
+  },
 ];
 
 /** Layers that are images, in painting order. */

@@ -60,6 +60,9 @@ export class Receiver {
       case "view_3d":
         this.#store.set({ view3d: message });
         break;
+      case "finding":
+        this.#store.set({ finding: message });
+        break;
       case "acquisition":
         this.#store.set({ acquisition: message });
         break;

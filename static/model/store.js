@@ -33,6 +33,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("./protocol.js").View3dMessage | null} view3d what the 3-D view shows
  * @property {import("./protocol.js").BodySizesMessage | null} bodySizes of the active person
  * @property {import("./protocol.js").AcquisitionMessage | null} acquisition of sizes from the footage
+ * @property {import("./protocol.js").FindingMessage | null} finding the search for people whom nobody has placed
  * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
  * @property {import("./protocol.js").SearchRunsMessage | null} searchRuns
  * @property {Map<number, import("./search_runs.js").Steps>} searchSteps recorded steps by run
@@ -89,6 +90,7 @@ export class Store {
     view3d: null,
     bodySizes: null,
     acquisition: null,
+    finding: null,
     searchSetup: null,
     searchRuns: null,
     searchSteps: new Map(),

@@ -47,13 +47,13 @@ export const LINE_STYLES = {
   result: { width: 2, dash: [0.5, 4.5], layer: null, hasOutline: true, ofPerson: true },
   alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: null, hasOutline: true, ofPerson: true },
   new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: null, hasOutline: true, ofPerson: true },
+  residual: { width: 1, dash: [], layer: null, hasOutline: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasOutline: true },
   epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasOutline: true },
   // Outlines would merge thousands of short lines into one area.
   accepted: { width: 1.5, dash: [], layer: "accepted", hasOutline: false },
   floor: { width: 1.25, dash: [], layer: null, hasOutline: true },
   floor_sight: { width: 1.5, dash: [5, 4], layer: null, hasOutline: true },
-  residual: { width: 1.25, dash: [], layer: "contours", hasOutline: false },
   rejected: { width: 1, dash: [], layer: "rejected", hasOutline: false },
 };
 

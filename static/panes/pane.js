@@ -6,6 +6,7 @@ import { decluttered } from "./declutter.js";
 import { ofJoint } from "../model/observability.js";
 import { jointLabel } from "./joint_label.js";
 import { drawObservability } from "./observability_marks.js";
+import { drawAxes } from "./axis_lines.js";
 import { isDimmed, isInSight } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
@@ -194,6 +195,7 @@ export class Pane {
     this.#corner.showPlaceholder(placeholder);
     if (!state || !session || !overlay || placeholder?.pictures) return;
     drawing.drawPaths(context, this.view, overlay, this.#camera, layers, (person) => isDimmed(state, person));
+    drawAxes(context, this.view, this.#store.facts, this.#camera);
     this.#drawJoints(context, state, session.people);
     this.#showJoint(state);
     drawPins(context, this.view, this.#store.facts, this.#camera, width);

@@ -10,7 +10,7 @@ import { PaneShares } from "../layout/pane_shares.js";
 /** Two digits within this time form one number. */
 const SECOND_DIGIT_MS = 700;
 /** Facts that change the marks over the overlay. @type {(keyof import("../model/store.js").Facts)[]} */
-const MARKED = ["hover", "hoverPart", "pinHover", "heldPin", "observability"];
+const MARKED = ["hover", "hoverPart", "pinHover", "heldPin", "observability", "finding"];
 /** Facts that change the pictures. @type {(keyof import("../model/store.js").Facts)[]} */
 const PICTURED = ["shown", "placeholder", "layers", "imageTones"];
 

@@ -18,7 +18,6 @@ const NAMES = {
   alternative: () => "alternative pose",
   result: ({ compared }) => `result of the ${compared?.work}`,
   new_sizes: () => "new body sizes",
-  residual: () => "to the nearest edge",
 };
 
 export class PoseLegend {
@@ -37,8 +36,7 @@ export class PoseLegend {
   #show() {
     const { state, overlay, layers, session } = this.#store.facts;
     if (!state || !overlay) return;
-    const unit = overlay.paths.some(({ kind }) => kind === "residual") ? "iteration" : "step";
-    const replay = state.replay && `Replay of run ${state.replay.run}, ${unit} ${state.replay.step + 1} of ${state.replay.steps}`;
+    const replay = state.replay && `Replay of run ${state.replay.run}, step ${state.replay.step + 1} of ${state.replay.steps}`;
     /** @type {Map<Kind, string>} colours of the kinds that are visible */
     const colors = new Map();
     for (const { kind, color, count } of overlay.paths) {
@@ -50,7 +48,7 @@ export class PoseLegend {
       return color ? [{ kind, color, text: label(state) }] : [];
     });
     if (replay && colors.has("model")) {
-      lines.unshift({ kind: "model", color: session?.people[state.person].color ?? "#fff", text: unit === "step" ? "best pose so far" : "pose of the iteration" });
+      lines.unshift({ kind: "model", color: session?.people[state.person].color ?? "#fff", text: "best pose so far" });
     }
     const texts = [replay, ...(replay && !colors.has("model") ? ["contours are hidden"] : []), replay && "Esc exits"];
     const described = JSON.stringify([texts, lines]);

@@ -66,12 +66,17 @@ export class SearchPanel {
 
   #makeButtons() {
     const { actions, store } = { actions: this.#actions, store: this.#store };
-    const search = (/** @type {"step" | "stage" | "frame" | "stop"} */ action) => () => actions.search(action);
+    const search = (/** @type {"step" | "stage" | "frame" | "contours" | "stop"} */ action) => () => actions.search(action);
     const track = () => (hasTrack(store.facts.state) ? actions.togglePause() : actions.track("forward"));
     return {
       step: makeButton("Step", "Run one expansion of the search (S)", search("step")),
       stage: makeButton("Stage", "Run to the end of the current stage (Shift+S)", search("stage")),
       frame: makeButton("Frame", "Run the whole search of this frame (F)", search("frame")),
+      contours: makeButton(
+        "Contours",
+        "Fit the contours of this frame by Gauss-Newton; each iteration can be replayed",
+        search("contours"),
+      ),
       again: makeButton("Rerun", "Repeat the selected run from its start pose with the current settings (Shift+F)", () =>
         actions.searchAgain(),
       ),
@@ -123,8 +128,8 @@ export class SearchPanel {
     const { state, connected, settings, searchSetup } = this.#store.facts;
     const isReady = connected && !!state;
     const isRunning = !!state?.job.running;
-    const { step, stage, frame, again, track, stop } = this.#buttons;
-    step.disabled = stage.disabled = frame.disabled = !isReady || isRunning;
+    const { step, stage, frame, contours, again, track, stop } = this.#buttons;
+    step.disabled = stage.disabled = frame.disabled = contours.disabled = !isReady || isRunning;
     const run = selectedRun(this.#store.facts);
     again.disabled = !isReady || isRunning || run === null;
     track.disabled = !isReady;

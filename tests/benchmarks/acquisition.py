@@ -109,15 +109,15 @@ def recorded(data: Path, names: Sequence[str]) -> Iterator[Recording]:
 def measure(recording: Recording, folder: Path) -> list[Outcome]:
     """Track, acquire and track again; return the outcome of each person."""
     session, people = folder / recording.name, list(recording.references)
-    _quadrille(
+    quadrille(
         "new", session, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
         recording.background, "--people", *people,
     )  # fmt: skip
     for person, joints in recording.references.items():
-        _quadrille("init", session, "--joints", joints, "--person", person)
+        quadrille("init", session, "--joints", joints, "--person", person)
     before = _tracked(recording, session)
     for person in people:
-        _quadrille("acquire", session, "--person", person)
+        quadrille("acquire", session, "--person", person)
     after = _tracked(recording, session)
     out = []
     for person, model in ((p.name, p.model) for p in load_session(session).people):
@@ -129,10 +129,10 @@ def measure(recording: Recording, folder: Path) -> list[Outcome]:
 
 def _tracked(recording: Recording, session: Path) -> dict[str, Result]:
     """Track all people and evaluate each."""
-    _quadrille("track", session)
+    quadrille("track", session)
     out = {}
     for person, joints in recording.references.items():
-        found = _quadrille("evaluate", session, "--reference", joints, "--person", person)
+        found = quadrille("evaluate", session, "--reference", joints, "--person", person)
         at = load_session(session)
         model = next(p.model for p in at.people if p.name == person)
         stored = read_stored_poses(at.annotations_path, person, model)
@@ -141,7 +141,7 @@ def _tracked(recording: Recording, session: Path) -> dict[str, Result]:
     return out
 
 
-def _quadrille(*words: object) -> dict[str, Any]:
+def quadrille(*words: object) -> dict[str, Any]:
     """Run a command and return what it prints as JSON."""
     command = [str(Path(sys.executable).parent / "quadrille"), *map(str, words)]
     done = subprocess.run(command + ([] if words[0] == "new" else ["--json"]), capture_output=True, text=True)

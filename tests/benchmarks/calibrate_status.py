@@ -1,202 +1,328 @@
-"""Fit and check the weights and thresholds of `tracker/tracking/confidence.py`.
+"""Fit the weights of `tracker/tracking/confidence.py` and measure what its statuses are worth (docs/accuracy.md).
 
-`python tests/benchmarks/calibrate_status.py` makes simulated scenes (people whose shape is not the model's, clutter,
-noise), tracks them with and without the search for lost limbs, fits the logistic function of the evidence to the
-scenes of `FIT`, and prints its weights. It then prints, for thresholds of doubt, how many of the lost frames are
-flagged and how many of the frames called good are lost: on each scene of `FIT` by weights fitted to the other scenes,
-and on the scenes of `CHECK`, which nothing was set by, as the tracker calls them now. A limb is lost when one of its
-joints is off by more than 150 mm. With `--scenes DIR` scenes are kept there and taken up again;
-`--check` leaves the fit out.
+`python tests/benchmarks/calibrate_status.py --data DIR` films simulated people of ten builds, couples and a crowd, with
+clutter and noise. It tracks them with the generic body of the height that their joints give, and with the body acquired
+from one of the recordings: with two to eight cameras, at half the frame rate, without backgrounds, and without the
+search for lost limbs. The weights are fitted to all of that. What they are worth is measured on each body by weights
+fitted to the others, and on the recordings in DIR, to which nothing is fitted.
+
+It prints the weights, to be copied into the code, and writes the tables and docs/images/reliability.svg. `--work DIR`
+keeps scenes, bodies and features there: after a change of the tracker, remove `DIR/rows` and run it again.
 """
 
 import argparse
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import minimize
-from true_starts import read_simulated
+from acquisition import PLAYED, RECORDED, quadrille, recorded
+from status_model import LimbRows, Run, load_rows, save_rows
+from status_tables import write_results
 
+from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
+from tracker.acquisition.from_joints import height_from_joints, place_joints
 from tracker.body.limbs import limbs
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
+from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
+from tracker.fitting.gauss_newton import fit_to_points
+from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
-from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
+from tracker.formats.model_toml import format_model, load_model, parse_model
+from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
+from tracker.session.assemble import DEFAULT_MODEL
+from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
-from tracker.simulate.motion.scenes import cast_of
 from tracker.tracking import confidence
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.confidence import Status
-from tracker.tracking.estimate import PoseEstimate
+from tracker.tracking.estimate import PoseEstimate, TrackedFrame
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
-VGA, SMALL = (640, 480), (320, 240)
+FOUR, TWO, THREE = (0, 1, 2, 3), (0, 1), (0, 1, 2)
+SEVERAL_SEED, SECOND_SEED, RING_SEED = 52, 53, 51
+_N_FRAMES, _RING_FRAMES = 40, 36
+_FIRST = 36
+"""Frames of the recordings that bodies are acquired from."""
+_MIN_GOOD = 6
+"""Fewest good frames for an acquisition; else all that are not lost are used."""
 
 
-class Scene(NamedTuple):
-    """A simulated scene."""
+@dataclass(frozen=True)
+class Scene:
+    """A simulated recording and how it is tracked."""
 
     name: str
-    seed: int
-    cameras: int = 4
-    size: tuple[int, int] = VGA
+    bodies: tuple[str, ...]
+    simulation: Simulation
+    cameras: Mapping[int, tuple[int, ...]]
+    """Indices of the cameras by their number; the first entry is that of all other conditions."""
+
+
+class Footage(NamedTuple):
+    """What is tracked: cameras, number of frames, rate and the true joints of each person."""
+
+    cameras: tuple[CameraSource, ...]
+    n_frames: int
+    fps: float
+    references: tuple[MarkerTable, ...]
+
+
+SECOND = {
+    "child_3": ("dance", 15.0), "heavy_man": ("dance", 15.0), "tall_thin_man": ("exercise", 15.0),
+    "broad_man": ("dance", 25.0), "child_10": ("reach_and_cross", 25.0), "heavy_woman": ("exercise", 15.0),
+    "long_legged_woman": ("dance", 15.0), "short_woman": ("exercise", 25.0), "child_6": ("reach_and_cross", 15.0),
+    "heavy_child": ("dance", 15.0),
+}  # fmt: skip
+"""Scene and frame rate of the second recording of each person."""
+RING = {
+    "heavy_man": ("exercise", 25.0), "child_10": ("dance", 15.0), "short_woman": ("reach_and_cross", 15.0),
+    "broad_man": ("leaving", 25.0),
+}  # fmt: skip
+"""Those of a third recording, with eight cameras around."""
+
+
+def _scenes() -> Iterator[Scene]:
+    """Return all scenes; those that bodies are acquired from come first."""
+    for name, (scene, seed) in PLAYED.items():
+        yield Scene(f"{name}_1", (name,), Simulation(scene, 4, _FIRST, seed, person=name), {4: FOUR, 2: TWO})
+    for scene in ("couple_near", "tango", "couple_touching", "crowd_of_three", "couple_overlapping"):
+        crowd = scene.startswith("crowd")
+        bodies = ("man of a crowd", "woman of a crowd", "man of a crowd 2") if crowd else ("man", "woman")
+        views = {4: FOUR, 2: TWO} if scene in ("couple_near", "tango") else {4: FOUR}
+        yield Scene(scene, bodies, Simulation(scene, 4, _N_FRAMES, SEVERAL_SEED), views)
+    for name, (scene, fps) in SECOND.items():
+        made = Simulation(scene, 4, _N_FRAMES, SECOND_SEED, fps=fps, person=name)
+        yield Scene(f"{name}_2", (name,), made, {4: FOUR, 3: THREE})
+    for name, (scene, fps) in RING.items():
+        made = Simulation(scene, 8, _RING_FRAMES, RING_SEED, fps=fps, person=name)
+        yield Scene(f"{name}_3", (name,), made, {4: (0, 2, 4, 6), 8: tuple(range(8)), 2: (1, 4)})
+
+
+def build_of(body: str) -> str:
+    """Return the name under which a body is left out: people of a crowd have the builds of the couples."""
+    return body.split()[0] if "crowd" in body else body
+
+
+class Pass(NamedTuple):
+    """One way to track a recording."""
+
+    condition: str
+    body: str
+    cameras: tuple[int, ...]
+    stride: int = 1
+    background: bool = True
+    searched: bool = True
 
     @property
-    def of_several(self) -> bool:
-        """Whether it shows more than one person."""
-        return len(cast_of(self.name, self.seed)) > 1
+    def name(self) -> str:
+        """Name for files."""
+        return "_".join([self.body, self.condition or "plain"]).replace(" ", "_")
 
 
-FIT = (
-    *(Scene(n, s) for n, s in (("exercise", 1), ("exercise", 2), ("dance", 1), ("dance", 2), ("dance", 3))),
-    *(Scene(n, s) for n, s in (("leaving", 1), ("leaving", 2), ("reach_and_cross", 1), ("reach_and_cross", 3))),
-    Scene("couple_near", 1), Scene("couple_touching", 2), Scene("couple_overlapping", 3), Scene("tango", 4),
-)  # fmt: skip
-CHECK = (
-    *(Scene(n, s) for n in ("exercise", "dance", "leaving", "reach_and_cross") for s in (11, 12, 31)),
-    Scene("dance", 13, 3, SMALL), Scene("exercise", 13, 6, SMALL),
-    Scene("couple_overlapping", 41), Scene("couple_touching", 42), Scene("tango", 44),
-)  # fmt: skip
-LOST_M = 0.15
-UNSEARCHED_WEIGHT = 0.3
-"""What a frame counts that was tracked without search: more is lost there, but not as it is lost with search."""
-RIDGE = 3e-3
-THRESHOLDS = (-4.0, -3.5, -3.0, -2.5, -2.0, -1.0, 0.0)
+def passes(cameras: Mapping[int, tuple[int, ...]]) -> Iterator[Pass]:
+    """List the ways to track a simulated recording."""
+    main, *rest = cameras.items()
+    for body in ("generic", "acquired"):
+        yield Pass("", body, main[1])
+        for n, indices in rest:
+            yield Pass(f"{n} cameras", body, indices)
+        yield Pass("half the frame rate", body, main[1], stride=2)
+        yield Pass("no backgrounds", body, main[1], background=False)
+    yield Pass("no search", "generic", main[1], searched=False)
 
 
-class Limbs:
-    """What is known of the limbs of all frames of a scene, one row each."""
-
-    def __init__(self) -> None:
-        self.evidence: list[Array] = []
-        self.lost: list[bool] = []
-        self.searched: list[bool] = []
-        self.frames: list[tuple[int, int]] = []  # person and frame
-        self.statuses: list[Status] = []
-
-    def add(self, scene: Path, settings: TrackSettings) -> None:
-        """Track a scene and note what there is to know of each limb."""
-        session, models, truths, starts = read_simulated(scene)
-        limb_joints = [t.points[:, [t.names.index(n) for n in LIMB_JOINTS]] for t in truths]
-        with Recording(session.cameras) as recording:
-            observer, frames = Observer(session.cameras, recording), range(session.n_frames)
-            subjects = Subjects.of(models, keyframes={0: dict(enumerate(starts))})
-            for found in ChamferTracker(settings).estimates(TrackingRun(observer, subjects, starts, frames)):
-                for person, (model, joints) in enumerate(zip(models, limb_joints, strict=True)):
-                    self._add_person(person, model, joints[found.frame], found, settings.recover is not None)
-
-    def _add_person(self, person: int, model: BodyModel, truth: Array, found: PoseEstimate, searched: bool) -> None:
-        """Note what there is to know of the limbs of a person, whose true limb joints are (12, 3), on a frame."""
-        quality = found.qualities[person]
-        if quality is None:
-            return
-        joints = model.points_world(found.poses[person])[[model.point_names.index(n) for n in LIMB_JOINTS]]
-        off = np.linalg.norm(joints - truth, axis=-1) > LOST_M
-        for limb in quality.limbs:
-            of_limb = _joints(model, limb.name)
-            if of_limb.any():
-                self.evidence.append(confidence.features(quality, limb))
-                self.lost.append(bool(off[of_limb].any()))
-                self.searched.append(searched)
-                self.frames.append((person, found.frame))
-                self.statuses.append(found.statuses[person])
+def track(footage: Footage, models: Sequence[BodyModel], how: Pass) -> tuple[LimbRows, list[PoseEstimate]]:
+    """Track all people from their joints in frame 0; return the rows, and the estimates of the first pass."""
+    starts = [_start_of(m, t) for m, t in zip(models, footage.references, strict=True)]
+    cameras = [footage.cameras[i] for i in how.cameras]
+    cameras = cameras if how.background else [replace(c, background=None, masks=None) for c in cameras]
+    settings = TrackSettings() if how.searched else replace(TrackSettings(), recover=None, backward_pass=False)
+    rows = _RowList(models, footage.references)
+    with Recording(cameras) as recording:
+        subjects = Subjects.of(models, keyframes={0: dict(enumerate(starts))})
+        frames = range(0, footage.n_frames, how.stride)
+        run = TrackingRun(Observer(cameras, recording), subjects, starts, frames, footage.fps / how.stride)
+        tracker = ChamferTracker(settings)
+        found = list(tracker.estimates(run))
+        for estimate in found:
+            rows.add(estimate, range(len(models)))
+        for step in tracker.backward_pass(run, [TrackedFrame.of(f) for f in found]):
+            for better in step.better:
+                rows.replace(better, step.person)
+    return rows.collected(), found
 
 
-def _joints(model: BodyModel, limb: str) -> NDArray[np.bool_]:
-    """Which of the limb joints belong to a limb."""
+class _RowList:
+    """Rows of the limbs of a run while it is tracked."""
+
+    def __init__(self, models: Sequence[BodyModel], references: Sequence[MarkerTable]) -> None:
+        self._models = models
+        self._joints = [dict(zip(t.frames.tolist(), t.points, strict=True)) for t in references]
+        self._names = [list(t.names) for t in references]
+        self._rows: list[tuple] = []
+
+    def add(self, found: PoseEstimate, people: Sequence[int]) -> None:
+        """Add the limbs of some people."""
+        for person in people:
+            quality = found.qualities[person]
+            if quality is None or found.frame not in self._joints[person]:
+                continue
+            model = self._models[person]
+            errors = self._errors_mm(person, found.frame, found.poses[person])
+            worst = np.nanmax([errors.get(n, np.nan) for n in LIMB_JOINTS])
+            for limb in quality.limbs:
+                own = [errors[n] for n in _joints_of(model, limb.name) if n in errors]
+                self._rows.append((
+                    confidence.features(quality, limb), max(own, default=np.nan), worst, person, found.frame, False,
+                    quality.is_unseen, bool(found.alternatives[person]),
+                ))  # fmt: skip
+
+    def replace(self, better: PoseEstimate, person: int) -> None:
+        """Mark the rows of a person on a frame as replaced, and add those of a better pose."""
+        same = (person, better.frame)
+        self._rows = [(*r[:5], True, *r[6:]) if (r[3], r[4]) == same else r for r in self._rows]
+        self.add(better, [person])
+
+    def collected(self) -> LimbRows:
+        """Return all rows."""
+        columns = list(zip(*self._rows, strict=True))
+        return LimbRows(*(np.array(c) for c in columns))
+
+    def _errors_mm(self, person: int, frame: int, pose: Array) -> dict[str, float]:
+        """Return the error of each known joint."""
+        model = self._models[person]
+        estimate = dict(zip(model.point_names, model.joint_centers_world(pose), strict=True))
+        truth = dict(zip(self._names[person], self._joints[person][frame], strict=True))
+        known = [n for n in JOINTS if n in estimate and n in truth and np.all(np.isfinite(truth[n]))]
+        return {n: 1000 * float(np.linalg.norm(estimate[n] - truth[n])) for n in known}
+
+
+def _joints_of(model: BodyModel, limb: str) -> list[str]:
+    """Return the joints that tell whether a limb is off: those on its parts; neck and head for the head."""
     parts = next(x.parts for x in limbs(model) if x.name == limb)
-    return np.isin([model.point_parts[model.point_names.index(n)] for n in LIMB_JOINTS], parts)
+    if limb == "head":
+        return ["neck", "head"]
+    return [n for n in LIMB_JOINTS if model.point_parts[model.point_names.index(n)] in parts]
 
 
-def fitted(scenes: Sequence[Limbs]) -> Array:
-    """Weights of the evidence and, last, the constant, by ridge regression on standardized evidence."""
-    X = np.concatenate([np.array(s.evidence) for s in scenes])
-    y = np.concatenate([np.array(s.lost, dtype=float) for s in scenes])
-    w = np.concatenate([np.where(s.searched, 1.0, UNSEARCHED_WEIGHT) for s in scenes])
-    middle, spread = X.mean(axis=0), X.std(axis=0) + 1e-9
-    Z = np.column_stack([(X - middle) / spread, np.ones(len(X))])
-
-    def loss(b: Array) -> tuple[float, Array]:
-        odds = Z @ b
-        ridge = np.append(b[:-1], 0.0)
-        value = np.average(np.logaddexp(0, odds) - y * odds, weights=w) + RIDGE * ridge @ ridge
-        return float(value), Z.T @ (w * (1 / (1 + np.exp(-odds)) - y)) / w.sum() + 2 * RIDGE * ridge
-
-    b = minimize(loss, np.zeros(Z.shape[1]), jac=True).x
-    return np.append(b[:-1] / spread, b[-1] - np.sum(b[:-1] * middle / spread))
+def _start_of(model: BodyModel, reference: MarkerTable) -> Array:
+    return fit_to_points(model, _joints_at_start(reference), centers=True).pose
 
 
-def by_frame(scene: Limbs, values: NDArray[Any], merge: Callable[[NDArray[Any]], Any]) -> NDArray[Any]:
-    """One figure for each person and frame that was tracked as the tracker does, from one for each of their limbs."""
-    frames, searched = np.array(scene.frames), np.array(scene.searched)
-    each = np.unique(frames[searched], axis=0)
-    return np.array([merge(values[(frames == k).all(axis=1) & searched]) for k in each])
+def _joints_at_start(reference: MarkerTable) -> dict[str, Array]:
+    row = reference.points[np.flatnonzero(reference.frames == 0)[0]]
+    return {n: p for n, p in zip(reference.names, row, strict=True) if n in LIMB_JOINTS and np.all(np.isfinite(p))}
 
 
-def share(of: NDArray[np.bool_]) -> float:
-    """Share of what holds; 0 of nothing."""
-    return float(of.mean()) if len(of) else 0.0
+def acquire(footage: Footage, models: Sequence[BodyModel], found: Sequence[PoseEstimate], person: int) -> BodyModel:
+    """Acquire a body as `quadrille acquire` does after `track`: from good frames, and the joints of frame 0."""
+    good = [f for f in found if f.frame == 0 or f.statuses[person] == "good"]
+    if len(good) < _MIN_GOOD:
+        good = [f for f in found if f.frame == 0 or f.statuses[person] != "lost"]
+    people = [person, *(i for i in range(len(models)) if i != person)]
+    bodies = {f.frame: tuple(PosedBody(models[i], f.poses[i]) for i in people) for f in good}
+    placed = {0: place_joints(models[person], _joints_at_start(footage.references[person]))}
+    with Recording(footage.cameras) as recording:
+        observer = Observer(footage.cameras, recording)
+        return acquire_from_contours(observer, bodies, 0, placed, AcquisitionSettings()).body
 
 
-def report(flags: NDArray[np.bool_], lost: NDArray[np.bool_]) -> str:
-    """What flags are worth."""
-    return (
-        f"{share(flags[lost]):.0%} of {lost.sum()} lost frames flagged, {share(lost[~flags]):.1%} of the others lost, "
-        f"{share(~flags[~lost]):.0%} of the found frames called good"
-    )
+class Workshop:
+    """Tracks recordings and keeps what is found in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        """Make the folder."""
+        self._rows, self._bodies = folder / "rows", folder / "bodies"
+        for path in (self._rows, self._bodies):
+            path.mkdir(parents=True, exist_ok=True)
+
+    def runs(
+        self, name: str, bodies: Sequence[str], footage: Footage, cameras: Mapping[int, tuple[int, ...]],
+        ways: Sequence[Pass],
+    ) -> Iterator[Run]:  # fmt: skip
+        """Track a recording in several ways.
+
+        Args:
+            name: of the recording.
+            bodies: name of each person's body; a body that is not there yet is acquired.
+            footage: the recording.
+            cameras: the first entry acquires bodies.
+            ways: how it is tracked.
+        """
+        generic = load_model(DEFAULT_MODEL)
+        models = {"generic": [generic.with_height(height_from_joints(generic, t)) for t in footage.references]}
+        main = footage._replace(cameras=tuple(footage.cameras[i] for i in next(iter(cameras.values()))))
+        models["acquired"] = list(self._acquired(bodies, main, models["generic"]))
+        for how in ways:
+            path = self._rows / f"{name}_{how.name}.npz"
+            if not path.exists():
+                save_rows(path, track(footage, models[how.body], how)[0])
+                print(f"tracked {path.stem}", flush=True)
+            builds = tuple(map(build_of, bodies))
+            yield Run(name, builds, how.condition, how.body, how.searched, load_rows(path))
+
+    def _acquired(self, bodies: Sequence[str], main: Footage, generic: Sequence[BodyModel]) -> Iterator[BodyModel]:
+        """Return the acquired bodies."""
+        found: list[PoseEstimate] = []
+        for person, body in enumerate(bodies):
+            path = self._bodies / f"{body.replace(' ', '_')}.toml"
+            if not path.exists():
+                found = found or track(main, generic, Pass("", "generic", tuple(range(len(main.cameras)))))[1]
+                path.write_text(format_model(acquire(main, generic, found, person)), "utf-8")
+                print(f"acquired {body}", flush=True)
+            yield parse_model(path.read_text("utf-8"), path.stem)
+
+
+def simulated_runs(folder: Path, workshop: Workshop) -> Iterator[Run]:
+    """Track the simulated recordings, and make those that are not there."""
+    for scene in _scenes():
+        at = folder / scene.name
+        if not at.exists():
+            simulate(at, scene.simulation)
+        session = load_session(at)
+        names = ["truth.trc"] if len(session.people) == 1 else [f"truth_{p.name}.trc" for p in session.people]
+        truths = tuple(read_joints(at / name, session.fps) for name in names)
+        footage = Footage(session.cameras, session.n_frames, session.fps, truths)
+        yield from workshop.runs(scene.name, scene.bodies, footage, scene.cameras, [*passes(scene.cameras)])
+
+
+def recorded_runs(data: Path, folder: Path, workshop: Workshop) -> Iterator[Run]:
+    """Track the recordings of a folder."""
+    for recording in recorded(data, [*RECORDED]):
+        at = folder / recording.name
+        if not at.exists():
+            quadrille(
+                "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
+                recording.background,
+            )  # fmt: skip
+        session = load_session(at)
+        truths = tuple(read_joints(path, session.fps) for path in recording.references.values())
+        footage = Footage(session.cameras, session.n_frames, session.fps, truths)
+        bodies = [f"{recording.name} {person}" for person in recording.references]
+        ways = [Pass("", body, FOUR) for body in ("generic", "acquired")]
+        for run in workshop.runs(recording.name, bodies, footage, {4: FOUR}, ways):
+            yield run._replace(bodies=tuple(bodies))
 
 
 def main() -> None:
-    """Fit, check and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=Path, help="folder where simulated scenes are kept")
-    parser.add_argument("--frames", type=int, default=90, help="frames of a scene that is made")
-    parser.add_argument("--check", action="store_true", help="fit nothing: only check, in a third of the time")
+    """Track, fit, print and write."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
+    parser.add_argument("--work", type=Path, help="folder that keeps scenes, bodies and features")
     words = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        folder = words.scenes or Path(name)
-        tracked = {}
-        for spec in CHECK if words.check else FIT + CHECK:
-            path = folder / f"{spec.name}_{spec.seed}"
-            if not path.exists():
-                # Two people are two persons' frames, and take longer.
-                n_frames = words.frames // 2 if spec.of_several else words.frames
-                simulate(path, Simulation(spec.name, spec.cameras, n_frames, spec.seed, spec.size))
-            tracked[spec] = limbs = Limbs()
-            limbs.add(path, TrackSettings())
-            if spec in FIT:
-                limbs.add(path, replace(TrackSettings(), recover=None))
-            print(f"{spec.name} {spec.seed}: {sum(limbs.lost)} limbs of {len(limbs.lost)} lost", flush=True)
-    if not words.check:
-        _tell_fit([tracked[s] for s in FIT])
-    _tell_check(tracked)
-
-
-def _tell_fit(fit: Sequence[Limbs]) -> None:
-    """Print the weights fitted to scenes, and what they are worth on each by those of the others."""
-    print("weights:", np.round(fitted(fit), 3).tolist())
-    weights = [fitted(fit[:i] + fit[i + 1 :]) for i in range(len(fit))]
-    odds = [by_frame(x, np.array(x.evidence) @ w[:-1] + w[-1], np.max) for x, w in zip(fit, weights, strict=True)]
-    lost = np.concatenate([by_frame(x, np.array(x.lost), np.any) for x in fit])
-    for threshold in THRESHOLDS:
-        print(f"left out one by one, doubt from {threshold}:", report(np.concatenate(odds) > threshold, lost))
-
-
-def _tell_check(tracked: Mapping[Scene, Limbs]) -> None:
-    """Print how the tracker calls frames of scenes that nothing was set by."""
-    for size, of_several in ((VGA, False), (SMALL, False), (VGA, True)):
-        check = [tracked[s] for s in CHECK if s.size == size and s.of_several == of_several]
-        flags = np.concatenate([by_frame(x, np.array([s != "good" for s in x.statuses]), np.any) for x in check])
-        lost = np.concatenate([by_frame(x, np.array(x.lost), np.any) for x in check])
-        whose = "two people" if of_several else "one person"
-        print(f"as called, on other scenes, {whose}, {size[0]}x{size[1]}:", report(flags, lost))
+        work = words.work or Path(name)
+        workshop = Workshop(work)
+        runs = [*simulated_runs(work / "scenes", workshop)]
+        outside = [*recorded_runs(words.data, work / "sessions", workshop)] if words.data else []
+    write_results(runs, outside)
 
 
 if __name__ == "__main__":

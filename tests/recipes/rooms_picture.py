@@ -36,7 +36,7 @@ HOUSE = {
         ["pipeline", "export"],
         ["simulate", "evaluation", "posing"],
         ["acquisition", "initialization"],
-        ["tracking/chamfer, tracking/contour"],
+        ["tracking/chamfer, tracking/contour, tracking/voxel"],
         ["tracking/estimation"],
         ["tracking"],
         ["search", "appearance", "fitting", "voxels"],

@@ -27,6 +27,7 @@ ROOMS = [
     "tracker.tracking.estimation",
     "tracker.tracking.chamfer",
     "tracker.tracking.contour",
+    "tracker.tracking.voxel",
     "tracker.acquisition",
     "tracker.initialization",
     "tracker.posing",

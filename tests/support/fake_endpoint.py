@@ -74,14 +74,17 @@ PLOTS = {
     "torso": [("Angles", "deg", ANGLES[:3]), ("Position", "cm", ("x", "y", "z"))],
     "cost": [("Cost", "px", ("mean", *CAMERA_NAMES))],
 }
-TRACK = {"estimate": "refine", "order": 1, "past_poses": 3, "recover": True, "backward_pass": True, "smooth": True}
+TRACK = {
+    "method": "chamfer", "stride": 1, "cameras": [], "estimate": "refine", "order": 1, "past_poses": 3, "recover": True,
+    "backward_pass": True, "smooth": True,
+}  # fmt: skip
 SEARCH = {
     "theta_px": None, "outliers": "truncated", "passes": [1.0, 0.5], "patience": 3, "max_expansions": 60,
     "limbs_apart": False, "bound_rad": 0.2618, "bound_m": 0.1, "step_rad": 0.0873, "step_m": 0.05,
 }  # fmt: skip
 VIEW_3D = {
     "bodies": True, "colors": "parts", "opacity": 1.0, "cameras": True, "images": True, "floor": True, "gizmos": True,
-    "ghost": False, "trail_points": [], "trail_frames": 25,
+    "ghost": False, "voxels": False, "trail_points": [], "trail_frames": 25,
 }  # fmt: skip
 BODY_SIZES = {
     "type": "body_sizes", "person": 0, "height_m": 1.7, "sides_alike": True, "edited": False, "has_former": False,

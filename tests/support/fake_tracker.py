@@ -56,7 +56,7 @@ class FakeTracker:
             status = "doubtful" if frame == 4 else "lost" if frame % 7 == 0 else "good"
             remark = "left arm relocated" if frame == 4 else ""
             self.seen.append(frame)
-            view_costs_px = np.array([1.0, np.nan, 2.0, 3.0])
+            view_costs_px = np.array([1.0, np.nan, 2.0, 3.0])[: len(run.observer.cameras)]
             part_costs_px = np.array([0.5] * (N_PARTS - 1) + [np.nan])
             n = len(models)
             self.last[frame] = PoseEstimate(

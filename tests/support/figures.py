@@ -1,7 +1,11 @@
 """A figure of voxels with known joints, unlike any body model of the program."""
 
 import numpy as np
+from staging import camera_at
 
+from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.initialization.candidates import PersonScene
+from tracker.voxels.figure_masks import figure_masks, paint
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -27,7 +31,7 @@ def joints_of(arms_deg=35.0, legs_deg=12.0, turn_deg=0.0):
 def figure(size_m=0.025, noise=0.0, **pose):
     """Voxels of such a person, and the true joints. `noise` is the share of surface voxels that are missing."""
     joints, R = joints_of(**pose)
-    grid = VoxelGrid.over(np.array([-0.9, -0.9, -0.05]), np.array([0.9, 0.9, 1.85]), size_m)
+    grid = VoxelGrid.over(np.array([-0.9, -0.9, -0.05]), np.array([0.9, 0.9, 2.25]), size_m)
     points = grid.centers(np.argwhere(np.ones(grid.shape, bool)))
     trunk = (points - (0, 0, 1.16)) @ R
     inside = np.linalg.norm((points - joints["head"]) / (0.09, 0.09, 0.125), axis=1) <= 1
@@ -52,3 +56,25 @@ def _capsule(points, a, b, radius):
     axis = b - a
     along = np.clip((points - a) @ axis / (axis @ axis), 0, 1)
     return np.linalg.norm(points - a - along[:, None] * axis, axis=1) <= radius
+
+
+def silhouettes_of_figure(voxels, cameras):
+    """Silhouettes of a figure, as masks."""
+    found = []
+    for camera in cameras:
+        empty = ViewSilhouette(np.zeros((camera.height, camera.width), bool), camera, 1.0, "mask")
+        surface = voxels.grid.centers(voxels.indices[voxels.is_surface])
+        found.append(empty._replace(mask=paint(surface, voxels.grid.size_m, empty)))
+    return found
+
+
+def cameras_about_a_figure(n=4):
+    """Cameras on a circle about a standing person, none opposite another."""
+    turns = 2.0 * np.arange(n) * np.pi / n + 0.2 * np.arange(n)
+    places = [(4.0 * np.cos(t), 4.0 * np.sin(t), 1.3) for t in turns]
+    return [camera_at(f"c{i}", place, (0.0, 0.0, 0.9), focal=560.0) for i, place in enumerate(places)]
+
+
+def scene_of(voxels, silhouettes, motion=None):
+    """What is known of a figure that is alone."""
+    return PersonScene(voxels, silhouettes, figure_masks(silhouettes, voxels), UP, motion)

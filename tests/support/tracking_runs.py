@@ -1,4 +1,4 @@
-"""Run a tracker on staged evidence: the chamfer tracker, or that of the given settings."""
+"""Run trackers on staged evidence, the chamfer tracker by default."""
 
 from tracker.pipeline.methods import make_tracker
 from tracker.tracking.chamfer.settings import TrackSettings

@@ -55,12 +55,15 @@ class _Ahead(NamedTuple):
 class Observer:
     """Computes evidence from the frames of a recording. Thread-safe."""
 
-    def __init__(self, cameras: Sequence[CameraSource], recording: Recording) -> None:
+    def __init__(
+        self, cameras: Sequence[CameraSource], recording: Recording, in_recording: Sequence[int] | None = None
+    ) -> None:
         """Read the backgrounds.
 
         Args:
             cameras: the views, with their side files.
             recording: their footage.
+            in_recording: index of each view in the recording, if it has others too.
 
         Raises:
             RecordingError: a background is missing, unreadable or of the wrong size.
@@ -68,6 +71,7 @@ class Observer:
         self.cameras = tuple(cameras)
         self.recording = recording
         """Footage of the views."""
+        self._in_recording = in_recording
         # OpenCV's own threads would compete with the threads of other views.
         self._pool, self._pool_ahead = (
             ThreadPoolExecutor(_WORKERS, name, initializer=cv2.setNumThreads, initargs=(1,))
@@ -77,6 +81,11 @@ class Observer:
         self._reader, self._finder = (ThreadPoolExecutor(1, name) for name in ("read ahead", "find ahead"))
         self._ahead: OrderedDict[int, _Ahead] = OrderedDict()
         self._lock = threading.Lock()
+
+    def with_cameras(self, chosen: Sequence[int]) -> "Observer":
+        """Return an observer of some of the views, by their indices, of the same footage."""
+        known = range(len(self.cameras)) if self._in_recording is None else self._in_recording
+        return Observer([self.cameras[i] for i in chosen], self.recording, [known[i] for i in chosen])
 
     @property
     def working_cameras(self) -> tuple[Camera, ...]:
@@ -166,7 +175,8 @@ class Observer:
         )  # fmt: skip
 
     def _prepare(self, k: int) -> list[Prepared | None]:
-        frames = self.recording.read(k)
+        chosen = self._in_recording
+        frames = self.recording.read(k) if chosen is None else self.recording.read(k, chosen)
         return [None if f is None else view.prepare(f, k) for view, f in zip(self._views, frames, strict=True)]
 
     def _find_ahead(

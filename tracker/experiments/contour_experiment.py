@@ -9,7 +9,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.experiments.contour_run import RunResult, Scene, track_scene
-from tracker.experiments.convergence import Convergence, measure_convergence
+from tracker.experiments.convergence import Convergence, RoughStep, fit_rough_guess, measure_convergence
 from tracker.experiments.smooth_motion import smooth_motion
 from tracker.experiments.staged_views import ModelActor, SkinActor
 from tracker.formats.model_toml import load_model
@@ -18,6 +18,7 @@ from tracker.simulate.people.outfit import Outfit
 from tracker.simulate.people.skeleton import altered_model
 from tracker.simulate.people.skin import make_skin
 from tracker.simulate.stage.camera_rig import make_cameras
+from tracker.tracking.contour.paper import paper_settings
 from tracker.tracking.tracker import TrackerSettings
 
 ActorKind = Literal["own shape", "skinned person"]
@@ -28,6 +29,10 @@ _SKELETON = "gavrila22"
 _HEIGHT_M = 1.75
 _SIZE = (640, 480)
 FPS = 30.0
+_PAPER_RUNS = {"contour, paper": True, "contour, paper, no sliding": False}
+"""Main runs in the paper's mode, and whether the sliding term is part of the Jacobian."""
+N_PAPER_RUNS = len(_PAPER_RUNS) + 1
+"""Number of runs besides those of the methods that are compared."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +84,12 @@ class ExperimentResult(NamedTuple):
     """True poses of the main run, (n_frames, n_values)."""
     runs: Sequence[Comparison]
     """All runs, for each actor, method and number of cameras."""
+    paper: Mapping[str, RunResult]
+    """The main run in the paper's mode, by what the report calls it: with and without the sliding term."""
     convergence: Sequence[Convergence]
-    """Fits of single frames with and without the sliding term, on the main run's scene."""
+    """Fits with and without the sliding term, on the main run's scene."""
+    rough: tuple[Sequence[RoughStep], Sequence[RoughStep]]
+    """Steps from a rough guess on its first frame, see `fit_rough_guess`."""
 
     def main(self, method: str) -> RunResult:
         """Return the main run of a method: the model's own shape, with the paper's number of cameras."""
@@ -111,13 +120,18 @@ def run_contour_experiment(
         scene = make_scene(experiment, actor, n)
         runs.append(Comparison(actor, n, name, track_scene(scene, methods[name], experiment.seed)))
         if progress is not None:
-            progress(len(runs), len(wanted) + 1)
-    convergence = measure_convergence(make_scene(experiment, "own shape", experiment.n_cameras), experiment.seed)
+            progress(len(runs), len(wanted) + N_PAPER_RUNS)
+    scene, paper = make_scene(experiment, "own shape", experiment.n_cameras), dict[str, RunResult]()
+    for name, sliding in _PAPER_RUNS.items():
+        paper[name] = track_scene(scene, paper_settings("edges", sliding), experiment.seed)
+        if progress is not None:
+            progress(len(wanted) + len(paper), len(wanted) + N_PAPER_RUNS)
+    convergence, rough = measure_convergence(scene, experiment.seed), fit_rough_guess(scene, experiment.seed)
     if progress is not None:
-        progress(len(wanted) + 1, len(wanted) + 1)
+        progress(len(wanted) + N_PAPER_RUNS, len(wanted) + N_PAPER_RUNS)
     models = {actor: load_model(_BODIES[actor], _HEIGHT_M) for actor in ACTORS}
     truth = _truth(experiment, models["own shape"])
-    return ExperimentResult(experiment, models, truth, runs, convergence)
+    return ExperimentResult(experiment, models, truth, runs, paper, convergence, rough)
 
 
 def make_scene(experiment: ContourExperiment, actor: ActorKind, n_cameras: int) -> Scene:

@@ -1,42 +1,38 @@
-"""Convergence of single frames: the paper's minimization with and without the sliding term (KRH08 Fig. 13)."""
+"""Convergence of the paper's minimization: with and without the sliding term (KRH08 Fig. 13), and from a rough guess by
+incremental pose estimation (Fig. 9)."""
 
-from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.model import BodyModel, PosedBody
-from tracker.evidence.view_evidence import ViewEvidence
-from tracker.experiments.contour_run import Scene, contour_rms_px
+from tracker.body.model import PosedBody
+from tracker.experiments.contour_run import Scene
 from tracker.experiments.staged_views import StagedObserver
-from tracker.fitting.contour_residuals import ContourResiduals, paper_match
-from tracker.fitting.gauss_newton import ResidualBlock
-from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.geometry.arrays import Array
-from tracker.tracking.contour.frame_estimator import NO_LIMIT_PX
-from tracker.tracking.contour.image_contours import with_unlimited_distances
-from tracker.tracking.contour.settings import ContourSettings
-from tracker.tracking.estimation.settings import TOLERANCE, prior_blocks
+from tracker.tracking.contour.paper import paper_settings
+from tracker.tracking.contour.paper_fit import (
+    FitIteration,
+    fit_by_iterations,
+    fit_incrementally,
+    paper_residuals,
+    unlimited_views,
+)
 
-Kind = Literal["with sliding", "without sliding", "contour tracker"]
-KINDS: tuple[Kind, ...] = ("with sliding", "without sliding", "contour tracker")
-"""The paper's minimization, with and without the sliding term; and the residuals and priors of the contour tracker."""
 MAX_ITERATIONS = 15
 MIN_GAIN = 0.01
-"""Relative decrease of the RMS distance below which an iteration is the last."""
-ENOUGH_PX = 0.7
-"""RMS distance that a fit should reach in 5 iterations, px."""
+"""Relative decrease of the RMS distance below which an iteration is the last that counts."""
 _EVERY = 5
 """Every so many frames is fitted."""
 BACK = (1, 4)
 """Numbers of frames by which a start pose lies in the past."""
+ROUGH_RAD, ROUGH_M = float(np.radians(15)), 0.1
+"""Errors of the rough guess: standard deviation of each angle and of each coordinate of the root, rad and metres."""
 
 
-class ContourFit(NamedTuple):
+class TracedFit(NamedTuple):
     """A fit of one frame."""
 
-    pose: Array
-    """(n_values,)."""
     rms_px: tuple[float, ...]
     """RMS distance of the contours before the first iteration and after each one, px."""
 
@@ -51,67 +47,82 @@ class Convergence(NamedTuple):
 
     back: int
     """Number of frames between the start pose and the frame that is fitted."""
-    kind: Kind
-    fits: tuple[ContourFit, ...]
+    sliding: bool
+    fits: tuple[TracedFit, ...]
 
     @property
     def mean_rms_px(self) -> Array:
         """Mean RMS distance after each iteration, (MAX_ITERATIONS + 1,), px; a fit that has ended keeps its last."""
-        return np.asarray(np.mean(self._padded, axis=0))
+        padded = [[*f.rms_px, *[f.rms_px[-1]] * (MAX_ITERATIONS + 1 - len(f.rms_px))] for f in self.fits]
+        return np.asarray(np.mean(padded, axis=0))
 
     @property
     def mean_iterations(self) -> float:
         """Mean number of iterations."""
         return float(np.mean([f.iterations for f in self.fits]))
 
-    def share_within(self, iterations: int) -> float:
-        """Return the share of the fits that are at `ENOUGH_PX` or nearer after some iterations, 0 to 1."""
-        return float(np.mean(self._padded[:, iterations] <= ENOUGH_PX))
 
-    @property
-    def _padded(self) -> Array:
-        return np.array([[*f.rms_px, *[f.rms_px[-1]] * (MAX_ITERATIONS + 1 - len(f.rms_px))] for f in self.fits])
+class RoughStep(NamedTuple):
+    """A step of the incremental fit of a rough guess."""
+
+    name: str
+    """What moved."""
+    rms_px: float
+    """RMS distance of the contours after it, px."""
+    off_m: float
+    """Mean distance of the body's points from the true ones after it, metres."""
 
 
 def measure_convergence(scene: Scene, seed: int = 0) -> tuple[Convergence, ...]:
-    """Fit every fifth frame of a scene from true poses of earlier frames.
+    """Fit every fifth frame of a scene from true poses of earlier frames, with and without the sliding term.
 
     Args:
         scene: of a body of elliptical cones.
         seed: of the noise.
     """
     observer = StagedObserver(scene.actor, scene.truth, scene.cameras, scene.noise_px, seed)
-    found: dict[tuple[int, Kind], list[ContourFit]] = {(back, kind): [] for back in BACK for kind in KINDS}
+    found: dict[tuple[int, bool], list[TracedFit]] = {(back, on): [] for back in BACK for on in (True, False)}
     for k in range(min(max(BACK), len(scene.truth) - 1), len(scene.truth), _EVERY):
-        views = observer.evidence(k)
-        for back, kind in found:
-            found[back, kind].append(fit_contours(scene.model, scene.truth[max(k - back, 0)], views, kind))
-    return tuple(Convergence(back, kind, tuple(fits)) for (back, kind), fits in found.items())
+        for back, sliding in found:
+            settings, start = paper_settings("edges", sliding), scene.truth[max(k - back, 0)]
+            unlimited = unlimited_views(observer.evidence(k), settings)
+            residuals = paper_residuals(unlimited, [PosedBody(scene.model, start)], 0, settings)
+            found[back, sliding].append(_traced([*fit_by_iterations(scene.model, start, residuals, MAX_ITERATIONS)]))
+    return tuple(Convergence(back, sliding, tuple(fits)) for (back, sliding), fits in found.items())
 
 
-def fit_contours(model: BodyModel, start: Array, views: Sequence[ViewEvidence], kind: Kind) -> ContourFit:
-    """Fit a frame from a start pose, (n_values,), and measure the contours after each iteration.
+def fit_rough_guess(scene: Scene, seed: int = 0) -> tuple[tuple[RoughStep, ...], tuple[RoughStep, ...]]:
+    """Fit the first frame of a scene from a rough guess: chain by chain, and all degrees of freedom at once.
 
-    The descent begins again for each number of iterations, because it runs in one compiled call.
+    Args:
+        scene: of a body of elliptical cones.
+        seed: of the guess and the noise.
+
+    Returns:
+        The steps of each fit, the start first. Of the fit at once there is one step.
     """
-    blocks, poses = _blocks(model, start, views, kind), [model.clip(start)]
-    rms = [contour_rms_px(views, PosedBody(model, poses[0]))]
-    while len(rms) <= MAX_ITERATIONS:
-        fit = solve_compiled(model, start, blocks, None, len(rms), TOLERANCE)
-        if np.array_equal(fit.pose, poses[-1]):
-            break
-        poses.append(fit.pose)
-        rms.append(contour_rms_px(views, PosedBody(model, fit.pose)))
-        if rms[-1] > (1 - MIN_GAIN) * rms[-2]:
-            break
-    return ContourFit(poses[-1], tuple(rms))
+    model, truth, rng = scene.model, scene.truth[0], np.random.default_rng([seed, 9])
+    step = np.where(model.dof_is_length, ROUGH_M, ROUGH_RAD) * rng.normal(size=model.n_dofs)
+    start, settings = model.clip(model.retract(truth, step)), paper_settings("edges")
+    observer = StagedObserver(scene.actor, scene.truth, scene.cameras, scene.noise_px, seed)
+    unlimited = unlimited_views(observer.evidence(0), settings)
+    residuals = paper_residuals(unlimited, [PosedBody(model, start)], 0, settings)
+    true_world = model.points_world(truth)
+
+    def measured(i: FitIteration, name: str) -> RoughStep:
+        off = np.linalg.norm(model.points_world(i.pose) - true_world, axis=1)
+        return RoughStep(name, i.rms_px, float(off.mean()))
+
+    steps = tuple(measured(i, i.name) for i in fit_incrementally(model, start, residuals))
+    *_, last = fit_by_iterations(model, start, residuals, settings.max_iterations)
+    return steps, (steps[0], measured(last, "all at once"))
 
 
-def _blocks(model: BodyModel, start: Array, views: Sequence[ViewEvidence], kind: Kind) -> list[ResidualBlock]:
-    body, settings = PosedBody(model, start), ContourSettings()
-    if kind == "contour tracker":
-        sigmas = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
-        return [ContourResiduals(views, [body], 0, settings.match), *prior_blocks(model, start, sigmas)]
-    unlimited = [with_unlimited_distances(v, "edges") for v in views]
-    match = paper_match("sliding" if kind == "with sliding" else "rigid")
-    return [ContourResiduals(unlimited, [body], 0, match, NO_LIMIT_PX, everywhere=True)]
+def _traced(iterations: list[FitIteration]) -> TracedFit:
+    """Return the iterations up to the first that gains little, that one included."""
+    rms = [iterations[0].rms_px]
+    for before, i in pairwise(iterations):
+        rms.append(i.rms_px)
+        if i.rms_px > (1 - MIN_GAIN) * before.rms_px:
+            break
+    return TracedFit(tuple(rms))

@@ -1,10 +1,14 @@
 """Options of an export, and the axes of its files."""
 
+import re
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
+from tracker.body.model import BodyModel
+from tracker.errors import TrackerError
+from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
@@ -31,12 +35,30 @@ class ExportOptions:
     view: str | None = None
     """Overlay video: name of the camera; None for a grid of all."""
     character: str | None = None
-    """Overlay video: body model that moves as the people do, beside the footage; None for the footage alone."""
+    """Overlay video: body that moves as the person beside the footage, a preset or a file; see `load_character`."""
 
     @property
     def per_metre(self) -> float:
         """Units per metre."""
         return 1000.0 if self.units == "mm" else 1.0
+
+
+def load_character(text: str) -> BodyModel:
+    """Return the body of a character: a preset or the path of a .toml file, and `:METRES` for its height.
+
+    Raises:
+        TrackerError: there is no such body, or the height is none.
+    """
+    name, _, height = text.rpartition(":") if re.search(r":[\d.]+$", text) else (text, "", "")
+    try:
+        height_m = float(height) if height else None
+    except ValueError:
+        height_m = np.nan
+    if height_m is not None and not 0.3 <= height_m <= 3.0:
+        raise TrackerError(
+            f"expected a height of 0.3 to 3 metres after the body, found '{text}'; give one as {name}:1.2"
+        )
+    return load_model(name, height_m)
 
 
 def file_from_world(session: Session, axes: AxesName) -> Array:

@@ -5,7 +5,7 @@ A residual block returns the normal equations of its weighted residuals at a pos
 """
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -135,16 +135,37 @@ def solve(
         gain: smallest decrease of the cost, predicted or found, for another iteration. Costs of image residuals are
             rough near their minimum, where steps are refused repeatedly.
     """
+    *_, last = iterate(model, pose, blocks, active_dofs, max_iterations, tolerance, gain)
+    return last
+
+
+def iterate(
+    model: BodyModel,
+    pose: Array,
+    blocks: Sequence[ResidualBlock],
+    active_dofs: NDArray[np.bool_] | None = None,
+    max_iterations: int = 50,
+    tolerance: float = 1e-6,
+    gain: float = 0.0,
+) -> Iterator[Fit]:
+    """Minimize as `solve`, one iteration at a time.
+
+    Yields:
+        The start, then the pose after each iteration that lowers the cost. Where the last iteration does not, the pose
+        before it comes once more, with that iteration counted.
+    """
     is_active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
     start = pose  # inactive degrees of freedom stay there, even outside the limits
     pose = with_locked_dofs(model, model.clip(start), start, active_dofs)
     here = _sum(model, pose, blocks)
     damping, iterations = INITIAL_DAMPING, 0
+    yield Fit(pose, here.cost, iterations, here.hessian)
     while iterations < max_iterations:
         iterations += 1
         active = np.flatnonzero(is_active & ~_pressed_against_limit(model, pose, here.gradient))
         if not len(active):
-            break
+            yield Fit(pose, here.cost, iterations, here.hessian)
+            return
         g, H = here.gradient[active], here.hessian[active[:, None], active]
         # Damping by the diagonal is independent of units; the floor keeps unobserved dofs well conditioned.
         scale = np.diag(H) + 1e-6 * max(1e-12, float(np.trace(H)) / len(H))
@@ -160,13 +181,14 @@ def solve(
                 break
             damping = max(10 * damping, MIN_RETRY_DAMPING)
         if there.cost >= here.cost:
-            break
+            yield Fit(pose, here.cost, iterations, here.hessian)
+            return
         gained = here.cost - there.cost
         pose, here = trial, there
         damping = max(MIN_DAMPING, damping / 10)
+        yield Fit(pose, here.cost, iterations, here.hessian)
         if moved < tolerance or gained < gain:
-            break
-    return Fit(pose, here.cost, iterations, here.hessian)
+            return
 
 
 def with_locked_dofs(model: BodyModel, pose: Array, locked: Array, active_dofs: NDArray[np.bool_] | None) -> Array:

@@ -94,14 +94,19 @@ class Recording:
                 found.append(str(error))
         return found
 
-    def read(self, k: int) -> tuple[Image | None, ...]:
+    def read(self, k: int, cameras: Sequence[int] | None = None) -> tuple[Image | None, ...]:
         """Read frame k of each camera as filmed, (H, W, 3) RGB, not writable; None if it is damaged.
+
+        Args:
+            k: frame number.
+            cameras: indices of the cameras to read; all by default.
 
         Raises:
             RecordingError: k is out of range, or a file cannot be read any more.
         """
         self._check(k)
-        return tuple(self._pool.map(lambda i: self._read_one(i, k), range(len(self._cameras))))
+        wanted = range(len(self._cameras)) if cameras is None else cameras
+        return tuple(self._pool.map(lambda i: self._read_one(i, k), wanted))
 
     def read_view(self, camera: int, k: int) -> Image | None:
         """Read frame k of one camera, by its index; otherwise as `read`."""

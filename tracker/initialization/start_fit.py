@@ -1,4 +1,4 @@
-"""Fit start poses to the contours of a frame, and choose among them."""
+"""Fit start poses to the contours of a frame, and compare them by short tracks in both directions."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -14,7 +14,6 @@ from tracker.tracking.confidence import Status
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
-_RANK: dict[Status, int] = {"good": 0, "doubtful": 1, "lost": 2}
 _LOST_PX, _DOUBTFUL_PX = 2.0, 0.5
 """What a lost and a doubtful frame of a short track add to its cost, px."""
 
@@ -27,37 +26,38 @@ class FittedStart(NamedTuple):
     status: Status
     """As the tracker gives it."""
     cost_px: float
-    """Mean cost over the frames of a short track, px of the footage; lost frames cost more."""
-    start: int
-    """Index of the start that it came from."""
+    """Mean cost over the frames of the track, px of the footage; lost frames cost more."""
 
 
-def fit_starts(
+def fit_start(
     observer: Observer,
     models: Sequence[BodyModel],
-    person: int,
-    starts: Sequence[Array],
-    frames: Sequence[int],
+    start: Array,
+    frame: int,
+    later: Sequence[Sequence[int]],
     others: Sequence[Array],
 ) -> FittedStart:
-    """Fit several start poses to the first of some frames, track each over the others, and return the cheapest.
+    """Fit the start pose of the first person to a frame, and track from it in several directions.
 
     Args:
         observer: of the recording.
         models: the body of each person.
-        person: index of the person.
-        starts: start poses, (n_values,) each.
-        frames: the frame of the start, and those of a short track; at least one.
-        others: pose of each person on that frame; that of the person is not used.
+        start: of the first person, (n_values,).
+        frame: of the start.
+        later: for each direction the frames of a short track, without the first.
+        others: pose of each other person on that frame, (n_values,) each.
     """
-    found = []
-    for index, start in enumerate(starts):
-        poses = [start if i == person else p for i, p in enumerate(others)]
-        run = TrackingRun(observer, Subjects.of(models, [person]), poses, frames)
-        estimates = list(ChamferTracker(TrackSettings(backward_pass=False)).estimates(run))
-        first, cost = estimates[0], 0.0
-        for estimate in estimates:
-            status = estimate.statuses[person]
-            cost += estimate.cost_px + (_LOST_PX if status == "lost" else _DOUBTFUL_PX if status == "doubtful" else 0.0)
-        found.append(FittedStart(first.poses[person], first.statuses[person], cost / len(estimates), index))
-    return min(found, key=lambda f: (f.cost_px if np.isfinite(f.cost_px) else np.inf, _RANK[f.status]))
+    pose, costs = start, list[float]()
+    status: Status = "lost"
+    for number, frames in enumerate([(), *later]):
+        own = [frame, *frames]
+        run = TrackingRun(observer, Subjects.of(models, [0]), [pose, *others], own)
+        for estimate in ChamferTracker(TrackSettings(backward_pass=False)).estimates(run):
+            found = estimate.statuses[0]
+            extra = _LOST_PX if found == "lost" else _DOUBTFUL_PX if found == "doubtful" else 0.0
+            if number == 0:
+                pose, status = estimate.poses[0], found
+            if number == 0 or estimate.frame != frame:
+                costs.append(estimate.cost_px + extra)
+    cost = float(np.mean(costs))
+    return FittedStart(pose, status, cost if np.isfinite(cost) else np.inf)

@@ -21,7 +21,7 @@ _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _FOOT_M, _BEND_M, _MOTION_M = 0.06, 0.06, 0.12
 """Lengths that say with some certainty where a person faces: a foot before its ankle, a knee or elbow beside the line
 through its limb, and the way to the next frames, metres."""
-_SURE = 1.0
+SURE = 1.0
 """Sum of these cues from which on left and right are known."""
 _ONE_LEG = 0.25
 """Largest share of a figure's voxels in a single leg."""
@@ -41,12 +41,12 @@ class FigureParts(NamedTuple):
     limbs: dict[str, LimbRegion]
     """Limbs that stand out, by name: `left_arm` and so on."""
     facing: float
-    """Sum of the cues for the direction; below `_SURE` left and right may be exchanged."""
+    """Sum of the cues for the direction; below `SURE` left and right may be exchanged."""
 
     @property
     def is_facing_sure(self) -> bool:
         """Whether the cues tell left from right."""
-        return self.facing >= _SURE
+        return self.facing >= SURE
 
     @property
     def unresolved(self) -> tuple[str, ...]:
@@ -77,7 +77,7 @@ def locate_parts(figure: Voxels, motion: Array | None = None) -> FigureParts:
         )
     torso = find_torso(figure, head.neck, head.is_head)
     limbs = find_limbs(figure, torso, head.is_head)
-    facing = _facing(figure, torso, limbs, motion)
+    facing = facing_cues(figure, torso.axes[:, 0], torso.axes[:, 2], motion) + _bends(torso, limbs)
     if facing < 0:
         torso = torso._replace(axes=torso.axes * np.array([-1.0, -1.0, 1.0]))
     return FigureParts(figure, head, torso, _by_side(torso, limbs, len(figure.indices)), abs(facing))
@@ -147,19 +147,29 @@ def _by_side(torso: Torso, limbs: Sequence[LimbRegion], n_voxels: int) -> dict[s
     return found
 
 
-def _facing(figure: Voxels, torso: Torso, limbs: Sequence[LimbRegion], motion: Array | None) -> float:
-    """Return the sum of the cues for the torso's narrow axis as the direction in which a person faces."""
+def _bends(torso: Torso, limbs: Sequence[LimbRegion]) -> float:
+    """Return what the bends of limbs say for the torso's narrow axis as the direction in which a person faces."""
     forward, total = torso.axes[:, 0], 0.0
-    points = figure.points_world
     for limb in limbs:
         bend = float((limb.middle - (limb.proximal + limb.distal) / 2) @ forward)
-        if limb.kind == "leg":
-            total += 0.5 * np.clip(bend / _BEND_M, -1, 1) if limb.is_bent else 0.0
-        else:
-            total -= 0.5 * np.clip(bend / _BEND_M, -1, 1) if limb.is_bent else 0.0
-    feet = points @ torso.axes[:, 2]
-    low = points[feet < feet.min() + 0.06]
-    above = points[(feet > feet.min() + 0.10) & (feet < feet.min() + 0.22)]
+        sign = 1.0 if limb.kind == "leg" else -1.0
+        total += sign * 0.5 * float(np.clip(bend / _BEND_M, -1, 1)) if limb.is_bent else 0.0
+    return total
+
+
+def facing_cues(figure: Voxels, forward: Array, up: Array, motion: Array | None) -> float:
+    """Return what feet and motion say for a direction as that in which a person faces; from `SURE` on they tell.
+
+    Args:
+        figure: voxels of the person.
+        forward: the direction, (3,).
+        up: from the legs to the head, (3,).
+        motion: the way of the figure to later frames, (3,), metres; None if it is not known.
+    """
+    points, total = figure.points_world, 0.0
+    along = points @ up
+    low = points[along < along.min() + 0.06]
+    above = points[(along > along.min() + 0.10) & (along < along.min() + 0.22)]
     if len(low) and len(above):
         total += float(np.clip((low.mean(axis=0) - above.mean(axis=0)) @ forward / _FOOT_M, -1.5, 1.5))
     if motion is not None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,13 +31,13 @@ from tracker.tracking.tracker import TrackingRun
 
 SIZES_EDITS = "sizes_edits"
 """Setting of the session: for each entry of the history that changed sizes, the name of the person and the revisions
-before and after it."""
+before and after it; a list of such triples for several people."""
 PLACED_M = 0.02
 """Standard deviation of a joint that a user has placed in the images, metres."""
 _HAND = 3.0
 """Standard deviation of where a hand puts a point, in that of a pin that pulls a pose."""
 _MOST_TRACKED = 90
-"""Number of frames that are tracked for an acquisition where too few poses are stored."""
+"""Largest number of frames that are tracked for an acquisition where too few poses are stored."""
 _TRACKING = 0.4
 """Share of the work up to the end of that tracking."""
 
@@ -60,6 +60,7 @@ def acquire_body(
     frames: Sequence[int],
     settings: AcquisitionSettings | TwoViewSettings,
     report: Report = lambda stage, share: None,
+    known: PosedFrames | None = None,
 ) -> Acquisition:
     """Acquire the body of a person from stored poses; where they are too few, from frames tracked for it.
 
@@ -72,11 +73,12 @@ def acquire_body(
         frames: the frames that may be used, ascending.
         settings: of the acquisition; their type is the method.
         report: shows progress. What it raises ends the acquisition.
+        known: poses to begin from, in the present bodies; those that the session stores by default.
 
     Raises:
         TrackerError: the person has no pose on these frames, or the views show nothing of them.
     """
-    known = posed_frames(session, person, frames)
+    known = known or posed_frames(session, person, frames)
     begun = 0.0
     if len(known.bodies) < settings.n_frames < len(frames):
         begun = _TRACKING
@@ -161,6 +163,18 @@ def store_body(
     return changed
 
 
+def sizes_changed(edits: Mapping[str, Any], edit: int) -> list[tuple[str, int, int]]:
+    """Return whose sizes an entry of the history changed, with the revisions before and after it.
+
+    Args:
+        edits: the setting `SIZES_EDITS`.
+        edit: number of the entry.
+    """
+    found = edits.get(str(edit), [])
+    rows = found if found and isinstance(found[0], list) else [found] if found else []
+    return [(str(name), int(before), int(after)) for name, before, after in rows]
+
+
 def refitted_record(record: PoseRecord, pose: Array, revision: int) -> PoseRecord:
     """Return the record of a keyframe in another body of the same degrees of freedom.
 
@@ -202,18 +216,21 @@ def _with_tracked(
     session: Session, observer: Observer, person: int, frames: Sequence[int], known: PosedFrames,
     report: Callable[[float], None],
 ) -> PosedFrames:  # fmt: skip
-    """Track the person on from the first known frame, and add the good frames."""
+    """Track the person from the first known frame, in both directions, and add the good frames."""
     first = min(known.bodies)
     ahead, behind = [k for k in frames if k >= first], [k for k in frames if k <= first][::-1]
-    run_frames = (ahead if len(ahead) >= len(behind) else behind)[:_MOST_TRACKED]
-    own, model = known.bodies[first], session.people[person].model
+    room = max(_MOST_TRACKED // 2, _MOST_TRACKED - min(len(ahead), len(behind)))
+    ways = [way[:room] for way in (ahead, behind) if len(way) > 1]
+    own, done, total = known.bodies[first], 0, max(1, sum(map(len, ways)))
     subjects = Subjects.of([b.model for b in own], keyframes={k: {0: known.bodies[k][0].values} for k in known.placed})
-    run = TrackingRun(observer, subjects, [b.values for b in own], run_frames)
     bodies = dict(known.bodies)
-    for i, found in enumerate(ChamferTracker(TrackSettings()).estimates(run)):
-        report((i + 1) / len(run_frames))
-        if found.statuses[0] == "good":
-            people = zip(subjects.models, found.poses, strict=True)
-            bodies.setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))
-    assert all(b[0].model is model for b in bodies.values())
+    for way in ways:
+        run = TrackingRun(observer, subjects, [b.values for b in own], way)
+        for found in ChamferTracker(TrackSettings()).estimates(run):
+            done += 1
+            report(done / total)
+            if found.statuses[0] == "good":
+                people = zip(subjects.models, found.poses, strict=True)
+                bodies.setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))
+    assert all(b[0].model is session.people[person].model for b in bodies.values())
     return PosedFrames(bodies, known.placed, known.seen)

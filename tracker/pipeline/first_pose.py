@@ -1,7 +1,12 @@
-"""Find the first pose of a person in a session with nobody's help (MTHC01 Sect. 3), and store it."""
+"""Find the first pose of a person in a session with nobody's help, and store it.
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+On each frame that is tried every method gives start poses (`tracker.initialization.candidates`), one for each way of
+facing. Each is fitted to the contours. The best are tracked over a few frames in both directions, and the cheapest
+track is kept.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -10,23 +15,34 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
-from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
-from tracker.initialization.start_fit import FittedStart, fit_starts
-from tracker.initialization.voxel_start import FigureParts, locate_parts, measured_height, start_pose, turned_round
+from tracker.initialization.candidates import METHODS, PersonScene, StartCandidate, StartMethod, silhouette_axes
+from tracker.initialization.start_fit import FittedStart, fit_start
+from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
-from tracker.session.session import Session, save_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.session import Session
 from tracker.store.stored_poses import read_stored_poses
+from tracker.voxels.figure_masks import figure_masks
 from tracker.voxels.visual_hull import VisualHull, carve_people
 from tracker.voxels.voxel_grid import Voxels
 
 VOXEL_M = 0.025
 """Edge of a voxel, metres."""
-_TRACK_FRAMES = (3, 6)
-"""Frames after (or before) the first pose over which starts are compared."""
+_TRACK_STEPS = (2, 4, 6)
+"""Frames after and before the first pose over which starts are compared."""
+_MOTION_FRAMES = 6
+"""Frames over which the motion of a figure is measured."""
+_ENOUGH_FRAMES, _AXIS_FRAMES = 5, 2
+"""Number of frames with starts from voxels, and with starts on the axis, among which `auto` chooses."""
+_N_TRACKED = 4
+"""Starts of a frame that are tracked."""
+_CUES_PX = 0.05
+"""What a cue for the direction counts against the cost of a track, px."""
+_SURE_RATIO = 1.05
+"""Ratio of the cost of the cheapest track that faces the other way above which left and right are known."""
+_OPPOSITE = 0.0
+"""Largest cosine of the angle between two directions that count as opposite."""
 _OWN_M = 0.4
 """A figure that is closer to the trunk of another person with a pose is that person, metres."""
 _MAX_HULL_M3 = 0.25
@@ -39,108 +55,222 @@ class FirstPose(NamedTuple):
     """A first pose and how it was found."""
 
     frame: int
-    model: BodyModel
-    """The body; of another height than before where it was measured."""
-    parts: FigureParts
-    """What the voxels show."""
-    start: Array
-    """Pose before the fit to contours, (n_values,)."""
+    candidate: StartCandidate
+    """The start before the fit to contours, and the body; of another height than before where it was measured."""
     fitted: FittedStart
+    is_facing_sure: bool
+    """Whether cues or costs tell left from right."""
     notes: tuple[str, ...]
     """Sentences on what is not sure."""
+    lines_px: Mapping[str, Array] = MappingProxyType({})
+    """Successive approximations to the major axis of the silhouette in each view that shows the person alone (GD96
+    Fig. 5): ends in undistorted px of the footage, (n_rounds, 2, 2) each."""
+
+    @property
+    def model(self) -> BodyModel:
+        """The body."""
+        return self.candidate.model
 
 
-def find_first_pose(
-    session: Session, observer: Observer, person: int, frames: Sequence[int], size_m: float = VOXEL_M,
-    say: Say = lambda text: None,
-) -> FirstPose:  # fmt: skip
-    """Find the pose of a person on one of some frames from the voxels of the silhouettes.
+class FirstPoses(NamedTuple):
+    """The first poses of several people on one frame."""
 
-    Where several frames are given, the one whose short track costs least is kept.
+    frame: int
+    poses: dict[int, FirstPose]
+    """By index of the person."""
+
+    @property
+    def cost_px(self) -> float:
+        """Mean cost of their short tracks, px of the footage."""
+        return float(np.mean([p.fitted.cost_px for p in self.poses.values()]))
+
+    @property
+    def is_good(self) -> bool:
+        """Whether the fits of all are good."""
+        return all(p.fitted.status == "good" for p in self.poses.values())
+
+
+def find_first_poses(
+    session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int],
+    methods: Sequence[StartMethod] = ("voxels",), size_m: float = VOXEL_M, say: Say = lambda text: None,
+) -> FirstPoses:  # fmt: skip
+    """Find the poses of some people on one of some frames, on which all stand apart.
+
+    The frame and the starts whose short tracks cost least are kept.
 
     Args:
         session: the session; nothing is stored.
         observer: of its recording.
-        person: index of the person.
+        people: indices of the people. Others are where their stored poses are.
         frames: the frames to try; at least one.
+        methods: to try on each frame.
         size_m: edge of a voxel, metres.
-        say: receives a sentence on each frame that is tried.
+        say: receives a sentence on each frame that is tried. What it raises ends the search.
 
     Raises:
-        TrackerError: no frame shows the person well enough. The message is that of the first frame.
+        TrackerError: no frame shows the people well enough. The message is that of the first frame.
     """
-    finder = SilhouetteFinder(session.cameras, observer.recording)
-    found, errors = list[FirstPose](), list[TrackerError]()
-    try:
+    with _Trial(session, observer, people, size_m, say) as trial:
         for frame in frames:
-            try:
-                found.append(_on_frame(session, observer, finder, person, frame, size_m))
-            except TrackerError as error:
-                errors.append(error)
-                say(f"frame {frame}: {error}")
-                continue
-            last = found[-1]
-            say(f"frame {frame}: {last.fitted.status}, cost {last.fitted.cost_px:.2f} px over a short track")
-    finally:
-        finder.close()
-    if not found:
-        raise errors[0]
-    return min(found, key=lambda f: f.fitted.cost_px)
+            trial.add(frame, methods)
+        return trial.best()
 
 
-def store_first_pose(session: Session, store: AnnotationStore, person: int, found: FirstPose, method: str) -> None:
-    """Store a first pose, and make the measured height that of the person.
+def find_first_poses_anywhere(
+    session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int], size_m: float = VOXEL_M,
+    say: Say = lambda text: None,
+) -> FirstPoses:  # fmt: skip
+    """Find first poses by whatever method and on whatever of some frames tracks best; see `find_first_poses`.
 
-    Args:
-        session: the session, which this process has locked.
-        store: its annotations.
-        person: index of the person.
-        found: the pose.
-        method: name of the method, for the history.
+    Voxels are tried until they succeed on enough frames. The axis is tried on the best of these, and a search along the
+    figure where neither finds a good start.
     """
-    who = session.people[person]
-    if found.model is not who.model:
-        people = tuple(replace(p, model=found.model) if i == person else p for i, p in enumerate(session.people))
-        save_session(replace(session, people=people))
-    revision = store.add_model_revision(who.name, format_model(found.model))
-    pose = found.fitted.pose
-    record = PoseRecord(
-        pose, ("searched",) * len(pose), revision, status=found.fitted.status, settings={"method": method},
-        remark="; ".join(found.notes),
-    )  # fmt: skip
-    store.commit(f"init from {method}, frame {found.frame}", [PoseChange(who.name, found.frame, record)])
+    with _Trial(session, observer, people, size_m, say) as trial:
+        for frame in frames:
+            if len(trial.found) < _ENOUGH_FRAMES:
+                trial.add(frame, ("voxels",))
+        by_cost = sorted(trial.found, key=lambda f: f.cost_px)
+        chosen = [f.frame for f in by_cost[:_AXIS_FRAMES]] or list(frames)[:_ENOUGH_FRAMES]
+        for frame in chosen:
+            trial.add(frame, ("axis",))
+        for frame in chosen:
+            if not any(f.is_good for f in trial.found):
+                trial.add(frame, ("search",))
+        return trial.best()
 
 
-def _on_frame(
-    session: Session, observer: Observer, finder: SilhouetteFinder, person: int, frame: int, size_m: float
-) -> FirstPose:
-    last = session.n_frames - 1
-    step = 1 if frame + _TRACK_FRAMES[-1] <= last else -1
-    track = [k for k in (frame, *(frame + step * d for d in _TRACK_FRAMES)) if 0 <= k <= last]
+class _Trial:
+    """First poses on the frames that were tried."""
+
+    def __init__(self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say) -> None:
+        self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
+        self._finder = SilhouetteFinder(session.cameras, observer.recording)
+        self.found, self._errors = list[FirstPoses](), list[TrackerError]()
+
+    def __enter__(self) -> "_Trial":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._finder.close()
+
+    def add(self, frame: int, methods: Sequence[StartMethod]) -> None:
+        """Try a frame."""
+        own: dict[int, FirstPose] = {}
+        try:
+            for person in self._people:
+                task = _Task(self._session, self._observer, self._finder, person, self._size_m)
+                own[person] = _on_frame(task, frame, methods, own)
+        except TrackerError as error:
+            self._errors.append(error)
+            self._say(f"frame {frame}, {' and '.join(methods)}: {error}")
+            return
+        self.found.append(FirstPoses(frame, own))
+        statuses = ", ".join(p.fitted.status for p in own.values())
+        cost = f"cost {self.found[-1].cost_px:.2f} px over a short track"
+        self._say(f"frame {frame}, {' and '.join(methods)}: {statuses}, {cost}")
+
+    def best(self) -> FirstPoses:
+        """Return the first poses that cost least; those whose fits are good go before.
+
+        Raises:
+            TrackerError: there are none.
+        """
+        if not self.found:
+            raise self._errors[0]
+        return min(self.found, key=lambda f: (not f.is_good, f.cost_px))
+
+
+class _Task(NamedTuple):
+    session: Session
+    observer: Observer
+    finder: SilhouetteFinder
+    person: int
+    size_m: float
+
+
+def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Mapping[int, FirstPose]) -> FirstPose:
+    session, observer, finder, person, size_m = task
     silhouettes = finder.silhouettes(frame, person)
     hull = carve_people(silhouettes, size_m)
-    others = _others(session, person, frame)
+    others = _others(session, person, frame, found)
     figure = _own_figure(session, person, hull, others)
-    parts = locate_parts(figure, _motion(finder, figure, person, track, size_m) if len(track) > 1 else None)
-    model, height_note = _sized(session, person, parts)
-    both = [parts] if parts.is_facing_sure else [parts, turned_round(parts)]
-    starts = [start_pose(model, p) for p in both]
-    models = [model, *(b.model for b in others)]
-    poses = [starts[0], *(b.values for b in others)]
-    fitted = fit_starts(observer, models, 0, starts, track, poses)
-    kept = both[fitted.start]
-    notes = (*_notes(kept, hull, silhouettes), *height_note)
-    return FirstPose(frame, model, kept, starts[fitted.start], fitted, notes)
+    masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
+    up = up_rotation(session.up, session.floor)[:, 2]
+    scene = PersonScene(figure, silhouettes, masks, up, _motion(task, figure, frame))
+    candidates = _candidates(scene, session.people[person].model, methods)
+    poses, bodies = [b.values for b in others], [b.model for b in others]
+
+    def fitted(candidate: StartCandidate, later: Sequence[Sequence[int]]) -> FittedStart:
+        return fit_start(observer, [candidate.model, *bodies], candidate.pose, frame, later, poses)
+
+    tried = [(c, fitted(c, ())) for c in candidates]
+    kept = _kept(tried)
+    steps = _track_frames(frame, session.n_frames)
+    tracked = sorted(((c, fitted(c, steps)) for c, _ in kept), key=_weighed)
+    best, fit = tracked[0]
+    opposite = [_weighed(t) for t in tracked if t[0].forward @ best.forward < _OPPOSITE]
+    opposite += [_weighed(t) for t in tried if t[0].forward @ best.forward < _OPPOSITE and not opposite]
+    is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > _SURE_RATIO * _weighed(tracked[0]))
+    return FirstPose(frame, best, fit, is_sure, _notes(best, is_sure, hull, silhouettes), _lines_px(session, scene))
 
 
-def _others(session: Session, person: int, frame: int) -> list[PosedBody]:
-    """Return the other people who have a pose on a frame."""
-    found = []
-    for i, other in enumerate(session.people):
-        stored = read_stored_poses(session.annotations_path, other.name, other.model, range(frame, frame + 1))
-        if i != person and frame in stored:
-            found.append(stored[frame].body)
+def _candidates(scene: PersonScene, model: BodyModel, methods: Sequence[StartMethod]) -> list[StartCandidate]:
+    """Return the starts of all methods; those that fail are left out unless all do."""
+    found, errors = list[StartCandidate](), list[TrackerError]()
+    is_known = not has_preset_sizes(model)
+    for method in methods:
+        try:
+            found += METHODS[method](scene, model, is_known)
+        except TrackerError as error:
+            errors.append(error)
+    if not found:
+        raise errors[0]
     return found
+
+
+def _weighed(start: tuple[StartCandidate, FittedStart]) -> float:
+    """Return the cost of a start, px, less what the cues say for its direction."""
+    return start[1].cost_px - _CUES_PX * start[0].cues
+
+
+def _lines_px(session: Session, scene: PersonScene) -> dict[str, Array]:
+    """Return the axes of the silhouettes by view, undistorted px of the footage; empty if fewer than two have one."""
+    try:
+        axes = silhouette_axes(scene)
+    except TrackerError:
+        return {}
+    widths = {c.camera.name: c.camera.width for c in session.cameras}
+    return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in axes}
+
+
+def _kept(tried: Sequence[tuple[StartCandidate, FittedStart]]) -> list[tuple[StartCandidate, FittedStart]]:
+    """Return the starts to track: the cheapest ones, and the cheapest that faces the other way than the first."""
+    order = sorted(tried, key=_weighed)
+    kept, rest = order[:_N_TRACKED], order[_N_TRACKED:]
+    if all(c.forward @ kept[0][0].forward >= _OPPOSITE for c, _ in kept):
+        kept += [t for t in rest if t[0].forward @ kept[0][0].forward < _OPPOSITE][:1]
+    return kept
+
+
+def _track_frames(frame: int, n_frames: int) -> list[list[int]]:
+    """Return the frames of the short tracks, forward and backward."""
+    both = [[frame + sign * d for d in _TRACK_STEPS] for sign in (1, -1)]
+    return [own for frames in both if (own := [k for k in frames if 0 <= k < n_frames])]
+
+
+def _others(session: Session, person: int, frame: int, found: Mapping[int, FirstPose]) -> list[PosedBody]:
+    """Return the other people who have a pose on a frame, found just now or stored."""
+    bodies = []
+    for i, other in enumerate(session.people):
+        if i == person:
+            continue
+        if i in found:
+            bodies.append(PosedBody(found[i].model, found[i].fitted.pose))
+            continue
+        stored = read_stored_poses(session.annotations_path, other.name, other.model, range(frame, frame + 1))
+        if frame in stored:
+            bodies.append(stored[frame].body)
+    return bodies
 
 
 def _own_figure(session: Session, person: int, hull: VisualHull, others: Sequence[PosedBody]) -> Voxels:
@@ -179,43 +309,42 @@ def _is_in(figure: Voxels, body: PosedBody) -> bool:
     return bool(np.linalg.norm(figure.points_world.mean(axis=0) - trunk) < _OWN_M)
 
 
-def _motion(finder: SilhouetteFinder, figure: Voxels, person: int, track: Sequence[int], size_m: float) -> Array | None:
-    """Return the way of a figure from the first to the last frame of a track, (3,); None if it cannot be found."""
+def _motion(task: _Task, figure: Voxels, frame: int) -> Array | None:
+    """Return the way of a figure to a later frame, (3,); None if it cannot be found."""
+    ahead = frame + _MOTION_FRAMES < task.session.n_frames
+    later = frame + (_MOTION_FRAMES if ahead else -_MOTION_FRAMES)
+    if later < 0:
+        return None
     try:
-        later = carve_people(finder.silhouettes(track[-1], person), 2 * size_m).figures
+        found = carve_people(task.finder.silhouettes(later, task.person), 2 * task.size_m).figures
     except TrackerError:
         return None
     begin = figure.points_world.mean(axis=0)
-    ways = [f.points_world.mean(axis=0) - begin for f in later]
-    return min(ways, key=lambda way: float(np.linalg.norm(way))) * np.sign(track[-1] - track[0])
+    ways = [f.points_world.mean(axis=0) - begin for f in found]
+    return min(ways, key=lambda way: float(np.linalg.norm(way))) * (1.0 if ahead else -1.0)
 
 
-def _sized(session: Session, person: int, parts: FigureParts) -> tuple[BodyModel, tuple[str, ...]]:
-    """Return the body with the measured height where nobody has said how tall the person is, and a note without it."""
-    model = session.people[person].model
-    if not has_preset_sizes(model):
-        return model, ()
-    height_m = measured_height(parts, up_rotation(session.up, session.floor)[:, 2])
-    if height_m is None:
-        return model, (f"the height stays {model.height_m:.2f} m: the person does not stand upright",)
-    return model.with_height(height_m), ()
-
-
-def _notes(parts: FigureParts, hull: VisualHull, silhouettes: Sequence[ViewSilhouette]) -> tuple[str, ...]:
+def _notes(
+    best: StartCandidate, is_sure: bool, hull: VisualHull, silhouettes: Sequence[ViewSilhouette]
+) -> tuple[str, ...]:
     notes = []
-    if not parts.is_facing_sure:
-        notes.append("left and right are not sure: feet, bends and motion do not tell them apart")
-    if parts.unresolved:
-        listed = ", ".join(n.replace("_", " ") for n in parts.unresolved)
+    if not is_sure:
+        notes.append("left and right are not sure: feet, bends, motion and joint limits do not tell them apart")
+    if best.unresolved:
+        listed = ", ".join(n.replace("_", " ") for n in best.unresolved)
         notes.append(f"not resolved by the voxels, which show them as one with the body: {listed}")
-    if parts.straight:
-        listed = ", ".join(n.replace("_", " ") for n in parts.straight)
+    if best.straight:
+        listed = ", ".join(n.replace("_", " ") for n in best.straight)
         notes.append(f"straight, with the middle joint by usual proportions: {listed}")
     if hull.broken:
         notes.append(f"view {hull.broken[0]} was left out: the others agree without it; check whether it has moved")
+    if best.axis is not None and best.axis.left_out:
+        notes.append(f"the axis contradicts the others in view {', '.join(best.axis.left_out)}")
     cut = [s.camera.name for s in silhouettes if _is_cut_off(s)]
     if cut:
         notes.append(f"cut off by the image in view {', '.join(cut)}")
+    if not best.is_measured:
+        notes.append(f"the height stays {best.model.height_m:.2f} m: the person does not stand upright")
     return tuple(notes)
 
 

@@ -66,8 +66,8 @@ def fit_frame(
         settings: settings of the contour residuals.
         people: indices of the people to fit.
         constraints: locked degrees of freedom and held points of each person; none by default. A held point stays
-            where it was put in the views, or else where it is; edges move it by some centimetres at most. A pin of a
-            point overrules it.
+            where it was put in the views, or else where it is; edges and pins of other points move it by some
+            centimetres at most. A pin of the point itself overrules it.
     """
     people = list(people)
     models, now = [b.model for b in bodies], [np.array(b.values) for b in bodies]
@@ -75,6 +75,7 @@ def fit_frame(
     active = [c.active_dofs for c in constraints]
     blocks = [pin_block(m, cameras, p) if p else None for m, p in zip(models, pins, strict=True)]
     pinned = [np.zeros(len(m.value_names), dtype=bool) for m in models]
+    # Where they were placed: pins of the trunk must not carry placed limbs away.
     held = [
         _held_blocks(PosedBody(m, v), cameras, c, {pin.point for pin in p})
         for m, v, c, p in zip(models, now, constraints, pins, strict=True)

@@ -19,23 +19,6 @@ _LOOSE_RAD, _LOOSE_M = 0.5, 0.5
 arm."""
 
 
-def drive_pose(pose: Array, source: BodyModel, target: BodyModel) -> Array:
-    """Return the pose of any other body that follows a pose: shared angles as they are, then fitted to shared joints.
-
-    Args:
-        pose: the pose, (n_values,) of the source.
-        source: the body that moved.
-        target: the body that is driven; its degrees of freedom may differ.
-
-    Returns:
-        The pose of the target, (n_values,).
-    """
-    start, own = target.neutral(), dict(zip(source.value_names, pose, strict=True))
-    for i, name in enumerate(target.value_names):
-        start[i] = own.get(name, start[i])
-    return _fitted(source.points_world(pose), source, target, target.clip(start), [], None)
-
-
 def retarget_pose(
     pose: Array,
     source: BodyModel,
@@ -59,25 +42,13 @@ def retarget_pose(
     """
     if source is target:
         return pose
-    pinned = [pin_block(target, cameras, pins)] if pins else []
-    return _fitted(source.points_world(pose), source, target, pose, pinned, active_dofs)
-
-
-def _fitted(
-    places_world: Array,
-    source: BodyModel,
-    target: BodyModel,
-    pose: Array,
-    more: Sequence[ResidualBlock],
-    active_dofs: NDArray[np.bool_] | None,
-) -> Array:
-    """Fit a pose of the target, (n_values,), to the points of the source, (n_points, 3), and to further blocks."""
     points = np.array([i for i, n in enumerate(target.point_names) if n in source.point_names], dtype=np.int64)
-    places = places_world[[source.point_names.index(target.point_names[i]) for i in points]]
+    places = source.points_world(pose)[[source.point_names.index(target.point_names[i]) for i in points]]
     near = np.where(target.dof_is_length, 1 / _LOOSE_M, 1 / _LOOSE_RAD)
     blocks: list[ResidualBlock] = [
         PointTargets(points, places, np.full(len(points), 1 / _JOINT_M)),
         PosePrior(pose, near),
-        *more,
     ]
+    if pins:
+        blocks.append(pin_block(target, cameras, pins))
     return solve(target, pose, blocks, active_dofs, max_iterations=30, tolerance=1e-5).pose

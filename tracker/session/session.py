@@ -74,6 +74,11 @@ class Session:
     """The floor set by a person; None for the plane through the world's origin across `up`."""
 
     @property
+    def camera_names(self) -> tuple[str, ...]:
+        """Names of the cameras, in order."""
+        return tuple(c.camera.name for c in self.cameras)
+
+    @property
     def annotations_path(self) -> Path:
         """Path of the database of the session's poses."""
         return self.folder / ANNOTATIONS_FILE

@@ -1,7 +1,10 @@
 """Classify a pose as good, doubtful or lost, from features of how well it fits the evidence.
 
-The log odds that a limb is lost are linear in its features. The weights were fitted on simulated footage, where the
-error is known, and are checked on other scenes (`tests/benchmarks/calibrate_status.py`).
+The log odds that a limb is off are linear in its features. One set of weights serves two thresholds: a joint of the
+limb is off by more than 100 mm, or by more than 150 mm. The weights were fitted on simulated people of many builds,
+where the error is known (`tests/benchmarks/calibrate_status.py`).
+
+Searches have odds of their own: they begin before the pose is settled, and a needless search costs only time.
 """
 
 from collections.abc import Sequence
@@ -12,11 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import ColorScore, PartColors
-from tracker.body.limbs import limb_display_name, limbs
-from tracker.body.model import PosedBody
+from tracker.body.limbs import Limb, limb_display_name, limbs
+from tracker.body.model import BodyModel, PosedBody
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
 from tracker.geometry.arrays import Array
+from tracker.tracking.silhouette_overlap import axis_samples
+from tracker.tracking.view_regions import px_per_m
 
 Status = Literal["good", "doubtful", "lost"]
 
@@ -26,19 +32,34 @@ _MIN_LENGTH_PX = 5.0
 """Shortest contour length that the explained points are divided by, px."""
 _MIN_TRUST = 0.5
 """Silhouettes trusted less are left out."""
+_LIMIT_RAD = 0.05
+"""An angle is at its limit where it is nearer, rad."""
+_WEIGHTS = np.array([-0.241, 0.309, 2.037, 8.293, -2.248, 1.241, 5.118, -0.869])
+"""Weights of `features`, in their order."""
+_OFF_CONSTANT, _LOST_CONSTANT = -6.34, -7.585
+"""Constants of the log odds that a joint of a limb is off by more than 100 mm, and by more than 150 mm."""
+
+
+def _odds(probability: float) -> float:
+    """Return the log odds of a probability."""
+    return float(np.log(probability / (1.0 - probability)))
+
+
+OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.15)
+"""A limb is doubtful above these log odds that a joint is off by more than 100 mm, and lost above these that one is by
+more than 150 mm. To call a wrong pose good is the worse error."""
+_DOUBTFUL_ODDS = OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT
+"""Log odds of a lost limb where the odds that it is off are `OFF_ODDS`."""
+DOUBTFUL_FROM, LOST_FROM = (float(1.0 / (1.0 + np.exp(-odds))) for odds in (_DOUBTFUL_ODDS, LOST_ODDS))
+"""Probabilities of a lost limb above which it is doubtful, and lost."""
+
+_SEARCH_WEIGHTS = np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704])
+"""Weights of `search_features`, in their order, and the constant."""
+_SEARCH, _SEARCH_OF_SEVERAL = -3.5, -3.0
+"""Search odds above which a limb is searched, of a single person and of one of several. A wrong limb misleads the
+frames after it, so that a search begins early. Among several people a search may take another person's limb."""
 _MAX_UNEXPLAINED = 0.07
 """A larger unexplained share of a silhouette's contour shows a limb that is elsewhere."""
-_WEIGHTS = np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704])
-"""Weights of `features`, in their order, and the constant."""
-_DOUBTFUL, _LOST = -3.8, 0.0
-"""Log odds of a lost limb above which a frame is doubtful, and lost. Few limbs are lost, and to call a lost limb good
-is the worse error: a frame is doubtful from odds of 1 to 45."""
-DOUBTFUL_FROM, LOST_FROM = (float(1.0 / (1.0 + np.exp(-odds))) for odds in (_DOUBTFUL, _LOST))
-"""The same as probabilities: a limb that is lost with a higher one is doubtful, or lost."""
-_SEARCH, _SEARCH_OF_SEVERAL = -3.5, -3.0
-"""Log odds above which a limb is searched, of a single person and of one of several. A wrong limb misleads the frames
-after it, so that a search begins nearly as early as doubt. Among several people half of all limbs are in doubt, and a
-search may take another person's limb."""
 _LOST_FORWARD = 0.6
 """Mean distance of the contour to the edges above which the whole body is lost, in outlier distances."""
 
@@ -60,6 +81,10 @@ class LimbFeatures(NamedTuple):
     """Length of its visible contour in the views that see the body, relative to that seen from the side."""
     explained: float
     """Number of edge and silhouette points that it explains, per pixel of its visible contour."""
+    outside: float
+    """Share of its axis outside the silhouette, mean over the views with a trusted one; 0 where there is none."""
+    at_limits: float
+    """Share of its degrees of freedom at a limit. A limb that is drawn to wrong edges bends as far as it can."""
 
 
 class PoseQuality(NamedTuple):
@@ -76,38 +101,65 @@ class PoseQuality(NamedTuple):
 
     @property
     def log_odds(self) -> Array:
-        """Log odds that each limb is lost, (n_limbs,)."""
+        """Log odds that a joint of each limb is off by more than 150 mm, (n_limbs,)."""
         return _log_odds(self)
 
     @property
     def lost_probabilities(self) -> Array:
-        """Probability that each limb is lost, (n_limbs,), 0 to 1."""
+        """Probability that a joint of each limb is off by more than 150 mm, (n_limbs,), 0 to 1."""
         return np.asarray(1.0 / (1.0 + np.exp(-self.log_odds)))
 
-    def doubtful_limbs(self, alone: bool) -> tuple[str, ...]:
-        """Return the names of limbs that seem lost, of a single person or of one of several."""
-        least = _SEARCH if alone else _SEARCH_OF_SEVERAL
-        return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > least)
+    @property
+    def is_unseen(self) -> bool:
+        """Whether no edge is near the body."""
+        return self.views == 0 or self.forward > _LOST_FORWARD
 
     @property
-    def lost(self) -> tuple[str, ...]:
-        """Names of limbs that are more likely lost than not."""
-        return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > _LOST)
+    def search_odds(self) -> Array:
+        """Log odds by which limbs are searched, (n_limbs,)."""
+        return _search_odds(self)
+
+    def doubtful_limbs(self, alone: bool) -> tuple[str, ...]:
+        """Return the names of limbs that are worth a search themselves, of a single person or of one of several."""
+        least = _SEARCH if alone else _SEARCH_OF_SEVERAL
+        return self._searched_from(least)
+
+    @property
+    def missing_limbs(self) -> tuple[str, ...]:
+        """Names of limbs that are more likely elsewhere than not, by their search odds."""
+        return self._searched_from(0.0)
 
     def search_candidates(self, alone: bool) -> tuple[str, ...]:
         """Return the limbs to search, most likely lost first; all limbs if part of the silhouette is unexplained."""
         doubtful, all_limbs = self.doubtful_limbs(alone), self.unexplained > _MAX_UNEXPLAINED
-        names = [self.limbs[i].name for i in np.argsort(-self.log_odds)]
+        names = [self.limbs[i].name for i in np.argsort(-self.search_odds)]
         return tuple(name for name in names if all_limbs or name in doubtful)
 
     @property
     def is_body_lost(self) -> bool:
-        """Whether the whole body is lost, not only a limb or two."""
-        return self.views == 0 or self.forward > _LOST_FORWARD or 2 * len(self.lost) > len(self.limbs)
+        """Whether the whole body is searched, not only a limb or two."""
+        return self.is_unseen or 2 * len(self.missing_limbs) > len(self.limbs)
+
+    def _searched_from(self, least: float) -> tuple[str, ...]:
+        return tuple(x.name for x, odds in zip(self.limbs, self.search_odds, strict=True) if odds > least)
 
 
 def features(pose: PoseQuality, limb: LimbFeatures) -> Array:
-    """Return the features of a limb that the classifier weighs, (7,)."""
+    """Return the features of a limb from which its status follows, (8,)."""
+    return np.array([
+        np.clip(limb.color, -2, 1),
+        np.clip(limb.worst_drop, -0.5, 3),
+        np.log(np.clip(limb.spread_px, 0.5, 50)),
+        limb.forward,
+        np.log(np.clip(limb.shown, 0.02, 2)),
+        limb.outside,
+        limb.at_limits,
+        np.log(max(1, pose.views)),
+    ])  # fmt: skip
+
+
+def search_features(pose: PoseQuality, limb: LimbFeatures) -> Array:
+    """Return the features of a limb by which it is searched, (7,)."""
     return np.array([
         np.clip(limb.color, -2, 1),
         np.clip(limb.worst_drop, -0.5, 3),
@@ -121,7 +173,14 @@ def features(pose: PoseQuality, limb: LimbFeatures) -> Array:
 
 @lru_cache(maxsize=8)  # used several times for each frame
 def _log_odds(found: PoseQuality) -> Array:
-    odds = np.array([_WEIGHTS @ [*features(found, x), 1.0] for x in found.limbs])
+    odds = np.array([_WEIGHTS @ features(found, x) + _LOST_CONSTANT for x in found.limbs])
+    odds.flags.writeable = False
+    return odds
+
+
+@lru_cache(maxsize=8)
+def _search_odds(found: PoseQuality) -> Array:
+    odds = np.array([_SEARCH_WEIGHTS @ [*search_features(found, x), 1.0] for x in found.limbs])
     odds.flags.writeable = False
     return odds
 
@@ -130,9 +189,8 @@ def quality(
     body: PosedBody,
     fit: Fit,
     costs: PartCosts,
+    views: Sequence[ViewEvidence],
     thetas_px: Array,
-    trusts: Array,
-    px_per_m: float,
     colors: tuple[ColorScore, PartColors] | None,
 ) -> PoseQuality:
     """Compute the features of a pose.
@@ -141,33 +199,43 @@ def quality(
         body: in the pose.
         fit: the pose, and the normal matrix there.
         costs: of its parts.
+        views: the evidence of each view.
         thetas_px: outlier distance of each view, (V,), working px.
-        trusts: trust in the silhouette of each view, (V,), 0 to 1; 0 where there is none.
-        px_per_m: length of a metre in the images at the body, working px.
         colors: scores of the colours, and the colours that were learnt; None before the first frame.
     """
     model, chains = body.model, limbs(body.model)
     far = np.nan_to_num(costs.forward_px) / thetas_px[:, None] * costs.length_px
-    views = int(np.count_nonzero(costs.length_px.sum(axis=1) > 0))
-    beside_px = 2.0 * px_per_m * max(1, views) * np.array([2.0 * s.half_axes[2] for s in model.shapes])
+    n_views = int(np.count_nonzero(costs.length_px.sum(axis=1) > 0))
+    scale = px_per_m([v.camera for v in views], body)
+    beside_px = 2.0 * scale * max(1, n_views) * np.array([2.0 * s.half_axes[2] for s in model.shapes])
     color, worst_drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
     if colors is not None:
         score, known = colors
         color = np.where(score.samples >= _MIN_SAMPLES, score.parts, np.inf)
         worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
-    spreads = px_per_m * _end_spreads(body, fit)
+    spreads = scale * _end_spreads(body, fit)
+    trusted = np.array([v.silhouette is not None and v.silhouette.trust > _MIN_TRUST for v in views], dtype=bool)
+    samples = [axis_samples(v, body) for v, is_trusted in zip(views, trusted, strict=True) if is_trusted]
     return PoseQuality(
         float(far.sum() / max(1e-9, costs.length_px.sum())),
-        views,
-        _second_largest(1.0 - costs.silhouette[trusts > _MIN_TRUST]),
+        n_views,
+        _second_largest(1.0 - costs.silhouette[trusted]),
         tuple(
             LimbFeatures(
                 c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread),
                 *_of_contour(costs, far, beside_px, c.parts),
+                float(np.mean([x.share_outside(c.parts) for x in samples])) if samples else 0.0,
+                _share_at_limits(model, body.values, c),
             )
             for c, spread in zip(chains, spreads, strict=True)
         ),
     )  # fmt: skip
+
+
+def _share_at_limits(model: BodyModel, pose: Array, limb: Limb) -> float:
+    """Return the share of a limb's degrees of freedom that are at a limit in a pose, (n_values,)."""
+    values = pose[model.dof_value[limb.dofs], None]
+    return float(np.mean(np.abs(model.limits[limb.dofs] - values).min(axis=1) < _LIMIT_RAD))
 
 
 def _of_contour(costs: PartCosts, far: Array, beside_px: Array, parts: NDArray[np.int64]) -> tuple[float, float, float]:
@@ -196,9 +264,9 @@ def _second_largest(shares: Array) -> float:
 def classify(found: PoseQuality) -> Status:
     """Return the status of a pose."""
     most = found.log_odds.max(initial=-np.inf)
-    if found.is_body_lost or most > _LOST:
+    if found.is_unseen or most > LOST_ODDS:
         return "lost"
-    return "doubtful" if most > _DOUBTFUL or found.unexplained > _MAX_UNEXPLAINED else "good"
+    return "doubtful" if most > _DOUBTFUL_ODDS else "good"
 
 
 def reason(found: PoseQuality) -> str:
@@ -209,10 +277,7 @@ def reason(found: PoseQuality) -> str:
         return "no view shows the body"
     if found.forward > _LOST_FORWARD:
         return "no edges near the body"
-    odds = found.log_odds
-    if odds.max() <= _DOUBTFUL:
-        return "part of the silhouette unexplained"
-    return f"{limb_display_name(found.limbs[int(odds.argmax())].name)} uncertain"
+    return f"{limb_display_name(found.limbs[int(found.log_odds.argmax())].name)} uncertain"
 
 
 def worst(statuses: Sequence[Status]) -> Status:

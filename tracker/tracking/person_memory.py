@@ -94,7 +94,7 @@ class PersonMemory:
 
         def cooled_down(limb: Limb) -> bool:
             last, backoff = self._backoffs.get(limb.name, (-1, 0))
-            return (alone and limb.name in quality.lost) or self._n_frames > last + min(backoff, longest)
+            return (alone and limb.name in quality.missing_limbs) or self._n_frames > last + min(backoff, longest)
 
         return [x for x in doubtful or candidates if cooled_down(x)]
 

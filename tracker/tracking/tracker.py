@@ -4,6 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
+import numpy as np
+
+from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
@@ -25,7 +28,11 @@ class TrackerSettings(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class TrackingRun:
-    """The input of a tracker besides its settings."""
+    """The input of a tracker besides its settings.
+
+    Raises:
+        TrackerError: a start pose or a keyframe holds a value that is not a number.
+    """
 
     observer: Observer
     """Gives the evidence of a frame."""
@@ -37,6 +44,14 @@ class TrackingRun:
     """The frames in the order of tracking."""
     fps: float = 30.0
     """Frame rate of the recording, 1/s."""
+
+    def __post_init__(self) -> None:
+        """Check the poses: from one that is no number, none of the frames after it would be."""
+        for person, start in enumerate(self.start):
+            _require_numbers(start, f"start pose of person {person + 1}")
+        for frame, poses in self.subjects.keyframes.items():
+            for person, pose in poses.items():
+                _require_numbers(pose, f"keyframe of person {person + 1} at frame {frame}")
 
 
 class Tracker(Protocol):
@@ -56,3 +71,10 @@ class Tracker(Protocol):
             run: the run whose frames were tracked; `start` and `frames` are not used.
             tracked: all frames, in the order of tracking, also those of an interrupted run.
         """
+
+
+def _require_numbers(pose: Array | Sequence[Array], name: str) -> None:
+    if not np.all(np.isfinite(pose)):
+        raise TrackerError(
+            f"expected numbers in the {name}, found a value that is none; pose the person there, or begin elsewhere"
+        )

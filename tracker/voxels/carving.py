@@ -1,6 +1,7 @@
 """Carve the voxels that agree with the silhouettes of a frame (MTHC01 Sect. 2)."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import cv2
@@ -11,7 +12,7 @@ from tracker.compute.threads import N_HELPERS, map_chunked
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.voxels.carving_kernels import STACK_COLUMNS, ViewTables, carve_blocks, carve_each
-from tracker.voxels.sensor_lookup import SensorLookup, sensor_lookup
+from tracker.voxels.sensor_lookup import Lens, SensorLookup, lens_of, lookup_of_lens
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
 _BLOCK = 16
@@ -78,21 +79,23 @@ class Carver:
 
 
 def _view_tables(silhouettes: Sequence[ViewSilhouette]) -> ViewTables:
-    lookups = [sensor_lookup(s.camera) for s in silhouettes]
+    lookups = _joined_lookups(tuple(lens_of(s.camera) for s in silhouettes))
     sums, boxes = zip(*(_integral(s.mask) for s in silhouettes), strict=True)
     return ViewTables(
         np.stack([s.camera.T_camera_world[:3] for s in silhouettes]).astype(np.float32),
-        _joined([lookup.pixels.reshape(-1, 2) for lookup in lookups]),
-        _layout([lookup.pixels.shape[:2] for lookup in lookups]),
-        _scales(lookups),
+        *lookups,
         np.concatenate([s.ravel() for s in sums]),
         np.column_stack([_layout([s.shape for s in sums])[:, [0, 2]], np.array(boxes)]),
         np.array([s.camera.size for s in silhouettes], dtype=np.int64),
     )
 
 
-def _joined(tables: Sequence[NDArray[np.int16]]) -> NDArray[np.int16]:
-    return np.concatenate(tables)
+@lru_cache(maxsize=4)  # joining megabytes takes longer than carving
+def _joined_lookups(lenses: tuple[Lens, ...]) -> tuple[NDArray[np.int16], IntArray, FloatArray]:
+    """Return the tables of several lenses one after the other, their layout and their scales; see `ViewTables`."""
+    lookups = [lookup_of_lens(lens) for lens in lenses]
+    pixels = np.concatenate([lookup.pixels.reshape(-1, 2) for lookup in lookups])
+    return pixels, _layout([lookup.pixels.shape[:2] for lookup in lookups]), _scales(lookups)
 
 
 def _layout(shapes: Sequence[tuple[int, ...]]) -> IntArray:

@@ -23,6 +23,17 @@ BEYOND_LENS = -32000
 _BORDER_SAMPLES = 64
 
 
+class Lens(NamedTuple):
+    """The lens of a camera and the size of its image, as values that can be looked up."""
+
+    size: tuple[int, int]
+    """Width and height, px."""
+    K: bytes
+    """Its matrix."""
+    distortion: bytes
+    """Its coefficients."""
+
+
 class SensorLookup(NamedTuple):
     """Raw pixel of each quantized point of the undistorted sensor plane at focal length 1."""
 
@@ -41,12 +52,19 @@ def sensor_lookup(camera: Camera) -> SensorLookup:
 
     It covers the image and half a pixel around it.
     """
-    return _lookup(camera.size, camera.K.tobytes(), camera.distortion.tobytes())
+    return lookup_of_lens(lens_of(camera))
+
+
+def lens_of(camera: Camera) -> Lens:
+    """Return what the table of a camera follows from."""
+    return Lens(camera.size, camera.K.tobytes(), camera.distortion.tobytes())
 
 
 @lru_cache(maxsize=32)
-def _lookup(size: tuple[int, int], K: bytes, distortion: bytes) -> SensorLookup:
-    camera = Camera("", size, np.frombuffer(K).reshape(3, 3), np.frombuffer(distortion), np.eye(4))
+def lookup_of_lens(lens: Lens) -> SensorLookup:
+    """Return the table of all cameras with a lens, cached."""
+    K, distortion = np.frombuffer(lens.K).reshape(3, 3), np.frombuffer(lens.distortion)
+    camera = Camera("", lens.size, K, distortion, np.eye(4))
     low, high = _border(camera)
     step = max(1 / (_STEPS_PER_PX * max(camera.K[0, 0], camera.K[1, 1])), float((high - low).max()) / _MAX_ENTRIES)
     n_columns, n_rows = (int(np.ceil(n)) + 1 for n in (high - low) / step)

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
 from tracker.errors import TrackerError
@@ -11,12 +10,16 @@ from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.voxels.bounding_volume import bounding_volume
 from tracker.voxels.carving import DEFAULT_CARVING, Carver, CarveSettings
+from tracker.voxels.figure_masks import needed_figures, paint
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
 MIN_FIGURE_M3 = 0.02
 """Smallest volume of a figure, cubic metres: half of a small child."""
 _MIN_SHARE = 0.25
 """Smallest volume of a figure, as a share of the largest one."""
+_MIN_NEEDED = 0.15
+"""Share of a figure's silhouette that no other figure explains, in some view. Lines of sight to two people also meet
+where nobody is: such a figure explains nothing by itself."""
 _MIN_COVERAGE = 0.6
 """Share of its silhouette that the hull explains in a view that agrees with the others."""
 _MIN_GAIN = 0.15
@@ -58,6 +61,7 @@ def carve_people(
     figures = (
         [v for v in voxels.components(_MIN_SHARE) if v.volume_m3 >= MIN_FIGURE_M3] if voxels.occupied.any() else []
     )
+    figures = needed_figures(seen, figures, _MIN_NEEDED)
     if not figures:
         raise TrackerError(
             f"expected a figure of at least {1000 * MIN_FIGURE_M3:.0f} litres where the silhouettes meet, found "
@@ -128,20 +132,6 @@ def _without(
 
 
 def _coverage(points: Array, size_m: float, silhouette: ViewSilhouette) -> float:
-    """Return the share of a silhouette within squares of the size of a voxel around projected surface voxels.
-
-    Squares of the hull's surface cover the inside too, because the far and the near side are projected.
-    """
-    camera, mask = silhouette.camera, silhouette.mask
-    depths = camera.depths(points)
-    near = depths > size_m
-    if not near.any():
-        return 0.0
-    px = camera.project(points[near])
-    half = int(np.ceil(0.5 * size_m * camera.K[0, 0] / float(np.median(depths[near])))) + 1
-    painted = np.zeros(mask.shape, np.uint8)
-    inside = (px >= 0).all(axis=1) & (px <= np.array(camera.size) - 1).all(axis=1)
-    columns, rows = np.round(px[inside]).astype(int).T
-    painted[rows, columns] = 1
-    painted = np.asarray(cv2.dilate(painted, np.ones((2 * half + 1, 2 * half + 1), np.uint8)), np.uint8)
-    return float(np.count_nonzero(painted[mask]) / np.count_nonzero(mask))
+    """Return the share of a silhouette that projected surface voxels cover."""
+    covered = paint(points, size_m, silhouette) & silhouette.mask
+    return float(np.count_nonzero(covered) / np.count_nonzero(silhouette.mask))

@@ -13,7 +13,7 @@ from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_o
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
-from tracker.pipeline.body_acquisition import SIZES_EDITS, refitted_record
+from tracker.pipeline.body_acquisition import SIZES_EDITS, refitted_record, sizes_changed
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
@@ -158,17 +158,21 @@ class BodySizeEditing:
         edits = saver.setting(SIZES_EDITS, {})
         latest = next((e for e in saver.history(1) if not e.undone), None)
         for edit in saver.moved_edits:
-            name, before, after = edits.get(str(edit), (None, 0, 0))
-            person = next((i for i, p in enumerate(session_state.session.people) if p.name == name), None)
-            if person is None:
-                continue
             # A move has one direction: if its last entry is applied now, all of them are.
             done = latest is not None and latest.edit == saver.moved_edits[-1]
-            model = saver.revisions.body(after if done else before)
-            if model is not session_state.present[person]:
-                session_state.set_body_models(save_model(session_state.session, person, model))
-            self._runs.clear()
-            session_state.set(draft=None, sizes_message="")
+            for name, before, after in sizes_changed(edits, edit):
+                person = next((i for i, p in enumerate(session_state.session.people) if p.name == name), None)
+                if person is not None:
+                    self._restore(person, after if done else before)
+
+    def _restore(self, person: int, revision: int) -> None:
+        """Make a revision the present body of a person."""
+        session_state = self._session_state
+        model = session_state.saver.revisions.body(revision)
+        if model is not session_state.present[person]:
+            session_state.set_body_models(save_model(session_state.session, person, model))
+        self._runs.clear()
+        session_state.set(draft=None, sizes_message="")
 
     def _sizes(self, person: int) -> BodyDimensions:
         return dimensions_of(self.model(person))

@@ -48,12 +48,12 @@ class Replay:
             run = self._run(number)
             if self._session_state.state.search.running:
                 raise TrackerError("expected no running search during a replay, found one; stop it first (Esc)")
-            at = min(max(-1, step), len(run.steps) - 1)
+            at, fitted_from = min(max(-1, step), len(run.steps) - 1), run.start if run.is_contour_fit else None
             if at < 0:
                 costs: tuple[float | None, ...] = ()
                 shown = ReplayState(
                     number, -1, len(run.steps), None, run.start, None, finite_or_none(run.start_px),
-                    finite_or_none(run.start_px), costs, 0, run.method,
+                    finite_or_none(run.start_px), costs, 0, fitted_from,
                 )  # fmt: skip
             else:
                 recorded = run.steps[at]
@@ -61,7 +61,7 @@ class Replay:
                     number, at, len(run.steps), run.poses_of(recorded.candidate), run.poses_of(recorded.best),
                     run.stages[recorded.stage].name, recorded.candidate_px, recorded.best_px,
                     tuple(finite_or_none(float(c)) for c in recorded.best_view_costs_px), recorded.evaluations,
-                    run.method,
+                    fitted_from,
                 )  # fmt: skip
             leave_before(self._session_state)
             self._set_view(replace(self._view, replay=shown, preview=None))

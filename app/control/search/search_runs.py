@@ -4,13 +4,12 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array, FloatArray
-from tracker.pipeline.methods import MethodName
-from tracker.search.best_first import SearchSettings, SearchStep, Stage, stages
+from tracker.search.best_first import SearchStep, Stage, stages
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimation.settings import EstimationSettings
 
 MAX_STEPS = 10_000
 """Maximum number of recorded steps of a run; beyond, every other step without improvement is discarded."""
@@ -76,7 +75,8 @@ class SearchRun:
         models: Sequence[BodyModel],
         start: tuple[Array, ...],
         start_px: float,
-        settings: EstimationSettings,
+        settings: TrackSettings,
+        free: Sequence[NDArray[np.bool_]] | None = None,
         planned: Sequence[Stage] | None = None,
     ) -> None:
         """Begin without steps.
@@ -87,12 +87,14 @@ class SearchRun:
             models: the body of each person.
             start: pose of each person before the search, (n_values,) each.
             start_px: their cost, px; NaN if unknown.
-            settings: of the search, or of the fit by contours.
-            planned: stages, in order; by default those of a search of everybody.
+            settings: of the search.
+            free: of each person the degrees of freedom that may move, (n_dofs,); all by default.
+            planned: stages of a fit of contours; None for those of a search.
         """
         self.number, self.frame, self.start, self.settings = number, frame, start, settings
-        search = settings.search if isinstance(settings, TrackSettings) else None
-        self.stages = list(planned or stages(models, search or SearchSettings()))
+        self.is_contour_fit = planned is not None
+        """Whether the steps are iterations of a fit of contours."""
+        self.stages = stages(models, settings.search, active_dofs=free) if planned is None else list(planned)
         self.counts = [StageCount(0, 0, 0.0, False) for _ in self.stages]
         self.steps: list[RecordedStep] = []
         self.best, self.best_px = start, start_px
@@ -110,11 +112,6 @@ class SearchRun:
         self._at = -1
         self._stage: Stage | None = None
         self._best_row = np.concatenate(start).astype(np.float32)
-
-    @property
-    def method(self) -> MethodName:
-        """The method whose steps these are: `contour` for the iterations of a fit."""
-        return "chamfer" if isinstance(self.settings, TrackSettings) else "contour"
 
     def add(self, step: SearchStep, seconds: float) -> None:
         """Record a step.
@@ -134,7 +131,7 @@ class SearchRun:
             count.gain_px + former_px - step.best_px,
             step.stage_done,
         )
-        if better or not isinstance(self.settings, TrackSettings):  # a fit moves on at any cost
+        if better:
             self._best_row = np.concatenate(step.best).astype(np.float32)
         if np.isnan(self.start_px):
             self.start_px = step.best_px
@@ -187,12 +184,13 @@ class SearchRuns:
         models: Sequence[BodyModel],
         start: tuple[Array, ...],
         start_px: float,
-        settings: EstimationSettings,
+        settings: TrackSettings,
+        free: Sequence[NDArray[np.bool_]] | None = None,
         planned: Sequence[Stage] | None = None,
     ) -> SearchRun:
         """Add a run, in place of the oldest if there are too many. Arguments as for `SearchRun`."""
         self._number += 1
-        run = SearchRun(self._number, frame, models, start, start_px, settings, planned)
+        run = SearchRun(self._number, frame, models, start, start_px, settings, free, planned)
         of_frame = self._runs.pop(frame, [])
         self._runs[frame] = [*of_frame, run][-_MAX_RUNS:]  # as the newest frame of the dict
         while len(self._runs) > _MAX_FRAMES:

@@ -12,7 +12,6 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings, stages
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimation.settings import EstimationSettings
 
 _PLAIN = ("bound_rad", "bound_m", "step_rad", "step_m")
 
@@ -108,13 +107,10 @@ def changed(before: TrackSettings, models: Sequence[BodyModel], changes: Mapping
     return replace(after, search=replace(search, **plain))
 
 
-def described(settings: EstimationSettings) -> dict[str, str]:
-    """Return the settings of a search, or of a fit by contours, as text by label."""
-    if not isinstance(settings, TrackSettings):
-        return {"method": "contour"}
+def described(settings: TrackSettings) -> dict[str, str]:
+    """Return the settings of a search as text by label."""
     s = settings.search
     found = {
-        "method": "chamfer",
         "theta": "default" if settings.theta_px is None else f"{settings.theta_px:g} px",
         "outliers": settings.outliers,
         "passes": " ".join(f"{p:g}" for p in s.passes),
@@ -133,7 +129,7 @@ def described(settings: EstimationSettings) -> dict[str, str]:
     return found
 
 
-def differences(all_settings: Sequence[EstimationSettings]) -> list[dict[str, str]]:
+def differences(all_settings: Sequence[TrackSettings]) -> list[dict[str, str]]:
     """Return for each settings the values, by label, that are not equal in all of them."""
     texts = [described(s) for s in all_settings]
     labels = dict.fromkeys(label for one in texts for label in one)

@@ -1,7 +1,7 @@
 """Search the poses of the shown frame, step by step or to the end, and save the best ones."""
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -15,13 +15,10 @@ from app.state.people import ShownPose
 from app.state.search import SearchState, SearchView
 from app.state.state import Costs, finite_or_none
 from tracker.errors import TrackerError
-from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
-from tracker.pipeline.methods import of_method
 from tracker.search.best_first import SearchStep, Stage, stages
 from tracker.tracking.chamfer.settings import TrackSettings, search_frame
-from tracker.tracking.contour.fit_steps import fit_frame, fit_stages
-from tracker.tracking.contour.settings import ContourSettings
+from tracker.tracking.contour.fit_steps import FitPlan, contour_steps
 from tracker.tracking.subjects import Subjects
 
 _SAVE_S = 0.5
@@ -78,6 +75,17 @@ class SearchRunner:
     def run(self, person: int | None = None) -> None:
         """Search to the end; continues a paused search of the same people, see `step`."""
         self._go(lambda _: False, person)
+
+    def fit_contours(self, person: int | None = None) -> None:
+        """Fit people to the image contours as KRH08 does, one iteration after the other; see `step`.
+
+        Every iteration is recorded, so that the replay shows it.
+        """
+        self.halt()
+        with self._activities.starting(self):
+            if not self.running:
+                self.forget()
+                self._go(lambda _: False, person, contours=True)
 
     def run_again(self, number: int | None = None, person: int | None = None) -> None:
         """Search again from the start of a recorded run of this frame, with the present settings.
@@ -138,25 +146,28 @@ class SearchRunner:
                 self._end()
 
     def _go(
-        self, until: Callable[[SearchStep], bool], person: int | None, start: tuple[Array, ...] | None = None
+        self,
+        until: Callable[[SearchStep], bool],
+        person: int | None,
+        start: tuple[Array, ...] | None = None,
+        contours: bool = False,
     ) -> None:
         with self._activities.starting(self):
             if not self.running:
-                job = self._paused_job(person, start)
+                job = self._paused_job(person, start, contours)
                 self._session_state.set(search=replace(self._session_state.state.search, running=True))
                 job.run(until)
 
-    def _paused_job(self, person: int | None, start: tuple[Array, ...] | None = None) -> Job[SearchStep]:
+    def _paused_job(
+        self, person: int | None, start: tuple[Array, ...] | None = None, contours: bool = False
+    ) -> Job[SearchStep]:
         """Return the paused search of the same people, or a new one from given poses, by default the shown ones."""
         session_state, state = self._session_state, self._session_state.state
         if self._job is None or self._job.ended or self._person != person:
-            frame, models = state.frame, session_state.models
+            frame, settings, models = state.frame, state.settings, session_state.models
             poses = state.poses if start is None else session_state.within_locks(start)
             free = [session_state.active_dofs(i) & (person is None or i == person) for i in range(len(models))]
-            subjects = Subjects.of(models, active_dofs=free)
-            chosen = of_method(state.settings, state.method)
-            planned = _planned(subjects, chosen)
-            if not planned:
+            if not stages(models, settings.search, active_dofs=free):
                 raise TrackerError("expected degrees of freedom to search, found all of them locked; unlock some")
             if self._run is not None:
                 self._run.over = True
@@ -164,10 +175,21 @@ class SearchRunner:
             people = tuple(
                 p if p.values is v else ShownPose(v, p.source) for p, v in zip(state.people, poses, strict=True)
             )
-            known_px = np.nan if costs["cost_px"] is None else costs["cost_px"]
-            run = self._runs.begin(frame, models, poses, known_px, chosen, planned)
+            plan = FitPlan(models, free) if contours else None
+            known_px = np.nan if contours or costs["cost_px"] is None else costs["cost_px"]
+            run = self._runs.begin(
+                frame, models, poses, known_px, settings, free, None if plan is None else plan.stages
+            )
+            subjects = Subjects.of(models, active_dofs=free)
+
+            def steps() -> Iterator[SearchStep]:
+                views = session_state.frames.evidence(frame)
+                if plan is not None:
+                    return contour_steps(views, poses, plan)
+                return search_frame(views, subjects, poses, settings)
+
             job: Job[SearchStep] = Job(
-                lambda: _steps(session_state.frames.evidence(frame), subjects, poses, chosen, planned),
+                steps,
                 lambda step, seconds: self._stepped(job, step, seconds),
                 lambda error: self._ended(job, error),
                 lambda: self._paused(job),
@@ -279,26 +301,3 @@ class SearchRunner:
 def _rest_s(speed: float | None) -> float:
     """Rest after each expansion, seconds; none at full speed."""
     return 0.0 if speed is None else 1.0 / speed
-
-
-def _planned(subjects: Subjects, settings: TrackSettings | ContourSettings) -> list[Stage]:
-    """Return the stages of a search, or of a fit by contours."""
-    if isinstance(settings, ContourSettings):
-        return fit_stages(subjects)
-    free = [np.ones(m.n_dofs, bool) if a is None else a for m, a in zip(
-        subjects.models, subjects.active_dofs, strict=True
-    )]  # fmt: skip
-    return stages(subjects.models, settings.search, active_dofs=free)
-
-
-def _steps(
-    views: Sequence[ViewEvidence],
-    subjects: Subjects,
-    poses: tuple[Array, ...],
-    settings: TrackSettings | ContourSettings,
-    planned: Sequence[Stage],
-) -> Iterator[SearchStep]:
-    """Search from some poses, or fit them by contours, where that is the chosen method."""
-    if isinstance(settings, ContourSettings):
-        return fit_frame(views, subjects, poses, settings, planned)
-    return search_frame(views, subjects, poses, settings)

@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,9 +12,11 @@ from app.control.tracking import track_settings
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
 from app.state.progress import TrackState
+from app.state.run_choices import RunChoices
 from app.state.state import StateChanges, finite_or_none
 from tracker.errors import TrackerError
-from tracker.pipeline.methods import MethodName, make_tracker, of_method
+from tracker.evidence.observer import Observer
+from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import SmoothedRows, Step, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson
 from tracker.store.records import PoseChange
@@ -32,6 +34,8 @@ class _Run(NamedTuple):
 
     session: TrackSession
     job: Job[Step]
+    on_end: Callable[[bool], None]
+    """Is told at its end whether it did all its work."""
 
     @property
     def subjects(self) -> Subjects:
@@ -42,13 +46,15 @@ class _Run(NamedTuple):
 class _SaverSink:
     """Saves the poses of a run through the saver, which retries failed writes."""
 
-    def __init__(self, session_state: SessionState) -> None:
-        self._session_state = session_state
+    def __init__(self, session_state: SessionState, edit: int | None) -> None:
+        """Add to an entry of the history, or make one at the first write if `edit` is None."""
+        self._session_state, self._first_edit = session_state, edit
 
     def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
         """See `Sink.write`. What cannot be written waits in the saver's queue."""
         self._session_state.last_save = time.monotonic()
-        return self._session_state.saver.write(label, changes, edit, by_program=True)
+        amended = self._first_edit if edit is None else edit
+        return self._session_state.saver.write(label, changes, amended, by_program=True)
 
 
 class Tracking:
@@ -63,8 +69,9 @@ class Tracking:
         """
         self._session_state, self._activities = session_state, activities
         activities.add_job(self, on_shown_frame=True)
-        settings, method = track_settings.restored(session_state.saver.setting(track_settings.SETTING))
-        session_state.set(settings=settings, method=method)
+        kept = session_state.saver.setting(track_settings.SETTING)
+        settings, choices = track_settings.restored(kept, session_state.session.camera_names)
+        session_state.set(settings=settings, run_choices=choices)
         self._run: _Run | None = None
         session_state.unwritten.append(lambda: self._run is not None and self._run.session.has_unsaved)
 
@@ -80,19 +87,24 @@ class Tracking:
             TrackerError: the session's settings cannot be written.
         """
         state = self._session_state.state
-        settings = track_settings.stored(state.settings, state.method)
+        settings = track_settings.stored(state.settings, state.run_choices)
         self._session_state.saver.store_setting(track_settings.SETTING, settings)
 
-    def set_method(self, method: MethodName) -> None:
-        """Choose the method of the next run."""
-        self._session_state.set(method=method)
+    def choose(self, choices: RunChoices) -> None:
+        """Choose method, frames and cameras of the next run."""
+        self._session_state.set(run_choices=choices)
 
-    def start(self, backward: bool, until: int | None) -> None:
+    def start(
+        self, backward: bool, until: int | None, edit: int | None = None,
+        on_end: Callable[[bool], None] = lambda is_done: None,
+    ) -> None:  # fmt: skip
         """Begin a run from the shown poses; a former run must have been ended.
 
         Args:
             backward: towards the first frame.
             until: last frame to track; None for the end of the recording.
+            edit: entry of the history that the run belongs to; None for one of its own.
+            on_end: is told at the end whether the run did all its work. It must return quickly.
 
         Raises:
             TrackerError: no person has been placed, or there is no frame to track.
@@ -108,16 +120,16 @@ class Tracking:
             way = "backward" if backward else "forward"
             free = [session_state.active_dofs(person) for person in range(len(models))]
             session = TrackSession(
-                make_tracker(of_method(state.settings, state.method)),
+                make_tracker(track_settings.of_run(state.settings, state.run_choices)),
                 TrackingRun(
-                    session_state.frames.observer,
+                    self._observer(state.run_choices),
                     Subjects.of(models, people, free, saver.keyframes(frames)),
                     session_state.present_poses(),
                     frames,
                     session_state.session.fps,
                 ),
                 [StoredPerson(p.name, saver.revisions.current(i)) for i, p in enumerate(session_state.session.people)],
-                _SaverSink(session_state),
+                _SaverSink(session_state, edit),
                 f"track {way} from frame {frames[0]}",
             )
             job = Job(
@@ -126,7 +138,7 @@ class Tracking:
                 lambda error: self._ended(run, error),
                 lambda: self._paused(run),
             )
-            run = _Run(session, job)
+            run = _Run(session, job, on_end)
             self._run, session_state.open_edit_owner = run, None
             track = TrackState(running=True, first=frames[0], last=frames[-1], total=len(frames))
             session_state.set(track=track, follow=True)
@@ -179,14 +191,21 @@ class Tracking:
                 self.flush()
                 self._session_state.show_frame(at)
 
+    def _observer(self, choices: RunChoices) -> Observer:
+        """Return the observer of the chosen cameras."""
+        observer, cameras = self._session_state.frames.observer, choices.cameras
+        chosen = [i for i, c in enumerate(observer.cameras) if c.camera.name in cameras]
+        return observer.with_cameras(chosen) if chosen else observer
+
     def _frames(self, backward: bool, until: int | None, people: Sequence[int]) -> range:
         """Return the frames to track, from the shown one if a person has no stored pose there, else the next."""
-        session_state, step = self._session_state, -1 if backward else 1
+        session_state = self._session_state
+        step = session_state.state.run_choices.stride * (-1 if backward else 1)
         last = session_state.session.n_frames - 1
         end = (0 if backward else last) if until is None else min(max(0, until), last)
         state = session_state.state
         first = state.frame if any(state.people[i].source is None for i in people) else state.frame + step
-        frames = range(first, end + step, step)
+        frames = range(first, end + (-1 if backward else 1), step)
         if not frames:
             raise TrackerError(
                 f"expected frames to track {'before' if backward else 'after'} frame {state.frame}, found none up to "
@@ -252,6 +271,8 @@ class Tracking:
     def _found(self, run: _Run, found: PoseEstimate) -> StateChanges:
         """Return the fields of the state that show a tracked frame."""
         keyframes, tracked = run.subjects.keyframes_at(found.frame), run.subjects.tracked
+        names = [c.camera.name for c in run.session.run.observer.cameras]
+        view_costs_px = dict(zip(names, map(finite_or_none, found.view_costs_px), strict=True))
         people = []
         for i, shown in enumerate(self._session_state.state.people):
             stored = self._session_state.saver.pose(i, found.frame) if i in keyframes or i not in tracked else None
@@ -269,7 +290,7 @@ class Tracking:
             "models": models,
             "revisions": revisions,
             "cost_px": finite_or_none(found.cost_px),
-            "view_costs_px": tuple(finite_or_none(c) for c in found.view_costs_px),
+            "view_costs_px": tuple(map(view_costs_px.get, self._session_state.session.camera_names)),
         }
 
     def _paused(self, run: _Run) -> None:
@@ -304,6 +325,7 @@ class Tracking:
         self._session_state.set(
             track=TrackState(message=f"{how}: {_summary(len(run.session.tracked), track)}", failed=failed)
         )
+        run.on_end(how == "done")
 
 
 def _summary(frames: int, track: TrackState) -> str:

@@ -6,7 +6,7 @@ import pytest
 from command_line import SAMPLE
 
 from app.__main__ import main
-from app.bench import acquisition_rows, contour_rows, report
+from app.bench import acquisition_rows, contour_rows, report, voxel_rows
 from app.bench import rows as bench_rows
 from app.bench.opencv_oracle import PaintedCost
 from app.bench.rows import Row, Yardstick
@@ -75,8 +75,10 @@ def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
         *bench_rows.candidates(frame, cones, Yardstick()),
         *bench_rows.searches(frame, cones, Yardstick()),
         *bench_rows.iterations(cones, cones, Yardstick()),
+        contour_rows.iteration(cones, Yardstick()),
+        *contour_rows.solves(cones, Yardstick()),
+        voxel_rows.voxel_frame(frame, Yardstick()),
         *bench_rows.evolution(cones, Yardstick()),
-        *contour_rows.extremal_contours(cones, Yardstick()),
         *acquisition_rows.acquisitions(frame, Yardstick()),
         *bench_rows.crowds(read_crowd(SAMPLE.with_name("tango"), 25), Yardstick()),
     ]

@@ -98,3 +98,12 @@ def test_help_lists_every_format(run):
     text = " ".join(out.replace("│", " ").split())
     for one in FORMATS.values():
         assert f"{one.name}: {one.title}" in text
+
+
+@pytest.mark.parametrize(("character", "expected"), [
+    ("nobody", "body model 'nobody' not found"), ("gavrila34:9", "expected a height of 0.3 to 3 metres"),
+])  # fmt: skip
+def test_a_character_that_is_none(run, couple, tmp_path, character, expected):
+    found = run("export", couple, "--out", tmp_path / "m.mp4", "--character", character)
+    assert_refused(found, [expected])
+    assert not (tmp_path / "m.mp4").exists()

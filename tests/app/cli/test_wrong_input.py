@@ -264,3 +264,9 @@ def test_a_reader_that_has_read_enough():
     program.stdout.close()
     assert program.stderr.read() == ""
     assert program.wait(timeout=120) == 141
+
+
+def test_options_that_contradict_the_search_for_people_are_refused(run, session):
+    assert_refused(run("track", session, "--acquire"), ["expected --acquire with --init auto", "quadrille acquire"])
+    result = run("track", session, "--init", "auto", "--backward")
+    assert_refused(result, ["expected --init without --backward", "both directions"])

@@ -60,7 +60,7 @@ RIGHT_DASH = json.loads(re.search(r"RIGHT_DASH = (\[.*?\]);", sheet("panes/drawi
 OWN_SHAPES = {
     "facing": "arrow", "facing_away": "arrow", "epipolar": "straight line across the pane",
     "floor": "crosses and grid", "part_edge": "thin line in an outline", "accepted": "loose strokes",
-    "rejected": "loose strokes",
+    "rejected": "loose strokes", "residual": "short strokes across the outlines",
 }  # fmt: skip
 """Kinds of lines whose shape, not their dash, tells them from outlines of bodies."""
 

@@ -3,7 +3,6 @@
 import av
 import numpy as np
 import pytest
-from staging import cameras_around
 from stored_motions import distorted_cameras, random_poses
 
 from app.export import overlay_video
@@ -75,9 +74,9 @@ def test_a_grid_shows_all_views(session, tmp_path):
     ],
 )
 def test_the_views_of_a_grid_are_as_large_as_can_be(n, size, grid, tile):
-    cameras = cameras_around(n, size=size)
-    assert overlay_video._grid(cameras) == grid
-    assert overlay_video._tile_size(cameras) == tile
+    sizes = [size] * n
+    assert overlay_video._grid(sizes) == grid
+    assert overlay_video._tile_size(sizes) == tile
 
 
 def test_contours_are_drawn_where_the_lens_shows_them():
@@ -104,23 +103,15 @@ def test_nothing_is_left_of_a_video_that_was_stopped(session, tmp_path):
         export(FORMATS["mp4"], motion, ExportOptions(), tmp_path / "out.mp4", overwrite=True)
 
 
-@pytest.mark.parametrize("name", ["gavrila34", "knossow54"])
-def test_a_character_of_another_body_moves_beside_the_footage(session, tmp_path, name):
-    loaded = load_session(session)
-    motion = posed_motion(loaded, range(2, 4), gaps=(3,))
-    options = ExportOptions(view="FRONT", character=name)
+def test_a_character_moves_beside_the_footage(session, tmp_path):
+    """Each view has twice its width: the footage with the person, and the character as the same camera sees it."""
+    motion = posed_motion(load_session(session), range(2, 4), gaps=(3,))
+    options = ExportOptions(view="FRONT", character="gavrila22_cones:1.2")
     overlay_video.write_overlay_video(motion, options, tmp_path / "a.mp4")
-    images = frames_of(tmp_path / "a.mp4")[1]
-    camera = next(c.camera for c in loaded.cameras if c.camera.name == "FRONT")
-    left, right = np.split(images[0], 2, axis=1)
-    assert painted(left).any()
-    height, width = right.shape[:2]
-    dark = (np.array((0x53, 0xA5, 0x04)) * 0.7).astype(int)
-    drawn = np.abs(right - dark).max(axis=-1) < 40
-    points_px = camera.pinhole.project(motion.people[0].poses[2].body.points_world)
-    points_px *= np.array([width, height]) / camera.size
-    rows, columns = np.nonzero(drawn)
-    assert len(rows) > 300
-    assert abs(np.median(columns) - np.median(points_px[:, 0])) < 30
-    assert abs(np.median(rows) - np.median(points_px[:, 1])) < 60
-    assert not (np.abs(np.split(images[1], 2, axis=1)[1] - dark).max(axis=-1) < 30).any()  # frame 3 has no body
+    _, images = frames_of(tmp_path / "a.mp4")
+    camera = next(c.camera for c in motion.session.cameras if c.camera.name == "FRONT")
+    assert images[0].shape == (camera.height, 2 * camera.width, 3)
+    character = np.abs(images[0][:, camera.width :] - images[1][:, camera.width :]).max(axis=-1) > 60
+    assert np.count_nonzero(character) > 2000  # frame 3 has no pose
+    body = motion.people[0].poses[2].body
+    assert np.ptp(np.nonzero(character)[0]) < 0.9 * np.ptp(camera.project(body.points_world)[:, 1])

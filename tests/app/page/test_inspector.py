@@ -64,7 +64,28 @@ def test_track_settings_are_kept_with_the_session(page, opened):
     assert Page(opened()).updates()["settings"].track == chosen.track_default
 
 
-@pytest.mark.parametrize("kept", [3, {"order": 7}, {"order": "2"}, {"estimate": "guess"}, {"later": True}, ["order"]])
+def test_stride_and_cameras_are_kept_and_only_known_cameras_taken(page, opened):
+    names = page.controller.session.camera_names
+    page.send("track_settings", changes={"stride": 4, "cameras": [names[2], names[0]]})
+    shown = page.updates()["settings"].track
+    assert (shown.stride, shown.cameras) == (4, (names[0], names[2]))
+    with pytest.raises(TrackerError, match="unknown camera 'roof'"):
+        page.send("track_settings", changes={"cameras": ["roof"]})
+    with pytest.raises(MessageError, match=r"a whole number >= 1 as 'changes.stride'"):
+        page.send("track_settings", changes={"stride": 0})
+    again = Page(opened())
+    assert again.updates()["settings"].track == shown
+    again.send("track_settings", changes={"cameras": list(names)})
+    assert again.updates()["settings"].track.cameras == ()  # all of them
+
+
+@pytest.mark.parametrize(
+    "kept",
+    [
+        3, {"order": 7}, {"order": "2"}, {"estimate": "guess"}, {"later": True}, ["order"], {"stride": 0},
+        {"cameras": ["roof"]},
+    ],
+)  # fmt: skip
 def test_kept_settings_that_cannot_be_used_are_passed_over(opened, kept):
     opened()._session_state.saver.store_setting("track_settings", kept)
     settings = Page(opened()).updates()["settings"]

@@ -66,6 +66,7 @@ async def test_files_are_made_sent_and_deleted(client, temporary):
 @pytest.mark.parametrize(
     ("path", "status", "expected"),
     [
+        ("mp4?character=%2Fetc%2Fbody.toml", 400, "expected a character among"),
         ("fbx", 404, "Expected a format of trc, csv"),
         ("..%2F..%2Fetc%2Fpasswd", 404, "Expected a format"),
         ("trc?person=..%2Fann", 400, "expected a person of ann, bob, found '../ann'"),

@@ -16,6 +16,7 @@ OTHER = View3d(
     floor=False,
     gizmos=False,
     ghost=True,
+    voxels=True,
     trail_points=frozenset(("left_wrist", "head")),
     trail_frames=80,
 )

@@ -1,6 +1,7 @@
 """The inspector: sections, fields, what they ask of the program, and its room beside the views."""
 
 import pytest
+from fake_endpoint import CAMERA_NAMES
 from page_driver import shows, until
 
 
@@ -40,6 +41,32 @@ async def test_settings_are_changed_marked_and_reset(page, endpoint):
     await page.locator("[data-section=search] button", has_text="Reset").click()
     await until(lambda: len(endpoint.received) == 5)
     assert endpoint.received[-1]["changes"] == endpoint.settings["search_default"]
+
+
+async def test_stride_and_cameras_of_a_run_are_chosen(page, endpoint):
+    await opened(page, "track")
+    await row(page, "Stride").locator("input").fill("3")
+    await page.keyboard.press("Enter")
+    cameras = page.get_by_role("group", name="Cameras to track with")
+    names = await cameras.locator("label").all_inner_texts()
+    assert names == list(CAMERA_NAMES)
+    assert await cameras.locator("input:checked").count() == len(names)
+    await cameras.get_by_label(names[1]).uncheck()
+    await until(lambda: len(endpoint.received) == 2)
+    chosen = [n for n in names if n != names[1]]
+    assert [m["changes"] for m in endpoint.received] == [{"stride": 3}, {"cameras": chosen}]
+    endpoint.settings["track"] |= {"stride": 3, "cameras": names[:1]}
+    await endpoint.broadcast(endpoint.settings)
+    await shows(page, "document.querySelectorAll('[data-section=track] .row-label.is-changed').length === 2")
+    assert await row(page, "Stride").locator("input").input_value() == "3"
+    only = cameras.get_by_label(names[0])
+    await only.click()
+    await shows(page, "document.querySelector('#notices').textContent.includes('expected at least one')")
+    assert await only.is_checked()
+    for name in names[1:]:
+        await cameras.get_by_label(name).check()
+    await until(lambda: len(endpoint.received) == 1 + len(names))
+    assert endpoint.received[-1]["changes"] == {"cameras": []}  # all of them
 
 
 async def test_a_value_out_of_range_is_refused_with_its_range(page, endpoint):
@@ -148,8 +175,8 @@ async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
 FOUND = {
     "body": ("Body sizes", "Height, cm"),
     "sizes": ("Body sizes", "Height, cm"),
-    "settings": ("Track settings", "How the pose"),
-    "track settings": ("Track settings", "How the pose"),
+    "settings": ("Track settings", "Chamfer matching"),
+    "track settings": ("Track settings", "Chamfer matching"),
     "search settings": ("Search settings", "Angle bound, °"),
     "angle bound": ("Angle bound", "Angle bound, °"),
 }
@@ -206,6 +233,34 @@ async def test_a_theme_is_chosen_kept_and_recolours_the_3d_view_as_it_stands(pag
     await theme.select_option("system")
     await shows(page, f"{GROUND} === '{dark}'")
     assert endpoint.received == []
+
+
+async def test_people_are_found_with_progress_and_a_stop(page, endpoint):
+    await opened(page, "find")
+    section = page.locator("[data-section=find]")
+    await section.get_by_role("button", name="Find people").click()
+    await until(lambda: endpoint.heard("find_people") == [{"type": "find_people", "action": "start"}])
+    work = {"type": "finding", "running": True, "stage": "acquiring sizes", "share": 0.6, "notes": ["frame 7: good"]}
+    ends = {"message": "", "failed": False, "frame": None, "axes": []}
+    await endpoint.broadcast(work | ends)
+    await shows(page, "document.querySelector('[data-section=find] progress').value === 0.6")
+    assert "acquiring sizes" in await section.get_by_role("status").inner_text()
+    assert await section.locator("li").all_inner_texts() == ["frame 7: good"]
+    assert await section.get_by_role("button", name="Find people").is_hidden()
+    await section.get_by_role("button", name="Stop").click()
+    await until(lambda: endpoint.heard("find_people")[-1]["action"] == "stop")
+    text = "Expected somebody in the silhouettes, found none."
+    await endpoint.broadcast(work | ends | {"running": False, "message": text, "failed": True})
+    await section.get_by_role("button", name="Find people").wait_for()
+    assert await section.get_by_role("status").inner_text() == text
+
+
+async def test_the_palette_finds_people(page, endpoint):
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("find people")
+    await page.keyboard.press("Enter")
+    await until(lambda: endpoint.heard("find_people") == [{"type": "find_people", "action": "start"}])
+    await page.locator("[data-section=find]").wait_for()
 
 
 async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page, endpoint):

@@ -1,5 +1,6 @@
 """Layers, image tones and the grid against `fake_endpoint`: what is on the canvases, what the program is asked for."""
 
+import asyncio
 import itertools
 
 import pytest
@@ -243,3 +244,32 @@ class TestZoom:
         assert endpoint.views[-1]["reductions"][5] == 1  # what is there is fine enough
         await page.keyboard.press(".")
         await until(lambda: endpoint.views[-1]["reductions"] == before)
+
+
+async def test_the_axes_of_the_silhouettes_are_drawn_on_their_frame_alone(page, endpoint):
+    plain = await color_at(page)
+    camera, u, _, v = PLACE
+    line = [u, v - 40, u, v + 40]
+    found = {
+        "type": "finding", "running": False, "stage": "", "share": 1.0, "notes": [], "message": "Done.",
+        "failed": False,
+        "axes": [{"camera": camera, "people": [[[u + 30, v - 40, u + 30, v + 40], line]]}],
+    }  # fmt: skip
+    frame = await page.evaluate("quadrille.state.state.frame")
+    await endpoint.broadcast(found | {"frame": frame + 1})
+    await shows(page, "quadrille.state.finding !== null")
+    assert await color_at(page) == plain
+    await endpoint.broadcast(found | {"frame": frame})
+    await shows(page, f"quadrille.state.finding.frame === {frame}")
+    await until_async(lambda: color_at(page), lambda color: color != plain)
+    await page.keyboard.press("a")
+    await page.locator("[data-layer=axes]").uncheck()
+    await until_async(lambda: color_at(page), lambda color: color == plain)
+
+
+async def until_async(read, holds):
+    for _ in range(100):
+        if holds(await read()):
+            return
+        await asyncio.sleep(0.05)
+    raise AssertionError(await read())

@@ -88,7 +88,7 @@ def found():
 
 def test_the_report_and_its_figures(found, tmp_path):
     report = write_contour_report(tmp_path / "r", found[0])
-    assert found[1] == [(i + 1, 5) for i in range(5)]
+    assert found[1] == [(i + 1, 7) for i in range(7)]
     text = report.read_text("utf-8")
     figures = re.findall(r"\]\(([^)]+)\)", text)
     assert {"fig5a_a.svg", "fig5b_a.svg", "fig6_left_elbow_extension.svg", "fig7_right_shoulder_abduction.svg"} <= set(

@@ -13,7 +13,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import PointObservation
-from tracker.posing.grab import Constraints
+from tracker.posing.grab import Constraints, limb_points
 from tracker.posing.pinned_fit import fit_frame
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -128,6 +128,28 @@ def test_a_held_point_belongs_where_the_user_saw_it():
     held = Constraints(held={"left_wrist": CAMERAS[:2]}, seen=put)
     assert off_seen_m(held) < 0.03
     assert off_seen_m(held, seen(GAVRILA, start, ["left_wrist"], CAMERAS)) == pytest.approx(begun, rel=0.1)
+
+
+def test_pins_of_the_trunk_leave_limbs_that_were_placed():
+    """The trunk turns by 20 degrees to its pins; limbs that were placed do not turn with it, the others do."""
+    placed = posed(GAVRILA, 1)
+    turn = np.zeros(GAVRILA.n_dofs)
+    turn[5] = np.radians(20)
+    pins = seen(
+        GAVRILA,
+        GAVRILA.retract(placed, turn),
+        [f"{s}_{j}" for s in ("left", "right") for j in ("shoulder", "hip")],
+        CAMERAS,
+    )
+
+    def moved_m(held):
+        found = fit_frame([PosedBody(GAVRILA, placed)], [pins], CAMERAS, None, SETTINGS, [0], [Constraints(held=held)])
+        points = dict(zip(GAVRILA.point_names, off_m(GAVRILA, found.poses[0], placed), strict=True))
+        assert max(off_px(GAVRILA, found.poses[0], pins)) < 3
+        return max(points[f"{s}_{j}"] for s in ("left", "right") for j in ("wrist", "ankle"))
+
+    assert moved_m(dict.fromkeys(limb_points(GAVRILA), CAMERAS)) < 0.03
+    assert moved_m({}) > 0.1
 
 
 def test_what_is_locked_stays_to_the_last_bit(two_people):

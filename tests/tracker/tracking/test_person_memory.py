@@ -5,7 +5,7 @@ from tracker.motion.prediction import PredictSettings
 from tracker.tracking.confidence import LimbFeatures, PoseQuality
 from tracker.tracking.person_memory import PersonMemory
 
-CLEAR, ASTRAY = (1.0, 0.0, 1.2, 0.05, 0.6, 0.5), (-2.0, 3.0, 4.0, 0.3, 0.2, 0.1)
+CLEAR, ASTRAY = (1.0, 0.0, 1.2, 0.05, 0.6, 0.5, 0.0, 0.0), (-2.0, 3.0, 4.0, 0.3, 0.2, 0.1, 0.5, 0.25)
 
 
 class NoColors:
@@ -69,8 +69,8 @@ def test_a_limb_of_somebody_alone_that_is_lost_does_not_wait(memory, gavrila):
     """One that is merely suspect does, and so does one of several people."""
     alone = PersonMemory(gavrila, gavrila.neutral(), memory.active_dofs)
     lost, suspect = seen(memory, astray=("left_calf",)), seen(memory, unexplained=0.2)
-    assert lost.lost == ("left_calf",)
-    assert suspect.lost == ()
+    assert lost.missing_limbs == ("left_calf",)
+    assert suspect.missing_limbs == ()
     assert searched_at(alone, lost, 6) == [0, 1, 2, 3, 4, 5]
     assert searched_at(memory, lost, 6) == [0, 2]
     assert searched_at(alone, suspect, 1) == [0]

@@ -1,106 +1,109 @@
-"""The fit of one frame by the contour method, iteration by iteration, and the residuals of a pose as vectors."""
+"""The minimization of KRH08 on one frame as the steps of a search, to be watched and replayed."""
 
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import PosedBody
+from tracker.body.model import BodyModel, PosedBody
 from tracker.body.parts import SearchGroup
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.search.best_first import SearchStep, Stage
-from tracker.tracking.contour.settings import ContourSettings
-from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior, with_body
-from tracker.tracking.estimation.settings import chamfer_cost
-from tracker.tracking.subjects import Subjects
+from tracker.tracking.contour.image_contours import with_unlimited_distances
+from tracker.tracking.contour.paper import paper_settings
+from tracker.tracking.contour.paper_fit import FitIteration, fit_by_iterations, paper_residuals, unlimited_views
 
-_STRIDE = 3
-"""Every so many pieces of contour has a vector: more could not be told apart."""
-_NEAR_PX = 0.5
-"""A contour that is nearer to an edge has no vector, working px."""
+_SETTINGS = paper_settings()
+_STRIDE = 4
+"""One residual is drawn for so many pieces of contour."""
 
 
-def fit_stages(subjects: Subjects) -> list[Stage]:
-    """Return the stages of a fit: one for each person of whom anything may move."""
-    free = [
-        (person, np.ones(subjects.models[person].n_dofs, bool) if active is None else active)
-        for person in subjects.tracked
-        for active in (subjects.active_dofs[person],)
-    ]
-    return [Stage(p, SearchGroup("fit", _names(subjects, p, active)), 1.0) for p, active in free if active.any()]
+class FitPlan(NamedTuple):
+    """Whom to fit, one after the other."""
+
+    models: Sequence[BodyModel]
+    """The body of each person."""
+    active_dofs: Sequence[NDArray[np.bool_]]
+    """The degrees of freedom of each person that may move, (n_dofs,) each."""
+
+    @property
+    def stages(self) -> list[Stage]:
+        """One stage for each person who may move."""
+        return [
+            Stage(p, SearchGroup("contours", tuple(np.array(m.dof_names)[active])), 1.0)
+            for p, (m, active) in enumerate(zip(self.models, self.active_dofs, strict=True))
+            if active.any()
+        ]
 
 
-def _names(subjects: Subjects, person: int, active: NDArray[np.bool_]) -> tuple[str, ...]:
-    return tuple(n for n, is_active in zip(subjects.models[person].dof_names, active, strict=True) if is_active)
-
-
-def fit_frame(
-    views: Sequence[ViewEvidence],
-    subjects: Subjects,
-    start: Sequence[Array],
-    settings: ContourSettings,
-    planned: Sequence[Stage],
-) -> Iterator[SearchStep]:
-    """Fit the people of a frame one after the other, one step for each Gauss-Newton iteration.
-
-    The descent begins again for each number of iterations, because it runs in one compiled call. Costs are those of the
-    chamfer distance, as everywhere in the page, and not those that are minimized.
+def contour_steps(views: Sequence[ViewEvidence], poses: Sequence[Array], plan: FitPlan) -> Iterator[SearchStep]:
+    """Fit people to the image contours of a frame, each with the others where they are; a step for each iteration.
 
     Args:
         views: the evidence of the frame.
-        subjects: bodies, whom to fit, and what may move; keyframes are not used.
-        start: the pose of each person to begin from, (n_values,).
-        settings: of the tracker.
-        planned: see `fit_stages`.
+        poses: pose of each person to begin from, (n_values,).
+        plan: whom to fit.
+
+    Yields:
+        The start and every iteration. Costs are RMS distances of the contours of the person who is fitted, px, over
+        their length at the start, so that they fall as the minimized sum does. The number of evaluations is that of
+        iterations.
     """
-    bodies = tuple(PosedBody(m, p) for m, p in zip(subjects.models, start, strict=True))
-    people = [PersonPrior(b.model, b.values, a) for b, a in zip(bodies, subjects.active_dofs, strict=True)]
-    problem, cost, done = FrameProblem(views, people, settings), chamfer_cost(views, bodies, settings), 0
-    for stage in planned:
-        person, origin = stage.person, bodies
-        blocks = [problem.residuals(person, origin), *problem.priors(person, origin)]
-        for n in range(1, settings.max_iterations + 1):
-            fit = problem.solve(person, origin[person].values, blocks, n)
-            following = problem.solve(person, origin[person].values, blocks, n + 1)
-            is_last = n == settings.max_iterations or bool(np.array_equal(following.pose, fit.pose))
-            bodies, done = with_body(origin, person, PosedBody(origin[person].model, fit.pose)), done + 1
-            poses = tuple(b.values for b in bodies)
-            found = cost(poses)
-            yield SearchStep(
-                stage, poses, found.total_px, poses, found.total_px, found.view_costs_px, done, is_last
-            )  # fmt: skip
-            if is_last:
-                break
+    unlimited, now, done = unlimited_views(views, _SETTINGS), tuple(poses), 0
+    for stage in plan.stages:
+        person, model = stage.person, plan.models[stage.person]
+        bodies = [PosedBody(m, pose) for m, pose in zip(plan.models, now, strict=True)]
+        residuals = paper_residuals(unlimited, bodies, person, _SETTINGS)
+        active, most = plan.active_dofs[person], _SETTINGS.max_iterations
+        first: FitIteration | None = None
+        waiting: FitIteration | None = None
+        for i in fit_by_iterations(model, now[person], residuals, most, active):
+            first = first or i
+            if waiting is not None:
+                yield _step(stage, now, _relative(waiting, first), done, False, len(views))
+                done += 1
+            waiting, now = i, (*now[:person], i.pose, *now[person + 1 :])
+        if waiting is not None and first is not None:
+            yield _step(stage, now, _relative(waiting, first), done, True, len(views))
 
 
-def residual_vectors(view: ViewEvidence, bodies: Sequence[PosedBody]) -> FloatArray:
-    """Return vectors from visible contours of the model to the image contours, x0, y0, x1, y1, (N, 4), footage px.
+def _relative(now: FitIteration, first: FitIteration) -> FitIteration:
+    """Return an iteration with the RMS distance over the length of the contours at the start."""
+    return now._replace(rms_px=first.rms_px * float(np.sqrt(now.cost / first.cost)) if first.cost > 0 else now.rms_px)
 
-    A vector follows the slope of the distance image for the distance there. Contours beyond the limit of the distance
-    image have none.
 
-    Args:
-        view: the evidence.
-        bodies: all people.
+def _step(
+    stage: Stage, poses: tuple[Array, ...], found: FitIteration, done: int, last: bool, n_views: int
+) -> SearchStep:
+    at = (*poses[: stage.person], found.pose, *poses[stage.person + 1 :])
+    return SearchStep(stage, at, found.rms_px, at, found.rms_px, np.full(n_views, np.nan), done, last)
+
+
+def residual_segments(bodies: Sequence[PosedBody], view: ViewEvidence) -> FloatArray:
+    """Return lines from the visible contours to the image contours that they are drawn to, (N, 4), undistorted px.
+
+    Each goes down the slope of the distance image, as far as the distance.
     """
-    seen = occluding_contours.trace(bodies, view.camera)
-    pieces = seen.pieces_px[~seen.occluded][::_STRIDE].astype(np.float64)
-    middles = (pieces[:, :2] + pieces[:, 2:]) / 2
-    height, width = view.distance.shape
-    if height < 3 or width < 3:
-        return np.empty((0, 4), np.float32)
-    u, v = np.rint(middles).astype(int).T
-    inside = (u >= 1) & (v >= 1) & (u < width - 1) & (v < height - 1)
-    middles, u, v = middles[inside], u[inside], v[inside]
-    image = view.distance
-    distances = image[v, u]
-    slopes = np.stack([image[v, u + 1] - image[v, u - 1], image[v + 1, u] - image[v - 1, u]], axis=1)
-    lengths = np.linalg.norm(slopes, axis=1)
-    drawn = (distances > _NEAR_PX) & (distances < 0.99 * image.max()) & (lengths > 0.2)
-    ends = middles[drawn] - (distances[drawn] / lengths[drawn])[:, None] * slopes[drawn]
-    corner = np.array(view.corner_px)
+    distance = _unlimited(view).distance
+    contour = occluding_contours.trace(bodies, view.camera)
+    ends = contour.pieces_px[~contour.occluded][::_STRIDE]
+    middles = (ends[:, :2] + ends[:, 2:]) / 2
+    at = np.rint(middles).astype(np.intp)
+    inside = np.all((at >= 1) & (at < np.array(view.camera.size) - 1), axis=1)
+    middles, (u, v) = middles[inside], at[inside].T
+    slope = np.stack([distance[v, u + 1] - distance[v, u - 1], distance[v + 1, u] - distance[v - 1, u]], axis=1)
+    length = np.linalg.norm(slope, axis=1, keepdims=True)
+    toward = np.divide(slope, length, out=np.zeros_like(slope), where=length > 0)
+    lines = np.hstack([middles, middles - distance[v, u][:, None] * toward])
     # Resizing keeps the borders of pixels, not their centres.
-    both = [(points + corner + 0.5) / view.scale - 0.5 for points in (middles[drawn], ends)]
-    return np.hstack(both).astype(np.float32)
+    return ((lines + np.tile(view.corner_px, 2) + 0.5) / view.scale - 0.5).astype(np.float32)
+
+
+@lru_cache(maxsize=16)
+def _unlimited(view: ViewEvidence) -> ViewEvidence:
+    """Cached: the evidence of a frame stays while its iterations are replayed."""
+    return with_unlimited_distances(view, _SETTINGS.image_contours)

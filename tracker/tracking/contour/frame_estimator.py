@@ -1,7 +1,6 @@
 """Estimate a frame by the extremal contours of KRH08, made robust and symmetric, or as the paper does."""
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,20 +8,18 @@ from numpy.typing import NDArray
 from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import ContourResiduals, paper_match
+from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import NormalEquations
-from tracker.tracking.contour.image_contours import select_contours, with_unlimited_distances
+from tracker.tracking.contour.image_contours import select_contours
+from tracker.tracking.contour.paper_fit import paper_residuals, unlimited_views
 from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.estimate import NormalMatrix
-from tracker.tracking.estimation.assessment import PersonEstimate, assess
+from tracker.tracking.estimation.assessment import PersonEstimate
 from tracker.tracking.estimation.frame_estimator import FrameEstimator
 from tracker.tracking.estimation.frame_problem import PersonFit, with_body
 from tracker.tracking.estimation.incremental_fit import fit_by_chains
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
-
-NO_LIMIT_PX = 1e5
-"""An outlier distance that no residual reaches, px of the footage."""
 
 
 class ContourEstimator(FrameEstimator):
@@ -48,28 +45,28 @@ class ContourEstimator(FrameEstimator):
         """Find the poses of some people and move them there."""
         if not self._contour_settings.paper:
             return super().estimate(people)
-        wanted = self._contour_settings.image_contours
-        self._unlimited = [with_unlimited_distances(v, wanted) for v in self.problem.views]
+        self._unlimited = unlimited_views(self.problem.views, self._contour_settings)
         return {p: self.finalize(p, self.move(p, self._minimize(p))) for p in people}
 
     def finalize(self, person: int, found: PersonFit) -> PersonEstimate:
-        """Turn the fit of a person into an estimate; by the paper with the rank of its normal matrix (Sect. 5.4)."""
-        assessment = found.assessment or assess(self.problem, person, self.bodies, found)
-        out = super().finalize(person, found._replace(assessment=assessment))
+        """Turn the fit of a person into an estimate, with the rank of its normal matrix (KRH08 Sect. 5.4)."""
+        out = super().finalize(person, found)
         model, active = found.body.model, self.problem.people[person].active_dofs
-        n_dofs = model.n_dofs if active is None else int(active.sum())
-        length_px = float(assessment.part_costs.length_px.sum())
-        few = f"{length_px:.0f} px of contour are visible, fewer than the {n_dofs} degrees of freedom"
-        if length_px < n_dofs:
-            out = out._replace(status="lost", note=few)
-        if not self._contour_settings.paper:
-            return out
-        linear = self._paper_residuals(person).linearize(model, found.fit.pose, model.kinematics(found.fit.pose))
+        residuals = self._paper_residuals(person) if self._contour_settings.paper else found.residuals
+        pose = found.fit.pose
+        linear = residuals.linearize(model, pose, model.kinematics(pose))
         matrix = conditioning(linear, active)
-        if length_px >= n_dofs and matrix.rank < n_dofs:
-            few = f"the contours determine {matrix.rank} of {n_dofs} degrees of freedom"
-            out = out._replace(note=", ".join(n for n in (out.note, few) if n))
-        return out._replace(normal_matrix=matrix)
+        length_px = float(residuals.part_costs(pose).length_px.sum())
+        out = out._replace(normal_matrix=matrix)
+        if length_px < matrix.n_dofs:
+            return out._replace(
+                status="lost",
+                note=f"{length_px:.0f} px of contour are visible, fewer than the {matrix.n_dofs} degrees of freedom",
+            )
+        if self._contour_settings.paper and matrix.rank < matrix.n_dofs:
+            few = f"the contours determine {matrix.rank} of {matrix.n_dofs} degrees of freedom"
+            return out._replace(note=", ".join(n for n in (out.note, few) if n))
+        return out
 
     def _minimize(self, person: int) -> PersonFit:
         """Minimize the squared chamfer distances of a person's contours from the pose so far (KRH08 Eq. 60)."""
@@ -86,8 +83,7 @@ class ContourEstimator(FrameEstimator):
 
     def _paper_residuals(self, person: int) -> ContourResiduals:
         around, index = self.problem.around(person, self.bodies)
-        motion: Literal["rigid", "sliding"] = "sliding" if self._contour_settings.sliding else "rigid"
-        return ContourResiduals(self._unlimited, around, index, paper_match(motion), NO_LIMIT_PX, everywhere=True)
+        return paper_residuals(self._unlimited, around, index, self._contour_settings)
 
 
 def conditioning(linear: NormalEquations, active_dofs: NDArray[np.bool_] | None) -> NormalMatrix:

@@ -33,12 +33,13 @@ def with_unlimited_distances(view: ViewEvidence, wanted: ImageContours) -> ViewE
         view: the evidence, see `select_contours`.
         wanted: what its edges are.
     """
+    if view.segments is None:
+        rows, columns = np.nonzero(view.distance == 0)
+        pixels = np.stack([columns, rows], axis=1).astype(np.float32)
+    else:
+        pixels = view.segments.points_px
     if wanted == "silhouettes" and view.silhouette is not None:
         pixels = view.silhouette.contour.points_px
-    elif view.segments is not None:
-        pixels = view.segments.points_px
-    else:  # `points_px` are thinned
-        pixels = np.argwhere(view.distance == 0)[:, ::-1].astype(np.float32)
     return replace(view, distance=_distances(view, pixels, None))
 
 

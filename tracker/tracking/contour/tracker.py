@@ -3,9 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from tracker.errors import TrackerError
 from tracker.tracking.contour.frame_estimator import ContourEstimator
 from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
@@ -21,17 +18,7 @@ class ContourTracker:
     settings: ContourSettings = field(default_factory=ContourSettings)
 
     def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
-        """See `Tracker.estimates`.
-
-        Raises:
-            TrackerError: a start pose holds a value that is not a number.
-        """
-        for person, start in enumerate(run.start):
-            if not np.all(np.isfinite(start)):
-                raise TrackerError(
-                    f"expected numbers in the start pose of person {person + 1}, found a value that is none; "
-                    "pose the person on the first frame, or begin elsewhere"
-                )
+        """See `Tracker.estimates`."""
         return track_forward(run, self.settings, ContourEstimator)
 
     def backward_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:

@@ -13,7 +13,6 @@ from tracker.tracking import confidence
 from tracker.tracking.confidence import PoseQuality, Status
 from tracker.tracking.estimate import NormalMatrix
 from tracker.tracking.estimation.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
-from tracker.tracking.view_regions import px_per_m
 
 ELSEWHERE_RAD = 0.3
 """A limb of which a joint turned farther is elsewhere, rad."""
@@ -77,10 +76,8 @@ def assess(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFit)
     known, colors = problem.people[person].colors, None
     if known is not None:
         colors = problem.colors(person, bodies).score(found.fit.pose, known), known
-    trusts = np.array([0.0 if v.silhouette is None else v.silhouette.trust for v in problem.views])
-    scale = px_per_m([v.camera for v in problem.views], found.body)
     costs = found.residuals.part_costs(found.fit.pose)
-    quality = confidence.quality(found.body, found.fit, costs, problem.thetas_px, trusts, scale, colors)
+    quality = confidence.quality(found.body, found.fit, costs, problem.views, problem.thetas_px, colors)
     return Assessment(quality, costs)
 
 

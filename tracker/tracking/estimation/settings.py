@@ -2,7 +2,7 @@
 cost that follow from them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
@@ -102,6 +102,15 @@ class EstimationSettings:
     def settles_start(self) -> bool:
         """Whether a start that the first frame contradicts is searched, see `start_pose`."""
         return self.recover is not None
+
+
+def at_stride(settings: EstimationSettings, stride: int) -> EstimationSettings:
+    """Return settings for every so many frames: bodies move farther between frames that are farther apart."""
+    motion = settings.predict
+    return replace(
+        settings, trust_rad=stride * settings.trust_rad, trust_m=stride * settings.trust_m,
+        predict=replace(motion, bound_rad=stride * motion.bound_rad, bound_m=stride * motion.bound_m),
+    )  # fmt: skip
 
 
 def chamfer_cost(

@@ -19,7 +19,6 @@ from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, solve
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import Status, worst
 from tracker.tracking.estimation.assessment import PersonEstimate, estimate_at
 from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior, moved_m, with_body
 from tracker.tracking.estimation.incremental_fit import fit_by_chains
@@ -53,9 +52,9 @@ def settle_starts(
 ) -> dict[int, PosedBody]:
     """Search the start poses that the first frame contradicts.
 
-    The start of a single person is searched unless it is good, and that of one of several where it is lost. Limbs are
-    searched together with those of the other side, and exchanged with them. Nobody is searched who was tracked before:
-    a motion is known of them, and the pose is a prediction.
+    The start of a single person is searched where a limb is worth a search, and that of one of several where a limb is
+    missing. Limbs are searched together with those of the other side, and exchanged with them. Nobody is searched who
+    was tracked before: a motion is known of them, and the pose is a prediction.
 
     Args:
         frame: the first frame.
@@ -73,8 +72,8 @@ def settle_starts(
     first = FrameProblem(frame.views, known, settings, (start, frame.contours))
     before = {p: estimate_at(first, p, start) for p in people if len(memories[p].history) == 1}
     # In a close hold a right start is doubtful, and a search may take the other's limb.
-    refuted: tuple[Status, ...] = ("doubtful", "lost") if len(memories) == 1 else ("lost",)
-    doubted = [p for p, e in before.items() if e.status in refuted]
+    least = 1 if len(memories) == 1 else 2
+    doubted = [p for p, e in before.items() if _contradiction(e) >= least]
     if not doubted or not any(len(v.points_px) for v in first.views):
         return {}
     wide, bodies = replace(settings, trust_rad=_START_RAD, trust_m=_START_M), start
@@ -85,12 +84,16 @@ def settle_starts(
         if all(moved_m(a, b) < _SETTLED_M for a, b in zip(last, bodies, strict=True)):
             break
     found = FrameProblem(observe(bodies), known, wide)
-    return {p: bodies[p] for p in doubted if _is_no_worse(estimate_at(found, p, bodies), before[p])}
+    return {p: bodies[p] for p in doubted if _contradiction(estimate_at(found, p, bodies)) <= _contradiction(before[p])}
 
 
-def _is_no_worse(now: PersonEstimate, before: PersonEstimate) -> bool:
-    """Return whether the status of a pose is no worse than that of another."""
-    return worst((now.status, before.status)) == before.status
+def _contradiction(estimate: PersonEstimate) -> int:
+    """Return how strongly a frame contradicts a pose: 0 not, 1 a limb is worth a search, 2 a limb is missing."""
+    quality = estimate.quality
+    assert quality is not None
+    if quality.missing_limbs or quality.is_body_lost:
+        return 2
+    return 1 if quality.search_candidates(alone=True) else 0
 
 
 def _searched(problem: FrameProblem, person: int, bodies: Bodies, memory: PersonMemory) -> PosedBody:

@@ -220,3 +220,26 @@ def test_the_shown_source_is_the_stored_one(opened):
     assert source_of(controller) == "manual"
     controller.pinning.fit(0)
     assert source_of(controller) == "fitted"
+
+
+def test_contours_are_fitted_iteration_by_iteration(opened):
+    """Each iteration lowers the distance of the contours, and is replayed with the contours at the start beside it."""
+    controller = opened()
+    controller.search.fit_contours()
+    wait_for(lambda: controller.state.search.message)
+    with controller.lock:
+        run = controller.replay.runs()[-1]
+    assert run.is_contour_fit
+    px = [step.best_px for step in run.steps]
+    assert len(px) >= 2
+    assert px == sorted(px, reverse=True)
+    assert px[-1] < px[0]
+    assert [step.evaluations for step in run.steps] == list(range(len(px)))  # the number of iterations
+    controller.replay.show(run.number, 1)
+    shown = controller.state.search_view.replay
+    assert shown.fitted_from is run.start
+    assert shown.best_px == px[1]
+    controller.replay.leave()
+    searched(controller)
+    controller.replay.show(controller.replay.runs()[-1].number, 0)
+    assert controller.state.search_view.replay.fitted_from is None

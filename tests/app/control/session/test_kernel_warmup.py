@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import threading
 import time
 from types import SimpleNamespace
 
@@ -105,6 +106,19 @@ def test_closing_ends_the_program_and_what_it_started(empty_cache):
             return stat.read().rsplit(")", 1)[1].split()[0] == "Z"
 
     wait_for(is_gone)
+
+
+def test_the_first_kernels_are_waited_for_until_they_are_there_or_never_come(empty_cache):
+    compiler = KernelCompiler(WAITS)
+    waiting = threading.Thread(target=compiler.wait_for, args=("posing",))
+    waiting.start()
+    waiting.join(0.3)
+    assert waiting.is_alive()
+    record_stage("posing")
+    waiting.join(5)
+    assert not waiting.is_alive()
+    compiler.close()
+    KernelCompiler(FAILS).wait_for("contours")
 
 
 def test_a_program_that_fails_is_reported_and_the_page_goes_on(opened, empty_cache, caplog):

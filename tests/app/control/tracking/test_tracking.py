@@ -9,6 +9,7 @@ import pytest
 from fake_tracker import STEP_M
 from gestures import FRONT, PAGE, drag, wait_for
 
+from app.state.run_choices import RunChoices
 from tracker.errors import SessionError, TrackerError
 from tracker.store.annotation_store import AnnotationStore
 from tracker.tracking.estimate import BackwardStep
@@ -114,6 +115,26 @@ def test_keyframes_are_taken_as_they_are(placed, tracker):
 def tracker_fixed(controller, tracker):
     wait_for(lambda: tracker.run)
     return tracker.run.subjects.keyframes
+
+
+def test_a_run_takes_the_chosen_stride_and_cameras(placed, tracker):
+    names = placed.session.camera_names
+    alone = placed.state.settings
+    placed.tracking.choose(RunChoices(stride=3, cameras=(names[1], names[3])))
+    placed.tracking.start(backward=False, until=9)
+    tracker.let_go(1)
+    wait_for(at(placed, 5))
+    assert placed.state.view_costs_px == (None, 1.0, None, None)  # the fake sees no edge in its second view
+    tracker.let_go(1)
+    wait_for(lambda: placed.state.track.message)
+    assert tracker.seen == [5, 8]
+    observer = tracker.run.observer
+    assert [c.camera.name for c in observer.cameras] == [names[1], names[3]]
+    whole = placed._session_state.frames.observer.evidence(5)
+    for own, same in zip(observer.evidence(5), (whole[1], whole[3]), strict=True):
+        np.testing.assert_array_equal(own.points_px, same.points_px)
+    assert set(placed.stored_poses.timeline()) == {2, 5, 8}
+    assert (tracker.settings.trust_m, tracker.settings.trust_rad) == (3 * alone.trust_m, 3 * alone.trust_rad)
 
 
 def test_a_run_over_keyframes_alone_is_no_entry(placed, tracker):

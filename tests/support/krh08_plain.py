@@ -1,34 +1,29 @@
-"""The distances of KRH08 Eq. 59 and their derivatives, row by row with numpy: the reference of the compiled kernels."""
+"""The derivatives of KRH08 Eq. 55 and 61 over all visible contour points, in numpy, to check the kernels with."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
-from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.arrays import Array, FloatArray, IntArray
+from tracker.fitting.sliding import SINGULAR
 from tracker.geometry.shapes import EllipticalCone
 
-SINGULAR = 0.02
-"""Conditioning of a ruling below which its sliding term is weighted down: the two rulings of a cone nearly meet."""
 _ON_SIDE = 0.999
-"""Largest height of a point on the curved surface, in half its length. Points beyond lie on the rim of an end."""
 
 
 class Linearization(NamedTuple):
     """Distances of all visible contour points, and their derivatives."""
 
-    distances: Array
+    distances: np.ndarray
     """(m,), px."""
-    jacobian: Array
+    jacobian: np.ndarray
     """(m, n_dofs), px per radian or metre."""
-    lengths: Array
+    lengths: np.ndarray
     """Length of the piece of contour around each point, (m,), px."""
 
 
-def linearize(model: BodyModel, pose: Array, views: Sequence[ViewEvidence], sliding: bool) -> Linearization:
+def linearize(model, pose, views, sliding):
     """Return the chamfer distances of all visible contour points (Eq. 59) and their derivatives (Eq. 55, 61)."""
     body = PosedBody(model, pose)
     kinematics = body.kinematics
@@ -59,7 +54,7 @@ def linearize(model: BodyModel, pose: Array, views: Sequence[ViewEvidence], slid
     return Linearization(np.concatenate(distances), jacobian, np.concatenate(lengths))
 
 
-def _bilinear(image: FloatArray, x: Array) -> tuple[Array, Array]:
+def _bilinear(image, x):
     """Return distances (N,) and their gradients (N, 2) at points (N, 2) within an image, px (Eq. 59, corrected)."""
     u, v = np.floor(x).astype(np.int64).T
     r1, r2 = (x - np.floor(x)).T
@@ -70,7 +65,7 @@ def _bilinear(image: FloatArray, x: Array) -> tuple[Array, Array]:
     return C00 + r1 * (C10 - C00) + r2 * ((1 - r1) * (C01 - C00) + r1 * (C11 - C10)), np.stack([along_u, along_v], 1)
 
 
-def _sliding_rows(body: PosedBody, parts: IntArray, points: Array, eye: Array, spatial: Array) -> Array:
+def _sliding_rows(body, parts, points, eye, spatial):
     """Return the sliding part of the derivatives of distances by spatial twists, `spatial . B` of Eq. 31, (N, 6).
 
     Points on the rim of an end do not slide. Where the two rulings of a cone nearly meet, the weight falls to 0.

@@ -1,0 +1,100 @@
+"""`quadrille init --method voxels`, `axis` and `auto`: first poses with nobody's help."""
+
+from collections.abc import Sequence
+from contextlib import closing
+from typing import TYPE_CHECKING, Any
+
+from app.cli.target import Target
+from app.runtime.progress import Reporter
+from tracker.errors import TrackerError
+
+if TYPE_CHECKING:
+    from tracker.pipeline.first_pose import FirstPoses
+    from tracker.session.session import Session
+    from tracker.store.annotation_store import AnnotationStore
+
+
+def init_from_silhouettes(
+    at: Target, method: str, frame: int, voxel_m: float, only_unplaced: bool, progress: Reporter
+) -> dict[str, Any]:
+    """Find the poses of people on one frame, and store them as one entry of the history.
+
+    Args:
+        at: the session and the people.
+        method: `voxels`, `axis` or `auto`.
+        frame: frame to set; with `auto` the first one to try.
+        voxel_m: edge of a voxel, metres.
+        only_unplaced: whether people who have a pose keep it.
+        progress: says what was tried.
+
+    Returns:
+        `frame` and `people`, a list of `person`, `method`, `height_m`, `status`, `cost_px`, `unresolved`, `straight`,
+        `facing_sure`, `notes`.
+
+    Raises:
+        TrackerError: everybody has a pose, or no frame shows the people well enough; nothing is stored then.
+    """
+    from tracker.evidence.observer import Observer
+    from tracker.footage.recording import Recording
+    from tracker.pipeline.find_people import FoundPeople, frames_to_try, store_found
+    from tracker.pipeline.first_pose import find_first_poses, find_first_poses_anywhere
+    from tracker.session.lock import SessionLock
+    from tracker.session.relink import require_files
+    from tracker.store.annotation_store import AnnotationStore
+
+    session = at.session
+    require_files(session)
+    with (
+        SessionLock(session.folder),
+        closing(AnnotationStore(session.annotations_path)) as store,
+        Recording(session.cameras) as recording,
+    ):
+        people = unplaced(session, store, at.people) if only_unplaced else at.people
+        if not people:
+            raise TrackerError(
+                "expected a person without a pose, found none; name one with --person to find the person again"
+            )
+        observer = Observer(session.cameras, recording)
+        if method == "auto":
+            tried = frames_to_try(range(session.n_frames), frame)
+            first = find_first_poses_anywhere(session, observer, people, tried, voxel_m, progress.say)
+        else:
+            first = find_first_poses(session, observer, people, [frame], (method,), voxel_m)  # type: ignore[arg-type]
+        bodies = {i: p.model for i, p in first.poses.items()}
+        poses = {i: p.fitted.pose for i, p in first.poses.items()}
+        store_found(session, store, FoundPeople(first, bodies, poses, {}), f"init from {method}")
+    return first_poses_record(session, first)
+
+
+def unplaced(session: "Session", store: "AnnotationStore", people: Sequence[int]) -> tuple[int, ...]:
+    """Return the people who have no pose on any frame."""
+    return tuple(i for i in people if not store.frames(session.people[i].name))
+
+
+def first_poses_record(session: "Session", first: "FirstPoses") -> dict[str, Any]:
+    """Return what `init_from_silhouettes` returns."""
+    people = [
+        {
+            "person": session.people[i].name,
+            "method": p.candidate.method,
+            "height_m": p.model.height_m,
+            "status": p.fitted.status,
+            "cost_px": p.fitted.cost_px,
+            "unresolved": list(p.candidate.unresolved),
+            "straight": list(p.candidate.straight),
+            "facing_sure": p.is_facing_sure,
+            "notes": list(p.notes),
+        }
+        for i, p in first.poses.items()
+    ]
+    return {"frame": first.frame, "people": people}
+
+
+def format_first_poses(found: dict[str, Any]) -> str:
+    """Format the result for a terminal."""
+    lines = []
+    for own in found["people"]:
+        head = f"{own['person']}, {own['height_m']:.2f} m tall, frame {found['frame']}, by {own['method']}: "
+        lines.append(f"{head}{own['status']}, cost {own['cost_px']:.2f} px")
+        lines += [f"note: {note}" for note in own["notes"]]
+    return "\n".join(lines)

@@ -1,0 +1,196 @@
+"""Find people whom nobody has placed, acquire their sizes and track them: one job, and one entry of the history."""
+
+import logging
+import threading
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from app.control.search.search_runs import SearchRuns
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
+from app.control.tracking.tracking import Tracking
+from app.state.progress import FindState, Line
+from tracker.errors import TrackerError
+from tracker.formats.model_toml import format_model
+from tracker.pipeline.body_acquisition import SIZES_EDITS
+from tracker.pipeline.find_people import (
+    AXES,
+    FindSettings,
+    FoundPeople,
+    axes_record,
+    find_people,
+    first_record,
+    sentences,
+)
+from tracker.session.session import save_model
+from tracker.store.records import PoseChange
+
+_LOG = logging.getLogger(__name__)
+_STEPS = 100
+"""Progress is shown in so many steps."""
+
+
+class _StoppedError(Exception):
+    """The user has stopped the search for people."""
+
+
+class FindingPeople:
+    """At most one search for people at a time. Until it has found them it changes nothing."""
+
+    def __init__(
+        self, session_state: SessionState, activities: Activities, tracking: Tracking, runs: SearchRuns
+    ) -> None:
+        """Find nobody yet; show the axes of the silhouettes that were found before.
+
+        Args:
+            session_state: holds the state.
+            activities: ends searches and gestures before poses are stored.
+            tracking: tracks the people who were found.
+            runs: recorded searches, which end where sizes change.
+        """
+        self._session_state, self._activities, self._tracking, self._runs = session_state, activities, tracking, runs
+        self._thread: threading.Thread | None = None
+        self._stopping = threading.Event()
+        frame, axes = _axes(session_state.saver.setting(AXES))
+        session_state.set(finding=FindState(frame=frame, axes=axes))
+
+    def start(self, acquire: bool = True) -> None:
+        """Begin to find the people who have no pose.
+
+        Args:
+            acquire: whether their sizes are acquired from the contours.
+
+        Raises:
+            TrackerError: a search for people is at work, or everybody is placed.
+        """
+        session_state = self._session_state
+        with session_state.lock:
+            if session_state.state.finding.running:
+                raise TrackerError(
+                    "expected no other search for people at work, found one; stop it or wait for its end"
+                )
+            people = self._unplaced()
+            if not people:
+                raise TrackerError(
+                    "expected a person without a pose, found that all are placed; track from here (T), or clear a "
+                    "person's frames first"
+                )
+            finding = session_state.state.finding
+            session_state.set(
+                finding=replace(finding, running=True, stage="starting", share=0.0, notes=(), message="", failed=False)
+            )
+        self._stopping.clear()
+        self._thread = threading.Thread(target=self._work, args=(people, acquire), name="find people", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop the work; what was stored stays. The caller must not hold the lock."""
+        self._stopping.set()
+        if self._session_state.state.finding.running:
+            self._tracking.stop()
+        if self._thread is not None:
+            self._thread.join(30)
+
+    def _unplaced(self) -> tuple[int, ...]:
+        session_state = self._session_state
+        return tuple(i for i in range(len(session_state.present)) if not session_state.saver.index.frames(i))
+
+    def _work(self, people: tuple[int, ...], acquire: bool) -> None:
+        session_state = self._session_state
+        try:
+            session = session_state.session
+            found = find_people(
+                session, session_state.frames.observer, people, range(session.n_frames), FindSettings(acquire=acquire),
+                self._report,
+            )  # fmt: skip
+            edit = self._store(found, people)
+            self._set(notes=tuple(sentences(session, found)))
+            is_done = self._track(found, edit)
+            self._set(running=False, message="Done." if is_done else "Stopped; what was tracked stays.")
+        except _StoppedError:
+            self._set(running=False, message="Stopped; nothing was changed.")
+        except Exception as error:
+            if not isinstance(error, TrackerError):
+                _LOG.exception("a search for people failed")
+            text = str(error)
+            self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
+
+    def _report(self, stage: str, share: float, text: str) -> None:
+        if self._stopping.is_set():
+            raise _StoppedError
+        before = self._session_state.state.finding
+        share = round(share * _STEPS) / _STEPS
+        notes = (*before.notes, text) if text else before.notes
+        if (stage, share, notes) != (before.stage, before.share, before.notes):
+            self._set(stage=stage, share=share, notes=notes)
+
+    def _set(self, **changes: Any) -> None:
+        with self._session_state.lock:
+            self._session_state.set(finding=replace(self._session_state.state.finding, **changes))
+
+    def _store(self, found: FoundPeople, people: tuple[int, ...]) -> int | None:
+        """Store the first poses and bodies as one entry of the history, and show them; return the entry.
+
+        Raises:
+            TrackerError: somebody was placed meanwhile, or a body cannot be written.
+        """
+        with self._activities.editing():
+            session_state, saver = self._session_state, self._session_state.saver
+            if self._unplaced() != people:
+                raise TrackerError(
+                    "expected nobody to be placed meanwhile, found a new pose; what was found is discarded"
+                )
+            sizes, changes = [], []
+            for person, body in found.bodies.items():
+                who, before = session_state.session.people[person], saver.revisions.current(person)
+                if format_model(body) != format_model(who.model):
+                    session_state.set_body_models(save_model(session_state.session, person, body))
+                revision = saver.revisions.current(person)
+                changes.append(PoseChange(who.name, found.frame, first_record(found, person, revision)))
+                if revision != before:
+                    sizes.append([who.name, before, revision])
+            edit = saver.write("find people", changes, None, by_program=False)
+            axes = axes_record(found)
+            saver.store_setting(AXES, axes)
+            if edit is not None and sizes:
+                saver.store_setting(SIZES_EDITS, {**saver.setting(SIZES_EDITS, {}), str(edit): sizes})
+                self._runs.clear()
+            frame, lines = _axes(axes)
+            session_state.show_frame(found.frame, finding=replace(session_state.state.finding, frame=frame, axes=lines))
+            session_state.refresh_saving()
+            return edit
+
+    def _track(self, found: FoundPeople, edit: int | None) -> bool:
+        """Track to the first frame, then over the whole recording; return whether both runs did all their work."""
+        last = self._session_state.session.n_frames - 1
+        for backward, begin, end in ((True, found.frame, 0), (False, 0, last)):
+            if begin == end:
+                continue
+            if self._stopping.is_set():
+                return False
+            self._set(stage="tracking back to the first frame" if backward else "tracking", share=1.0)
+            ended, outcome = threading.Event(), list[bool]()
+
+            def on_end(is_done: bool, ended: threading.Event = ended, outcome: list[bool] = outcome) -> None:
+                outcome.append(is_done)
+                ended.set()
+
+            with self._activities.editing():
+                self._session_state.show_frame(begin)
+            self._tracking.start(backward, end, edit, on_end)
+            ended.wait()
+            if not outcome[0]:
+                return False
+        return True
+
+
+def _axes(record: Mapping[str, Any] | None) -> tuple[int | None, dict[str, tuple[tuple[Line, ...], ...]]]:
+    """Return the frame and the lines of the setting `AXES`; nobody's where it is missing."""
+    if record is None:
+        return None, {}
+    lines = {
+        camera: tuple(tuple((a[0], a[1], b[0], b[1]) for a, b in own) for own in people)
+        for camera, people in record["lines"].items()
+    }
+    return int(record["frame"]), lines

@@ -1,0 +1,98 @@
+"""Draw the voxels of the shown frame in the 3-D view, in the colours of their parts (MTHC01 Fig. 7)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from app.control.controller import Controller
+from app.drawing.overlay_colors import rgb
+from app.runtime.jobs import LatestWinsWorker
+from app.state.identity import Identity
+from app.state.state import State
+from tracker.body.model import BodyModel
+from tracker.errors import TrackerError
+from tracker.evidence.silhouettes import SilhouetteFinder
+from tracker.geometry.arrays import Array
+from tracker.tracking.voxel.body_pose import state_of
+from tracker.tracking.voxel.figure import N_PARTS, figure_of
+from tracker.tracking.voxel.labels import LabelRule, label_voxels
+from tracker.tracking.voxel.settings import VoxelSettings
+from tracker.voxels.visual_hull import carve_people
+
+_VOXEL_M = 0.03
+"""Edge of the voxels, metres."""
+_FREE_RGB = (150, 150, 150)
+"""Colour of voxels that belong to no part."""
+_REST_S = 0.1
+"""Time between updates, so that panes go first."""
+
+
+class VoxelLayer:
+    """The voxels of the shown frame. They are carved and labelled in a thread of their own."""
+
+    def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
+        """Follow the controller's state; silhouettes are found once the layer is switched on."""
+        self._server, self._controller = server, controller
+        self._finder: SilhouetteFinder | None = None
+        self._drawn: tuple[object, ...] = ()
+        latest = LatestWinsWorker(self._show, "voxels", _REST_S)
+        controller.subscribe(latest.offer)
+        latest.offer(controller.state)
+
+    def _show(self, state: State) -> None:
+        if not state.view_3d.voxels or state.drag is not None or state.is_3d_throttled:
+            if not state.view_3d.voxels and self._drawn:
+                self._drawn = ()
+                self._draw(np.zeros((0, 3)), np.zeros((0, 3), np.uint8), "")
+            return
+        wanted = (state.frame, *map(Identity, state.poses), state.models)
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        try:
+            points = self._carved(state.frame)
+        except TrackerError as error:  # of an empty scene, a camera that has moved, unreadable footage
+            self._draw(np.zeros((0, 3)), np.zeros((0, 3), np.uint8), f"No voxels: {error}")
+            return
+        self._draw(points, part_colors(points, state.models, state.poses), "")
+
+    def _carved(self, frame: int) -> Array:
+        """Return the surface voxels of all people on a frame, (N, 3), metres."""
+        if self._finder is None:
+            session = self._controller.session
+            self._finder = SilhouetteFinder(session.cameras, self._controller.frames.observer.recording)
+        hull = carve_people(self._finder.silhouettes(frame), _VOXEL_M)
+        return np.concatenate([f.points_world[f.is_surface] for f in hull.figures])
+
+    def _draw(self, points: Array, colors: NDArray[np.uint8], note: str) -> None:
+        with self._server.atomic():
+            self._server.scene.add_point_cloud(
+                "/voxels/points", points.astype(np.float32), colors, point_size=_VOXEL_M, precision="float32"
+            )
+            self._server.scene.add_label("/voxels/note", note, visible=bool(note))
+
+
+def part_colors(points: Array, models: Sequence[BodyModel], poses: Sequence[Array | None]) -> NDArray[np.uint8]:
+    """Return the colour of each voxel, (N, 3): that of the part that it belongs to, grey where none is near.
+
+    Args:
+        points: centres of voxels, (N, 3), metres.
+        models: the body of each person.
+        poses: of each person, (n_values,); None for a person without a pose on the frame.
+    """
+    settings, states, colors = VoxelSettings(), [], [_FREE_RGB]
+    for model, pose in zip(models, poses, strict=True):
+        try:
+            members = figure_of(model).members
+        except TrackerError:  # a body without the joints of ten parts colours nothing
+            continue
+        if pose is not None:
+            states.append(state_of(model, [pose], 1.0, settings))
+            colors += [rgb(model.parts[members[k][0]].color) for k in range(N_PARTS)]
+    out = np.array(colors, dtype=np.uint8)
+    if not states:
+        return np.broadcast_to(out[0], points.shape).copy()
+    rule = LabelRule(np.inf if settings.gate is None else settings.gate)
+    return out[label_voxels(points, states, _VOXEL_M, rule).labels + 1]

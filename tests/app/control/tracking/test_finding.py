@@ -1,0 +1,139 @@
+"""Find people in the page's program: progress, one entry of the history, stop, and what is refused."""
+
+import threading
+
+import numpy as np
+import pytest
+from gestures import drag, wait_for
+
+from app.control.tracking import finding
+from app.page import inspector_feed
+from tracker.errors import TrackerError
+from tracker.initialization.candidates import StartCandidate
+from tracker.initialization.start_fit import FittedStart
+from tracker.pipeline.find_people import FoundPeople
+from tracker.pipeline.first_pose import FirstPose, FirstPoses
+
+FRAME = 1
+
+
+@pytest.fixture
+def found(monkeypatch):
+    """Stands for the search, which takes many seconds: finds a person 5% larger once it is let go."""
+    go = threading.Event()
+
+    def find(session, observer, people, frames, settings, report):
+        report("finding first poses", 0.25, "frame 1, voxels: good")
+        assert go.wait(10)
+        report("acquiring sizes", 0.5, "")
+        model = session.people[0].model
+        body = model.with_height(1.05 * model.height_m)
+        pose = body.neutral()
+        candidate = StartCandidate("axis", body, pose, np.array([1.0, 0.0, 0.0]), 2.0)
+        lines = {"FRONT": np.array([[[10.0, 20.0], [30.0, 40.0]], [[11.0, 20.0], [29.0, 40.0]]])}
+        first = FirstPose(FRAME, candidate, FittedStart(pose, "good", 1.0), True, (), lines)
+        return FoundPeople(FirstPoses(FRAME, dict.fromkeys(people, first)), {0: body}, {0: pose}, {})
+
+    monkeypatch.setattr(finding, "find_people", find)
+    return go
+
+
+@pytest.fixture
+def tracked(monkeypatch):
+    """The runs of the tracker that were asked for; each does nothing and ends well."""
+    runs = []
+
+    def start(self, backward, until, edit, on_end):
+        runs.append((self._session_state.state.frame, backward, until, edit))
+        on_end(True)
+
+    monkeypatch.setattr("app.control.tracking.tracking.Tracking.start", start)
+    return runs
+
+
+def begun(controller):
+    controller.finding.start()
+    wait_for(lambda: controller.state.finding.share > 0)
+
+
+def test_one_entry_holds_poses_sizes_and_tracks(opened, found, tracked):
+    controller = opened()
+    before = controller.models[0].height_m
+    begun(controller)
+    assert controller.state.finding.stage == "finding first poses"
+    assert controller.state.finding.notes == ("frame 1, voxels: good",)
+    found.set()
+    wait_for(lambda: not controller.state.finding.running)
+    assert controller.state.finding.message == "Done."
+    last = controller.session.n_frames - 1
+    (edit,) = {run[3] for run in tracked}
+    assert edit is not None
+    assert [run[:3] for run in tracked] == [(FRAME, True, 0), (0, False, last)]
+    assert controller.session.people[0].model.height_m == pytest.approx(1.05 * before)
+    controller.history.undo()
+    assert controller.session.people[0].model.height_m == pytest.approx(before)
+    assert controller.state.undo is None
+    controller.history.redo()
+    assert controller.session.people[0].model.height_m == pytest.approx(1.05 * before)
+
+
+def test_the_axes_of_the_silhouettes_are_shown_and_kept(opened, found, tracked):
+    controller = opened()
+    begun(controller)
+    found.set()
+    wait_for(lambda: not controller.state.finding.running)
+    controller = opened()  # a restart
+    message = inspector_feed.finding(controller.state.finding, [c.camera.name for c in controller.session.cameras])
+    assert message.frame == FRAME
+    (axes,) = message.axes
+    assert axes.camera == 0
+    assert axes.people == (((10.0, 20.0, 30.0, 40.0), (11.0, 20.0, 29.0, 40.0)),)
+
+
+def test_a_stop_changes_nothing(opened, found, tracked):
+    controller = opened()
+    begun(controller)
+    stopper = threading.Thread(target=controller.finding.stop)
+    stopper.start()
+    found.set()
+    stopper.join(10)
+    assert controller.state.finding.message == "Stopped; nothing was changed."
+    assert controller.state.people[0].source is None
+    assert tracked == []
+
+
+def test_a_person_who_was_placed_meanwhile_wins(opened, found, tracked):
+    controller = opened()
+    begun(controller)
+    drag(controller, "left_wrist", (6.0, -9.0))
+    found.set()
+    wait_for(lambda: not controller.state.finding.running)
+    assert controller.state.finding.failed
+    assert "placed meanwhile" in controller.state.finding.message
+    assert controller.state.undo is not None
+    assert tracked == []
+
+
+def test_one_at_a_time_and_only_where_somebody_is_missing(opened, found, tracked):
+    controller = opened()
+    begun(controller)
+    with pytest.raises(TrackerError, match="no other search for people"):
+        controller.finding.start()
+    controller.finding._stopping.set()
+    found.set()
+    wait_for(lambda: not controller.state.finding.running)
+    drag(controller, "left_wrist", (6.0, -9.0))
+    with pytest.raises(TrackerError, match="a person without a pose"):
+        controller.finding.start()
+
+
+def test_an_error_is_one_sentence(opened, monkeypatch):
+    def fail(*_):
+        raise TrackerError("expected somebody in the silhouettes, found none")
+
+    monkeypatch.setattr(finding, "find_people", fail)
+    controller = opened()
+    controller.finding.start()
+    wait_for(lambda: not controller.state.finding.running)
+    assert controller.state.finding.message == "Expected somebody in the silhouettes, found none."
+    assert controller.state.finding.failed

@@ -1,0 +1,90 @@
+"""Start poses of one person by each method, on figures with known joints that are unlike any body model."""
+
+import numpy as np
+import pytest
+from figures import cameras_about_a_figure, figure, scene_of, silhouettes_of_figure
+
+from tracker.errors import TrackerError
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.formats.model_toml import load_model
+from tracker.initialization.candidates import from_axis, from_search, from_voxels, silhouette_axes, standing_height
+
+CAMERAS = cameras_about_a_figure()
+MODEL = load_model("gavrila34")
+POSES = [
+    {"arms_deg": arms, "legs_deg": legs, "turn_deg": turn, "noise": 0.05}
+    for arms, legs, turn in (
+        (35, 12, 0), (45, 15, 30), (60, 10, 75), (30, 20, 120), (80, 12, 160),
+        (40, 14, 200), (55, 18, 250), (35, 10, 290), (70, 16, 310), (50, 12, 345),
+    )
+]  # fmt: skip
+
+
+def scene(voxels, **changes):
+    return scene_of(voxels, silhouettes_of_figure(voxels, CAMERAS), **changes)
+
+
+def error_mm(candidate, joints):
+    model = candidate.model
+    own = dict(zip(model.point_names, model.points_world(candidate.pose), strict=True))
+    return 1000 * float(np.mean([np.linalg.norm(own[n] - joints[n]) for n in LIMB_JOINTS]))
+
+
+@pytest.mark.slow
+def test_the_axis_gives_starts():
+    errors = []
+    for pose in POSES:
+        voxels, joints = figure(**pose)
+        found = sorted(from_axis(scene(voxels), MODEL, False), key=lambda c: c.cues)
+        assert found[-1].cues > 0 > found[0].cues  # both ways of facing, told apart by the feet
+        left = joints["left_shoulder"] - joints["right_shoulder"]
+        assert np.cross(found[-1].axis.up, found[-1].forward) @ left / np.linalg.norm(left) > 0.7
+        errors.append(error_mm(found[-1], joints))
+    assert np.mean(errors) < 80
+    assert max(errors) < 120
+
+
+def test_voxels_give_both_ways_of_facing():
+    voxels, joints = figure(**POSES[1])
+    ahead, back = from_voxels(scene(voxels), MODEL, False)
+    assert ahead.cues == -back.cues > 0
+    np.testing.assert_allclose(ahead.forward, -back.forward)
+    assert error_mm(ahead, joints) < 80 < error_mm(back, joints)
+    assert ahead.is_measured
+    assert ahead.model.height_m == pytest.approx(1.74, abs=0.05)
+
+
+def test_a_known_height_stays():
+    assert from_voxels(scene(figure()[0]), MODEL, True)[0].model is MODEL
+
+
+@pytest.mark.slow
+def test_a_search_needs_no_head_that_stands_out():
+    voxels, joints = figure(arms_deg=150)  # the upper arms lie beside the head
+    found = from_search(scene(voxels), MODEL, True)
+    assert min(error_mm(c, joints) for c in found) < 150
+
+
+@pytest.mark.parametrize("arms_deg", [20, 90, 175])
+def test_raised_arms_do_not_make_a_person_taller(arms_deg):
+    voxels, joints = figure(arms_deg=arms_deg)
+    top = joints["head"] + (0.0, 0.0, 0.125)
+    soles_m = joints["left_ankle"][2] - 0.07
+    found = standing_height(scene(voxels), np.array([0.0, 0.0, 1.0]), top, joints["neck"] + (0.0, 0.0, 0.08))
+    assert found == pytest.approx(top[2] - soles_m, abs=0.03)
+
+
+def test_a_person_who_lies_or_crouches_has_no_standing_height():
+    voxels, joints = figure()
+    top, up = joints["head"] + (0.0, 0.0, 0.125), np.array([0.0, 0.0, 1.0])
+    assert standing_height(scene(voxels), np.array([1.0, 0.0, 0.0]), top) is None
+    assert standing_height(scene(voxels), up, top, joints["neck"] - (0.0, 0.0, 0.10)) is None
+
+
+def test_views_in_which_others_stand_before_the_person_are_left_out():
+    own = scene(figure()[0])
+    masks = [m._replace(is_apart=i > 0) for i, m in enumerate(own.masks)]
+    assert [a.camera.name for a in silhouette_axes(own._replace(masks=masks))] == ["c1", "c2", "c3"]
+    nothing = [m._replace(mask=np.zeros_like(m.mask)) for m in own.masks]
+    with pytest.raises(TrackerError, match="the person in at least 2 views"):
+        silhouette_axes(own._replace(masks=nothing))

@@ -1,0 +1,145 @@
+"""People found with nobody's help: which frames are tried, what is said where nobody can be found, what is stored."""
+
+import shutil
+from contextlib import closing
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from figures import cameras_about_a_figure, figure, silhouettes_of_figure
+from solids import ellipsoid, silhouettes_of
+
+from tracker.errors import TrackerError
+from tracker.formats.model_toml import format_model
+from tracker.initialization.candidates import StartCandidate
+from tracker.initialization.start_fit import FittedStart
+from tracker.pipeline import first_pose
+from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
+from tracker.pipeline.find_people import AXES, FoundPeople, frames_to_try, store_found
+from tracker.pipeline.first_pose import FirstPose, FirstPoses, find_first_poses
+from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
+
+NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
+CAMERAS = [replace(c, name=n) for c, n in zip(cameras_about_a_figure(), NAMES, strict=True)]
+HALF = np.array([0.17, 0.17, 0.6])
+
+
+@pytest.fixture
+def session(tmp_path, sample_folder):
+    session = load_session(shutil.copytree(sample_folder, tmp_path / "session"))
+    session.annotations_path.unlink(missing_ok=True)
+    return session
+
+
+@pytest.fixture
+def silhouettes(monkeypatch):
+    """What is seen on every frame, a list that tests fill."""
+    seen = []
+    finder = SimpleNamespace(silhouettes=lambda k, person=None: tuple(seen), close=lambda: None)
+    monkeypatch.setattr(first_pose, "SilhouetteFinder", lambda cameras, recording: finder)
+    return seen
+
+
+@pytest.fixture
+def fits(monkeypatch):
+    """Every start fits as it is; the second way of facing costs more."""
+    costs = iter(np.arange(1.0, 100.0))
+
+    def fit(observer, models, start, frame, later, others):
+        return FittedStart(start, "good", float(next(costs)))
+
+    monkeypatch.setattr(first_pose, "fit_start", fit)
+
+
+OBSERVER = SimpleNamespace(recording=None)
+
+
+def find(session, size_m=0.05):
+    return find_first_poses(session, OBSERVER, [0], [3], size_m=size_m)
+
+
+def test_frames_are_tried_far_from_one_another():
+    tried = frames_to_try(range(100), None)
+    assert tried[:3] == [50, 0, 99]
+    assert len(tried) == len(set(tried)) == 12
+    assert frames_to_try(range(10, 14), 12) == [12, 10, 11, 13]
+    assert set(frames_to_try(range(0, 60, 3), None)) <= set(range(0, 60, 3))
+
+
+def test_nobody_in_the_silhouettes(session, silhouettes):
+    silhouettes += [s._replace(mask=np.zeros_like(s.mask)) for s in silhouettes_of_figure(figure()[0], CAMERAS)]
+    with pytest.raises(TrackerError, match="expected somebody in the silhouettes of at least 2 views, found none"):
+        find(session)
+
+
+def test_two_people_where_one_was_announced(session, silhouettes):
+    people = [ellipsoid((0.0, -0.6, 0.9), HALF), ellipsoid((0.0, 0.6, 0.9), HALF)]
+    silhouettes += silhouettes_of(people, CAMERAS)
+    with pytest.raises(TrackerError, match="expected 1 person as the session has, found 2 figures that stand apart"):
+        find(session)
+
+
+def test_a_camera_that_moved_is_named(session, silhouettes, fits, monkeypatch):
+    monkeypatch.setattr(first_pose, "_MAX_HULL_M3", 0.5)  # three views leave a wide hull
+    views = silhouettes_of_figure(figure()[0], CAMERAS)
+    silhouettes += [views[0], views[1]._replace(mask=np.roll(views[1].mask, 130, axis=1)), *views[2:]]
+    notes = " ".join(find(session, 0.03).poses[0].notes)
+    assert "view RIGHT was left out" in notes
+    assert "cut off" not in notes
+
+
+def test_several_cameras_that_moved_are_an_error(session, silhouettes):
+    views = silhouettes_of_figure(figure()[0], CAMERAS)
+    silhouettes += [v._replace(mask=np.roll(v.mask, 110 * i, axis=1)) for i, v in enumerate(views)]
+    with pytest.raises(TrackerError, match="no camera has moved"):
+        find(session)
+
+
+def test_a_person_cut_off_by_the_image(session, silhouettes, fits):
+    views = silhouettes_of_figure(figure()[0], CAMERAS)
+    bottom = int(views[0].mask.any(axis=1).nonzero()[0][-1])
+    height = bottom - 20
+    camera = views[0].camera.cropped((0, 0, views[0].camera.width, height))
+    silhouettes += [views[0]._replace(mask=views[0].mask[:height], camera=camera), *views[1:]]
+    assert "cut off by the image in view FRONT" in find(session).poses[0].notes
+
+
+def test_both_ways_of_facing_are_compared(session, silhouettes, fits):
+    silhouettes += silhouettes_of_figure(figure(turn_deg=40)[0], CAMERAS)
+    first = find(session).poses[0]
+    assert first.is_facing_sure  # the feet say so
+    assert first.candidate.cues > 1
+    assert set(first.lines_px) <= set(NAMES)
+
+
+def found_people(session, scale):
+    model = session.people[0].model
+    body = model.with_height(scale * model.height_m)
+    candidate = StartCandidate("axis", body, body.neutral(), np.array([1.0, 0.0, 0.0]), 2.0)
+    lines = {"FRONT": np.array([[[1.0, 2.0], [3.0, 4.0]]])}
+    first = FirstPose(7, candidate, FittedStart(body.neutral(), "good", 1.0), True, ("a note",), lines)
+    return FoundPeople(FirstPoses(7, {0: first}), {0: body}, {0: body.neutral()}, {})
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.05])
+def test_poses_and_bodies_are_one_entry_of_the_history(session, scale):
+    found = found_people(session, scale)
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        changed = store_found(session, store, found)
+        (entry,) = store.history()
+        record = store.pose("person", 7)
+        assert (record.remark, record.status, record.keyframe) == ("a note", "good", False)
+        assert record.settings["method"] == "axis"
+        assert store.setting(AXES) == {"frame": 7, "lines": {"FRONT": [[[[1.0, 2.0], [3.0, 4.0]]]]}}
+        sizes = sizes_changed(store.setting(SIZES_EDITS, {}), entry.edit)
+        assert [name for name, _, _ in sizes] == (["person"] if scale != 1.0 else [])
+    assert changed.people[0].model.height_m == pytest.approx(found.bodies[0].height_m)
+    assert format_model(load_session(session.folder).people[0].model) == format_model(changed.people[0].model)
+
+
+def test_an_entry_of_one_person_is_read_as_before():
+    assert sizes_changed({"5": ["ann", 1, 2]}, 5) == [("ann", 1, 2)]
+    assert sizes_changed({"5": [["ann", 1, 2], ["bob", 3, 4]]}, 5) == [("ann", 1, 2), ("bob", 3, 4)]
+    assert sizes_changed({"5": ["ann", 1, 2]}, 6) == []

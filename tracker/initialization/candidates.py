@@ -1,0 +1,189 @@
+"""Start poses of one person on one frame by each method: voxels, the body's axis, and search along the figure."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from tracker.body.model import BodyModel
+from tracker.errors import TrackerError
+from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.geometry.arrays import Array
+from tracker.initialization.axis_start import AxisStart, search_on_axes
+from tracker.initialization.body_axis import BodyAxis, find_body_axes
+from tracker.initialization.outline_evidence import outline_evidence
+from tracker.initialization.silhouette_axis import MajorAxis, major_axis
+from tracker.initialization.voxel_start import facing_cues, locate_parts, start_pose, turned_round
+from tracker.voxels.figure_masks import FigureMask
+from tracker.voxels.part_size import principal_axes
+from tracker.voxels.voxel_grid import Voxels
+
+StartMethod: TypeAlias = Literal["voxels", "axis", "search"]
+
+_UPRIGHT = 0.9
+"""Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
+_NECK, _NECK_SPREAD = 0.88, 0.04
+"""Height of the base of the head of a person who stands, as a fraction of the body's height, and its largest relative
+difference from that: folded legs make it lower."""
+_AXES_TRIED = 3
+_RAISED = (0.0, 0.10, 0.20)
+"""Tops of the head that a search tries, below the end of the figure, as fractions of the height: hands may be above."""
+
+
+class PersonScene(NamedTuple):
+    """What is known of one person on a frame before any pose is."""
+
+    figure: Voxels
+    """Voxels of the person."""
+    silhouettes: Sequence[ViewSilhouette]
+    """Of all views."""
+    masks: Sequence[FigureMask]
+    """Those of the person alone."""
+    up: Array
+    """Vertical axis of the world, (3,)."""
+    motion: Array | None
+    """The way of the person to later frames, (3,), metres; None if it is not known."""
+
+
+class StartCandidate(NamedTuple):
+    """A start pose before the fit to contours."""
+
+    method: StartMethod
+    model: BodyModel
+    """The body, with the height that was measured."""
+    pose: Array
+    """(n_values,)."""
+    forward: Array
+    """Unit direction in which the trunk faces, (3,)."""
+    cues: float
+    """What feet, bends and motion say for that direction; below 0 they speak for the opposite one."""
+    unresolved: tuple[str, ...] = ()
+    """Limbs that the method does not tell from the rest of the body."""
+    straight: tuple[str, ...] = ()
+    """Limbs whose middle joint follows from proportions."""
+    axis: BodyAxis | None = None
+    """The axis of the body, where the method found one."""
+    is_measured: bool = True
+    """Whether the height of the body was measured, or was known."""
+
+
+def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
+    """Return starts from the parts that voxels show (MTHC01 Sect. 3), one for each way of facing.
+
+    Args:
+        scene: the person on a frame.
+        model: the body.
+        is_known: whether its height is known; else it is measured, if the person stands.
+
+    Raises:
+        TrackerError: no head is found.
+    """
+    parts = locate_parts(scene.figure, scene.motion)
+    head = scene.figure.points_world[parts.head.is_head]
+    top = head[int(np.argmax(head @ scene.up))] + scene.figure.grid.size_m / 2 * scene.up
+    height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], top, parts.head.neck)
+    own = model if height_m is None else model.with_height(height_m)
+    return [
+        StartCandidate(
+            "voxels", own, start_pose(own, p), p.torso.axes[:, 0], sign * p.facing, p.unresolved, p.straight,
+            None, is_known or height_m is not None,
+        )
+        for sign, p in ((1.0, parts), (-1.0, turned_round(parts)))
+    ]  # fmt: skip
+
+
+def from_axis(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
+    """Return starts on the axis of the silhouettes (GD96 Sect. 4.1), one for each way of facing.
+
+    Views in which others cover the person are left out if two remain. See `from_voxels`.
+
+    Raises:
+        TrackerError: fewer than two views agree on an axis, or no head is found along it.
+    """
+    axes = find_body_axes(silhouette_axes(scene), scene.up, model.height_m)[:_AXES_TRIED]
+    best = axes[0]
+    height_m = None if is_known else standing_height(scene, best.up, best.top)
+    own = model if height_m is None else model.with_height(height_m)
+    return _on_axes("axis", scene, own, axes, is_known or height_m is not None)
+
+
+def from_search(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
+    """Return starts from a search along the figure's longest axis, with the head near either end.
+
+    It needs no head that stands out. See `from_voxels`.
+    """
+    found = principal_axes(scene.figure.points_world, scene.figure.grid.size_m)
+    up = found.axes[:, 2] * (1.0 if found.axes[:, 2] @ scene.up >= 0 else -1.0)
+    axes = []
+    for direction in (up, -up):
+        top = found.center + float(((scene.figure.points_world - found.center) @ direction).max()) * direction
+        axes += [BodyAxis(direction, top - s * model.height_m * direction, np.nan, (), ()) for s in _RAISED]
+    return _on_axes("search", scene, model, axes, is_known)
+
+
+METHODS: Mapping[StartMethod, Callable[[PersonScene, BodyModel, bool], list[StartCandidate]]] = {
+    "voxels": from_voxels,
+    "axis": from_axis,
+    "search": from_search,
+}
+"""Each method by name, in the order in which they are tried."""
+
+
+def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
+    """Return the major axes of a person's silhouettes in the views that show the person alone.
+
+    Raises:
+        TrackerError: fewer than two views show the person.
+    """
+    pairs = list(zip(scene.masks, scene.silhouettes, strict=True))
+    apart = [(m, s) for m, s in pairs if m.is_apart and m.mask.any()]
+    chosen = apart if len(apart) >= 2 else pairs
+    axes = [a for m, s in chosen if (a := major_axis(m.mask, s.camera)) is not None]
+    if len(axes) < 2:
+        raise TrackerError(
+            f"expected the person in at least 2 views, found {len(axes)}; choose another --frame, or check the "
+            "background"
+        )
+    return axes
+
+
+def standing_height(scene: PersonScene, trunk_up: Array, top: Array, neck: Array | None = None) -> float | None:
+    """Return the height of a person who stands upright, metres; None if the person does not.
+
+    Args:
+        scene: the person on a frame.
+        trunk_up: direction of the trunk towards the head, (3,).
+        top: top of the head, (3,), metres; raised hands are above it.
+        neck: base of the head, (3,), metres, where it was found.
+    """
+    if trunk_up @ scene.up < _UPRIGHT:
+        return None
+    low = float((scene.figure.points_world @ scene.up).min()) - scene.figure.grid.size_m / 2
+    height_m = float(top @ scene.up) - low
+    if neck is None:
+        return height_m
+    share = (float(neck @ scene.up) - low) / height_m
+    return height_m if abs(share / _NECK - 1) < _NECK_SPREAD else None
+
+
+def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:
+    """Return the direction from the feet upwards, (3,): the soles of who stands are on the ground, bent or not."""
+    return scene.up if axis.up @ scene.up > _UPRIGHT else axis.up
+
+
+def _on_axes(
+    method: StartMethod, scene: PersonScene, model: BodyModel, axes: Sequence[BodyAxis], is_measured: bool
+) -> list[StartCandidate]:
+    pairs = list(zip(scene.masks, scene.silhouettes, strict=True))
+    apart = sum(m.is_apart and bool(m.mask.any()) for m, _ in pairs) >= 2
+    masks = [m.mask if m.is_apart or not apart else np.zeros_like(m.mask) for m, _ in pairs]
+    views = outline_evidence(masks, [s.camera for _, s in pairs])
+    starts: list[AxisStart] = search_on_axes(model, views, axes)
+    return [
+        StartCandidate(
+            method, model, start.pose, start.forward,
+            facing_cues(scene.figure, start.forward, _feet_up(scene, start.axis), scene.motion),
+            axis=start.axis, is_measured=is_measured,
+        )
+        for start in starts
+    ]  # fmt: skip

@@ -1,0 +1,5 @@
+"""The voxel tracker (MTHC01 Sect. 4): an extended Kalman filter on the parts of a figure of voxels.
+
+It may import compute, geometry, body, evidence, voxels, fitting and `tracker.tracking`. Public:
+`tracker.VoxelTracker`, `settings.VoxelSettings`, `paper.paper_settings`, `labels.label_voxels`.
+"""

@@ -1,0 +1,104 @@
+"""Turn poses of a session's body into filter states, and states back into poses."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body.model import BodyModel, PosedBody
+from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, covariance, solve
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
+from tracker.tracking.voxel.settings import VoxelSettings
+from tracker.tracking.voxel.state import FilterState, Layout, center_jacobian, point_jacobian
+
+_PLACE_M = 0.015
+"""Standard deviation between the joints of a figure and those of a body whose trunk bends, metres."""
+_NEAR_RAD, _NEAR_M = 0.5, 0.5
+"""Standard deviations of the pose of the frame before, where the joints do not determine it: the twist of a straight
+limb, rad and metres."""
+_START_RATE, _START_SPEED = 2.0, 0.5
+"""Standard deviations of unknown angular velocities, rad/s, and of the torso's velocity, m/s."""
+_MAX_ITERATIONS = 15
+_TOLERANCE = 1e-3
+
+
+class BodyPose(NamedTuple):
+    """The pose of a body that stands for a state."""
+
+    values: Array
+    """(n_values,)."""
+    covariance: Array
+    """(n_dofs, n_dofs), rad and metres."""
+
+
+def state_of(
+    model: BodyModel, past: Sequence[Array], dt: float, settings: VoxelSettings, sure: bool = False
+) -> FilterState:
+    """Return the state of a person in a pose.
+
+    Args:
+        model: the body.
+        past: poses of the last frames, (n_values,) each, the present one last.
+        dt: time between them, s.
+        settings: of the tracker.
+        sure: whether the pose is a keyframe, or one that was tracked before.
+    """
+    of = figure_of(model)
+    layout = Layout(settings.sizes != "frozen", True, settings.turn_rates)
+    body = PosedBody(model, past[-1])
+    rotations = part_rotations(body, of)
+    center = torso_center(body, of, rotations[0])
+    velocity, rates = np.zeros(3), np.zeros((N_PARTS, 3))
+    known = len(past) > 1
+    if known:
+        before = PosedBody(model, past[-2])
+        turned = part_rotations(before, of)
+        velocity = (center - torso_center(before, of, turned[0])) / dt
+        if settings.turn_rates:
+            rates = rigid.so3_log(np.swapaxes(turned, 1, 2) @ rotations) / dt
+    scale = 0.3 if sure or known else 1.0
+    variances = np.empty(layout.n)
+    variances[layout.turns_at] = (scale * settings.start_turn) ** 2
+    variances[layout.center_at] = (scale * settings.start_m) ** 2
+    variances[layout.sizes_at] = settings.start_size_m**2
+    variances[layout.velocity_at] = _START_SPEED**2
+    variances[layout.turn_rates_at] = _START_RATE**2
+    return FilterState(
+        of.figure, layout, rigid.quaternion_from_matrix(rotations), of.sizes.copy(), center, velocity, rates,
+        np.diag(variances),
+    )  # fmt: skip
+
+
+def pose_of(
+    model: BodyModel, state: FilterState, near: Array, active_dofs: NDArray[np.bool_] | None = None
+) -> BodyPose:
+    """Return the pose of a body that comes closest to the joints of a state, within the limits of the body.
+
+    Each joint counts by its own covariance. What joints do not determine stays near another pose.
+
+    Args:
+        model: the body.
+        state: of the filter.
+        near: the other pose, (n_values,).
+        active_dofs: degrees of freedom that may move, (n_dofs,); None: all.
+    """
+    by_center = center_jacobian(state)
+    indices, targets, weights = [], [], []
+    names = {n: i for i, n in enumerate(model.point_names)}
+    for name, part, shares in point_shares(state.figure):
+        J = point_jacobian(state, by_center, part, shares)
+        variance = float(np.einsum("ij,jk,ik->", J, state.covariance, J)) / 3
+        indices.append(names[name])
+        targets.append(state.centers[part] + state.rotations[part] @ (shares * state.sizes[part]))
+        weights.append(1 / np.sqrt(variance + _PLACE_M**2))
+    rest = np.where(model.dof_is_length, 1 / _NEAR_M, 1 / _NEAR_RAD)
+    blocks: list[ResidualBlock] = [
+        PointTargets(np.array(indices), np.array(targets), np.array(weights)),
+        PosePrior(model.neutral(), 1 / model.spreads),
+        PosePrior(near, rest),
+    ]
+    fit = solve(model, near, blocks, active_dofs, _MAX_ITERATIONS, _TOLERANCE)
+    return BodyPose(fit.pose, covariance(model, fit))

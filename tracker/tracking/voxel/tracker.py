@@ -1,0 +1,37 @@
+"""The voxel tracker of MTHC01 behind the interface that all trackers share."""
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+from tracker.evidence.silhouettes import SilhouetteFinder
+from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
+from tracker.tracking.tracker import TrackingRun
+from tracker.tracking.voxel.frame_estimator import VoxelEstimator
+from tracker.tracking.voxel.settings import VoxelSettings
+
+
+@dataclass(frozen=True)
+class VoxelTracker:
+    """Predict, carve, label, measure and update, one frame at a time."""
+
+    settings: VoxelSettings = field(default_factory=VoxelSettings)
+
+    def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
+        """See `Tracker.estimates`."""
+        finder = SilhouetteFinder(run.observer.cameras, run.observer.recording)
+        estimator = VoxelEstimator(run, self.settings)
+        try:
+            with ThreadPoolExecutor(1, "silhouettes ahead") as ahead:
+                following = ahead.submit(finder.silhouettes, run.frames[0])
+                for i, frame in enumerate(run.frames):
+                    silhouettes = following.result()
+                    if i + 1 < len(run.frames):
+                        following = ahead.submit(finder.silhouettes, run.frames[i + 1])
+                    yield estimator.estimate(frame, silhouettes)
+        finally:
+            finder.close()
+
+    def backward_pass(self, run: TrackingRun, tracked: Sequence[TrackedFrame]) -> Iterator[BackwardStep]:
+        """See `Tracker.backward_pass`; the filter has none."""
+        return iter(())
