@@ -4,7 +4,7 @@ import numpy as np
 from solids import cameras_around, ellipsoid, silhouettes_of
 
 from tracker.geometry import rigid
-from tracker.tracking.voxel.figure import Figure, chain_centers, joint_points
+from tracker.tracking.voxel.figure import FigureJoints, chain_centers, joint_points
 
 SHARES = np.array(
     [[0, 0, 0], [0, 0, 1], [0, 1, 0.85], [0, -1, 0.85], [0, 0.6, -0.95], [0, -0.6, -0.95], *[[0, 0, -1]] * 4], float
@@ -17,7 +17,7 @@ ADULT = np.array([
 ])  # fmt: skip
 CHILD = 0.62 * ADULT * np.array([[1.1], [1.75], *[[0.95]] * 8])
 """A child: short limbs, and a head three quarters larger than an adult's of that height."""
-FIGURE = Figure(SHARES, OWN, ENDS, np.ones(10, bool), np.argsort(ADULT, axis=1))
+FIGURE = FigureJoints(SHARES, OWN, ENDS, np.ones(10, bool), np.argsort(ADULT, axis=1))
 
 
 def cameras():

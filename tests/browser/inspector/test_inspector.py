@@ -269,10 +269,10 @@ async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page,
     await until(lambda: endpoint.heard("acquire") == [{"type": "acquire", "action": "start", "person": 0}])
     work = {"type": "acquisition", "person": 0, "running": True, "stage": "fitting sizes", "share": 0.4}
     await endpoint.broadcast(work | {"message": "", "result": None})
-    await shows(page, "document.querySelector('.acquisition progress').value === 0.4")
+    await shows(page, "document.querySelector('[data-section=body] progress').value === 0.4")
     assert "fitting sizes" in await page.locator(".acquisition-status").inner_text()
     assert await page.get_by_role("button", name="Acquire from footage").is_hidden()
-    await page.locator(".acquisition").get_by_role("button", name="Stop").click()
+    await page.locator("[data-section=body] .acquisition").get_by_role("button", name="Stop").click()
     await until(lambda: endpoint.heard("acquire")[-1]["action"] == "stop")
     lines = {"before": [[0, 0, 10, 10]], "after": [[0, 0, 12, 10], [12, 10, 20, 20]]}
     result = {
@@ -283,8 +283,8 @@ async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page,
     await endpoint.broadcast(work | {"running": False, "stage": "", "message": "", "result": result})
     await page.locator(".acquisition-sizes").wait_for()
     assert await page.locator(".acquisition-sizes tbody tr").inner_text() == "Thigh, length\t40.0\t44.5\t0.8"
-    assert "Frames 0, 7: 3.00 → 2.25 px" in await page.locator(".acquisition").inner_text()
-    assert await page.locator(".acquisition path.is-after").first.get_attribute("d") == "M0 0L12 10M12 10L20 20"
+    assert "Frames 0, 7: 3.00 → 2.25 px" in await page.locator("[data-section=body] .acquisition").inner_text()
+    assert await page.locator("[data-section=body] .acquisition path.is-after").first.get_attribute("d") == "M0 0L12 10M12 10L20 20"
     # Nobody else's result is shown as one's own.
     await endpoint.broadcast(endpoint.body_sizes | {"person": 1})
     await page.locator(".acquisition-sizes").wait_for(state="hidden")

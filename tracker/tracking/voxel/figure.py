@@ -34,7 +34,7 @@ _ENDS = {"left_forearm": "left_wrist", "right_forearm": "right_wrist", "left_cal
 """Point that is followed on a part without a part beyond it."""
 
 
-class Figure(NamedTuple):
+class FigureJoints(NamedTuple):
     """The structure of a figure. Joints lie at fixed shares of the half sizes of their parts."""
 
     parent_shares: Array
@@ -58,7 +58,7 @@ class Figure(NamedTuple):
 class FigureOfBody(NamedTuple):
     """A figure with the sizes of a body of a session, and how the parts of that body belong to it."""
 
-    figure: Figure
+    figure: FigureJoints
     sizes: Array
     """Half sizes along x, y, z of each part, (10, 3), metres."""
     members: tuple[IntArray, ...]
@@ -93,7 +93,7 @@ def figure_of(model: BodyModel) -> FigureOfBody:
     at_parent[TORSO] = 0.0
     own = (joints - centers) / sizes
     own[TORSO] = 0.0
-    figure = Figure(
+    figure = FigureJoints(
         at_parent, own, (ends - centers) / sizes,
         np.array([isinstance(model.shapes[m[0]], Ellipsoid) or k == HEAD for k, m in enumerate(members)]),
         np.argsort(sizes, axis=1, kind="stable"),
@@ -128,7 +128,7 @@ def torso_center(body: PosedBody, of: FigureOfBody, rotation: Array) -> Array:
     return np.asarray(np.sum(found, axis=0) / 4.0)
 
 
-def chain_centers(figure: Figure, sizes: Array, rotations: Array, center: Array) -> Array:
+def chain_centers(figure: FigureJoints, sizes: Array, rotations: Array, center: Array) -> Array:
     """Return the centres of all parts, (10, 3), metres, by their kinematic chains (MTHC01 Eq. 3).
 
     Args:
@@ -146,7 +146,7 @@ def chain_centers(figure: Figure, sizes: Array, rotations: Array, center: Array)
     return out
 
 
-def joint_points(figure: Figure, sizes: Array, rotations: Array, centers: Array) -> dict[str, Array]:
+def joint_points(figure: FigureJoints, sizes: Array, rotations: Array, centers: Array) -> dict[str, Array]:
     """Return the joints of a figure and the ends of its limbs by name, (3,) each, metres."""
     found = {}
     for i, name in enumerate(PARTS):
@@ -157,7 +157,7 @@ def joint_points(figure: Figure, sizes: Array, rotations: Array, centers: Array)
     return found
 
 
-def point_shares(figure: Figure) -> tuple[tuple[str, int, Array], ...]:
+def point_shares(figure: FigureJoints) -> tuple[tuple[str, int, Array], ...]:
     """Return the points of `joint_points`: name, index of the part, and position in its half sizes, (3,)."""
     roots = tuple((_ROOTS[n], i, figure.own_shares[i]) for i, n in enumerate(PARTS) if i)
     return roots + tuple((_ENDS[n], i, figure.end_shares[i]) for i, n in enumerate(PARTS) if n in _ENDS)

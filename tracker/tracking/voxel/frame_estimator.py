@@ -16,7 +16,7 @@ from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations
 from tracker.tracking.voxel.frame_voxels import FrameVoxels, carve_around
 from tracker.tracking.voxel.kalman import LinearizedMeasurement, Update, joined, update
 from tracker.tracking.voxel.labels import Labels, label_voxels
-from tracker.tracking.voxel.levels import Levels, carried, find_levels, measure_together
+from tracker.tracking.voxel.levels import DetailLevels, carried, find_levels, measure_together
 from tracker.tracking.voxel.measurement import linearize, linearize_rotations, measure_parts
 from tracker.tracking.voxel.motion_model import predict
 from tracker.tracking.voxel.settings import VoxelSettings
@@ -51,7 +51,7 @@ class VoxelEstimator:
             state_of(m, list(s), self._dt, settings) for m, s in zip(run.subjects.models, starts, strict=True)
         ]
         self._has_motion = [len(s) > 1 for s in starts]
-        self._levels = [Levels.finest()] * len(starts)
+        self._levels = [DetailLevels.finest()] * len(starts)
         self.labels: Labels | None = None
         self.voxels: FrameVoxels | None = None
 

@@ -29,7 +29,7 @@ _LEG_PAIRS = ((4, 5), (8, 9))
 """Parts of the left and the right leg that are measured together."""
 
 
-class Levels(NamedTuple):
+class DetailLevels(NamedTuple):
     """Which parts the voxels resolve."""
 
     is_resolved: NDArray[np.bool_]
@@ -38,7 +38,7 @@ class Levels(NamedTuple):
     """Number of frames in a row on which a part was merged with another, (10,)."""
 
     @classmethod
-    def finest(cls) -> "Levels":
+    def finest(cls) -> "DetailLevels":
         """Return the levels where every part stands apart."""
         return cls(np.ones(N_PARTS, dtype=bool), np.zeros(N_PARTS, dtype=np.int64))
 
@@ -61,8 +61,8 @@ class Levels(NamedTuple):
 
 
 def find_levels(
-    before: Levels, state: FilterState, voxels: Voxels, labels: NDArray[np.int16], first_label: int, patience: int
-) -> Levels:
+    before: DetailLevels, state: FilterState, voxels: Voxels, labels: NDArray[np.int16], first_label: int, patience: int
+) -> DetailLevels:
     """Return which parts stand apart from the parts beside them; a part changes its level clearly or not at all.
 
     A coarser level waits: legs that pass each other touch for a few frames only, and the prediction tells them apart.
@@ -90,7 +90,7 @@ def find_levels(
     for upper, lower in LIMBS.values():  # an upper arm beside the trunk still begins a forearm that stands out
         resolved[upper] |= resolved[lower]
     resolved[:2] = True
-    return Levels(resolved, n_merged)
+    return DetailLevels(resolved, n_merged)
 
 
 def _touching(grid: NDArray[np.int16], part: int, other: int) -> int:
@@ -128,7 +128,7 @@ def measure_together(
     return LinearizedMeasurement(np.concatenate(rows), H, np.eye(len(H)) * _JOINT_M**2)
 
 
-def carried(before: FilterState, state: FilterState, levels: Levels) -> Array:
+def carried(before: FilterState, state: FilterState, levels: DetailLevels) -> Array:
     """Return the rotations of a state, (10, 3, 3), in which unresolved parts turn with the part that they hang on.
 
     Args:

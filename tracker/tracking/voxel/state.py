@@ -12,7 +12,7 @@ import numpy as np
 
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.tracking.voxel.figure import N_PARTS, PARENTS, TORSO, Figure, chain_centers
+from tracker.tracking.voxel.figure import N_PARTS, PARENTS, TORSO, FigureJoints, chain_centers
 
 MIN_SIZE_M = 0.01
 """Smallest half size of a part, metres."""
@@ -67,7 +67,7 @@ class Layout:
 class FilterState:
     """A state with its covariance."""
 
-    figure: Figure
+    figure: FigureJoints
     layout: Layout
     quaternions: Array
     """Rotation of each part in the world, (10, 4)."""
