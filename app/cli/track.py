@@ -215,7 +215,8 @@ def track(
 
     Returns:
         A summary. `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of
-        poses that the backward pass improved.
+        poses that the backward pass improved. `normal_matrices` has rank and conditioning by person, for methods that
+        compute them.
 
     Raises:
         SessionError: a person has no pose at or before the first frame, or a camera is unknown.
@@ -262,7 +263,26 @@ def track(
         "people": [session.people[i].name for i in at.people],
         "mean_cost_px": float(np.mean(costs)) if costs else None,
         "statuses": {session.people[i].name: dict(statuses[i]) for i in at.people},
+        "normal_matrices": _summarize_matrices(at, run),
     }
+
+
+def _summarize_matrices(at: Target, run: "TrackSession") -> dict[str, Any]:
+    """Return the lowest rank of the normal matrix and its median condition number, by person (KRH08 Sect. 5.4)."""
+    import numpy as np
+
+    out = dict[str, Any]()
+    for i in at.people:
+        found = [m for of_frame in run.normal_matrices.values() if (m := of_frame[i]) is not None]
+        if found:
+            lowest = min(found, key=lambda m: m.rank - m.n_dofs)
+            condition = float(np.median([m.condition for m in found]))
+            out[at.session.people[i].name] = {
+                "lowest_rank": lowest.rank,
+                "n_dofs": lowest.n_dofs,
+                "median_condition": condition if np.isfinite(condition) else None,
+            }
+    return out
 
 
 def _work(run: "TrackSession", progress: Reporter) -> None:
@@ -294,6 +314,12 @@ def _format(found: dict[str, Any]) -> str:
     for name, statuses in found["statuses"].items():
         counts = [f"{statuses[s]} {s}" for s in ("good", "doubtful", "lost") if statuses.get(s)]
         lines.append(f"{name}: {', '.join(counts)}")
+    for name, matrix in found["normal_matrices"].items():
+        condition = "unbounded" if matrix["median_condition"] is None else f"{matrix['median_condition']:.1e}"
+        lines.append(
+            f"{name}: normal matrix of rank {matrix['lowest_rank']} of {matrix['n_dofs']} or more, "
+            f"condition number {condition} in the median"
+        )
     if found["improved_backward"]:
         lines.append(f"the backward pass replaced {found['improved_backward']} poses of frames with lost people")
     if found["stopped_at"] is not None:

@@ -10,7 +10,7 @@ from tracker.pipeline.tracked_changes import StoredPerson, tracked_changes
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
 from tracker.tracking.confidence import Status
-from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
+from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
 from tracker.tracking.tracker import Tracker, TrackingRun
 
 
@@ -114,6 +114,8 @@ class TrackSession:
         """Frames tracked so far by their number, in the order of tracking."""
         self.costs_px: dict[int, float] = {}
         """Cost of each frame that this run has tracked, px."""
+        self.normal_matrices: dict[int, tuple[NormalMatrix | None, ...]] = {}
+        """How well the contours determine the pose of each person, by frame; empty where the method does not say."""
         self.n_improved = 0
         """Number of poses that the backward pass has replaced."""
         self.visited: int | None = None
@@ -165,6 +167,8 @@ class TrackSession:
         self._n_waiting += 1
         self.tracked[step.frame] = TrackedFrame.of(step)
         self.costs_px[step.frame] = step.cost_px
+        if step.normal_matrices:
+            self.normal_matrices[step.frame] = step.normal_matrices
         if self._save_frames is not None and self._n_waiting >= self._save_frames:
             self.save()
 

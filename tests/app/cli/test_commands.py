@@ -144,6 +144,17 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
     store.close()
 
 
+def test_the_contour_method_reports_its_normal_matrices(run, session):
+    run("init", session, "--joints", SAMPLE / "truth.trc")
+    words = ("track", session, "--frames", "0:2", "--method", "contour", "--paper")
+    _, out, _ = run(*words)
+    assert "person: normal matrix of rank 22 of 22 or more, condition number " in out
+    found = json.loads(run(*words, "--json")[1])["normal_matrices"]["person"]
+    assert (found["lowest_rank"], found["n_dofs"]) == (22, 22)
+    assert found["median_condition"] > 10
+    assert json.loads(run("track", session, "--frames", "0:2", "--json")[1])["normal_matrices"] == {}
+
+
 def test_every_tracking_method_can_be_named():
     choices = get_args(get_type_hints(TrackArguments)["method"])
     assert set(choices) == METHODS.keys() == _SETTINGS.keys()
@@ -220,7 +231,7 @@ def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(r
         notes = ("tracked back from frame 2",)
         return found._replace(poses=(found.poses[0] + 0.01,), notes=notes, statuses=("good",))
 
-    def ways_back(run, found, settings):
+    def ways_back(run, found, settings, make_estimator):
         offered.append(found)
         yield BackwardStep(1, 0, 1, 2, (elsewhere(1),))
         if len(offered) == 1:

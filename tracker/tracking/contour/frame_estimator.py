@@ -14,7 +14,7 @@ from tracker.tracking.contour.image_contours import select_contours
 from tracker.tracking.contour.paper_fit import paper_residuals, unlimited_views
 from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.estimate import NormalMatrix
-from tracker.tracking.estimation.assessment import PersonEstimate
+from tracker.tracking.estimation.assessment import PersonEstimate, assess
 from tracker.tracking.estimation.frame_estimator import FrameEstimator
 from tracker.tracking.estimation.frame_problem import PersonFit, with_body
 from tracker.tracking.estimation.incremental_fit import fit_by_chains
@@ -49,24 +49,23 @@ class ContourEstimator(FrameEstimator):
         return {p: self.finalize(p, self.move(p, self._minimize(p))) for p in people}
 
     def finalize(self, person: int, found: PersonFit) -> PersonEstimate:
-        """Turn the fit of a person into an estimate, with the rank of its normal matrix (KRH08 Sect. 5.4)."""
-        out = super().finalize(person, found)
+        """Turn the fit of a person into an estimate; by the paper with the rank of its normal matrix (Sect. 5.4)."""
+        assessment = found.assessment or assess(self.problem, person, self.bodies, found)
+        out = super().finalize(person, found._replace(assessment=assessment))
         model, active = found.body.model, self.problem.people[person].active_dofs
-        residuals = self._paper_residuals(person) if self._contour_settings.paper else found.residuals
-        pose = found.fit.pose
-        linear = residuals.linearize(model, pose, model.kinematics(pose))
+        n_dofs = model.n_dofs if active is None else int(active.sum())
+        length_px = float(assessment.part_costs.length_px.sum())
+        few = f"{length_px:.0f} px of contour are visible, fewer than the {n_dofs} degrees of freedom"
+        if length_px < n_dofs:
+            out = out._replace(status="lost", note=few)
+        if not self._contour_settings.paper:
+            return out
+        linear = self._paper_residuals(person).linearize(model, found.fit.pose, model.kinematics(found.fit.pose))
         matrix = conditioning(linear, active)
-        length_px = float(residuals.part_costs(pose).length_px.sum())
-        out = out._replace(normal_matrix=matrix)
-        if length_px < matrix.n_dofs:
-            return out._replace(
-                status="lost",
-                note=f"{length_px:.0f} px of contour are visible, fewer than the {matrix.n_dofs} degrees of freedom",
-            )
-        if self._contour_settings.paper and matrix.rank < matrix.n_dofs:
-            few = f"the contours determine {matrix.rank} of {matrix.n_dofs} degrees of freedom"
-            return out._replace(note=", ".join(n for n in (out.note, few) if n))
-        return out
+        if length_px >= n_dofs and matrix.rank < n_dofs:
+            few = f"the contours determine {matrix.rank} of {n_dofs} degrees of freedom"
+            out = out._replace(note=", ".join(n for n in (out.note, few) if n))
+        return out._replace(normal_matrix=matrix)
 
     def _minimize(self, person: int) -> PersonFit:
         """Minimize the squared chamfer distances of a person's contours from the pose so far (KRH08 Eq. 60)."""
