@@ -16,8 +16,8 @@ from tracker.tracking.voxel.settings import VoxelSettings
 
 _VOXEL_M = 0.05
 _FRAMES = range(FRAME, FRAME + 8)
-_MUST = 10 / 1.5
-"""10 ms in yardsticks of the quiet machine that bounds are stated for."""
+_MUST, _AIM = 10 / 1.5, 5 / 1.5
+"""10 and 5 ms in yardsticks of the quiet machine that bounds are stated for."""
 
 
 def voxel_frame(frame: BenchFrame, yardstick: Yardstick) -> Row:
@@ -43,4 +43,4 @@ def voxel_frame(frame: BenchFrame, yardstick: Yardstick) -> Row:
         timed = yardstick.beside(work, runs=40)
     lost = np.linalg.norm(estimator.states[0].center - frame.model.points_world(start).mean(axis=0)) > 1.0
     note = "lost the person" if lost else ""
-    return Row("voxel_frame", "voxel tracker, one frame, 50 mm, 4 views", *timed, _MUST, note=note)
+    return Row("voxel_frame", "voxel tracker, one frame, 50 mm, 4 views", *timed, _MUST, _AIM, note)
