@@ -114,11 +114,13 @@ def from_search(scene: PersonScene, model: BodyModel, is_known: bool) -> list[St
     """
     found = principal_axes(scene.figure.points_world, scene.figure.grid.size_m)
     up = found.axes[:, 2] * (1.0 if found.axes[:, 2] @ scene.up >= 0 else -1.0)
-    axes = []
+    starts: list[StartCandidate] = []
     for direction in (up, -up):
         top = found.center + float(((scene.figure.points_world - found.center) @ direction).max()) * direction
-        axes += [BodyAxis(direction, top - s * model.height_m * direction, np.nan, (), ()) for s in _RAISED]
-    return _on_axes("search", scene, model, axes, is_known)
+        axes = [BodyAxis(direction, top - s * model.height_m * direction, np.nan, (), ()) for s in _RAISED]
+        # Spread arms look like legs: both ends are kept, and the fits decide.
+        starts += _on_axes("search", scene, model, axes, is_known)
+    return starts
 
 
 METHODS: Mapping[StartMethod, Callable[[PersonScene, BodyModel, bool], list[StartCandidate]]] = {

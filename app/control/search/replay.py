@@ -57,8 +57,9 @@ class Replay:
                 )  # fmt: skip
             else:
                 recorded = run.steps[at]
+                candidate = None if run.is_contour_fit else run.poses_of(recorded.candidate)
                 shown = ReplayState(
-                    number, at, len(run.steps), run.poses_of(recorded.candidate), run.poses_of(recorded.best),
+                    number, at, len(run.steps), candidate, run.poses_of(recorded.best),
                     run.stages[recorded.stage].name, recorded.candidate_px, recorded.best_px,
                     tuple(finite_or_none(float(c)) for c in recorded.best_view_costs_px), recorded.evaluations,
                     fitted_from,

@@ -284,7 +284,10 @@ async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page,
     await page.locator(".acquisition-sizes").wait_for()
     assert await page.locator(".acquisition-sizes tbody tr").inner_text() == "Thigh, length\t40.0\t44.5\t0.8"
     assert "Frames 0, 7: 3.00 → 2.25 px" in await page.locator("[data-section=body] .acquisition").inner_text()
-    assert await page.locator("[data-section=body] .acquisition path.is-after").first.get_attribute("d") == "M0 0L12 10M12 10L20 20"
+    assert (
+        await page.locator("[data-section=body] .acquisition path.is-after").first.get_attribute("d")
+        == "M0 0L12 10M12 10L20 20"
+    )
     # Nobody else's result is shown as one's own.
     await endpoint.broadcast(endpoint.body_sizes | {"person": 1})
     await page.locator(".acquisition-sizes").wait_for(state="hidden")

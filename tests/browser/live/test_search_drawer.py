@@ -223,3 +223,18 @@ async def test_the_drawer_keeps_the_height_it_is_given(page):
     await shows(page, f"{RUNS} && document.querySelector('#drawer-stage').clientHeight === {after['height']}", 30)
     await page.locator("#drawer-grip").dblclick()
     await shows(page, f"document.querySelector('#drawer-stage').clientHeight === {before['height']}")
+
+
+async def test_contours_are_fitted_and_replayed_with_their_residuals(page):
+    before = await page.evaluate(f"{RUNS}.length")
+    await page.get_by_role("button", name="Contours", exact=True).click()
+    await shows(page, f"{RUNS}.length > {before} && {OVER}", 60)
+    run = await page.evaluate(f"{RUNS}.at(-1)")
+    assert run["steps"] >= 2
+    assert run["best_px"] < run["start_px"]
+    assert len(await drawn(page, "residual")) == 0
+    await page.get_by_role("button", name="Start of the search").click()
+    await page.get_by_role("button", name="One step forward").click()
+    await shows(page, "quadrille.state.overlay?.paths.some((p) => p.kind === 'residual')", 20)
+    assert len(await drawn(page, "compared")) > 10  # the contours at the start
+    assert len(await drawn(page, "residual")) > 10

@@ -15,8 +15,11 @@ _AXIS = np.linspace(-0.75, 0.75, 10)
 """Places along the axis of a part that are looked up, in half sizes."""
 _LOST_SHARE, _DOUBTFUL_SHARE = 0.5, 0.85
 """A limb of whose axis less lies in voxels is lost, or doubtful."""
-_LOST_VOLUME, _DOUBTFUL_VOLUME = 0.5, 0.25
+_LOST_VOLUME, _DOUBTFUL_VOLUME = 0.75, 0.4
 """Volume that no part explains, in volumes of a forearm, above which a limb is lost, or doubtful: it is elsewhere."""
+_BESIDE_M, _FOOT_M = 0.07, 0.30
+"""Distance from the surface of a part beyond which voxels are not its skin, and from a calf's end within which they are
+a foot, metres."""
 _MAX_INNOVATION = 8.0
 """Normalized innovation per row above which the prediction was wrong."""
 
@@ -71,6 +74,25 @@ def assess(
             f"view {', '.join(frame.broken)} left out: it contradicts the others; check whether it has moved",
         )
     return FigureAssessment("good", "")
+
+
+def unexplained_voxels(points: Array, states: Sequence[FilterState]) -> Array:
+    """Return the voxels that lie beside all parts of all people, (N, 3), metres. Feet are no parts of a figure.
+
+    Args:
+        points: centres of the voxels, (M, 3), metres.
+        states: the figures of all people.
+    """
+    free = np.ones(len(points), dtype=bool)
+    for state in states:
+        halves = state.sizes[:, 2, None] * state.rotations[:, :, 2]
+        offsets = points[:, None] - state.centers
+        along = np.clip(np.einsum("nmi,mi->nm", offsets, halves) / np.sum(halves**2, axis=1), -1, 1)
+        distances = np.linalg.norm(offsets - along[..., None] * halves, axis=2)
+        free &= (distances > state.sizes[:, :2].max(axis=1) + _BESIDE_M).all(axis=1)
+        for calf in (8, 9):
+            free &= np.linalg.norm(points - (state.centers[calf] - halves[calf]), axis=1) > _FOOT_M
+    return points[free]
 
 
 def _forearm_m3(state: FilterState) -> float:

@@ -10,7 +10,7 @@ from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.tracker import TrackingRun
-from tracker.tracking.voxel.assessment import assess
+from tracker.tracking.voxel.assessment import assess, unexplained_voxels
 from tracker.tracking.voxel.body_pose import pose_of, state_of
 from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations
 from tracker.tracking.voxel.frame_voxels import FrameVoxels, carve_around
@@ -155,8 +155,7 @@ class VoxelEstimator:
             state = self.states[p]
             body = pose_of(model, state, poses[p], subjects.active_dofs[p])
             poses[p] = body.values
-            assert self.labels is not None
-            free = points[self.labels.labels < 0]
+            free = unexplained_voxels(points, self.states)
             per_row = updates[p].normalized_innovation / max(1, updates[p].n_rows)
             verdict = assess(state, found, free, per_row, self._levels[p].notes)
             statuses.append(verdict.status)

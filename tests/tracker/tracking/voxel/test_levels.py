@@ -8,7 +8,7 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.model_toml import load_model
 from tracker.tracking.voxel.body_pose import state_of
 from tracker.tracking.voxel.labels import label_voxels
-from tracker.tracking.voxel.levels import Levels, carried, find_levels, measure_together
+from tracker.tracking.voxel.levels import DetailLevels, carried, find_levels, measure_together
 from tracker.tracking.voxel.settings import VoxelSettings
 
 SETTINGS = VoxelSettings()
@@ -24,7 +24,7 @@ def seen(**pose):
 def levels_of(before=None, patience=1, **pose):
     state, voxels = seen(**pose)
     labels = label_voxels(voxels.points_world, [state], voxels.grid.size_m, SETTINGS.label_rule)
-    return find_levels(before or Levels.finest(), state, voxels, labels.labels, 0, patience), state, labels.clouds
+    return find_levels(before or DetailLevels.finest(), state, voxels, labels.labels, 0, patience), state, labels.clouds
 
 
 def test_limbs_apart_are_resolved():
