@@ -172,14 +172,14 @@ async def test_zoom_stays_at_the_pointer_and_zero_resets_it(page):
 
 async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
     (first,) = endpoint.views
-    assert first["layers"] == ["image", "contours", "joints", "epipolar"]
+    assert first["layers"] == ["image", "contours", "joints", "epipolar", "axes"]
     assert first["reductions"] == pytest.approx([1 / view["scale"] for view in (await state_of(page))["views"]])
     await page.locator("#quick-layers").get_by_text("Distance").click()
     await shows(page, "'distance 3' in quadrille.state.shown.pictures")
     await page.locator("#quick-layers").get_by_text("Contours").click()
     await page.locator("#quick-layers").get_by_text("Joints").click()
     await shows(page, f"({DRAWN}) === 0")
-    await until(lambda: set(endpoint.views[-1]["layers"]) == {"image", "distance", "epipolar"})
+    await until(lambda: set(endpoint.views[-1]["layers"]) == {"image", "distance", "epipolar", "axes"})
 
 
 DRAWN = """[...document.querySelectorAll(".pane-overlay")].reduce((sum, canvas) => {

@@ -141,11 +141,16 @@ def test_an_edge_of_somebody_elses_does_not_pull():
 
 # What the collarbones, the spine, the waist and two joints in the neck do of their own the outline hardly shows. Start,
 # degrees; mean and largest distance of the joints, metres; mean angle of the parts' axes, degrees.
-WITHIN = {"gavrila34": (3.0, 0.0015, 0.004, 0.5), "knossow54": (3.0, 0.002, 0.006, 0.8)}
+WITHIN = {
+    "gavrila34": (3.0, 0.0015, 0.004, 0.5), "knossow54": (3.0, 0.002, 0.006, 0.8), "mikic10": (3.0, 0.0015, 0.005, 0.4)
+}  # fmt: skip
+AMBIGUOUS = {("mikic10", 0)}
+"""Elbows that are balls without limits: another pose of the arms draws the same outline, to 2% of the cost at the start."""
 
 
-@pytest.mark.parametrize("name", PRESETS)
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    ("name", "seed"), [(n, seed) for n in PRESETS for seed in range(4) if (n, seed) not in AMBIGUOUS]
+)
 def test_shaken_poses_come_back(name, seed):
     """From 4 degrees and 2 cm beside, drawn in every degree of freedom at once, to the pose that drew the edges.
 
