@@ -10,8 +10,7 @@ PYTHON_FILES := app tracker tests
 PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
 # The library's rooms that need neither kernels nor sessions.
 QUICK := $(wildcard tests/test_*.py) $(addprefix tests/,tracker/compute tracker/geometry tracker/body tracker/motion \
-	tracker/formats tracker/session tracker/store tracker/evaluation tracker/images tracker/contours tracker/fitting \
-	app/runtime app/state app/drawing)
+	tracker/formats tracker/session tracker/store tracker/evaluation tracker/images app/runtime app/state app/drawing)
 
 .PHONY: install run test test-all test-quick test-library test-page test-slow kernels bench check lint types \
 	page-types format clean

@@ -145,7 +145,7 @@ WITHIN = {
     "gavrila34": (3.0, 0.0015, 0.004, 0.5), "knossow54": (3.0, 0.002, 0.006, 0.8), "mikic10": (3.0, 0.0015, 0.005, 0.4)
 }  # fmt: skip
 AMBIGUOUS = {("mikic10", 0)}
-"""Elbows that are balls without limits: another pose of the arms draws the same outline, to 2% of the cost at the start."""
+"""Elbows that are balls without limits: another pose of the arms draws the same outline, to 2% of the cost at first."""
 
 
 @pytest.mark.parametrize(

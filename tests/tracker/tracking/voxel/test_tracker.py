@@ -39,7 +39,7 @@ def tracked(
     return estimates, np.array(errors)
 
 
-@pytest.mark.parametrize("model", ["gavrila34", "mikic10"])
+@pytest.mark.parametrize("model", ["gavrila34", pytest.param("mikic10", marks=pytest.mark.slow)])
 def test_a_person_of_another_shape_is_followed(model):
     estimates, errors = tracked(model=model)
     assert errors.mean() < 0.05
@@ -47,10 +47,12 @@ def test_a_person_of_another_shape_is_followed(model):
     assert np.all(np.linalg.eigvalsh(estimates[-1].covariances[0]) > 0)
 
 
+@pytest.mark.slow
 def test_with_every_third_frame():
     assert tracked(stride=3)[1].mean() < 0.06
 
 
+@pytest.mark.slow
 def test_the_papers_version_runs():
     estimates, errors = tracked(model="mikic10", settings=paper_settings(), n=6)
     assert errors.mean() < 0.15
