@@ -139,6 +139,8 @@ class FakeEndpoint:
     """Every message of every page, but for what each says when it connects."""
     frame_s: float = 0.05
     """How long a run takes for a frame."""
+    sending: asyncio.Lock = field(default_factory=asyncio.Lock, repr=False)
+    """Held while a frame is sent."""
     greetings: list = field(default_factory=list)
     """What the pages said when they connected."""
     views: list = field(default_factory=list)
@@ -472,6 +474,11 @@ class FakeEndpoint:
                 await socket.send_bytes(struct.pack("<I", len(text)) + text + payload)
 
     async def send_frame(self, sockets=None):
+        """Send the pictures of the frame and its overlay; like the program, never those of two frames at once."""
+        async with self.sending:
+            await self._send_frame(sockets)
+
+    async def _send_frame(self, sockets=None):
         frame, view = self.state["frame"], self.views[-1]
         layers = [layer for layer in ("image", "silhouette", "distance", "parts") if layer in view["layers"]]
         seen = [camera for camera, reduction in enumerate(view["reductions"]) if reduction]
