@@ -1,0 +1,215 @@
+"""Compare the cost of tracked poses with that of poses refined from the truth: is the search at fault, or the cost?
+
+A section of docs/accuracy.md, made by `python tests/benchmarks/true_pose_costs.py --data DIR`. Simulated people dance,
+and the recordings in DIR are added. Each is tracked with the generic body of the height that the true joints give, from
+the pose fitted to those of frame 0. On every frame the pose fitted to the true joints is refined twice on the same
+evidence. Where this pose costs less than the tracked one, the search has missed it. The cost is that of contours, joint
+spreads and penetration, without the prediction. The poses lie in one valley where no pose on the straight line between
+them costs more than both. `--work DIR` keeps the simulated recordings.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from acquisition import quadrille, recorded
+from calibrate_status import SECOND, SECOND_SEED
+from sections import put_section, table
+
+from tracker.acquisition.from_joints import height_from_joints
+from tracker.appearance.part_colors import Colors
+from tracker.body.model import BodyModel, PosedBody
+from tracker.contours import occluding_contours
+from tracker.evaluation.references import read_joints
+from tracker.evidence.observer import Observer
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import fit_to_points
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.recording import Recording
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.formats.model_toml import load_model
+from tracker.geometry.arrays import Array
+from tracker.session.assemble import DEFAULT_MODEL
+from tracker.session.session import load_session
+from tracker.simulate import Simulation, simulate
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.chamfer.tracker import ChamferTracker
+from tracker.tracking.estimate import TrackedFrame
+from tracker.tracking.estimation.pose_paths import FrameCost
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.tracker import TrackingRun
+from tracker.tracking.view_regions import regions, visible_pieces_px
+
+OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
+HEADS = (
+    "frames",
+    "at most that cost",
+    "at most 1% more",
+    "the rest in another valley",
+    "error, mm",
+    "from the truth, mm",
+)
+RECORDED = ("walk", "fast_arms")
+N_FRAMES = 40
+_ROUGH = 1.0
+"""A rise along the line between two poses below which they lie in one valley, nats: the cost is rough."""
+_ON_LINE = 21
+"""Poses on that line whose cost is computed."""
+_SAME = 1e-3
+"""A difference of the cost that does not count, nats."""
+
+
+class Dancer(NamedTuple):
+    """A recording of one person with known joints."""
+
+    name: str
+    cameras: tuple[CameraSource, ...]
+    n_frames: int
+    fps: float
+    model: BodyModel
+    joints: dict[int, dict[str, Array]]
+    """True limb joints by frame and name, (3,) each, metres."""
+
+
+class FrameResult(NamedTuple):
+    """The two poses of a frame."""
+
+    excess: float
+    """Cost of the tracked pose above that of the pose refined from the truth, nats."""
+    cost: float
+    """Cost of the latter, nats."""
+    barrier: float
+    """How far the cost rises between the two above the larger of their costs, nats."""
+    error_mm: float
+    """Mean error of the limb joints of the tracked pose."""
+    error_from_truth_mm: float
+    """The same of the pose refined from the truth."""
+
+
+def dancers(folder: Path, data: Path | None) -> Iterator[Dancer]:
+    """Make the simulated sessions that are not there, and list all recordings."""
+    for name, (scene, fps) in SECOND.items():
+        if scene != "dance":
+            continue
+        at = folder / "scenes" / f"{name}_2"
+        if not at.exists():
+            simulate(at, Simulation(scene, 4, N_FRAMES, SECOND_SEED, fps=fps, person=name))
+        yield read_dancer(name, at, at / "truth.trc")
+    for recording in recorded(data, RECORDED) if data else ():
+        at = folder / "sessions" / recording.name
+        if not at.exists():
+            quadrille(
+                "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
+                recording.background,
+            )  # fmt: skip
+        yield read_dancer(recording.name, at, recording.references["person"])
+
+
+def read_dancer(name: str, folder: Path, reference: Path) -> Dancer:
+    """Read a session and its true joints."""
+    session = load_session(folder)
+    table_of = read_joints(reference, session.fps)
+    generic = load_model(DEFAULT_MODEL)
+    joints = {
+        frame: {n: p for n, p in zip(table_of.names, row, strict=True) if n in LIMB_JOINTS and np.all(np.isfinite(p))}
+        for frame, row in zip(table_of.frames.tolist(), table_of.points, strict=True)
+    }
+    model = generic.with_height(height_from_joints(generic, table_of))
+    return Dancer(name.replace("_", " "), session.cameras, session.n_frames, session.fps, model, joints)
+
+
+def measure(dancer: Dancer, settings: TrackSettings) -> list[FrameResult]:
+    """Track a recording with both passes, and compare the poses of each frame."""
+    model, start = dancer.model, fit_to_points(dancer.model, dancer.joints[0], centers=True).pose
+    with Recording(dancer.cameras) as recording:
+        observer = Observer(dancer.cameras, recording)
+        subjects = Subjects.of([model], keyframes={0: {0: start}})
+        run, tracker = (
+            TrackingRun(observer, subjects, [start], range(dancer.n_frames), dancer.fps),
+            ChamferTracker(settings),
+        )
+        found = {f.frame: f for f in tracker.estimates(run)}
+        for step in tracker.backward_pass(run, [TrackedFrame.of(f) for f in found.values()]):
+            found.update({f.frame: f for f in step.better})
+        frames = [k for k in found if k in dancer.joints and k > 0]
+        return [_compare(dancer, observer, settings, k, found[k].poses[0]) for k in frames]
+
+
+def _compare(dancer: Dancer, observer: Observer, settings: TrackSettings, frame: int, tracked: Array) -> FrameResult:
+    """Compare the tracked pose of a frame, (n_values,), with the pose refined from the truth."""
+    model, cameras = dancer.model, observer.working_cameras
+    true = fit_to_points(model, dancer.joints[frame], centers=True).pose
+    guesses = [(PosedBody(model, pose),) for pose in (true, tracked)]
+    visible = [np.concatenate([visible_pieces_px(occluding_contours.trace(g, c)) for g in guesses]) for c in cameras]
+    where = regions(cameras, [body for g in guesses for body in g])
+    views = observer.evidence(frame, where, visible, edges=settings.edges)
+    residuals = ContourResiduals(views, guesses[0], 0, settings.match, settings.theta_px, everywhere=True)
+    cost_of = FrameCost(model, residuals, Colors(views, guesses[0], 0), None, [], settings, None)
+    once = cost_of.refined([true])[0]
+    refined = np.array([once, cost_of.refined([once])[0]])
+    best = refined[int(cost_of.costs(refined).argmin())]
+    step = model.difference(tracked, best)
+    line = cost_of.costs(np.array([model.retract(best, share * step) for share in np.linspace(0.0, 1.0, _ON_LINE)]))
+    cost, tracked_cost = cost_of.costs(np.array([best, tracked])).tolist()
+    return FrameResult(
+        tracked_cost - cost, cost, float(line.max()) - max(cost, tracked_cost), _error_mm(dancer, frame, tracked),
+        _error_mm(dancer, frame, best),
+    )  # fmt: skip
+
+
+def _error_mm(dancer: Dancer, frame: int, pose: Array) -> float:
+    """Return the mean error of the limb joints of a pose, (n_values,)."""
+    places = dict(zip(dancer.model.point_names, dancer.model.joint_centers_world(pose), strict=True))
+    return 1000 * float(np.mean([np.linalg.norm(places[n] - p) for n, p in dancer.joints[frame].items()]))
+
+
+def cells(results: Sequence[FrameResult]) -> list[str]:
+    """Return the row of a recording, in the order of `HEADS`."""
+    excess, cost, barrier, error, from_truth = np.array(results).T
+    more = excess > _SAME
+    elsewhere = f"{int(np.sum(barrier[more] > _ROUGH))} of {int(more.sum())}"
+    return [
+        str(len(results)), f"{np.mean(~more):.0%}", f"{np.mean(excess <= 0.01 * np.abs(cost)):.0%}", elsewhere,
+        f"{error.mean():.1f}", f"{from_truth.mean():.1f}",
+    ]  # fmt: skip
+
+
+def section(rows: dict[str, list[str]]) -> str:
+    """The results as Markdown."""
+    lines = [
+        "## Costs of tracked and true poses",
+        "",
+        "Made by `python tests/benchmarks/true_pose_costs.py`. Each recording is tracked with the generic body of the "
+        "height that the true joints give. On each frame the pose fitted to the true joints is refined on the same "
+        "evidence. Shares of the frames whose tracked pose costs at most what this pose does. Of the other frames those "
+        "are counted where a barrier lies between the two poses; on the rest both lie in one valley. Errors are those "
+        "of the 12 limb joints.",
+        "",
+    ]
+    return "\n".join([*lines, table(HEADS, rows).replace("| variant |", "| recording |", 1)])
+
+
+def main() -> None:
+    """Measure and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, help="folder with walk and fast_arms")
+    parser.add_argument("--work", type=Path, help="folder that keeps the sessions")
+    parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
+    parser.add_argument("--out", type=Path, default=OUT)
+    words = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        rows = dict[str, list[str]]()
+        for dancer in dancers(words.work or Path(name), words.data):
+            if words.only and dancer.name.replace(" ", "_") not in words.only:
+                continue
+            rows[dancer.name] = cells(measure(dancer, TrackSettings()))
+            print(f"{dancer.name}: {', '.join(map(' '.join, zip(HEADS, rows[dancer.name], strict=True)))}", flush=True)
+        if not words.only:
+            put_section(words.out, section(rows))
+
+
+if __name__ == "__main__":
+    main()
