@@ -11,13 +11,15 @@ from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings, predict
-from tracker.tracking.confidence import PoseQuality, Status
+from tracker.tracking.confidence import PoseQuality, Status, classify
 
 _MAX_BACKOFF_FRAMES = 8
 """Longest back-off of a limb that seems lost."""
 _CALM_BACKOFF_FRAMES, _MAX_CALM_BACKOFF_FRAMES = 31, 64
 """First and longest back-off of a limb that does not seem lost itself, where there are several people: the unexplained
 part of the silhouette may be anybody's."""
+_AROUND = "around"
+"""Key of the back-off of the search around a pose."""
 _LEARN_FRAMES = 3
 """The colours of the parts are updated every so many frames."""
 _TRACKED_SHARE, _KEYFRAME_SHARE = 0.15, 0.5
@@ -55,7 +57,7 @@ class PersonMemory:
         self.part_colors: PartColors | None = None
         """The colours of the parts; None before the first frame."""
         self._n_frames = 0
-        self._backoffs: dict[str, tuple[int, int]] = {}  # by limb: the frame of the last search, and its back-off
+        self._backoffs: dict[str, tuple[int, int]] = {}  # by limb: frame of the last search, back-off
 
     def predict(self, settings: PredictSettings) -> Array:
         """Return the predicted pose of the next frame, (n_values,)."""
@@ -109,6 +111,23 @@ class PersonMemory:
         calm = not (self.alone or limb.name in before.doubtful_limbs(self.alone))
         longer = max(_CALM_BACKOFF_FRAMES if calm else 1, 2 * self._backoffs.get(limb.name, (0, 0))[1] + 1)
         self._backoffs[limb.name] = (self._n_frames, 0 if found else min(_MAX_CALM_BACKOFF_FRAMES, longer))
+
+    def samples_around(self, quality: PoseQuality) -> bool:
+        """Return whether to search around a refined pose now: that of a single person that is not good.
+
+        After each search that finds nothing the back-off doubles, as that of a limb. A lost pose does not back off.
+        """
+        status, (last, backoff) = classify(quality), self._backoffs.get(_AROUND, (-1, 0))
+        is_due = status == "lost" or self._n_frames > last + min(backoff, _MAX_BACKOFF_FRAMES)
+        return self.alone and status != "good" and is_due
+
+    def record_sampling(self, found: bool) -> None:
+        """Record the outcome of a search around a pose.
+
+        Args:
+            found: whether the pose changed.
+        """
+        self._backoffs[_AROUND] = (self._n_frames, 0 if found else 2 * self._backoffs.get(_AROUND, (0, 0))[1] + 1)
 
     def update(self, pose: Array, colors: Colors, status: Status, keyframe: bool) -> None:
         """Take in the result of a frame.

@@ -106,3 +106,19 @@ def test_what_is_expected_two_frames_on_is_what_would_be_if_the_next_came_as_exp
     memory.history[-1] = gavrila.neutral()  # it came otherwise
     np.testing.assert_array_equal(twice, memory.predict_before_last(settings))
     np.testing.assert_allclose(gavrila.difference(twice, moved)[:3], 0.04, atol=1e-9)
+
+
+def test_poses_that_are_not_good_are_searched_around_less_and_less_often(gavrila):
+    memory = PersonMemory(gavrila, gavrila.neutral())
+    lost, frames = seen(memory, astray=("left_calf",)), []
+    assert not memory.samples_around(seen(memory))
+    for frame in range(30):
+        if memory.samples_around(lost):
+            memory.record_sampling(found=False)
+            frames.append(frame)
+        memory.update(memory.history[-1], NoColors(), "doubtful", keyframe=False)
+    assert np.diff(frames).tolist() == [2, 4, 8, 9]
+    memory.record_sampling(found=True)
+    memory.update(memory.history[-1], NoColors(), "doubtful", keyframe=False)
+    assert memory.samples_around(lost)
+    assert not PersonMemory(gavrila, gavrila.neutral(), alone=False).samples_around(lost)

@@ -20,6 +20,7 @@ from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton import Fit, with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.assessment import ELSEWHERE_RAD, PersonEstimate, assess, estimate_fixed, finalize
+from tracker.tracking.estimation.covariance_search import search_along_covariance
 from tracker.tracking.estimation.frame_problem import (
     Bodies,
     FrameProblem,
@@ -36,7 +37,9 @@ from tracker.tracking.person_memory import PersonMemory
 _MAX_LIMBS = 2
 """Number of limbs of a person that are searched in a frame, the most likely lost first."""
 _MOVED_RAD = 0.05
-"""A limb search succeeded where a joint turned farther, rad."""
+"""A search succeeded where a joint turned farther, rad."""
+_STAYS = 3.0
+"""A sampled pose is refined within so many standard deviations of a prediction."""
 _OTHERS_MOVED_M, _SELF_MOVED_M = 0.002, 0.01
 """A person is refined again where another, or they themselves, moved farther since, metres."""
 
@@ -84,9 +87,11 @@ class FrameEstimator:
         # One after the other: where all are refined at once, each takes edges of people who are still off.
         fits = {p: self.move(p, self.problem.refine(p, self.bodies)) for p in people}
         self._refine_together(fits)
+        self._converge(fits, people)
         self._recover(fits)
         if any(f.untrusted_limbs is not None for f in fits.values()):
             self._refine_together(fits)
+            self._converge(fits, [p for p, f in fits.items() if f.untrusted_limbs is not None])
         finalized = map_parallel(lambda p: self.finalize(p, fits[p]), [*fits])
         estimates = dict(zip(fits, finalized, strict=True))
         for (p, q), poses in identity_swaps(self.problem, self.bodies, fits).items():
@@ -116,6 +121,11 @@ class FrameEstimator:
             if done:
                 break
 
+    def _converge(self, fits: dict[int, PersonFit], people: Sequence[int]) -> None:
+        """Refine some people again, free of their prediction."""
+        for person in people:
+            fits[person] = self.move(person, self.problem.converge(person, fits[person]))
+
     def _recover(self, fits: dict[int, PersonFit]) -> None:
         """Search for lost limbs and bodies, and move people to what was found.
 
@@ -132,7 +142,7 @@ class FrameEstimator:
         for person, (quality, _) in zip(fits, assessments, strict=True):
             limbs = self._memories[person].limbs_to_search(quality)[:_MAX_LIMBS]
             candidates = quality.search_candidates(alone) if alone else quality.doubtful_limbs(alone)
-            if limbs or candidates or quality.is_body_lost:
+            if limbs or candidates or quality.is_body_lost or self._memories[person].samples_around(quality):
                 limbs_of[person] = limbs
         if not limbs_of:
             return
@@ -163,7 +173,8 @@ class FrameEstimator:
         fit = problem.solve(person, before.fit.pose, [residuals, *priors], MAX_ITERATIONS, MIN_DECREASE)
         # Limbs that wait for their search are no longer drawn to their prediction.
         found = PersonFit(residuals, bodies, fit, PosedBody(model, fit.pose), untrusted)
-        if not limbs and not quality.is_body_lost:
+        samples = memory.samples_around(quality)
+        if not limbs and not quality.is_body_lost and not samples:
             return found
         scorer = PoseScorer.of(
             residuals, priors, Colors(own, *problem.around(person, bodies)), memory.part_colors,
@@ -181,6 +192,11 @@ class FrameEstimator:
             memory.record_search(limb, quality, turned[limb.dofs].max() > _MOVED_RAD)
             if turned[limb.dofs].max() > ELSEWHERE_RAD:
                 notes.append(f"{limb_display_name(limb.name)} relocated")
+        if samples:
+            sigma = _STAYS * np.where(model.dof_is_length, self.settings.trust_m, self.settings.trust_rad)
+            sampled = search_along_covariance(model, best, scorer, sigma)
+            memory.record_sampling(np.abs(model.difference(sampled.pose, best.pose)).max() > _MOVED_RAD)
+            best = sampled
         return found._replace(
             fit=best, body=PosedBody(model, best.pose), evaluations=evaluations, notes=tuple(notes),
             alternatives=tuple(a.pose for a in alternatives),

@@ -20,7 +20,7 @@ from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import PoseQuality
-from tracker.tracking.estimation.settings import TOLERANCE, EstimationSettings, prior_blocks
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings, prior_blocks
 from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
 
 _SAME_ASSIGNMENT_M = 0.01
@@ -117,6 +117,18 @@ class FrameProblem:
             return PersonFit(residuals, bodies, fit, body)
         return before._replace(residuals=residuals, bodies=bodies, fit=fit, body=body, assessment=None)
 
+    def converge(self, person: int, found: PersonFit) -> PersonFit:
+        """Refine a fit again from its pose, which takes the place of the prediction.
+
+        The prediction holds the first refinement back where the person moves otherwise than predicted. The result has
+        the normal matrix with the prediction.
+        """
+        untrusted, pose = found.untrusted_limbs or (), found.fit.pose
+        around = self.priors(person, found.bodies, untrusted, pose)
+        pose = self.solve(person, pose, [found.residuals, *around], MAX_ITERATIONS, MIN_DECREASE).pose
+        fit = self.solve(person, pose, [found.residuals, *self.priors(person, found.bodies, untrusted)], 0)
+        return found._replace(fit=fit, body=PosedBody(self.people[person].model, fit.pose), assessment=None)
+
     def solve(
         self, person: int, start: Array, blocks: Sequence[ResidualBlock], max_iterations: int, min_decrease: float = 0.0
     ) -> Fit:
@@ -124,14 +136,23 @@ class FrameProblem:
         model, _, active, _ = self.people[person]
         return solve_compiled(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
 
-    def priors(self, person: int, bodies: Bodies, untrusted: Sequence[Limb] = ()) -> list[ResidualBlock]:
-        """Build the prior terms: prediction (first, weak for untrusted limbs), joint spread, penetration."""
+    def priors(
+        self, person: int, bodies: Bodies, untrusted: Sequence[Limb] = (), predicted: Array | None = None
+    ) -> list[ResidualBlock]:
+        """Build the prior terms: prediction (first, weak for untrusted limbs), joint spread, penetration.
+
+        Args:
+            person: whom to fit.
+            bodies: all people.
+            untrusted: limbs whose prediction is not trusted.
+            predicted: a pose in place of the prediction, (n_values,).
+        """
         settings, model = self.settings, self.people[person].model
         sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
         for limb in untrusted:
             assert settings.recover is not None
             sigma[limb.dofs] = settings.recover.trust_rad
-        blocks = prior_blocks(model, self.people[person].predicted, sigma)
+        blocks = prior_blocks(model, self.people[person].predicted if predicted is None else predicted, sigma)
         if len(self.people) > 1 and settings.apart > 0:
             blocks.append(BodyPenetration(bodies, person, settings.apart))
         return blocks

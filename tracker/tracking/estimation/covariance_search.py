@@ -1,0 +1,83 @@
+"""Search a pose's surroundings along the directions that the contours hardly determine.
+
+Local minima of the cost lie mostly along these directions: a pelvis that turned the wrong way under legs that fit, a
+trunk bent in another joint. No search of a single limb gets there. Poses are therefore drawn from a normal distribution
+with the covariance of the fit, made wider, and refined (covariance scaled sampling: C. Sminchisescu & B. Triggs 2001,
+Covariance Scaled Sampling for Monocular 3D Body Tracking, CVPR).
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from tracker.body.model import BodyModel
+from tracker.fitting.contour_residuals import MIN_DECREASE
+from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
+from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.geometry.arrays import Array
+from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN, PoseScorer
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE
+
+_N_SAMPLES = 16
+_SCALE = 2.0
+"""Factor of the standard deviations. Refinement leads smaller steps back to where they began."""
+_FREE = 3.0
+"""Factor of the standard deviations of a refinement, with which its start hardly counts in the covariance."""
+_MAX_STEP = 1.2
+"""Largest change of a degree of freedom, rad or metres. What no contour determines would turn freely otherwise."""
+
+
+def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array) -> Fit:
+    """Refine poses sampled around a fit, and return the fit of the cheapest.
+
+    Poses are compared without the prediction, since what it says has led to a doubtful pose.
+
+    Args:
+        model: the body.
+        fit: the refined pose.
+        scorer: compares poses; the first of its priors is the prediction.
+        sigma: standard deviations to which a refinement stays near its start, (n_dofs,), rad or metres.
+
+    Returns:
+        The given pose refined again, unless another is cheaper by `MIN_COST_GAIN`. Its normal matrix is that of all
+        blocks of the scorer.
+    """
+
+    def refined(scorer: PoseScorer, pose: Array) -> Fit:
+        found = solve_compiled(
+            model, pose, _blocks(scorer, pose, sigma), scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
+        )
+        # At the mean of its own prior a pose costs what it does without one.
+        return solve_compiled(model, found.pose, _blocks(scorer, found.pose, sigma), scorer.active_dofs, 0)
+
+    fits = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, sigma)])
+    costs = [scorer.cost(f) for f in fits]
+    cheapest = int(np.argmin(costs))
+    best = fits[cheapest if costs[cheapest] < costs[0] - MIN_COST_GAIN else 0]
+    return solve_compiled(model, best.pose, scorer.blocks, scorer.active_dofs, 0)
+
+
+def _blocks(scorer: PoseScorer, pose: Array, sigma: Array) -> list[ResidualBlock]:
+    """Return the residual blocks with a pose, (n_values,), in place of the prediction."""
+    return [scorer.residuals, PosePrior(pose, 1 / sigma), *scorer.priors[1:]]
+
+
+def _samples(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array) -> Sequence[Array]:
+    """Return poses drawn around a fit, (n_values,) each."""
+    free = np.flatnonzero(np.ones(model.n_dofs, dtype=bool) if scorer.active_dofs is None else scorer.active_dofs)
+    blocks = _blocks(scorer, fit.pose, _FREE * sigma)
+    around = solve_compiled(model, fit.pose, blocks, scorer.active_dofs, 0)
+    precisions, directions = np.linalg.eigh(around.hessian[np.ix_(free, free)])
+    steps = np.zeros((_N_SAMPLES, model.n_dofs))
+    spread = _SCALE / np.sqrt(np.maximum(precisions, np.finfo(np.float64).eps))
+    steps[:, free] = np.clip((_normal(_N_SAMPLES, len(free)) * spread) @ directions.T, -_MAX_STEP, _MAX_STEP)
+    return [model.clip(model.retract(fit.pose, step)) for step in steps]
+
+
+@lru_cache(maxsize=8)
+def _normal(n: int, dims: int) -> Array:
+    """Return the same standard normal samples, (n, dims), in each call: runs are repeatable."""
+    out = np.random.default_rng(0).normal(size=(n, dims))
+    out.flags.writeable = False
+    return out
