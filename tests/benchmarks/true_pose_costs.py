@@ -184,7 +184,7 @@ def section(rows: dict[str, list[str]]) -> str:
         "",
         "Made by `python tests/benchmarks/true_pose_costs.py`. Each recording is tracked with the generic body of the "
         "height that the true joints give. On each frame the pose fitted to the true joints is refined on the same "
-        "evidence. Shares of the frames whose tracked pose costs at most what this pose does. Of the other frames those "
+        "evidence. Shares of the frames whose tracked pose costs at most what this pose does. Of the others, those "
         "are counted where a barrier lies between the two poses; on the rest both lie in one valley. Errors are those "
         "of the 12 limb joints.",
         "",

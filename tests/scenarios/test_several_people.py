@@ -63,8 +63,8 @@ def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, so
     views = own_evidence([at(ball, *v[:3]) for v in values], cameras)
     expected = values.copy()
     expected[1, 0] += off_m
-    solve = FrameProblem.solve
-    monkeypatch.setattr(FrameProblem, "solve", lambda *a, **k: done.append(a) or solve(*a, **k))
+    refine = FrameProblem.refine
+    monkeypatch.setattr(FrameProblem, "refine", lambda *a, **k: done.append(a) or refine(*a, **k))
     estimator = estimator_of(ball, views, expected, TrackSettings(recover=None, rounds=5))
     estimator.estimate([0, 1])
     found = np.array([b.values for b in estimator.bodies])

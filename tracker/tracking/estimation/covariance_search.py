@@ -17,7 +17,7 @@ from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN, PoseScorer
-from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE
 
 _N_SAMPLES = 16
 _SCALE = 2.0
@@ -37,21 +37,23 @@ def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigm
         model: the body.
         fit: the refined pose.
         scorer: compares poses; the first of its priors is the prediction.
-        sigma: standard deviations to which a refinement stays near its start, (n_dofs,), rad or metres.
+        sigma: standard deviations of a prediction, (n_dofs,), rad or metres.
 
     Returns:
         The given pose refined again, unless another is cheaper by `MIN_COST_GAIN`. Its normal matrix is that of all
         blocks of the scorer.
     """
 
+    own = OWN_TRUST * sigma
+
     def refined(scorer: PoseScorer, pose: Array) -> Fit:
         found = solve_compiled(
-            model, pose, _blocks(scorer, pose, sigma), scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
+            model, pose, _blocks(scorer, pose, own), scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
         )
         # At the mean of its own prior a pose costs what it does without one.
-        return solve_compiled(model, found.pose, _blocks(scorer, found.pose, sigma), scorer.active_dofs, 0)
+        return solve_compiled(model, found.pose, _blocks(scorer, found.pose, own), scorer.active_dofs, 0)
 
-    fits = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, sigma)])
+    fits = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, own)])
     costs = [scorer.cost(f) for f in fits]
     cheapest = int(np.argmin(costs))
     best = fits[cheapest if costs[cheapest] < costs[0] - MIN_COST_GAIN else 0]

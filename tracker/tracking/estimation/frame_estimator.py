@@ -38,8 +38,6 @@ _MAX_LIMBS = 2
 """Number of limbs of a person that are searched in a frame, the most likely lost first."""
 _MOVED_RAD = 0.05
 """A search succeeded where a joint turned farther, rad."""
-_STAYS = 3.0
-"""A sampled pose is refined within so many standard deviations of a prediction."""
 _OTHERS_MOVED_M, _SELF_MOVED_M = 0.002, 0.01
 """A person is refined again where another, or they themselves, moved farther since, metres."""
 
@@ -193,8 +191,7 @@ class FrameEstimator:
             if turned[limb.dofs].max() > ELSEWHERE_RAD:
                 notes.append(f"{limb_display_name(limb.name)} relocated")
         if samples:
-            sigma = _STAYS * np.where(model.dof_is_length, self.settings.trust_m, self.settings.trust_rad)
-            sampled = search_along_covariance(model, best, scorer, sigma)
+            sampled = search_along_covariance(model, best, scorer, problem.sigma(person))
             memory.record_sampling(np.abs(model.difference(sampled.pose, best.pose)).max() > _MOVED_RAD)
             best = sampled
         return found._replace(

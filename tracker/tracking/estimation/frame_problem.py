@@ -15,12 +15,12 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals, PartCosts
-from tracker.fitting.gauss_newton import Fit, ResidualBlock
+from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import PoseQuality
-from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings, prior_blocks
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE, EstimationSettings, prior_blocks
 from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
 
 _SAME_ASSIGNMENT_M = 0.01
@@ -124,7 +124,8 @@ class FrameProblem:
         the normal matrix with the prediction.
         """
         untrusted, pose = found.untrusted_limbs or (), found.fit.pose
-        around = self.priors(person, found.bodies, untrusted, pose)
+        around = self.priors(person, found.bodies, untrusted)
+        around[0] = PosePrior(pose, 1 / (OWN_TRUST * self.sigma(person)))
         pose = self.solve(person, pose, [found.residuals, *around], MAX_ITERATIONS, MIN_DECREASE).pose
         fit = self.solve(person, pose, [found.residuals, *self.priors(person, found.bodies, untrusted)], 0)
         return found._replace(fit=fit, body=PosedBody(self.people[person].model, fit.pose), assessment=None)
@@ -136,23 +137,18 @@ class FrameProblem:
         model, _, active, _ = self.people[person]
         return solve_compiled(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
 
-    def priors(
-        self, person: int, bodies: Bodies, untrusted: Sequence[Limb] = (), predicted: Array | None = None
-    ) -> list[ResidualBlock]:
-        """Build the prior terms: prediction (first, weak for untrusted limbs), joint spread, penetration.
+    def sigma(self, person: int) -> Array:
+        """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""
+        is_length = self.people[person].model.dof_is_length
+        return np.where(is_length, self.settings.trust_m, self.settings.trust_rad)
 
-        Args:
-            person: whom to fit.
-            bodies: all people.
-            untrusted: limbs whose prediction is not trusted.
-            predicted: a pose in place of the prediction, (n_values,).
-        """
-        settings, model = self.settings, self.people[person].model
-        sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
+    def priors(self, person: int, bodies: Bodies, untrusted: Sequence[Limb] = ()) -> list[ResidualBlock]:
+        """Build the prior terms: prediction (first, weak for untrusted limbs), joint spread, penetration."""
+        settings, model, sigma = self.settings, self.people[person].model, self.sigma(person)
         for limb in untrusted:
             assert settings.recover is not None
             sigma[limb.dofs] = settings.recover.trust_rad
-        blocks = prior_blocks(model, self.people[person].predicted if predicted is None else predicted, sigma)
+        blocks = prior_blocks(model, self.people[person].predicted, sigma)
         if len(self.people) > 1 and settings.apart > 0:
             blocks.append(BodyPenetration(bodies, person, settings.apart))
         return blocks
