@@ -22,8 +22,8 @@ TOLERANCE = 1e-3
 """Step at which they end, rad or metres: a tenth of a pixel on a limb."""
 
 OWN_TRUST = 3.0
-"""Factor of the standard deviations of a prediction for a pose that is refined again. They only hold it where no contour
-determines it."""
+"""Factor of the standard deviations of a prediction for a pose that is refined again. They only hold it where no
+contour determines it."""
 
 
 @dataclass(frozen=True)
