@@ -78,7 +78,7 @@ def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
     truth = crowd(gavrila, 2)[:, 0]
     views, expected = own_evidence([PosedBody(gavrila, v) for v in truth], cameras_around(4)), truth.copy()
     for values, side in zip(expected, ("left", "right"), strict=True):
-        values[gavrila.dof_names.index(f"{side}_shoulder.elevation")] += 1.2
+        values[gavrila.dof_names.index(f"{side}_shoulder.elevation")] += 2.0
     searched = []
 
     def poses():
