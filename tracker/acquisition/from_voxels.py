@@ -19,7 +19,7 @@ from tracker.acquisition.size_parameters import SizeArrays, SizeParameters
 from tracker.body.dimensions import with_height_of_stature
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.threads import map_parallel
-from tracker.contours.label_image import part_labels
+from tracker.contours.body_silhouette import body_silhouette
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.fitting.gauss_newton import NormalEquations, PosePrior
@@ -79,7 +79,7 @@ class VoxelSizes(NamedTuple):
     poses: tuple[Array, ...]
     """Pose of each frame, (n_values,)."""
     overlap_before: float
-    """Volume shared by the hulls of the footage and of the body before, as a share of that of both; mean over frames."""
+    """Volume shared by the hulls of the footage and of the body before, as a share of that of both; the mean."""
     overlap_after: float
     """The same with this body and these poses."""
 
@@ -112,13 +112,12 @@ def fit_sizes_to_voxels(
     for number in range(settings.rounds + 1):
         report(number / (settings.rounds + 1))
         body, by_sizes = parameters.body(sizes), parameters.derivatives(sizes)
-        found = map_parallel(
-            lambda i: _Frame(frames[i], body, poses[i], settings).linearize(by_sizes, by_figure), range(len(frames))
-        )
+        problems = [_Frame(f, body, p, settings) for f, p in zip(frames, poses, strict=True)]
+        found = _linearized(problems, by_sizes, by_figure)
         if not any(f.equations.gradient[: len(sizes)].any() for f in found):
             raise TrackerError(
-                f"expected voxels of the person on frames {', '.join(str(f.frame) for f in frames)}, found none around the "
-                "body; check the background or the masks, and that the body is where the person is"
+                f"expected voxels of the person on frames {', '.join(str(f.frame) for f in frames)}, found none around "
+                "the body; check the background or the masks, and that the body is where the person is"
             )
         overlaps.append(float(np.mean([f.overlap for f in found])))
         if number < settings.rounds:
@@ -129,6 +128,12 @@ def fit_sizes_to_voxels(
     return VoxelSizes(
         parameters, sizes, body, covariance, tuple(f.frame for f in frames), tuple(poses), overlaps[0], overlaps[-1]
     )
+
+
+def _linearized(problems: Sequence["_Frame"], by_sizes: SizeArrays, by_figure: FigureSizes) -> "list[_FrameEquations]":
+    # The first frame alone fills the tables of lenses, which the others share.
+    first, *rest = problems
+    return [first.linearize(by_sizes, by_figure), *map_parallel(lambda p: p.linearize(by_sizes, by_figure), rest)]
 
 
 def _step(
@@ -145,7 +150,7 @@ def _step(
         solved = np.linalg.solve(f.hessian[n:, n:], np.column_stack([f.hessian[n:, :n], -f.gradient[n:]]))
         H += f.hessian[:n, :n] - f.hessian[:n, n:] @ solved[:, :n]
         g -= f.gradient[:n] + f.hessian[:n, n:] @ solved[:, n]
-        eliminated.append(solved)
+        eliminated.append(np.asarray(solved, dtype=np.float64))
     step, covariance = np.zeros(n), np.diag(1 / precision)
     own = np.asarray(np.linalg.inv(H[np.ix_(free, free)]), dtype=np.float64)
     step[free], covariance[np.ix_(free, free)] = own @ g[free], own
@@ -182,7 +187,7 @@ class _Frame:
         own = carve_around(self._own_silhouettes(), self._states, size_m)
         found = self._measurements(self._measured(seen), self._measured(own), by_sizes, by_figure)
         a, b = seen.voxels.occupied, own.voxels.occupied
-        overlap = float(np.count_nonzero(a & b) / max(1, np.count_nonzero(a | b)))
+        overlap = float(int(np.count_nonzero(a & b)) / max(1, int(np.count_nonzero(a | b))))
         return _FrameEquations(self._with_priors(found), overlap)
 
     def _measurements(
@@ -225,13 +230,11 @@ class _Frame:
         return NormalEquations(0.0, g, H)
 
     def _own_silhouettes(self) -> list[ViewSilhouette]:
-        """Return the silhouettes of the bodies themselves, in undistorted pixels; those of empty views stay empty."""
-        found = []
-        for s in self._frame.silhouettes:
-            camera = s.camera.pinhole
-            mask = np.zeros(s.mask.shape, bool) if s.is_empty else part_labels(self._bodies, camera) > 0
-            found.append(s._replace(mask=mask, camera=camera))
-        return found
+        """Return the silhouettes of the bodies themselves; empty views stay empty."""
+        return [
+            s if s.is_empty else s._replace(mask=body_silhouette(self._bodies, s.camera))
+            for s in self._frame.silhouettes
+        ]
 
     def _measured(self, frame: FrameVoxels) -> _Measured:
         """Return what the voxels of a frame measure of the person."""
