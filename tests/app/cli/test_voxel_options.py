@@ -41,4 +41,4 @@ def test_init_by_voxels_refuses_sizes_that_show_no_limbs(run, session):
     for size in ("0", "-5", "500"):
         expected = f"voxels of 10 to 100 mm, found {size} mm"
         assert_refused(run("init", session, "--method", "voxels", "--frame", "3", "--voxel-size", size), [expected])
-    assert not stored(session)
+    assert not (session / "annotations.sqlite").exists()
