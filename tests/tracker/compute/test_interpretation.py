@@ -25,7 +25,7 @@ from tracker.search import chamfer_kernels
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.session.session import load_session
 
-session = load_session(bundled("tango"))
+session = load_session(bundled("elbow_rotation"))
 cameras = [c.camera for c in session.cameras]
 
 def figures():
