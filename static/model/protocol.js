@@ -72,8 +72,8 @@
  *   TrackChanges
  * @typedef {{type: "track_settings", changes: TrackChanges}} SetTrackSettings
  * @typedef {{bodies?: boolean, colors?: "parts" | "people", opacity?: number, cameras?: boolean, images?: boolean,
- *   floor?: boolean, gizmos?: boolean, ghost?: boolean, voxels?: boolean, trail_points?: string[], trail_frames?:
- *   number}} View3dChanges
+ *   floor?: boolean, gizmos?: boolean, ghost?: boolean, voxels?: boolean, character?: string, trail_points?: string[],
+ *   trail_frames?: number}} View3dChanges
  * @typedef {{type: "view_3d", changes: View3dChanges}} SetView3d
  * @typedef {{type: "body_sizes", action: "height", person: number, height_m: number}} SetHeight
  * @typedef {{type: "body_sizes", action: "part", person: number, part: string, length_m?: number, half_depth_m?:
@@ -147,10 +147,11 @@
  * @typedef {{type: "settings", track: TrackValues, search: SearchValues, track_default: TrackValues, search_default:
  *   SearchValues}} SettingsMessage
  * @typedef {{bodies: boolean, colors: "parts" | "people", opacity: number, cameras: boolean, images: boolean, floor:
- *   boolean, gizmos: boolean, ghost: boolean, voxels: boolean, trail_points: string[], trail_frames: number}} View3d
+ *   boolean, gizmos: boolean, ghost: boolean, voxels: boolean, character: string, trail_points: string[], trail_frames:
+ *   number}} View3d
  * @typedef {{up: string, tilt_deg: number | null, height_m: number | null, has_former: boolean}} FloorInfo
- * @typedef {{type: "view_3d", view: View3d, floor: FloorInfo, prediction: string, trail_points: string[]}}
- *   View3dMessage
+ * @typedef {{type: "view_3d", view: View3d, floor: FloorInfo, prediction: string, trail_points: string[], characters:
+ *   string[]}} View3dMessage
  * @typedef {{name: string, length_m: number, half_depth_m: number, half_width_m: number}} PartSizes
  * @typedef {{name: string, width_m: number}} GirdleWidth
  * @typedef {{type: "body_sizes", person: number, height_m: number, parts: PartSizes[], widths: GirdleWidth[],
