@@ -16,12 +16,13 @@ RunState: TypeAlias = Literal["running", "paused", "over"]
 
 
 class RunSearch(Command, frozen=True, tag="search"):
-    """Search the shown frame: one expansion, to the end of the stage, or the whole frame; fit its contours; or stop.
+    """Search the shown frame: one expansion, to the end of the stage, or the whole frame; fit its contours, the whole
+    body at once or chain by chain; or stop.
 
     A search of other people than the current one starts from the beginning.
     """
 
-    action: Literal["step", "stage", "frame", "contours", "stop"]
+    action: Literal["step", "stage", "frame", "contours", "chains", "stop"]
     person: Index | None = None
     """The only person to search; null for everybody."""
 

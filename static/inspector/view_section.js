@@ -5,7 +5,7 @@ import { checkRow, choiceRow, sliderRow, textButton } from "./rows.js";
 
 const FREE = "free";
 const MAX_TRAIL_FRAMES = 250;
-const NO_CHARACTER = "";
+const NO_CHARACTER = /** @type {string} */ ("");
 
 /** @type {[import("../model/theme.js").ThemeChoice, string][]} */
 const THEMES = [

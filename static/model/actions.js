@@ -23,7 +23,7 @@ export class Actions {
     this.#send({ type: "redo" });
   }
 
-  /** @param {"step" | "stage" | "frame" | "contours" | "stop"} action */
+  /** @param {"step" | "stage" | "frame" | "contours" | "chains" | "stop"} action */
   search(action) {
     this.#send({ type: "search", action, person: scopePerson(this.#store.facts) });
   }

@@ -45,8 +45,8 @@
  *   v: number, live: boolean}} DragPin
  * @typedef {{type: "unpin", frame: number, person: number, point: string | null, camera: number | null}} RemovePins
  * @typedef {{type: "fit", frame: number, person?: number | null}} FitPose
- * @typedef {{type: "search", action: "step" | "stage" | "frame" | "contours" | "stop", person?: number | null}}
- *   RunSearch
+ * @typedef {{type: "search", action: "step" | "stage" | "frame" | "contours" | "chains" | "stop", person?: number |
+ *   null}} RunSearch
  * @typedef {{type: "search", action: "again", run?: number | null, person?: number | null}} RepeatSearch
  * @typedef {{type: "search_speed", per_second: number | null}} SetSearchSpeed
  * @typedef {{person: number, name: string, bound_rad?: number | null, bound_m?: number | null, step_rad?: number |
