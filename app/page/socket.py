@@ -352,6 +352,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         None if state.search.candidate is None else tuple(map(Identity, state.search.candidate)),
         state.search.running,
         state.search_view,
+        state.range_comparison,
         state.compared if not state.is_stored_drawn else None,
         state.drag,
         state.drag_seqs,
