@@ -6,6 +6,7 @@ make them, `protocol_docs` writes the page's types and docs/protocol.md from the
 
 from typing import Literal, TypeAlias, Union, get_args
 
+from app.page.comparison_messages import RangeComparisonMessage
 from app.page.inspector_messages import (
     AcquisitionMessage,
     BodySizesMessage,
@@ -378,7 +379,7 @@ class ObservabilityMessage(Message, frozen=True, tag="observability"):
 
 TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
-    ObservabilityMessage,
+    RangeComparisonMessage, ObservabilityMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
     AcquisitionMessage, FindingMessage,
 ]  # fmt: skip

@@ -14,6 +14,7 @@ from app.control.controller import Controller
 from app.drawing.curves import CurveGroup
 from app.page import client_messages as wire
 from app.page import commands, messages, picture_sets
+from app.page.comparison_messages import range_comparison
 from app.page.encoding import encode_text
 from app.page.inspector_feed import InspectorFeed
 from app.page.message_parsing import MessageError, parse
@@ -200,8 +201,7 @@ class PageConnection:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if self._view is not None:
                     await self._send_drawn(state, self._view)
-                if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
-                    await self._send(InconsistentMessage(state.inconsistent_frames))
+                await self._send_checks(sent, state)
                 await self._send_curves(state)
                 await self._send_observability(state)
                 await self._send_history()
@@ -298,6 +298,13 @@ class PageConnection:
             messages.curves, self._controller.session, person, group, frames, rows, since == 0
         )
         await self._send(message)
+
+    async def _send_checks(self, sent: State | None, state: State) -> None:
+        """Send what was found about frames other than the shown one, if it changed."""
+        if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
+            await self._send(InconsistentMessage(state.inconsistent_frames))
+        if sent is None or sent.range_comparison is not state.range_comparison:
+            await self._send(range_comparison(state.range_comparison))
 
     async def _send_observability(self, state: State) -> None:
         """Send how well the views constrain the shown pose, if the page shows that layer."""

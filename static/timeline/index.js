@@ -14,6 +14,7 @@ import { JumpMenu } from "./jump_menu.js";
 import { Jumps } from "./jumps.js";
 import { Playback } from "./playback.js";
 import { RangeBar } from "./range_bar.js";
+import { RunComparison } from "./run_comparison.js";
 import { Timeline } from "./timeline.js";
 import { drawerBindings, frameBindings, queueBindings, timelineBindings, trackBindings } from "./timeline_keys.js";
 import { TrackBar } from "./track_bar.js";
@@ -32,8 +33,9 @@ export function mount({ store, actions, navigation, reasons }) {
   const frameWindow = new FrameWindow(store);
   new Transport(store, navigation, playback, actions);
   new TrackBar(store, actions);
-  new RangeBar(store, actions);
   const drawer = new Drawer(store);
+  new RangeBar(store, actions, () => drawer.open("runs"));
+  new RunComparison(store, navigation, actions);
   new JumpMenu(store, jumps, () => drawer.open("doubts"));
   const queue = new DoubtQueue(store, navigation, actions);
   new DoubtList(store, queue);
