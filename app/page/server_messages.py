@@ -6,7 +6,6 @@ make them, `protocol_docs` writes the page's types and docs/protocol.md from the
 
 from typing import Literal, TypeAlias, Union, get_args
 
-from app.page.comparison_messages import RangeComparisonMessage
 from app.page.inspector_messages import (
     AcquisitionMessage,
     BodySizesMessage,
@@ -15,7 +14,7 @@ from app.page.inspector_messages import (
     View3dMessage,
 )
 from app.page.message_types import Message, Part, Status
-from app.page.search_messages import SearchRunsMessage, SearchSetupMessage
+from app.page.search_messages import RangeComparisonMessage, SearchRunsMessage, SearchSetupMessage
 from app.state.comparison import ComparedWork
 
 # --- session -------------------------------------------------------------------------------------------------------

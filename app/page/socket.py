@@ -14,7 +14,6 @@ from app.control.controller import Controller
 from app.drawing.curves import CurveGroup
 from app.page import client_messages as wire
 from app.page import commands, messages, picture_sets
-from app.page.comparison_messages import range_comparison
 from app.page.encoding import encode_text
 from app.page.inspector_feed import InspectorFeed
 from app.page.message_parsing import MessageError, parse
@@ -304,7 +303,7 @@ class PageConnection:
         if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
             await self._send(InconsistentMessage(state.inconsistent_frames))
         if sent is None or sent.range_comparison is not state.range_comparison:
-            await self._send(range_comparison(state.range_comparison))
+            await self._send(messages.range_comparison(state.range_comparison))
 
     async def _send_observability(self, state: State) -> None:
         """Send how well the views constrain the shown pose, if the page shows that layer."""

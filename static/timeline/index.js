@@ -14,7 +14,6 @@ import { JumpMenu } from "./jump_menu.js";
 import { Jumps } from "./jumps.js";
 import { Playback } from "./playback.js";
 import { RangeBar } from "./range_bar.js";
-import { RunComparison } from "./run_comparison.js";
 import { Timeline } from "./timeline.js";
 import { drawerBindings, frameBindings, queueBindings, timelineBindings, trackBindings } from "./timeline_keys.js";
 import { TrackBar } from "./track_bar.js";
@@ -35,7 +34,6 @@ export function mount({ store, actions, navigation, reasons }) {
   new TrackBar(store, actions);
   const drawer = new Drawer(store);
   new RangeBar(store, actions, () => drawer.open("runs"));
-  new RunComparison(store, navigation, actions);
   new JumpMenu(store, jumps, () => drawer.open("doubts"));
   const queue = new DoubtQueue(store, navigation, actions);
   new DoubtList(store, queue);
