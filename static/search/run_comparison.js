@@ -5,6 +5,9 @@ import { count, displayName } from "../widgets/text.js";
 
 /** @typedef {import("../model/protocol.js").ComparedPose} ComparedPose */
 
+/** Smallest difference of costs that counts, px: as much as is displayed. */
+const LEAST_PX = 0.005;
+
 export class RunComparison {
   #store;
   #navigation;
@@ -51,8 +54,8 @@ export class RunComparison {
       ? `No pose${name} in this range replaced another.`
       : "Track a range by one method, then by the other. Mark the range in the timeline and press Compare.";
     this.#text.textContent = poses.length > 0 ? summary(poses, name) : "";
-    this.#heads[0].textContent = `Present: ${methods(poses.map(({ method }) => method))}`;
-    this.#heads[1].textContent = `Replaced: ${methods(poses.map(({ other_method }) => other_method))}`;
+    this.#heads[0].textContent = `Present: ${methods(poses.map(({ method }) => method))}, cost in px and status`;
+    this.#heads[1].textContent = `Replaced: ${methods(poses.map(({ other_method }) => other_method))}, cost in px and status`;
     const largest = Math.max(1, ...poses.map(({ apart_mm }) => apart_mm));
     this.#rows.replaceChildren(...poses.map((pose) => this.#row(pose, largest)));
     this.#mark();
@@ -74,7 +77,7 @@ export class RunComparison {
     go.title = `Go to frame ${pose.frame}`;
     head.append(go);
     const [now, other] = [pose.cost_px, pose.other_cost_px];
-    const apart = cell(pose.apart_mm.toFixed(0));
+    const apart = cell(pose.apart_mm.toFixed(1));
     apart.className = "run-comparison-apart";
     apart.style.setProperty("--share", String(pose.apart_mm / largest));
     row.append(
@@ -84,7 +87,7 @@ export class RunComparison {
       cost(other, now),
       status(pose.other_status),
       apart,
-      cell(`${pose.farthest_mm.toFixed(0)}, ${pose.farthest}`),
+      cell(`${pose.farthest_mm.toFixed(1)}, ${pose.farthest}`),
     );
     return row;
   }
@@ -108,10 +111,10 @@ export class RunComparison {
 function summary(poses, name) {
   const mean = poses.reduce((sum, { apart_mm }) => sum + apart_mm, 0) / poses.length;
   const known = poses.filter(({ cost_px, other_cost_px }) => cost_px !== null && other_cost_px !== null);
-  const better = known.filter(({ cost_px, other_cost_px }) => (cost_px ?? 0) < (other_cost_px ?? 0)).length;
+  const better = known.filter(({ cost_px, other_cost_px }) => (cost_px ?? 0) < (other_cost_px ?? 0) - LEAST_PX).length;
   const lost = [poses.filter(({ status: s }) => s === "lost").length, poses.filter(({ other_status: s }) => s === "lost").length];
   const frames = `${count(poses.length)} frame${poses.length === 1 ? "" : "s"}`;
-  return `${frames}${name}: ${mean.toFixed(0)} mm apart, present pose cheaper on ${count(better)}, lost ${lost[0]} against ${lost[1]}`;
+  return `${frames}${name}: ${mean.toFixed(1)} mm apart, present pose cheaper on ${count(better)}, lost ${lost[0]} against ${lost[1]}`;
 }
 
 /** @param {string[]} all */
@@ -132,7 +135,7 @@ function cell(text) {
  */
 function cost(own, other) {
   const element = cell(own === null ? "–" : own.toFixed(2));
-  element.classList.toggle("is-better", own !== null && other !== null && own < other);
+  element.classList.toggle("is-better", own !== null && other !== null && own < other - LEAST_PX);
   return element;
 }
 

@@ -84,7 +84,8 @@ class AnnotationStore:
     def former_poses(self, person: str, frames: range) -> dict[int, PoseRecord]:
         """Return the poses that the present ones of a range of frames replaced, by frame, ascending.
 
-        Edits that changed only marks do not count, nor do steps within the edit that made the present pose.
+        Edits that changed only marks do not count, nor do steps within the edit that made the present pose. A pose
+        that was set after the frame was cleared has replaced none.
         """
         found = self._connection.all(
             "WITH RECURSIVE f (frame, numbers, edit, change) AS ("

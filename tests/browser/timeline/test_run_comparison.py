@@ -32,12 +32,12 @@ async def open_comparison(page, endpoint):
 async def test_a_range_is_compared_frame_by_frame(page, endpoint):
     await open_comparison(page, endpoint)
     heads = await page.locator("#run-comparison-table thead th").all_inner_texts()
-    assert heads[1:3] == ["Present: contour", "Replaced: chamfer"]
+    assert heads[1:3] == ["Present: contour, cost in px and status", "Replaced: chamfer, cost in px and status"]
     texts = [row.split("\t") for row in await page.locator("#run-comparison-rows tr").all_inner_texts()]
-    assert texts[0] == ["24", "2.50", "good", "3.00", "lost", "20", "60, left wrist"]
+    assert texts[0] == ["24", "2.50", "good", "3.00", "lost", "20.0", "60.0, left wrist"]
     assert texts[2][1:3] == ["–", "–"]
     summary = await page.locator("#run-comparison-text").inner_text()
-    assert summary == "3 frames: 30 mm apart, present pose cheaper on 1, lost 0 against 1"
+    assert summary == "3 frames: 30.0 mm apart, present pose cheaper on 1, lost 0 against 1"
     await page.locator("#run-comparison-rows tr").nth(1).click()
     await until(lambda: endpoint.heard("seek"))
     assert endpoint.heard("seek")[-1]["frame"] == 25
