@@ -229,7 +229,10 @@ async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
     for name in names:
         await page.locator(f"#range-{name}").click()
     await page.keyboard.press("Shift+I")
-    await until(lambda: len(endpoint.heard("range")) == 8)
+    await page.locator("#range-compare").click()
+    await until(lambda: len(endpoint.heard("range")) == 8 and endpoint.heard("compare_range"))
+    assert endpoint.heard("compare_range") == [{"type": "compare_range", "first": 24, "last": 36}]
+    await shows(page, "quadrille.state.drawer === 'runs'")
     assert [m["action"] for m in endpoint.heard("range")] == [
         "track_backward", "track_forward", "interpolate", "clear", "keyframe", "reviewed", "unreviewed", "interpolate",
     ]  # fmt: skip
