@@ -1,6 +1,6 @@
 """Assess a tracked figure by the voxels: which limbs lie in them, and what they hold that no part explains."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -31,12 +31,22 @@ class FigureAssessment(NamedTuple):
     status: Status
     note: str
     """The main reason against it, for people to read; empty where it is good."""
+    lost_limbs: frozenset[str] = frozenset()
+    """Names of the limbs outside of the voxels."""
 
 
 def assess(
-    state: FilterState, frame: FrameVoxels, unexplained: "UnexplainedVoxels", innovation: float, coarse: Sequence[str]
+    state: FilterState,
+    frame: FrameVoxels,
+    unexplained: "UnexplainedVoxels",
+    innovation: float,
+    coarse: Sequence[str],
+    lost_before: Collection[str] = (),
 ) -> FigureAssessment:
     """Return the status of a figure.
+
+    A limb that was lost is lost until it lies in voxels like a good one: on its way through the trunk it has not been
+    found.
 
     Args:
         state: as tracked.
@@ -44,6 +54,7 @@ def assess(
         unexplained: what the voxels hold besides.
         innovation: normalized innovation of the frame, per row.
         coarse: notes on the limbs that the voxels do not resolve.
+        lost_before: the `lost_limbs` of the frame before.
     """
     if frame.n_views < 2:
         return FigureAssessment("lost", "fewer than two views show anybody: the body is where it was predicted")
@@ -56,9 +67,12 @@ def assess(
     worst = min(shares, key=lambda n: shares[n])
     display = worst.replace("_", " ")
     volume = len(unexplained.points) * frame.voxels.grid.size_m**3 / _forearm_m3(state)
-    if shares[worst] < _LOST_SHARE or inside[:2].min() < _LOST_SHARE:
-        return FigureAssessment("lost", f"{display} outside of the voxels" if shares[worst] < _LOST_SHARE else
-                                "trunk or head outside of the voxels")  # fmt: skip
+    lost = frozenset(n for n, s in shares.items() if s < (_DOUBTFUL_SHARE if n in lost_before else _LOST_SHARE))
+    if lost:
+        display = min(lost, key=lambda n: shares[n]).replace("_", " ")
+        return FigureAssessment("lost", f"{display} outside of the voxels", lost)
+    if inside[:2].min() < _LOST_SHARE:
+        return FigureAssessment("lost", "trunk or head outside of the voxels")
     if volume > _LOST_VOLUME:
         return FigureAssessment("lost", "voxels that no part explains: a limb is elsewhere")
     if coarse:

@@ -52,6 +52,7 @@ class VoxelEstimator:
         ]
         self._has_motion = [len(s) > 1 for s in starts]
         self._levels = [DetailLevels.finest()] * len(starts)
+        self._lost_limbs = [frozenset[str]()] * len(starts)
         self.labels: Labels | None = None
         self.voxels: FrameVoxels | None = None
 
@@ -157,7 +158,8 @@ class VoxelEstimator:
             body = pose_of(model, state, poses[p], subjects.active_dofs[p])
             poses[p] = body.values
             per_row = updates[p].normalized_innovation / max(1, updates[p].n_rows)
-            verdict = assess(state, found, free[p], per_row, self._levels[p].notes)
+            verdict = assess(state, found, free[p], per_row, self._levels[p].notes, self._lost_limbs[p])
+            self._lost_limbs[p] = verdict.lost_limbs
             statuses.append(verdict.status)
             notes.append(verdict.note)
             covariances.append(body.covariance)
