@@ -48,7 +48,7 @@ def main(background: bool = False) -> None:
     """Compile the missing kernels. While another program compiles them, wait for it.
 
     Args:
-        background: work beside a page: at the lowest priority after what its first pictures need, and on two cores.
+        background: work beside a page: at the lowest priority after what its first cost needs, and on two cores.
     """
     gc.set_threshold(*_GC_THRESHOLDS)
     mark = compiled_mark()
@@ -67,19 +67,18 @@ def main(background: bool = False) -> None:
 def _call_kernels(background: bool) -> None:
     """Call the kernels stage by stage on the bundled tango: two people in four views.
 
-    In the background, those of posing are compiled at the priority of the page, which waits for them. Then a second
-    process compiles the kernels of the evidence and those that measure contours, which need none of the kernels that
-    trace contours. It is a fork: importing the program takes as long as a tenth of its work.
+    In the background, a second process compiles the kernels of the evidence, at the priority of the page: its first
+    cost waits for them, while it interprets what places bodies and traces contours. Then that process compiles those
+    that measure contours. It is a fork: importing the program takes as long as a tenth of its work.
     """
     session = load_session(bundled("tango"))
-    bodies = _compile_posing(session)
-    if background and hasattr(os, "nice"):
-        os.nice(19)
     fork = multiprocessing.get_context("fork")
-    beside = fork.Process(target=_compile_evidence, args=(session,), daemon=True) if background else None
+    beside = fork.Process(target=_compile_evidence, args=(session, background), daemon=True) if background else None
     if beside is not None:
         beside.start()
+        _be_nice()
     try:
+        bodies = _compile_posing(session)
         cameras = [c.camera for c in session.cameras]
         occluding_contours.trace(bodies, cameras[0].pinhole)
         points_occluded(bodies, [cameras[0].pinhole], bodies[0].points_world)
@@ -88,7 +87,7 @@ def _call_kernels(background: bool) -> None:
         if beside is not None:
             beside.join()
     if beside is None or beside.exitcode:
-        _compile_evidence(session)
+        _compile_evidence(session, background)
     with Recording(session.cameras) as recording:
         ChamferCost(Observer(session.cameras, recording).evidence(_FRAME), bodies).at_prediction()
     record_stage("cost")
@@ -105,11 +104,18 @@ def _compile_posing(session: Session) -> list[PosedBody]:
     return bodies
 
 
-def _compile_evidence(session: Session) -> None:
+def _be_nice() -> None:
+    if hasattr(os, "nice"):
+        os.nice(19)
+
+
+def _compile_evidence(session: Session, background: bool) -> None:
     """Compile the kernels of the evidence, and those that measure contours against it."""
     with Recording(session.cameras) as recording:
         views = Observer(session.cameras, recording).evidence(_FRAME)
     record_stage("evidence")
+    if background:
+        _be_nice()
     measure_nothing(views, tuple(p.model for p in session.people))
 
 

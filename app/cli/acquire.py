@@ -29,8 +29,11 @@ class AcquireArguments:
 
     session: SessionArg
     """session folder."""
-    method: Literal["contours"] = "contours"
-    """contours fits all sizes to the contours of several frames in all views."""
+    method: Literal["contours", "voxels"] = "contours"
+    """contours fits all sizes to the contours of several frames in all views. voxels fits lengths and girths to the
+    labelled voxels of the same frames first, and starts the fit to contours there."""
+    voxels_only: bool = False
+    """with --method voxels: leave out the fit to contours."""
     person: OptionalName = None
     """name; needed in a session of several people."""
     frames: OptionalRange = None
@@ -78,6 +81,8 @@ def _settings(arguments: AcquireArguments, cameras: list[str]) -> "AcquisitionSe
         TrackerError: the views are not two cameras of the session, or are given without --paper.
     """
     from tracker.acquisition.from_contours import AcquisitionSettings
+    from tracker.acquisition.from_voxels import VoxelSizeSettings
+    from tracker.acquisition.size_fit import SizeFitSettings
     from tracker.acquisition.two_views import TwoViewSettings
 
     views, coupled = arguments.views, not arguments.uncoupled
@@ -87,9 +92,16 @@ def _settings(arguments: AcquireArguments, cameras: list[str]) -> "AcquisitionSe
         raise TrackerError(
             f"expected --views as two of {', '.join(cameras)}, found '{' '.join(views)}'; name the frontal view first"
         )
+    by_voxels = arguments.method == "voxels"
+    if arguments.paper and by_voxels:
+        raise TrackerError("expected --paper with --method contours, found voxels; leave one of them out")
+    if arguments.voxels_only and not by_voxels:
+        raise TrackerError("expected --voxels-only with --method voxels, found contours; add --method voxels")
     if arguments.paper:
         return TwoViewSettings((views[0], views[1]) if views else None, arguments.n_frames, coupled)
-    return AcquisitionSettings(n_frames=arguments.n_frames, coupled=coupled)
+    fit = SizeFitSettings(rounds=()) if arguments.voxels_only else SizeFitSettings()
+    voxels = VoxelSizeSettings() if by_voxels else None
+    return AcquisitionSettings(n_frames=arguments.n_frames, coupled=coupled, fit=fit, voxels=voxels)
 
 
 def acquire(
@@ -106,7 +118,9 @@ def acquire(
 
     Returns:
         `person`; `frames` and `views` that were used; `cost_before_px`, `cost_after_px`; `height_m`; `sizes`, a list
-        of `name`, `before_m`, `after_m` and `sigma_m` (NaN without a known uncertainty); `model`, the body as TOML.
+        of `name`, `before_m`, `after_m` and `sigma_m` (NaN without a known uncertainty); `model`, the body as TOML;
+        `evaluations` of the fit to contours; `voxels`, None or the `height_m` of the body that was fitted to voxels,
+        and `overlap_before` and `overlap_after` of its hull with that of the footage, 0 to 1.
 
     Raises:
         TrackerError: the person has no pose on these frames, or the views show nothing of them.
@@ -147,7 +161,27 @@ def acquire(
         "height_m": found.body.height_m,
         "sizes": [c._asdict() for c in changes],
         "model": format_model(found.body),
-    }
+        "evaluations": found.fit.n_evaluations,
+        "voxels": None if found.voxels is None else {
+            "height_m": found.voxels.body.height_m,
+            "overlap_before": found.voxels.overlap_before,
+            "overlap_after": found.voxels.overlap_after,
+        },
+    }  # fmt: skip
+
+
+def _stages(found: dict[str, Any]) -> list[str]:
+    """Return a line on each stage, where the acquisition had two."""
+    by_voxels = found["voxels"]
+    if by_voxels is None:
+        return []
+    lines = [
+        f"voxels: {by_voxels['height_m']:.2f} m tall; the hulls of body and footage share "
+        f"{100 * by_voxels['overlap_before']:.0f}% before, {100 * by_voxels['overlap_after']:.0f}% after"
+    ]
+    if found["evaluations"]:
+        lines.append(f"contours: {found['height_m']:.2f} m tall, after {found['evaluations']} evaluations")
+    return lines
 
 
 def _format(found: dict[str, Any], arguments: AcquireArguments) -> str:
@@ -156,6 +190,7 @@ def _format(found: dict[str, Any], arguments: AcquireArguments) -> str:
     where += f", front view {found['views'][0]}, side view {found['views'][1]}" if arguments.paper else ""
     lines = [
         f"{found['person']}: {found['height_m']:.2f} m tall, from {where}",
+        *_stages(found),
         f"cost {found['cost_before_px']:.2f} px before, {found['cost_after_px']:.2f} px with the acquired body",
         f"sizes that changed most, cm (before, after{'' if arguments.paper else ', standard deviation'}):",
     ]

@@ -97,7 +97,9 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
 
 def _init_from_silhouettes(at: Target, arguments: InitArguments) -> None:
     from app.cli.init_silhouettes import format_first_poses, init_from_silhouettes
+    from tracker.tracking.voxel.settings import check_voxel_size
 
+    check_voxel_size(arguments.voxel_size / 1000)
     progress = Reporter(silent=arguments.json or arguments.method != "auto")
     found = init_from_silhouettes(
         at, arguments.method, arguments.frame, arguments.voxel_size / 1000, arguments.person is None, progress

@@ -1,5 +1,6 @@
 """`quadrille open`: open a session in the page."""
 
+import gc
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated
@@ -52,7 +53,8 @@ def command(
     folder = session_folder(folder)
     serving = Serving(host, port, allow_host, browser, token)
     with SessionLock(folder), Doorway(serving) as doorway, closing(KernelCompiler()) as compiler:
-        # These imports take seconds: the doorway answers meanwhile, and kernels are compiled.
+        # These imports take seconds: the doorway answers meanwhile, and kernels are compiled. What they make stays.
+        gc.disable()
         from tracker.session.relink import require_files
         from tracker.session.session import load_session
 
@@ -62,6 +64,8 @@ def command(
 
         from app.server.workbench import open_session
 
+        gc.freeze()
+        gc.enable()
         chosen = open_session(found, doorway, compiler, lambda line: print(line, flush=True))
     if chosen is not None:
         words = ["open", str(chosen.folder), "--host", host, "--port", str(chosen.port), "--no-browser"]

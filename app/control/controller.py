@@ -32,6 +32,7 @@ from app.control.session.kernel_warmup import KernelWarmup
 from app.control.session.save_retry import SaveRetry
 from app.control.session.session_state import SessionState
 from app.control.session.stored_poses import StoredPoses
+from app.control.tracking.comparing_runs import ComparingRuns
 from app.control.tracking.finding import FindingPeople
 from app.control.tracking.inconsistent_frames import InconsistentFrames
 from app.control.tracking.ranges import Ranges
@@ -77,6 +78,8 @@ class Controller:
         """Finds people whom nobody has placed, and tracks them."""
         self.ranges = Ranges(session_state, self.tracking, activities)
         """Interpolates, clears, marks and tracks ranges of frames."""
+        self.comparing_runs = ComparingRuns(session_state)
+        """Compares the poses of a range with those that they replaced."""
         self.dragging = Dragging(session_state, activities)
         """Drags points and parts."""
         self.held_points = HeldPoints(session_state, activities)
@@ -159,6 +162,7 @@ class Controller:
             self.history.save()
         self.dragging.close()
         self._inconsistent_frames.close()
+        self.comparing_runs.close()
         self._footage_scan.close()
         if self._compiling is not None:
             self._compiling.close()

@@ -108,6 +108,8 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     out = []
     tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
     drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
+    replaced = {} if state.range_comparison is None else state.range_comparison.others.get(state.frame, {})
+    former = [PosedBody(p.model, replaced.get(i, state.poses[i])) for i, p in enumerate(session.people)]
     result = stored.poses if state is not stored and state.search_view.replay is None else None
     preview, replay = state.search_view.preview, state.search_view.replay
     outlined: tuple[tuple[PathKind, tuple[Array, ...] | None], ...] = (
@@ -131,6 +133,8 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         if others:
             changed = {i for i, (now, other) in enumerate(zip(bodies, others, strict=True)) if now is not other}
             out += _some(changed, others, camera, index, "alternative")
+        if replaced:
+            out += _some(replaced, former, camera, index, "compared")
         for kind, poses in outlined:
             if poses is not None:
                 out += _outlined(session, poses, camera, index, kind)

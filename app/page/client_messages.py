@@ -40,7 +40,15 @@ from app.page.search_messages import (
 from app.state.page_view import Layer
 
 RangeAction: TypeAlias = Literal[
-    "track_forward", "track_backward", "interpolate", "clear", "keyframe", "reviewed", "unreviewed", "none"
+    "track_forward",
+    "track_backward",
+    "interpolate",
+    "clear",
+    "keyframe",
+    "reviewed",
+    "unreviewed",
+    "none",
+    "take_replaced",
 ]
 Tab: TypeAlias = Literal["search", "landscape"]
 
@@ -142,7 +150,7 @@ class ControlTracking(Command, frozen=True, tag="track"):
 
 
 class EditRange(Command, frozen=True, tag="range"):
-    """Track, interpolate, clear or mark a range of frames."""
+    """Track, interpolate, clear or mark a range of frames, or take the poses that its poses replaced."""
 
     action: RangeAction
     first: Frame
@@ -150,6 +158,14 @@ class EditRange(Command, frozen=True, tag="range"):
     """Included."""
     person: Index | None = None
     """Null for everybody. Tracking always moves everybody who is placed."""
+
+
+class CompareRange(Command, frozen=True, tag="compare_range"):
+    """Compare the poses of a range with those that they replaced; null ends the comparison."""
+
+    first: Frame | None
+    last: Frame | None
+    """Included."""
 
 
 class StopRange(Command, frozen=True, tag="stop_range"):
@@ -215,7 +231,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     Drag, PoseEdit, DragPin, RemovePins, FitPose,
     RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
     TakeCandidate, ShowLandscape, SetLandscapeDof,
-    StartTracking, ControlTracking, EditRange, StopRange, ToggleMark, FollowTracking,
+    StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, DraftSizes,
     AcquireSizes, FindPeople,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,

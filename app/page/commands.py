@@ -92,8 +92,17 @@ def _range(controller: Controller, _: int, message: wire.EditRange) -> None:
             ranges.clear(first, last, people)
         case "track_forward" | "track_backward":
             ranges.track(first, last, backward=message.action == "track_backward")
+        case "take_replaced":
+            ranges.take_replaced(first, last, people)
         case mark:
             ranges.mark(first, last, mark, people)
+
+
+def _compare_range(controller: Controller, _: int, message: wire.CompareRange) -> None:
+    if message.first is None or message.last is None:
+        controller.comparing_runs.leave()
+    else:
+        controller.comparing_runs.compare(message.first, message.last)
 
 
 def _mark(controller: Controller, _: int, message: wire.ToggleMark) -> None:
@@ -129,6 +138,7 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.StartTracking: lambda controller, _, m: controller.tracking.start(m.action == "backward", m.until),
     wire.ControlTracking: _control_tracking,
     wire.EditRange: _range,
+    wire.CompareRange: _compare_range,
     wire.StopRange: lambda controller, _, __: controller.ranges.stop(),
     wire.ToggleMark: _mark,
     wire.FollowTracking: lambda controller, _, m: controller.tracking.follow(m.follow),

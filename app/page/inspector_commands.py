@@ -11,6 +11,7 @@ from app.page import inspector_messages as wire
 from app.page.message_parsing import MessageError
 from app.page.message_types import Command
 from tracker.body.dimensions import PartDimensions, dimensions_of
+from tracker.formats.model_toml import PRESETS
 from tracker.validation import quoted
 
 
@@ -29,6 +30,8 @@ def _view_3d(controller: Controller, _: int, message: wire.SetView3d) -> None:
     changes = msgspec.to_builtins(message.changes)
     if "trail_points" in changes:
         changes["trail_points"] = frozenset(changes["trail_points"])
+    if changes.get("character") and changes["character"] not in PRESETS:
+        raise MessageError(f"one of {', '.join(PRESETS)} as 'changes.character'", quoted(changes["character"]))
     controller.view_3d.choose(**changes)
 
 

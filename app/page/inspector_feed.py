@@ -14,6 +14,7 @@ from app.state.progress import FindState
 from app.state.run_choices import RunChoices
 from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
+from tracker.formats.model_toml import PRESETS
 from tracker.posing.grab import minor_points
 from tracker.tracking.chamfer.settings import TrackSettings
 
@@ -89,7 +90,7 @@ def view_3d(controller: Controller, state: State) -> wire.View3dMessage:
     """Describe what the 3-D view shows."""
     models = [p.model for p in controller.session.people]
     names = dict.fromkeys(n for m in models for n in m.point_names if n not in minor_points(m))
-    return wire.View3dMessage(state.view_3d, _floor(state.floor), state.prediction_note, tuple(names))
+    return wire.View3dMessage(state.view_3d, _floor(state.floor), state.prediction_note, tuple(names), PRESETS)
 
 
 def body_sizes(controller: Controller, state: State) -> wire.BodySizesMessage:

@@ -62,6 +62,7 @@ class View3dChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gizmos: bool | UnsetType = UNSET
     ghost: bool | UnsetType = UNSET
     voxels: bool | UnsetType = UNSET
+    character: Name | UnsetType = UNSET
     trail_points: Annotated[list[Name], Meta(max_length=1000)] | UnsetType = UNSET
     trail_frames: Annotated[int, Meta(ge=1, le=MAX_TRAIL_FRAMES)] | UnsetType = UNSET
 
@@ -211,6 +212,8 @@ class View3dMessage(Message, frozen=True, tag="view_3d"):
     """What the predicted pose was computed from, or why there is none; empty while it is not shown."""
     trail_points: tuple[str, ...]
     """Names of the points whose trails can be shown."""
+    characters: tuple[str, ...]
+    """Names of the bodies that can move as each person does."""
 
 
 class PartSizes(Part, frozen=True):

@@ -10,10 +10,11 @@ import numpy as np
 from app.drawing import dof_labels, overlays, part_outlines, pin_marks
 from app.drawing.curves import CurveGroup, plots_of, samples
 from app.drawing.floor_lines import floor_lines
+from app.page import search_messages
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
 from app.page.encoding import encode_binary
-from app.state.comparison import PoseComparison
+from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import Picking
 from app.state.page_view import View
 from app.state.progress import TrackState
@@ -294,3 +295,20 @@ def _track(track: TrackState) -> wire.Track:
         back=track.back,
         message=track.message,
     )
+
+
+def range_comparison(found: RangeComparison | None) -> search_messages.RangeComparisonMessage:
+    """Describe the poses of a range against those that they replaced."""
+    if found is None:
+        return search_messages.RangeComparisonMessage(None, None, ())
+    people = (
+        tuple(
+            search_messages.ComparedPose(
+                f.frame, f.method, f.other_method, f.cost_px, f.other_cost_px, f.status, f.other_status,
+                1000 * f.apart_m, 1000 * f.farthest_m, f.farthest,
+            )
+            for f in of_person
+        )
+        for of_person in found.frames
+    )  # fmt: skip
+    return search_messages.RangeComparisonMessage(found.first, found.last, tuple(people))

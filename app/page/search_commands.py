@@ -19,8 +19,8 @@ def _search(controller: Controller, _: int, message: wire.RunSearch) -> None:
             controller.search.run_stage(message.person)
         case "frame":
             controller.search.run(message.person)
-        case "contours":
-            controller.search.fit_contours(message.person)
+        case "contours" | "chains":
+            controller.search.fit_contours(message.person, by_chains=message.action == "chains")
         case "stop":
             controller.activities.stop()
 

@@ -16,12 +16,13 @@ RunState: TypeAlias = Literal["running", "paused", "over"]
 
 
 class RunSearch(Command, frozen=True, tag="search"):
-    """Search the shown frame: one expansion, to the end of the stage, or the whole frame; fit its contours; or stop.
+    """Search the shown frame: one expansion, to the end of the stage, or the whole frame; fit its contours, the whole
+    body at once or chain by chain; or stop.
 
     A search of other people than the current one starts from the beginning.
     """
 
-    action: Literal["step", "stage", "frame", "contours", "stop"]
+    action: Literal["step", "stage", "frame", "contours", "chains", "stop"]
     person: Index | None = None
     """The only person to search; null for everybody."""
 
@@ -190,3 +191,33 @@ class SearchRunsMessage(Message, frozen=True, tag="search_runs"):
     replay: Replay | None
     compared: int | None
     """Number of the run whose result is drawn."""
+
+
+class ComparedPose(Part, frozen=True):
+    """The pose of a person in a frame, against the pose that it replaced."""
+
+    frame: int
+    method: str
+    """Method of the tracker, or the source of the values."""
+    other_method: str
+    cost_px: float | None
+    other_cost_px: float | None
+    status: str
+    """As its tracker assessed it; empty if none did."""
+    other_status: str
+    apart_mm: float
+    """Mean distance between the joints of both poses."""
+    farthest_mm: float
+    """Largest of these distances."""
+    farthest: str
+    """Name of that joint, for display."""
+
+
+class RangeComparisonMessage(Message, frozen=True, tag="range_comparison"):
+    """The poses of a range against those that they replaced."""
+
+    first: int | None
+    """Null while nothing is compared."""
+    last: int | None
+    people: tuple[tuple[ComparedPose, ...], ...]
+    """By person; frames whose pose replaced none are left out."""

@@ -14,7 +14,7 @@ from app.page.inspector_messages import (
     View3dMessage,
 )
 from app.page.message_types import Message, Part, Status
-from app.page.search_messages import SearchRunsMessage, SearchSetupMessage
+from app.page.search_messages import RangeComparisonMessage, SearchRunsMessage, SearchSetupMessage
 from app.state.comparison import ComparedWork
 
 # --- session -------------------------------------------------------------------------------------------------------
@@ -378,7 +378,7 @@ class ObservabilityMessage(Message, frozen=True, tag="observability"):
 
 TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
-    ObservabilityMessage,
+    RangeComparisonMessage, ObservabilityMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
     AcquisitionMessage, FindingMessage,
 ]  # fmt: skip

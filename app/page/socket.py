@@ -200,8 +200,7 @@ class PageConnection:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if self._view is not None:
                     await self._send_drawn(state, self._view)
-                if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
-                    await self._send(InconsistentMessage(state.inconsistent_frames))
+                await self._send_checks(sent, state)
                 await self._send_curves(state)
                 await self._send_observability(state)
                 await self._send_history()
@@ -299,6 +298,13 @@ class PageConnection:
         )
         await self._send(message)
 
+    async def _send_checks(self, sent: State | None, state: State) -> None:
+        """Send what was found about frames other than the shown one, if it changed."""
+        if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
+            await self._send(InconsistentMessage(state.inconsistent_frames))
+        if sent is None or sent.range_comparison is not state.range_comparison:
+            await self._send(messages.range_comparison(state.range_comparison))
+
     async def _send_observability(self, state: State) -> None:
         """Send how well the views constrain the shown pose, if the page shows that layer."""
         if self._observability.is_due(state, self._view):
@@ -352,6 +358,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         None if state.search.candidate is None else tuple(map(Identity, state.search.candidate)),
         state.search.running,
         state.search_view,
+        state.range_comparison,
         state.compared if not state.is_stored_drawn else None,
         state.drag,
         state.drag_seqs,

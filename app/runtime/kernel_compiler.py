@@ -4,21 +4,21 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Sequence
 from contextlib import suppress
 
+from tracker.compute.interpretation import interpret_modules
 from tracker.compute.kernel_cache import STAGES, compiled_stages, is_compiled
 
 COMMAND = (sys.executable, "-m", "app.bench.compile_kernels", "--background")
-_POLL_S = 0.02
+_POSING = "posing"
 
 
 class KernelCompiler:
     """The process that compiles the missing kernels, if there are any."""
 
     def __init__(self, command: Sequence[str] = COMMAND) -> None:
-        """Start the process unless all kernels are compiled.
+        """Start the process unless all kernels are compiled. This program interprets those that place a body meanwhile.
 
         Args:
             command: starts the process.
@@ -27,6 +27,8 @@ class KernelCompiler:
         if not is_compiled():
             # Ctrl+C in a terminal reaches the whole process group; only this program may end the process.
             self._process = subprocess.Popen(command, start_new_session=True)
+            if _POSING not in compiled_stages():
+                interpret_modules("tracker.body.kinematics")
 
     @property
     def has_failed(self) -> bool:
@@ -36,17 +38,15 @@ class KernelCompiler:
     @property
     def stages(self) -> frozenset[str]:
         """The stages whose kernels can be called without delay; all of them once the process has ended."""
-        if self._process is None or self._process.poll() is not None:
-            return frozenset(STAGES)
-        return compiled_stages()
+        has_ended = self._process is None or self._process.poll() is not None
+        return frozenset(STAGES) if has_ended else compiled_stages()
 
-    def wait_for(self, stage: str) -> None:
-        """Wait until the kernels of a stage are compiled or the process has ended.
-
-        For kernels that the caller would have to compile at once, beside the process that is at it.
-        """
-        while stage not in self.stages:
-            time.sleep(_POLL_S)
+    def follow(self) -> frozenset[str]:
+        """Return the `stages`; kernels that were interpreted because they were missing are loaded from now on."""
+        stages = self.stages
+        if _POSING in stages:
+            interpret_modules()
+        return stages
 
     def close(self) -> None:
         """End the process and what it has started. The kernels that it has compiled stay in the cache."""
@@ -54,3 +54,4 @@ class KernelCompiler:
             with suppress(ProcessLookupError):
                 os.killpg(self._process.pid, signal.SIGTERM)
             self._process.wait()
+        interpret_modules()

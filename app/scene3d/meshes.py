@@ -13,7 +13,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.contours.occluding_contours import part_poses
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.session.session import Session
+from tracker.session.session import Person
 
 _DIMMED = 0.2
 """Opacity of dimmed people, as a share of that of the others."""
@@ -28,7 +28,7 @@ class PeopleMeshes:
         self,
         server: viser.ViserServer,
         root: str,
-        session: Session,
+        people: Sequence[Person],
         color: tuple[int, int, int] | None = None,
         opacity: float | None = None,
     ) -> None:
@@ -37,11 +37,11 @@ class PeopleMeshes:
         Args:
             server: owns the scene.
             root: name of the node.
-            session: with the people.
+            people: who they are.
             color: of all meshes; by default each part has its own.
             opacity: of all meshes; opaque by default.
         """
-        self._people = session.people
+        self._people = tuple(people)
         self.handles = [
             [
                 server.scene.add_mesh_simple(

@@ -10,6 +10,7 @@ from app.drawing.predicted_pose import prediction
 from app.drawing.trails import Trails
 from app.runtime.jobs import LatestWinsWorker
 from app.scene3d.camera_view import CameraView
+from app.scene3d.character_layer import CharacterLayer
 from app.scene3d.frusta import Frusta
 from app.scene3d.meshes import PeopleMeshes
 from app.scene3d.throttle import Throttle
@@ -58,6 +59,7 @@ class SceneView:
         latest.offer(controller.state)
         CameraView(server, controller)
         VoxelLayer(server, controller)
+        CharacterLayer(server, controller)
 
     def _show(self, state: State) -> None:
         due = self._throttle.due(state)
@@ -93,7 +95,7 @@ class SceneView:
 
     def _new_people(self, state: State) -> PeopleMeshes:
         """Add the meshes of all people. A click selects the person, and the joint that moves the part."""
-        parts = PeopleMeshes(self._server, "/people", self._controller.session_of(state))
+        parts = PeopleMeshes(self._server, "/people", self._controller.session_of(state).people)
         for person, handles in enumerate(parts.handles):
             points = self._controller.models[person].point_names
             for part, handle in enumerate(handles):
@@ -153,10 +155,8 @@ class SceneView:
         notes = [f"{p.name}: {f.why}" if several else f.why for p, f in zip(self._session.people, found, strict=True)]
         self._controller.view_3d.note_prediction("; ".join(notes))
         if self._predicted is None:
-            session = self._controller.session
-            self._predicted = PeopleMeshes(
-                self._server, "/prediction", session, _PREDICTED_RGB, _PREDICTED_OPACITY
-            )  # fmt: skip
+            people = self._controller.session.people
+            self._predicted = PeopleMeshes(self._server, "/prediction", people, _PREDICTED_RGB, _PREDICTED_OPACITY)
         self._predicted.pose([f.values for f in found])
         self._predicted.show_only(frozenset(i for i, f in enumerate(found) if f.values is not None) - hidden)
 

@@ -5,7 +5,11 @@ nothing of the session, so it needs no token; Host and Origin are checked as for
 """
 
 import json
+import multiprocessing
+import os
+import signal
 import socket
+import sys
 import threading
 import webbrowser
 from collections.abc import Mapping
@@ -13,15 +17,16 @@ from contextlib import suppress
 from dataclasses import replace
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from multiprocessing.context import ForkProcess
 from types import TracebackType
-from typing import Self
+from typing import NamedTuple, Self
 
 from platformdirs import user_state_path
 
 from app.runtime.restart import inherited
 from app.server.access import Access, Invitation, access_for
 from app.server.address import Serving, listen, page_address, port_of
-from app.server.static_files import static_folder
+from app.server.static_files import KEPT, PageFiles, static_folder
 
 STEPS = ("Loading the program", "Opening the session", "Preparing the views")
 _POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'"
@@ -33,10 +38,24 @@ _FILES: Mapping[str, tuple[str, str]] = {
     "/static/theme.js": ("theme.js", "text/javascript"),
     "/static/icon.svg": ("icon.svg", "image/svg+xml"),
 }
-"""What is served, by path, with its type. No other file is read."""
+"""What is served, by path, with its type; besides it the files of the session's page, which it fetches ahead."""
+_NOT_KEPT = "no-store"
+_FORKS = sys.platform == "linux"
+"""Whether a process of its own answers. Threads would take turns with the loading program, and hold it up."""
 _TIMEOUT_S = 2.0
 """Time for a request to arrive: browsers also open connections that they do not use."""
 _POLL_S = 0.02
+
+
+class Answer(NamedTuple):
+    """The answer to a request."""
+
+    status: int
+    content: bytes
+    kind: str
+    """Content type."""
+    caching: str = _NOT_KEPT
+    """Cache-Control."""
 
 
 class Doorway:
@@ -58,12 +77,15 @@ class Doorway:
         self._without_token = replace(self.access, token=None, invitation=None)
         static = static_folder()
         self._files = {path: ((static / name).read_bytes(), kind) for path, (name, kind) in _FILES.items()}
+        self._page_files = PageFiles(static)
         self._step = 0
         self.sockets = inherited() or listen(serving.host, serving.port)
         """They listen until the end of the `with` block; who serves copies of them calls `close` before."""
         self.port = port_of(self.sockets)
         self._servers = [_Server(each, self) for each in self.sockets]
         self._threads = [threading.Thread(target=s.serve_forever, args=(_POLL_S,), daemon=True) for s in self._servers]
+        self._process: ForkProcess | None = None
+        self._steps = -1  # pipe to the process
 
     @property
     def address(self) -> str:
@@ -72,9 +94,33 @@ class Doorway:
 
     def __enter__(self) -> Self:
         """Begin to answer."""
+        if _FORKS:
+            reading, self._steps = os.pipe()
+            self._process = multiprocessing.get_context("fork").Process(
+                target=self._answer_until_closed, args=(reading,), daemon=True
+            )
+            self._process.start()
+            os.close(reading)
+        else:
+            self._start_threads()
+        return self
+
+    def _start_threads(self) -> None:
         for thread in self._threads:
             thread.start()
-        return self
+
+    def _answer_until_closed(self, steps: int) -> None:
+        """Answer in a process of its own until the program closes the doorway, or ends in whatever way.
+
+        Args:
+            steps: pipe from which the present step is read.
+        """
+        os.close(self._steps)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the program
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        self._start_threads()
+        while step := os.read(steps, 1):
+            self._step = step[0]
 
     def open_browser(self) -> None:
         """Open the page in the browser if that is wanted."""
@@ -98,24 +144,37 @@ class Doorway:
     def show(self, step: str) -> None:
         """Show what the program is doing, one of `STEPS`."""
         self._step = STEPS.index(step)
+        if self._process is not None:
+            with suppress(BrokenPipeError):
+                os.write(self._steps, bytes([self._step]))
 
     def close(self) -> None:
         """End to answer; requests that arrive later wait for who serves the sockets next."""
+        if self._process is not None:
+            os.close(self._steps)
+            self._process.join()
+            self._process = None
         for server, thread in zip(self._servers, self._threads, strict=True):
             if thread.is_alive():
                 server.shutdown()
                 thread.join()
 
-    def answer(self, path: str, host: str | None, origin: str | None) -> tuple[int, bytes, str]:
-        """Return the status, content and type of the answer to a request."""
+    def answer(self, path: str, host: str | None, origin: str | None) -> Answer:
+        """Answer a request."""
         why = self._without_token.refusal(host, origin)
         if why is not None:
-            return HTTPStatus.FORBIDDEN, f"Quadrille refused this request: {why}.\n".encode(), "text/plain"
+            return Answer(HTTPStatus.FORBIDDEN, f"Quadrille refused this request: {why}.\n".encode(), "text/plain")
         if path == "/starting.json":
-            return HTTPStatus.OK, json.dumps({"steps": STEPS, "at": self._step}).encode(), "application/json"
+            return Answer(HTTPStatus.OK, json.dumps({"steps": STEPS, "at": self._step}).encode(), "application/json")
+        if path == "/page-files.json":
+            addresses = list(self._page_files.addresses().values())
+            return Answer(HTTPStatus.OK, json.dumps(addresses).encode(), "application/json")
         if path in self._files:
-            return HTTPStatus.OK, *self._files[path]
-        return HTTPStatus.SERVICE_UNAVAILABLE, b"The program is starting.\n", "text/plain"
+            return Answer(HTTPStatus.OK, *self._files[path])
+        found = self._page_files.find(path)
+        if found is not None:
+            return Answer(HTTPStatus.OK, *found, KEPT)
+        return Answer(HTTPStatus.SERVICE_UNAVAILABLE, b"The program is starting.\n", "text/plain")
 
 
 class _Server(ThreadingHTTPServer):
@@ -139,21 +198,21 @@ class _Handler(BaseHTTPRequestHandler):
         hosts = self.headers.get_all("Host", [])
         host = hosts[0] if len(hosts) == 1 else None
         path = self.path.partition("?")[0]
-        status, content, kind = self.server.doorway.answer(path, host, self.headers.get("Origin"))
+        answer = self.server.doorway.answer(path, host, self.headers.get("Origin"))
         with suppress(OSError):
-            self.send_response(status)
+            self.send_response(answer.status)
             for name, value in (
-                ("Content-Type", kind),
-                ("Content-Length", str(len(content))),
+                ("Content-Type", answer.kind),
+                ("Content-Length", str(len(answer.content))),
                 ("Content-Security-Policy", _POLICY),
                 ("X-Content-Type-Options", "nosniff"),
                 ("Referrer-Policy", "no-referrer"),
-                ("Cache-Control", "no-store"),
+                ("Cache-Control", answer.caching),
                 ("Connection", "close"),
             ):
                 self.send_header(name, value)
             self.end_headers()
-            self.wfile.write(content)
+            self.wfile.write(answer.content)
 
     def log_message(self, format: str, *args: object) -> None:
         """Say nothing on the terminal."""

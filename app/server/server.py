@@ -19,6 +19,7 @@ from aiohttp.typedefs import Handler, Middleware
 
 from app.server import connections, viser_proxy
 from app.server.access import Access
+from app.server.static_files import KEPT, PREFIX, PageFiles
 
 _LOG = logging.getLogger(__name__)
 _SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
@@ -51,15 +52,22 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
     """
     app = web.Application(middlewares=[_guard(access)])
     app[_SOCKETS] = weakref.WeakSet()
-    proxy = viser_proxy.ViserProxy(viser_socket)
+    proxy, files = viser_proxy.ViserProxy(viser_socket), PageFiles(static)
 
     async def page(request: web.Request) -> web.StreamResponse:
-        response = web.FileResponse(static / "index.html")
+        response = web.Response(text=files.index(), content_type="text/html")
         if access.token is not None and "token" in request.query:
             # Set with the page itself: after a redirect, a browser that followed a link would not send a Strict cookie.
             name = access.cookie(request.headers["Host"])
             response.set_cookie(name, access.token, httponly=True, samesite="Strict", path="/")
         return response
+
+    async def page_file(request: web.Request) -> web.StreamResponse:
+        found = files.find(request.path)
+        if found is None:
+            raise web.HTTPNotFound
+        content, kind = found
+        return web.Response(body=content, content_type=kind, charset="utf-8", headers={"Cache-Control": KEPT})
 
     async def pane_socket(request: web.Request) -> web.StreamResponse:
         # Compression gains nothing on JPEG, and is not worth the delay for small vectors. Text is decoded where it is
@@ -84,7 +92,8 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
 
     app.router.add_get("/", page)
     app.router.add_get("/ws", pane_socket)
-    app.router.add_static("/static", static)
+    app.router.add_get(f"/{PREFIX}{{version:[0-9a-f]{{16}}}}/{{name:.+}}", page_file)
+    app.router.add_static(f"/{PREFIX}", static)
     app.router.add_get("/viser", proxy.handle)
     app.router.add_get("/viser/{path:.*}", proxy.handle)
     app.on_response_prepare.append(_add_headers)
@@ -160,8 +169,8 @@ async def _add_headers(request: web.Request, response: web.StreamResponse) -> No
     response.headers["X-Content-Type-Options"] = "nosniff"
     response.headers["Referrer-Policy"] = "no-referrer"
     response.headers["Cross-Origin-Resource-Policy"] = "same-origin"
-    # Modules may be kept but are asked for each time (304 where nothing changed): no page runs half of an old version.
-    response.headers["Cache-Control"] = "no-cache"
+    # All but the files of a version may be kept but are asked for each time (304 where nothing changed).
+    response.headers.setdefault("Cache-Control", "no-cache")
 
 
 async def _close_sockets(app: web.Application) -> None:

@@ -31,7 +31,6 @@ from app.session.frame_cache import FrameCache
 from app.session.recent_sessions import remember
 from app.storage import rescue
 from app.storage.saver import Saver
-from tracker.compute.kernel_cache import STAGES
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -83,7 +82,6 @@ def open_session(
         doorway.show("Preparing the views")
         frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
         saver = Saver(session, store, _author())
-        compiler.wait_for(STAGES[0])
         controller = Controller(session, saver, frames, compiler)
         viser = PrivateViser()
         thumbnails = Thumbnails(controller, FootageCrops(session.cameras, indices))

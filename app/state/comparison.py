@@ -1,5 +1,6 @@
-"""The poses of a frame before and after the last fit or search."""
+"""Poses that are compared: of a frame before and after a fit or search, and of a range with those they replaced."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -33,3 +34,41 @@ class PoseComparison:
     """Where edges and the user's placement disagree by much: a sentence for the user, or empty."""
     is_before_shown: bool = False
     """Whether the views show the poses before."""
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedFrame:
+    """The pose of a person in a frame, and the pose that it replaced."""
+
+    frame: int
+    method: str
+    """How the present pose was made: a tracker's method, or the source of its values."""
+    other_method: str
+    """How the replaced pose was made."""
+    cost_px: float | None
+    """Mean cost of the present pose over the views, px; None if unknown."""
+    other_cost_px: float | None
+    status: str
+    """As its tracker assessed it; empty if none did."""
+    other_status: str
+    apart_m: float
+    """Mean distance between the body's points in both poses, metres."""
+    farthest_m: float
+    """Largest of these distances, metres."""
+    farthest: str
+    """Display name of that point."""
+    other_pose: Array
+    """The replaced pose, (n_values,), in the present body."""
+
+
+@dataclass(frozen=True, eq=False)
+class RangeComparison:
+    """The poses of a range of frames against those that they replaced."""
+
+    first: int
+    last: int
+    """Included."""
+    frames: tuple[tuple[ComparedFrame, ...], ...]
+    """By person; frames whose pose replaced none are left out."""
+    others: Mapping[int, Mapping[int, Array]]
+    """The replaced poses, (n_values,), by frame and index of the person."""

@@ -5,7 +5,7 @@ from typing import TypedDict
 
 import numpy as np
 
-from app.state.comparison import PoseComparison
+from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import FloorState
 from app.state.people import AcquisitionState, DragState, HeldPoint, ShownPose, SizeDraft, Visibility
 from app.state.progress import FindState, FootageState, RangeState, TrackState
@@ -50,6 +50,8 @@ class State:
     """Cost of each view, px; None for a view without edges."""
     comparison: PoseComparison | None = None
     """The last fit or search of any frame; see `compared`."""
+    range_comparison: RangeComparison | None = None
+    """The poses of a range against those that they replaced; None while nothing is compared."""
     search: SearchState = field(default_factory=SearchState)
     search_view: SearchView = field(default_factory=SearchView)
     landscape: CostLandscape | None = None
@@ -192,6 +194,7 @@ class StateChanges(TypedDict, total=False):
     cost_px: float | None
     view_costs_px: tuple[float | None, ...]
     comparison: PoseComparison | None
+    range_comparison: RangeComparison | None
     search: SearchState
     search_view: SearchView
     landscape: CostLandscape | None

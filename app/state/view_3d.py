@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any, Literal
 
+from tracker.formats.model_toml import PRESETS
+
 MAX_TRAIL_FRAMES = 250
 """Longest trail, frames to either side of the shown one."""
 
@@ -30,6 +32,8 @@ class View3d:
     """Whether the predicted pose of the shown frame is drawn."""
     voxels: bool = False
     """Whether the voxels of the shown frame's silhouettes are drawn, in the colours of their parts."""
+    character: str = ""
+    """Name of the built-in body that moves as each person does, beside them; empty for none."""
     trail_points: frozenset[str] = frozenset()
     """Names of the points whose trails are drawn."""
     trail_frames: int = 25
@@ -55,6 +59,8 @@ def restored(data: object) -> View3d:
     view = replace(default, **switches)
     if data.get("colors") in ("parts", "people"):
         view = replace(view, colors=data["colors"])
+    if data.get("character") in PRESETS:
+        view = replace(view, character=data["character"])
     opacity, frames, points = data.get("opacity"), data.get("trail_frames"), data.get("trail_points")
     if isinstance(opacity, int | float) and 0 < opacity <= 1:
         view = replace(view, opacity=float(opacity))

@@ -139,6 +139,16 @@ class Saver:
                 first = i + 1
         return found
 
+    def replaced(self, person: int, frames: range) -> dict[int, tuple[PoseRecord, PoseRecord]]:
+        """Return the stored pose of each frame of a range and the pose that it replaced, by frame, ascending.
+
+        Poses of a body with other values are left out, and frames whose pose replaced none.
+        """
+        name = self._session.people[person].name
+        now, former = self._store.poses(name, frames), self._store.former_poses(name, frames)
+        pairs = {frame: (now[frame], former[frame]) for frame in former}
+        return {f: p for f, p in pairs.items() if all(self.revisions.fits(person, r.model_revision) for r in p)}
+
     def rows(self, person: int, frames: range) -> list[FrameRow]:
         """Return the marks and statuses of the frames of a range that have a pose, ascending."""
         return self._store.frames(self._session.people[person].name, frames)

@@ -5,6 +5,7 @@ import { checkRow, choiceRow, sliderRow, textButton } from "./rows.js";
 
 const FREE = "free";
 const MAX_TRAIL_FRAMES = 250;
+const NO_CHARACTER = /** @type {string} */ ("");
 
 /** @type {[import("../model/theme.js").ThemeChoice, string][]} */
 const THEMES = [
@@ -73,6 +74,12 @@ export function viewSection({ store, send, themes }, { floor }, panes) {
     format: (value) => `${Math.round(100 * value)}%`,
     change: (value) => set({ opacity: value }),
   });
+  const character = choiceRow({
+    label: "Character",
+    title: "Show another body that moves as each person does, beside them in the 3-D view",
+    options: [[NO_CHARACTER, "None"]],
+    change: (value) => set({ character: value }),
+  });
   const prediction = note();
   const floorText = note();
   const setFloor = textButton("Set floor…", "Click three points of the floor in the views (Shift+Y)", () => floor.toggle());
@@ -94,12 +101,13 @@ export function viewSection({ store, send, themes }, { floor }, panes) {
   const body = document.createElement("div");
   const [bodies, ...others] = layers.map(({ row }) => row.element);
   body.append(
-    theme.element, link.element, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction,
+    theme.element, link.element, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction, character.element,
     heading("Floor"), floorText, buttons(setFloor, formerFloor),
     heading("Trails"), trails.element, points, buttons(noTrails),
   ); // prettier-ignore
   let built = "";
   let listed = "";
+  let offered = "";
 
   const show = () => {
     const { view3d, state, session, linkedViews, theme: chosen } = store.facts;
@@ -116,6 +124,11 @@ export function viewSection({ store, send, themes }, { floor }, panes) {
     for (const { name, row } of layers) row.show(view[name]);
     colors.show(view.colors);
     opacity.show(view.opacity);
+    if (offered !== view3d.characters.join()) {
+      offered = view3d.characters.join(); // an open list of choices must not be replaced
+      character.fill([[NO_CHARACTER, "None"], ...view3d.characters.map((name) => /** @type {[string, string]} */ ([name, name]))]);
+    }
+    character.show(view.character);
     prediction.textContent = view3d.prediction && `Prediction ${view3d.prediction}`;
     prediction.hidden = !view3d.prediction;
     floorText.textContent = describe(view3d.floor);

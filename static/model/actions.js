@@ -23,7 +23,7 @@ export class Actions {
     this.#send({ type: "redo" });
   }
 
-  /** @param {"step" | "stage" | "frame" | "contours" | "stop"} action */
+  /** @param {"step" | "stage" | "frame" | "contours" | "chains" | "stop"} action */
   search(action) {
     this.#send({ type: "search", action, person: scopePerson(this.#store.facts) });
   }
@@ -97,6 +97,21 @@ export class Actions {
    */
   review({ person, first, last }) {
     this.#send({ type: "range", action: "reviewed", first, last, person });
+  }
+
+  /** @param {boolean} on whether to compare the marked range, or to end the comparison */
+  compareRange(on) {
+    const { range } = this.#store.facts;
+    if (!on) this.#send({ type: "compare_range", first: null, last: null });
+    else if (range) this.#send({ type: "compare_range", first: range.first, last: range.last });
+  }
+
+  /** Take the replaced poses of the compared range. */
+  takeReplaced() {
+    const { rangeComparison } = this.#store.facts;
+    if (!rangeComparison || rangeComparison.first === null || rangeComparison.last === null) return;
+    const { first, last } = rangeComparison;
+    this.#send({ type: "range", action: "take_replaced", first, last, person: null });
   }
 
   stopRange() {

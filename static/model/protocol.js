@@ -8,7 +8,7 @@
  * @typedef {"" | "good" | "doubtful" | "lost"} Status
  * @typedef {"arms" | "torso" | "legs" | "cost"} CurveGroup
  * @typedef {"track_forward" | "track_backward" | "interpolate" | "clear" | "keyframe" | "reviewed" | "unreviewed" |
- *   "none"} RangeAction
+ *   "none" | "take_replaced"} RangeAction
  * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
  * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |
@@ -45,8 +45,8 @@
  *   v: number, live: boolean}} DragPin
  * @typedef {{type: "unpin", frame: number, person: number, point: string | null, camera: number | null}} RemovePins
  * @typedef {{type: "fit", frame: number, person?: number | null}} FitPose
- * @typedef {{type: "search", action: "step" | "stage" | "frame" | "contours" | "stop", person?: number | null}}
- *   RunSearch
+ * @typedef {{type: "search", action: "step" | "stage" | "frame" | "contours" | "chains" | "stop", person?: number |
+ *   null}} RunSearch
  * @typedef {{type: "search", action: "again", run?: number | null, person?: number | null}} RepeatSearch
  * @typedef {{type: "search_speed", per_second: number | null}} SetSearchSpeed
  * @typedef {{person: number, name: string, bound_rad?: number | null, bound_m?: number | null, step_rad?: number |
@@ -64,6 +64,7 @@
  * @typedef {{type: "track", action: "forward" | "backward", until?: number | null}} StartTracking
  * @typedef {{type: "track", action: "pause" | "resume" | "stop"}} ControlTracking
  * @typedef {{type: "range", action: RangeAction, first: number, last: number, person?: number | null}} EditRange
+ * @typedef {{type: "compare_range", first: number | null, last: number | null}} CompareRange
  * @typedef {{type: "stop_range"}} StopRange
  * @typedef {{type: "mark", toggle: "keyframe" | "reviewed"}} ToggleMark
  * @typedef {{type: "follow", follow: boolean}} FollowTracking
@@ -72,8 +73,8 @@
  *   TrackChanges
  * @typedef {{type: "track_settings", changes: TrackChanges}} SetTrackSettings
  * @typedef {{bodies?: boolean, colors?: "parts" | "people", opacity?: number, cameras?: boolean, images?: boolean,
- *   floor?: boolean, gizmos?: boolean, ghost?: boolean, voxels?: boolean, trail_points?: string[], trail_frames?:
- *   number}} View3dChanges
+ *   floor?: boolean, gizmos?: boolean, ghost?: boolean, voxels?: boolean, character?: string, trail_points?: string[],
+ *   trail_frames?: number}} View3dChanges
  * @typedef {{type: "view_3d", changes: View3dChanges}} SetView3d
  * @typedef {{type: "body_sizes", action: "height", person: number, height_m: number}} SetHeight
  * @typedef {{type: "body_sizes", action: "part", person: number, part: string, length_m?: number, half_depth_m?:
@@ -127,6 +128,10 @@
  * @typedef {{type: "timeline", person: number | null, cells: Record<string, Cell | null>, replace: boolean}}
  *   TimelineMessage
  * @typedef {{type: "inconsistent", frames: number[]}} InconsistentMessage
+ * @typedef {{frame: number, method: string, other_method: string, cost_px: number | null, other_cost_px: number | null,
+ *   status: string, other_status: string, apart_mm: number, farthest_mm: number, farthest: string}} ComparedPose
+ * @typedef {{type: "range_comparison", first: number | null, last: number | null, people: ComparedPose[][]}}
+ *   RangeComparisonMessage
  * @typedef {{level: "known" | "weak" | "unknown", sigma: number, sentence: string}} DofObservability
  * @typedef {{type: "observability", frame: number, person: number, dofs: DofObservability[]}} ObservabilityMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null, bound_m:
@@ -147,10 +152,11 @@
  * @typedef {{type: "settings", track: TrackValues, search: SearchValues, track_default: TrackValues, search_default:
  *   SearchValues}} SettingsMessage
  * @typedef {{bodies: boolean, colors: "parts" | "people", opacity: number, cameras: boolean, images: boolean, floor:
- *   boolean, gizmos: boolean, ghost: boolean, voxels: boolean, trail_points: string[], trail_frames: number}} View3d
+ *   boolean, gizmos: boolean, ghost: boolean, voxels: boolean, character: string, trail_points: string[], trail_frames:
+ *   number}} View3d
  * @typedef {{up: string, tilt_deg: number | null, height_m: number | null, has_former: boolean}} FloorInfo
- * @typedef {{type: "view_3d", view: View3d, floor: FloorInfo, prediction: string, trail_points: string[]}}
- *   View3dMessage
+ * @typedef {{type: "view_3d", view: View3d, floor: FloorInfo, prediction: string, trail_points: string[], characters:
+ *   string[]}} View3dMessage
  * @typedef {{name: string, length_m: number, half_depth_m: number, half_width_m: number}} PartSizes
  * @typedef {{name: string, width_m: number}} GirdleWidth
  * @typedef {{type: "body_sizes", person: number, height_m: number, parts: PartSizes[], widths: GirdleWidth[],
@@ -197,12 +203,12 @@
  *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
  *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed |
  *   SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof |
- *   StartTracking | ControlTracking | EditRange | StopRange | ToggleMark | FollowTracking | SetTrackSettings |
- *   SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes | AcquireSizes |
- *   FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ *   StartTracking | ControlTracking | EditRange | CompareRange | StopRange | ToggleMark | FollowTracking |
+ *   SetTrackSettings | SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes |
+ *   AcquireSizes | FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
- *   ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage | View3dMessage | BodySizesMessage
- *   | AcquisitionMessage | FindingMessage} TextMessage
+ *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
+ *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

@@ -1,6 +1,6 @@
 /** Data of curves: one number per frame, NaN where there is none. */
 
-/** @typedef {import("./protocol.js").CurveGroup | "search" | "landscape" | "doubts"} Tab */
+/** @typedef {import("./protocol.js").CurveGroup | "search" | "landscape" | "doubts" | "runs"} Tab */
 
 /**
  * @typedef {import("./protocol.js").CurvesHeader} CurvesHeader

@@ -25,6 +25,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("./cells.js").Cells[]} lanes cells of each person, if there are several
  * @property {number[]} disagreeing frames whose pose is inconsistent with its neighbours, ascending
  * @property {import("./protocol.js").ObservabilityMessage | null} observability of the selected person
+ * @property {import("./protocol.js").RangeComparisonMessage | null} rangeComparison poses of a range and those that they replaced
  * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
  * @property {import("./series.js").Curves | null} curves the current group of curves
  * @property {import("./series.js").Tab | null} drawer the open tab; null while the drawer is closed
@@ -81,6 +82,7 @@ export class Store {
     timeline: new Cells(0),
     lanes: [],
     observability: null,
+    rangeComparison: null,
     disagreeing: [],
     visible: null,
     curves: null,

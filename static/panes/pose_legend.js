@@ -13,7 +13,8 @@ const SAMPLE_PX = 30;
 /** Kinds of outlines in the legend, with their names. @type {Partial<Record<Kind, (state: StateMessage) => string>>} */
 const NAMES = {
   candidate: () => "tested pose",
-  compared: ({ compared_run }) => (compared_run === null ? "start of the fit" : `run ${compared_run}`),
+  compared: ({ compared_run, replay }) =>
+    compared_run !== null ? `run ${compared_run}` : replay ? "start of the fit" : "replaced pose",
   preview: ({ preview }) => (preview ? `candidate ${preview.candidate + 1} of run ${preview.run}` : "candidate"),
   alternative: () => "alternative pose",
   result: ({ compared }) => `result of the ${compared?.work}`,

@@ -14,6 +14,9 @@ import { sceneBindings } from "./scene_keys.js";
 
 /** @typedef {ReturnType<typeof mount>} SceneRoom */
 
+/** Groups of kernels that are compiled before the first cost, or beside what it needs. */
+const BEFORE_COST = new Set(["posing", "contours", "evidence", "cost"]);
+
 /**
  * Prepare the 3-D view, which is loaded once the panes show their first images.
  *
@@ -26,7 +29,27 @@ export function mount({ store, send, reasons }, { grid }) {
   const cameraView = new CameraView(store, grid, send);
   const isSoftware = drawsInSoftware();
   if (isSoftware) new ScenePause(frame, store);
-  // viser is a large program: loaded earlier, it would delay the first images.
-  store.onceKnown("shown", () => loadScene(frame, store));
+  loadLate(frame, store, isSoftware);
   return { frame, floor, isSoftware, bindings: sceneBindings(cameraView, floor, reasons.away) };
+}
+
+/**
+ * Load the 3-D view after the first images: viser is a large program. Without a graphics card its start stops the page
+ * for seconds, so that it comes after the first cost where kernels are being compiled.
+ *
+ * @param {HTMLIFrameElement} frame
+ * @param {import("../model/store.js").Store} store
+ * @param {boolean} isSoftware
+ */
+function loadLate(frame, store, isSoftware) {
+  let isLoaded = false;
+  store.subscribe(() => {
+    const { shown, state } = store.facts;
+    if (isLoaded || shown === null || state === null) return;
+    const waits = isSoftware && BEFORE_COST.has(state.compiling ?? "") && state.cost_px === null;
+    byId("scene-note", HTMLElement).hidden = !waits;
+    if (waits) return;
+    isLoaded = true;
+    loadScene(frame, store);
+  });
 }

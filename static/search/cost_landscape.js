@@ -19,6 +19,8 @@ export class CostLandscape {
   #canvas = document.createElement("canvas");
   #choice = document.createElement("select");
   #legend = document.createElement("div");
+  /** What is shown until there is a landscape. */
+  #waiting = document.createElement("p");
   #toMinimum;
   #hovered = /** @type {number | null} */ (null);
   #plot = /** @type {Plot | null} */ (null);
@@ -45,7 +47,8 @@ export class CostLandscape {
     });
     this.#legend.className = "landscape-legend";
     this.#controls.append(this.#choice, this.#toMinimum, this.#legend);
-    this.#element.append(this.#canvas);
+    this.#waiting.className = "landscape-waiting";
+    this.#element.append(this.#canvas, this.#waiting);
     store.subscribe((changed) => {
       if (changed.has("drawer")) this.#open();
       if (!this.#isOpen) return;
@@ -102,8 +105,12 @@ export class CostLandscape {
   }
 
   #show() {
-    const { landscape: found, session } = this.#store.facts;
+    const { landscape: found, session, state } = this.#store.facts;
     this.#toMinimum.disabled = this.#choice.disabled = !found;
+    this.#waiting.hidden = Boolean(found);
+    this.#waiting.textContent = state?.compiling
+      ? "The cost is sampled once the kernels are compiled."
+      : "Sampling the cost along one degree of freedom…";
     if (found && found.names.join() !== this.#listed) {
       this.#listed = found.names.join();
       const groups = new Map(found.names.map((name) => [name.split(".")[0], document.createElement("optgroup")]));

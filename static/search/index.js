@@ -1,10 +1,11 @@
 /**
- * Search: watch, replay and compare searches, and the cost landscape.
+ * Search: watch, replay and compare searches, compare tracked poses, and the cost landscape.
  *
  * The room imports `widgets`, `model`, `panes` and `timeline`.
  */
 
 import { CostLandscape } from "./cost_landscape.js";
+import { RunComparison } from "./run_comparison.js";
 import { searchBindings } from "./search_keys.js";
 import { SearchPanel } from "./search_panel.js";
 
@@ -15,8 +16,9 @@ import { SearchPanel } from "./search_panel.js";
  *
  * @param {import("../model/index.js").Context} context
  */
-export function mount({ store, send, actions, reasons }) {
+export function mount({ store, send, actions, navigation, reasons }) {
   new SearchPanel(store, actions, send);
   new CostLandscape(store, send);
+  new RunComparison(store, navigation, actions);
   return { bindings: searchBindings(store, actions, reasons) };
 }

@@ -8,7 +8,7 @@ import { inArea, plain } from "../widgets/key_matching.js";
  * @param {import("../model/unavailable_reasons.js").Reasons} reasons
  */
 export function searchBindings(store, actions, { search: why }) {
-  const search = (/** @type {"step" | "stage" | "frame" | "contours"} */ action) => () => {
+  const search = (/** @type {"step" | "stage" | "frame" | "contours" | "chains"} */ action) => () => {
     if (store.facts.connected && !store.facts.state?.job.running) actions.search(action);
   };
   const shift = (/** @type {string} */ key) => plain(key, undefined, true);
@@ -17,6 +17,7 @@ export function searchBindings(store, actions, { search: why }) {
     { keys: ["Shift S"], label: "Search: to the end of the stage", matches: shift("s"), why, run: search("stage") },
     { keys: ["Shift F"], label: "Search: repeat from the same start", matches: shift("f"), run: () => actions.searchAgain() },
     { keys: [], label: "Search: fit the contours, iteration by iteration", matches: () => false, why, run: search("contours") },
+    { keys: [], label: "Search: fit the contours chain by chain, from a rough pose", matches: () => false, why, run: search("chains") },
     { keys: ["F"], label: "Search: this frame", matches: plain("f"), why, run: search("frame") },
   ]);
 }

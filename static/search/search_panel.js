@@ -66,7 +66,7 @@ export class SearchPanel {
 
   #makeButtons() {
     const { actions, store } = { actions: this.#actions, store: this.#store };
-    const search = (/** @type {"step" | "stage" | "frame" | "contours" | "stop"} */ action) => () => actions.search(action);
+    const search = (/** @type {"step" | "stage" | "frame" | "contours" | "chains" | "stop"} */ action) => () => actions.search(action);
     const track = () => (hasTrack(store.facts.state) ? actions.togglePause() : actions.track("forward"));
     return {
       step: makeButton("Step", "Run one expansion of the search (S)", search("step")),
@@ -76,6 +76,11 @@ export class SearchPanel {
         "Contours",
         "Fit the contours of this frame by Gauss-Newton; each iteration can be replayed",
         search("contours"),
+      ),
+      chains: makeButton(
+        "Chains",
+        "Fit the contours of a rough pose chain by chain: root, trunk, each limb, then the whole body; each iteration can be replayed",
+        search("chains"),
       ),
       again: makeButton("Rerun", "Repeat the selected run from its start pose with the current settings (Shift+F)", () =>
         actions.searchAgain(),
@@ -128,8 +133,8 @@ export class SearchPanel {
     const { state, connected, settings, searchSetup } = this.#store.facts;
     const isReady = connected && !!state;
     const isRunning = !!state?.job.running;
-    const { step, stage, frame, contours, again, track, stop } = this.#buttons;
-    step.disabled = stage.disabled = frame.disabled = contours.disabled = !isReady || isRunning;
+    const { step, stage, frame, contours, chains, again, track, stop } = this.#buttons;
+    step.disabled = stage.disabled = frame.disabled = contours.disabled = chains.disabled = !isReady || isRunning;
     const run = selectedRun(this.#store.facts);
     again.disabled = !isReady || isRunning || run === null;
     track.disabled = !isReady;

@@ -1,6 +1,6 @@
 /** Show what the program is doing until it serves the session's page, then load that. */
 
-const POLL_MS = 150;
+const POLL_MS = 60;
 const ENDED = "The program does not answer. If it has ended, its terminal says why.";
 
 const steps = /** @type {HTMLElement} */ (document.querySelector("#steps"));
@@ -20,6 +20,16 @@ function show({ steps: names, at }) {
   );
 }
 
+/** Fetch the files of the session's page, which the browser keeps: the page then opens without waiting for them. */
+async function fetchAhead() {
+  try {
+    const answer = await fetch("page-files.json", { cache: "no-store" });
+    for (const address of answer.ok ? await answer.json() : []) fetch(address).catch(() => {});
+  } catch {
+    // The page fetches them itself.
+  }
+}
+
 async function look() {
   try {
     const answer = await fetch("starting.json", { cache: "no-store" });
@@ -34,3 +44,4 @@ async function look() {
 }
 
 look();
+fetchAhead();

@@ -32,8 +32,8 @@ export function mount({ store, actions, navigation, reasons }) {
   const frameWindow = new FrameWindow(store);
   new Transport(store, navigation, playback, actions);
   new TrackBar(store, actions);
-  new RangeBar(store, actions);
   const drawer = new Drawer(store);
+  new RangeBar(store, actions, () => drawer.open("runs"));
   new JumpMenu(store, jumps, () => drawer.open("doubts"));
   const queue = new DoubtQueue(store, navigation, actions);
   new DoubtList(store, queue);

@@ -30,11 +30,18 @@ export class RangeBar {
   /**
    * @param {import("../model/store.js").Store} store
    * @param {import("../model/actions.js").Actions} actions
+   * @param {() => void} openComparison
    */
-  constructor(store, actions) {
+  constructor(store, actions, openComparison) {
     this.#store = store;
     this.#actions = actions;
     this.#buttons = BUTTONS.map(([id, action]) => button(id, () => this.#act(action)));
+    this.#buttons.push(
+      button("range-compare", () => {
+        actions.compareRange(true);
+        openComparison();
+      }),
+    );
     this.#stop = button("range-stop", () => actions.stopRange());
     button("range-close", () => store.set({ range: null }));
     this.#scope.addEventListener("change", () => this.#scope.blur());

@@ -60,6 +60,7 @@ export function drawerBindings(drawer) {
     { keys: ["B"], label: "Search panel", matches: plain("b"), run: () => drawer.toggle("search") },
     { keys: ["V"], label: "Cost landscape", matches: plain("v"), run: () => drawer.toggle("landscape") },
     { keys: ["Shift L"], label: "Doubtful and lost poses, most severe first", matches: shift("l"), run: () => drawer.toggle("doubts") },
+    { keys: [], label: "Poses compared with those that they replaced", matches: () => false, run: () => drawer.toggle("runs") },
   ]);
 }
 

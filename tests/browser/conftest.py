@@ -93,15 +93,9 @@ async def server(blank_viser):
     server = _Server()
     app = create_app(server, blank_viser, Access(), static_folder())
     app.router.add_get("/thumbnail/{person}/{frame}", server.thumbnail)
-    app.on_response_prepare.append(_let_cache)
     async with listening(app) as port:
         server.address = f"http://127.0.0.1:{port}/"
         yield server
-
-
-async def _let_cache(_request, response):
-    """Let the browser keep the page's hundred modules from one test to the next."""
-    response.headers["Cache-Control"] = "max-age=3600"
 
 
 @pytest.fixture

@@ -84,7 +84,7 @@ SEARCH = {
 }  # fmt: skip
 VIEW_3D = {
     "bodies": True, "colors": "parts", "opacity": 1.0, "cameras": True, "images": True, "floor": True, "gizmos": True,
-    "ghost": False, "voxels": False, "trail_points": [], "trail_frames": 25,
+    "ghost": False, "voxels": False, "character": "", "trail_points": [], "trail_frames": 25,
 }  # fmt: skip
 BODY_SIZES = {
     "type": "body_sizes", "person": 0, "height_m": 1.7, "sides_alike": True, "edited": False, "has_former": False,
@@ -188,6 +188,7 @@ class FakeEndpoint:
         }
         self.view_3d = {
             "type": "view_3d", "view": dict(VIEW_3D), "prediction": "", "trail_points": ["head", "l_wrist"],
+            "characters": ["gavrila34", "knossow54"],
             "floor": {"up": "y", "tilt_deg": None, "height_m": None, "has_former": False},
         }  # fmt: skip
         self.body_sizes = dict(BODY_SIZES)

@@ -27,10 +27,20 @@ async def shows(page, expression, timeout_s=20.0):
 
 
 async def until(condition, timeout_s=20.0):
-    """Wait until a condition of the fake endpoint holds."""
+    """Wait until a condition of the fake endpoint holds.
+
+    It does not hold yet where it looks at the last message and none has come.
+    """
     async with asyncio.timeout(timeout_s):
-        while not condition():
+        while not _holds(condition):
             await asyncio.sleep(0.02)
+
+
+def _holds(condition):
+    try:
+        return condition()
+    except IndexError:
+        return False
 
 
 async def handle_of(page, camera, point, person=0):

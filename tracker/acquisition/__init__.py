@@ -1,5 +1,5 @@
-"""Sizes of a body from data: known joints, contours of several frames, or two views of one (GD96 Sect. 3).
+"""Sizes of a body from data: known joints, voxels and contours of several frames, or two views of one (GD96 Sect. 3).
 
-May import the rooms below it, up to `tracking.chamfer`. Callers use `from_joints` to prepare, and
+May import the rooms below it, up to `tracking.voxel`. Callers use `from_joints` to prepare, and
 `from_contours.acquire_from_contours` or `two_views.acquire_from_two_views`; `size_report` lists what changed.
 """

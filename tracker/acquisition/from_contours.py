@@ -5,19 +5,26 @@ so that any poses will do and joints are found where the flesh turns about them.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from tracker.acquisition.frame_choice import choose_frames
+from tracker.acquisition.from_voxels import (
+    SilhouettedPerson,
+    VoxelSizes,
+    VoxelSizeSettings,
+    fit_sizes_to_voxels,
+)
 from tracker.acquisition.size_fit import SightedPerson, SizeFit, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
+from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock
@@ -30,7 +37,7 @@ from tracker.tracking.view_regions import regions, visible_pieces_px
 
 Report = Callable[[str, float], None]
 """Is given a stage and the share of all work that is done, 0 to 1. What it raises ends the acquisition."""
-_CHOOSING, _OBSERVING = 0.1, 0.25
+_CHOOSING, _OBSERVING, _VOXELS = 0.1, 0.25, 0.5
 """Shares of the work up to the ends of the stages before the fit."""
 
 
@@ -46,6 +53,8 @@ class AcquisitionSettings:
     """Whether left and right have the same sizes."""
     priors: SizePriors = field(default_factory=SizePriors)
     fit: SizeFitSettings = field(default_factory=SizeFitSettings)
+    voxels: VoxelSizeSettings | None = None
+    """Of a fit to voxels, which takes the place of the first round and gives the start of the others; None for none."""
 
 
 class Acquisition(NamedTuple):
@@ -65,6 +74,8 @@ class Acquisition(NamedTuple):
     fit: SizeFit
     views: tuple[str, ...] = ()
     """Names of the views that it was fitted to; all of them if empty."""
+    voxels: VoxelSizes | None = None
+    """The fit to voxels before, if there was one."""
 
 
 def acquire_from_contours(
@@ -113,14 +124,23 @@ def acquire_from_contours(
             SightedPerson(k, own_views(views, bodies[k], person), bodies[k], person, placed.get(k), seen.get(k))
         )
         report("reading contours", _CHOOSING + (_OBSERVING - _CHOOSING) * (i + 1) / len(frames))
+    begun, by_voxels, fit = _OBSERVING, None, settings.fit
+    if settings.voxels is not None:
+        begun, fit = _VOXELS, replace(fit, rounds=fit.rounds[1:])
+
+        def report_voxels(share: float) -> None:
+            report("fitting sizes to voxels", _OBSERVING + (_VOXELS - _OBSERVING) * share)
+
+        people = {k: (bodies[k][person], *bodies[k][:person], *bodies[k][person + 1 :]) for k in frames}
+        by_voxels = _fit_to_voxels(observer, parameters, people, settings.voxels, report_voxels)
     if not any(len(v.points_px) for s in sighted for v in s.views):
         raise TrackerError(
             f"expected contours of the person on frames {', '.join(map(str, frames))}, found no edges near the body; "
             "place it where the person is"
         )
     found = fit_sizes_to_contours(
-        parameters, sighted, settings.fit,
-        report=lambda share: report("fitting sizes", _OBSERVING + (1 - _OBSERVING) * share),
+        parameters, sighted, fit, by_voxels.start if by_voxels else None,
+        lambda share: report("fitting sizes", begun + (1 - begun) * share),
     )  # fmt: skip
     after = [
         cost_px(views, s.moved(found.body, p).bodies)
@@ -128,8 +148,22 @@ def acquire_from_contours(
     ]
     report("done", 1.0)
     return Acquisition(
-        found.body, tuple(frames), found.poses, float(np.mean(before)), float(np.mean(after)), parameters, found
-    )
+        found.body, tuple(frames), found.poses, float(np.mean(before)), float(np.mean(after)), parameters, found,
+        voxels=by_voxels,
+    )  # fmt: skip
+
+
+def _fit_to_voxels(
+    observer: Observer, parameters: SizeParameters, people: Mapping[int, tuple[PosedBody, ...]],
+    settings: VoxelSizeSettings, report: Callable[[float], None],
+) -> VoxelSizes:  # fmt: skip
+    """Fit sizes to the voxels of some frames. On each, the person is the first of the people."""
+    finder = SilhouetteFinder(observer.cameras, observer.recording)
+    try:
+        seen = [SilhouettedPerson(k, finder.silhouettes(k), own) for k, own in people.items()]
+    finally:
+        finder.close()
+    return fit_sizes_to_voxels(parameters, seen, settings, report)
 
 
 def cost_px(views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> float:

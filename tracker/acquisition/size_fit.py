@@ -4,7 +4,7 @@ The unknowns are the sizes, which all frames share, and the pose of each frame. 
 (`contour_residuals`), with the sizes as further columns of the Jacobian. Priors keep what the frames do not show.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -102,6 +102,17 @@ class SizeFitSettings:
     """Standard deviation of the initial position, metres."""
 
 
+class SizeStart(NamedTuple):
+    """Where a fit starts, other than at the body before."""
+
+    sizes: Array
+    """Parameters, (n_sizes,), see `SizeParameters`."""
+    covariance: Array
+    """Of the sizes, (n_sizes, n_sizes)."""
+    poses: Mapping[int, Array]
+    """By frame, (n_values,)."""
+
+
 class SizeFit(NamedTuple):
     """Sizes and poses that fit the frames."""
 
@@ -115,6 +126,8 @@ class SizeFit(NamedTuple):
     """Half the weighted sum of squares, of evidence and priors."""
     covariance: Array
     """Of the sizes, (n_sizes, n_sizes), whatever the poses are."""
+    n_evaluations: int = 0
+    """How many times the residuals of all frames were evaluated."""
 
 
 class _Bundle(NamedTuple):
@@ -129,7 +142,7 @@ def fit_sizes_to_contours(
     parameters: SizeParameters,
     frames: Sequence[SightedPerson],
     settings: SizeFitSettings,
-    sizes: Array | None = None,
+    start: SizeStart | None = None,
     report: Callable[[float], None] = lambda share: None,
 ) -> SizeFit:
     """Fit sizes and poses to the contours of several frames.
@@ -138,12 +151,14 @@ def fit_sizes_to_contours(
         parameters: the sizes; their prior has the mean 0.
         frames: the frames, with the initial poses.
         settings: of the fit.
-        sizes: initial parameters, (n_sizes,); 0 by default.
+        start: initial sizes and poses; by default those of the frames. Without rounds they are returned as they are.
         report: is given the share of the work that is done, 0 to 1. What it raises ends the fit.
     """
-    sizes = np.zeros(len(parameters.names)) if sizes is None else sizes
-    poses = [f.pose for f in frames]
-    cost, hessian = np.inf, np.eye(len(sizes))
+    n = len(parameters.names)
+    if start is None:
+        start = SizeStart(np.zeros(n), np.diag(parameters.sigmas**2), {})
+    sizes, poses, covariance = start.sizes, [start.poses.get(f.frame, f.pose) for f in frames], start.covariance
+    cost, n_evaluations = np.nan, 0
     planned, done = sum(step.iterations for step in settings.rounds), 0
     for step in settings.rounds:
         body = parameters.body(sizes)
@@ -156,10 +171,11 @@ def fit_sizes_to_contours(
                 break
         done += step.iterations
         sizes, poses, cost, hessian = problem.sizes, problem.poses, problem.cost, problem.hessian
-    n = len(sizes)
-    covariance: Array = np.asarray(np.linalg.inv(hessian)[:n, :n], dtype=np.float64)
+        n_evaluations += problem.n_evaluations
+        if step is settings.rounds[-1]:
+            covariance = np.asarray(np.linalg.inv(hessian)[:n, :n], dtype=np.float64)
     body = with_height_of_stature(parameters.body(sizes), parameters.base)
-    return SizeFit(sizes, body, tuple(poses), cost, covariance)
+    return SizeFit(sizes, body, tuple(poses), cost, covariance, n_evaluations)
 
 
 class _Resized(NamedTuple):
@@ -194,6 +210,7 @@ class _Problem:
         usual = PosePrior(model.neutral(), 1 / model.spreads)
         self._priors = [[PosePrior(f.pose, 1 / sigma), usual] for f in frames]
         self.sizes, self.poses, self._damping = sizes, [f.pose for f in frames], INITIAL_DAMPING
+        self.n_evaluations = 0
         self._here = self._linearize(self.sizes, self.poses)
 
     @property
@@ -242,6 +259,7 @@ class _Problem:
         return np.flatnonzero(np.concatenate(out))
 
     def _linearize(self, sizes: Array, poses: Sequence[Array]) -> _Bundle:
+        self.n_evaluations += 1
         body, by_sizes = self._parameters.body(sizes), self._parameters.derivatives(sizes)
         n, m = len(sizes), body.n_dofs
         # Frames with the same people share the arrays of their shapes.

@@ -28,6 +28,19 @@ class _Module(NamedTuple):
     """Names of the functions with an `njit` decorator."""
 
 
+_Place = tuple[str, str]
+"""Module and name."""
+
+
+class _Node(NamedTuple):
+    """One place of the sources."""
+
+    text: bytes
+    """What it contributes to a key."""
+    names: tuple[_Place, ...]
+    """The places that it names."""
+
+
 class KernelKeys:
     """Compute the keys of the kernels of one package.
 
@@ -45,6 +58,7 @@ class KernelKeys:
         """
         self._package, self._environment = package, environment
         self._modules: dict[str, _Module] = {}
+        self._nodes: dict[_Place, _Node] = {}
 
     def key(self, module: str, name: str) -> str:
         """Return the key of the kernel `name` of the module with the dotted name `module`.
@@ -55,8 +69,8 @@ class KernelKeys:
         if not self._is_own(module) or name not in self._module(module).definitions:
             raise UnknownSourceError(f"{module}.{name}")
         texts = hashlib.sha256(self._environment.encode())
-        for place, dumps in sorted(self._reached(module, name).items()):
-            texts.update(repr((place, dumps)).encode())
+        for place in sorted(self._reached(module, name)):
+            texts.update(self._node(place).text)
         return texts.hexdigest()[:20]
 
     def kernels(self) -> Iterator[tuple[str, str]]:
@@ -67,33 +81,38 @@ class KernelKeys:
                 module = ".".join(parts).removesuffix(".__init__")
                 yield from ((module, name) for name in self._module(module).kernels)
 
-    def _reached(self, module: str, name: str) -> dict[tuple[str, str], tuple[str, ...]]:
-        """Return dumps of the definitions that a name reaches, by module and name."""
-        reached: dict[tuple[str, str], tuple[str, ...]] = {}
+    def _reached(self, module: str, name: str) -> set[_Place]:
+        """Return module and name of all definitions that a name reaches, itself among them."""
+        reached: set[_Place] = set()
         left = [(module, name)]
         while left:
             place = left.pop()
-            if place in reached:
-                continue
-            module, name = place
-            if not self._is_own(module):
-                reached[place] = ()
-                continue
-            source = self._module(module)
-            if name in source.imports:
-                reached[place] = source.imports[name]
-                left.append(source.imports[name])
-            elif name == _WHOLE:
-                reached[place] = ()
-                left += [(module, other) for other in source.definitions]
-            elif name in source.definitions:
-                statements = source.definitions[name]
-                reached[place] = tuple(ast.dump(s) for s in statements)
-                left.append((module, _REST))
-                left += self._named_in(statements, module, source)
-            else:
-                raise UnknownSourceError(f"{module}.{name}")
+            if place not in reached:
+                reached.add(place)
+                left += self._node(place).names
         return reached
+
+    def _node(self, place: _Place) -> _Node:
+        """Return what a module and name stand for; read once, because most kernels reach the same helpers."""
+        if place not in self._nodes:
+            dumps, names = self._define(*place)
+            self._nodes[place] = _Node(repr((place, dumps)).encode(), tuple(dict.fromkeys(names)))
+        return self._nodes[place]
+
+    def _define(self, module: str, name: str) -> tuple[tuple[str, ...], list[_Place]]:
+        """Return dumps of the statements that define a name, and the names in them."""
+        if not self._is_own(module):
+            return (), []
+        source = self._module(module)
+        if name in source.imports:
+            return source.imports[name], [source.imports[name]]
+        if name == _WHOLE:
+            return (), [(module, other) for other in source.definitions]
+        if name not in source.definitions:
+            raise UnknownSourceError(f"{module}.{name}")
+        statements = source.definitions[name]
+        dumps = tuple(ast.dump(s) for s in statements)
+        return dumps, [(module, _REST), *self._named_in(statements, module, source)]
 
     def _named_in(self, statements: Iterable[ast.stmt], module: str, source: _Module) -> Iterator[tuple[str, str]]:
         """Yield module and name of all module-level names in statements, and of local names equal to one."""

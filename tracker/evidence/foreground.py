@@ -1,6 +1,7 @@
 """Prepare one view of a frame, then extract a region's smoothed image and its foreground."""
 
-from concurrent.futures import Executor
+import threading
+from concurrent.futures import Executor, Future
 from typing import NamedTuple
 
 import numpy as np
@@ -50,8 +51,7 @@ class Foreground:
 
         Args:
             source: the view, with its side files.
-            executor: pool in which the empty scene is computed meanwhile; loading the first kernel of a program is
-                slow.
+            executor: pool in which the empty scene is measured.
 
         Raises:
             RecordingError: the background is missing, unreadable or of the wrong size.
@@ -59,7 +59,20 @@ class Foreground:
         self.view = WorkingView(source.camera)
         """Conversion of footage to working pixels."""
         self._source, self._grid = source, SampleGrid(source.camera.size, self.view.scale)
-        self._empty = executor.submit(self._empty_scene, read_background(source))
+        self._executor, self._background = executor, read_background(source)
+        self._measuring: Future[_Empty | None] | None = None
+        self._lock = threading.Lock()
+
+    def measure_empty_scene(self) -> Future[_Empty | None]:
+        """Begin to measure the empty scene, at the first call.
+
+        Not when the view is opened: the first kernel of a program takes long to load, or even to compile.
+        """
+        with self._lock:
+            if self._measuring is None:
+                self._measuring = self._executor.submit(self._empty_scene, self._background)
+                self._background = None
+            return self._measuring
 
     def prepare(self, frame: Image, k: int) -> Prepared:
         """Prepare frame k, as filmed, as far as no region is needed.
@@ -67,7 +80,7 @@ class Foreground:
         Raises:
             RecordingError: its mask cannot be used.
         """
-        empty, mask = self._empty.result(), read_mask(self._source, k)
+        empty, mask = self.measure_empty_scene().result(), read_mask(self._source, k)
         statistics = self._grid.measure(frame)
         if empty is None:
             return Prepared(frame, mask, statistics.strengths, 0.0, np.ones(3, np.float32))
@@ -90,7 +103,7 @@ class Foreground:
             box: the region, working px.
         """
         u0, v0, u1, v1 = box
-        empty = self._empty.result()
+        empty = self.measure_empty_scene().result()
         if prepared.mask is not None:
             inside = self.view.mask(prepared.mask, box)
             return Changes(inside, inside)

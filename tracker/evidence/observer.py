@@ -177,6 +177,8 @@ class Observer:
     def _prepare(self, k: int) -> list[Prepared | None]:
         chosen = self._in_recording
         frames = self.recording.read(k) if chosen is None else self.recording.read(k, chosen)
+        for view in self._views:  # those of all views at the same time
+            view.measure_empty_scene()
         return [None if f is None else view.prepare(f, k) for view, f in zip(self._views, frames, strict=True)]
 
     def _find_ahead(

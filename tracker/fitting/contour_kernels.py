@@ -10,7 +10,6 @@ from tracker.contours.static_cache import StaticContours, copy_poses, is_static_
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
 from tracker.fitting.contour_arrays import ACROSS, SLIDING, ContourTerm, Scratch, Sums, ViewArrays
 from tracker.fitting.segment_matching import match_points, pack_visible, store_static
-from tracker.fitting.sliding import add_sliding_twists
 from tracker.fitting.twists import add_twists
 from tracker.images.distance_transform import bilinear
 
@@ -169,11 +168,8 @@ def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float
                     if not static.moves[part]:
                         continue
                     span, W = scratch.firsts[part : part + 2], scratch.traced.Ts_world_unit[part]
-                    M, b = sums.M[part], sums.b[part]
-                    if motion == SLIDING and surfaces.profile_sizes[part] > 0:
-                        add_sliding_twists(span, scratch.pieces, scratch.pulls, P, W, eye, M, b)
-                    else:
-                        add_twists(span, scratch.pieces, scratch.pulls, P, W, M, b)
+                    slides = motion == SLIDING and surfaces.profile_sizes[part] > 0
+                    add_twists(span, scratch.pieces, scratch.pulls, P, W, eye, slides, sums.M[part], sums.b[part])
         pixel += views.sizes[view, 0] * views.sizes[view, 1]
     if stale:
         copy_poses(Ts, static.Ts)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel
 from tracker.compute.jit import njit
-from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.fitting import gauss_newton
 from tracker.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumulate_normal_equations
 from tracker.fitting.contour_residuals import ContourResiduals
@@ -225,7 +225,7 @@ def _damped_step(gradient: Array, hessian: Array, active: IntArray, damping: flo
     return promised
 
 
-@njit(**NO_REFCOUNT)
+@njit(**FAST_MATH)
 def _factor(hessian: Array, active: IntArray, damping: float, floor: float, L: Array) -> bool:
     """Fill the Cholesky factor of the damped Hessian, the lower triangle of (m, m); return False if it is not
     definite."""

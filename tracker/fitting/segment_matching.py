@@ -14,6 +14,7 @@ from tracker.geometry.segment_distance import LANES, cells_within
 
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote the kernel's arithmetic to float64
 _FAR2 = np.float32(1e12)
+_NONE = np.int32(-1)
 _JOINED = 10
 """Largest number of pieces of a segment: longer segments would reach too many points."""
 
@@ -40,7 +41,7 @@ def nearest_oriented_segment(
         turn: squared distance that a right angle counts, px^2.
         reach: largest distance, px.
         best: updated squared distances, (N,), px^2.
-        nearest: updated indices of segments, (N,).
+        nearest: updated indices of segments, (N,); smaller than those of the wanted segments before.
     """
     far, weight = np.float32(reach), np.float32(turn)
     for k in range(n):
@@ -61,7 +62,9 @@ def nearest_oriented_segment(
                 alike = nu[i] * nx + nv[i] * ny
                 squared = off_u * off_u + off_v * off_v + weight * (_ONE - alike * alike)
                 closer = squared < best[i]
-                nearest[i] = index if closer else nearest[i]
+                # Later segments have larger indices. As a plain choice this would be a masked store, which is slow.
+                found = index if closer else _NONE
+                nearest[i] = found if found > nearest[i] else nearest[i]
                 best[i] = squared if closer else best[i]
 
 
@@ -121,10 +124,10 @@ def match_points(
     start, stop = views.firsts[view], views.firsts[view + 1]
     best, nearest, wanted, of, n = scratch.best, scratch.nearest, scratch.wanted, scratch.of_segment, stop - start
     if static.best.shape[0] == 0:
-        best[:n], wanted[:n_segments] = _FAR2, True
+        best[:n], nearest[:n], wanted[:n_segments] = _FAR2, _NONE, True
     else:
         for j in range(np.uint64(n)):
-            best[j], nearest[j] = static.best[np.uint64(start) + j], np.int32(-1)
+            best[j], nearest[j] = static.best[np.uint64(start) + j], _NONE
         for k in range(n_segments):
             wanted[k] = static.moves[of[2, k]]
         if mark_covered_segments(view, scratch.traced, static):
@@ -171,5 +174,5 @@ def store_static(
         visible += 1
     start, stop = views.firsts[view], views.firsts[view + 1]
     best, nearest = static.best[start:stop], static.nearest[start:stop]
-    best[:], scratch.wanted[:n_segments] = _FAR2, True
+    best[:], nearest[:], scratch.wanted[:n_segments] = _FAR2, _NONE, True
     _match_segments(view, n_segments, views, turn, scratch, best, nearest)

@@ -9,16 +9,22 @@ from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
+from tracker.fitting.sliding import sliding_speed, unit_eye
 from tracker.geometry.arrays import Array, FloatArray, IntArray
 
 
 @njit(**FAST_MATH)
-def add_twists(span: IntArray, pieces: FloatArray, pulls: Array, P: Array, W: Array, M: Array, b: Array) -> None:
+def add_twists(
+    span: IntArray, pieces: FloatArray, pulls: Array, P: Array, W: Array, eye: Array, slides: bool, M: Array, b: Array
+) -> None:
     """Add the sums of a part's pieces in one view to the normal matrix and gradient of the part's twist.
 
     The image (u, v) of a surface point X has derivatives (X x a, a) and (X x c, c) by the twist, with a and c the
     spatial gradients of u and v. Their products with the summed squares S of a piece are those of two rows, by the
     Cholesky factor of S.
+
+    A point that slides moves by s, the speed around the axis, for each unit of speed of the eye along the normal n,
+    relative to the part. To a row with spatial gradient g this adds -(g . s) (eye x n, n) (B of KRH08 Eq. 31).
 
     Args:
         span: index of the part's first piece, and after its last, (2,).
@@ -26,13 +32,16 @@ def add_twists(span: IntArray, pieces: FloatArray, pulls: Array, P: Array, W: Ar
         pulls: see `contour_arrays.Scratch`, (7, room).
         P: projection matrix, (3, 4).
         W: from the part's unit coordinates to the world, (3, 4), metres.
+        eye: camera centre in the world, (3,), metres.
+        slides: whether contour points slide on the surface. The part is then a solid of revolution in its unit
+            coordinates, such as an elliptical cone.
         M: upper triangle of the normal matrix, (6, 6), added to.
         b: gradient, (6,), added to.
     """
     m00 = m01 = m02 = m03 = m04 = m05 = m11 = m12 = m13 = m14 = m15 = 0.0
     m22 = m23 = m24 = m25 = m33 = m34 = m35 = m44 = m45 = m55 = 0.0
     b0 = b1 = b2 = b3 = b4 = b5 = 0.0
-    p0, p1, p2 = P[0], P[1], P[2]
+    p0, p1, p2, unit = P[0], P[1], P[2], unit_eye(W, eye)
     for k in range(np.uint64(span[0]), np.uint64(span[1])):
         x, y, z, u, v = pieces[5, k], pieces[6, k], pieces[7, k], pieces[0, k], pieces[1, k]
         X = W[0, 0] * x + W[0, 1] * y + W[0, 2] * z + W[0, 3]
@@ -42,21 +51,43 @@ def add_twists(span: IntArray, pieces: FloatArray, pulls: Array, P: Array, W: Ar
         a3, a4, a5 = (p0[0] - u * p2[0]) * w, (p0[1] - u * p2[1]) * w, (p0[2] - u * p2[2]) * w
         c3, c4, c5 = (p1[0] - v * p2[0]) * w, (p1[1] - v * p2[1]) * w, (p1[2] - v * p2[2]) * w
         nu, nv = pieces[3, k], pieces[4, k]
+        # The plane through the eye and the contour's tangent is the tangent plane of the surface.
+        at = nu * u + nv * v
+        n0, n1, n2 = (
+            nu * p0[0] + nv * p1[0] - at * p2[0],
+            nu * p0[1] + nv * p1[1] - at * p2[1],
+            nu * p0[2] + nv * p1[2] - at * p2[2],
+        )
+        e0, e1, e2 = eye[1] * n2 - eye[2] * n1, eye[2] * n0 - eye[0] * n2, eye[0] * n1 - eye[1] * n0
+        sight2 = (X - eye[0]) ** 2 + (Y - eye[1]) ** 2 + (Z - eye[2]) ** 2
+        along_x = W[0, 0] * n0 + W[1, 0] * n1 + W[2, 0] * n2
+        along_y = W[0, 1] * n0 + W[1, 1] * n1 + W[2, 1] * n2
+        speed = sliding_speed(x, y, z, along_x, along_y, sight2, unit) if slides else 0.0
+        s0, s1, s2 = (
+            speed * (x * W[0, 1] - y * W[0, 0]),
+            speed * (x * W[1, 1] - y * W[1, 0]),
+            speed * (x * W[2, 1] - y * W[2, 0]),
+        )
         gu, gv = pulls[1, k] * nu + pulls[5, k], pulls[1, k] * nv + pulls[6, k]
         f3, f4, f5 = gu * a3 + gv * c3, gu * a4 + gv * c4, gu * a5 + gv * c5
-        b0 += Y * f5 - Z * f4
-        b1 += Z * f3 - X * f5
-        b2 += X * f4 - Y * f3
-        b3 += f3
-        b4 += f4
-        b5 += f5
+        slide = f3 * s0 + f4 * s1 + f5 * s2
+        b0 += Y * f5 - Z * f4 - slide * e0
+        b1 += Z * f3 - X * f5 - slide * e1
+        b2 += X * f4 - Y * f3 - slide * e2
+        b3 += f3 - slide * n0
+        b4 += f4 - slide * n1
+        b5 += f5 - slide * n2
         root = np.sqrt(pulls[0, k] * nu * nu + pulls[2, k])
         skew = (pulls[0, k] * nu * nv + pulls[3, k]) / max(root, 1e-150)
         rest = np.sqrt(max(pulls[0, k] * nv * nv + pulls[4, k] - skew * skew, 0.0))
         a3, a4, a5 = root * a3 + skew * c3, root * a4 + skew * c4, root * a5 + skew * c5
         c3, c4, c5 = rest * c3, rest * c4, rest * c5
-        a0, a1, a2 = Y * a5 - Z * a4, Z * a3 - X * a5, X * a4 - Y * a3
-        c0, c1, c2 = Y * c5 - Z * c4, Z * c3 - X * c5, X * c4 - Y * c3
+        slide = a3 * s0 + a4 * s1 + a5 * s2
+        a0, a1, a2 = Y * a5 - Z * a4 - slide * e0, Z * a3 - X * a5 - slide * e1, X * a4 - Y * a3 - slide * e2
+        a3, a4, a5 = a3 - slide * n0, a4 - slide * n1, a5 - slide * n2
+        slide = c3 * s0 + c4 * s1 + c5 * s2
+        c0, c1, c2 = Y * c5 - Z * c4 - slide * e0, Z * c3 - X * c5 - slide * e1, X * c4 - Y * c3 - slide * e2
+        c3, c4, c5 = c3 - slide * n0, c4 - slide * n1, c5 - slide * n2
         m00 += a0 * a0 + c0 * c0
         m01 += a0 * a1 + c0 * c1
         m02 += a0 * a2 + c0 * c2

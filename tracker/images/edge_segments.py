@@ -194,7 +194,7 @@ def _neighbours(left: NDArray[np.uint8], u: int, v: int) -> int:
     count = -1
     for dv in range(-1, 2):
         for du in range(-1, 2):
-            count += left[v + dv, u + du]
+            count += int(left[v + dv, u + du])
     return count
 
 

@@ -18,12 +18,13 @@ from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.initialization.candidates import METHODS, PersonScene, StartCandidate, StartMethod, silhouette_axes
+from tracker.initialization.silhouette_check import check_against_silhouettes
 from tracker.initialization.start_fit import FittedStart, fit_start
 from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
 from tracker.session.session import Session
 from tracker.store.stored_poses import read_stored_poses
-from tracker.voxels.figure_masks import figure_masks
+from tracker.voxels.figure_masks import FigureMask, figure_masks
 from tracker.voxels.visual_hull import VisualHull, carve_people
 from tracker.voxels.voxel_grid import Voxels
 
@@ -206,12 +207,35 @@ def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Ma
     tried = [(c, fitted(c, ())) for c in candidates]
     kept = _kept(tried)
     steps = _track_frames(frame, session.n_frames)
-    tracked = sorted(((c, fitted(c, steps)) for c, _ in kept), key=_weighed)
+    tracked = _filling(sorted(((c, fitted(c, steps)) for c, _ in kept), key=_weighed), silhouettes, masks)
     best, fit = tracked[0]
     opposite = [_weighed(t) for t in tracked if t[0].forward @ best.forward < _OPPOSITE]
     opposite += [_weighed(t) for t in tried if t[0].forward @ best.forward < _OPPOSITE and not opposite]
     is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > _SURE_RATIO * _weighed(tracked[0]))
-    return FirstPose(frame, best, fit, is_sure, _notes(best, is_sure, hull, silhouettes), _lines_px(session, scene))
+    notes = _notes(best, is_sure, hull, silhouettes)
+    note = check_against_silhouettes(PosedBody(best.model, fit.pose), silhouettes, masks).note
+    if note:
+        notes, fit = (*notes, note), fit if fit.status == "lost" else fit._replace(status="doubtful")
+    return FirstPose(frame, best, fit, is_sure, notes, _lines_px(session, scene))
+
+
+def _filling(
+    tracked: Sequence[tuple[StartCandidate, FittedStart]], silhouettes: Sequence[ViewSilhouette],
+    masks: Sequence[FigureMask],
+) -> list[tuple[StartCandidate, FittedStart]]:  # fmt: skip
+    """Return the starts whose bodies fill the silhouettes.
+
+    Raises:
+        TrackerError: none does.
+    """
+    checks = [check_against_silhouettes(PosedBody(c.model, f.pose), silhouettes, masks) for c, f in tracked]
+    kept = [start for start, check in zip(tracked, checks, strict=True) if not check.is_refused]
+    if not kept:
+        raise TrackerError(
+            f"expected a body that fills the silhouettes, found none: {checks[0].note}; choose another --frame, or "
+            "place the person in the page"
+        )
+    return kept
 
 
 def _candidates(scene: PersonScene, model: BodyModel, methods: Sequence[StartMethod]) -> list[StartCandidate]:

@@ -81,6 +81,26 @@ class AnnotationStore:
         )
         return {frame: rows.row_to_record(row) for frame, *row in found}
 
+    def former_poses(self, person: str, frames: range) -> dict[int, PoseRecord]:
+        """Return the poses that the present ones of a range of frames replaced, by frame, ascending.
+
+        Edits that changed only marks do not count, nor do steps within the edit that made the present pose. A pose
+        that was set after the frame was cleared has replaced none.
+        """
+        found = self._connection.all(
+            "WITH RECURSIVE f (frame, numbers, edit, change) AS ("
+            f"SELECT p.frame, c.numbers, c.edit, c.previous {rows.CURRENT_POSES} "
+            "WHERE p.person = ? AND p.frame BETWEEN ? AND ? UNION ALL "
+            "SELECT f.frame, f.numbers, CASE WHEN d.numbers IS f.numbers THEN d.edit ELSE f.edit END, d.previous "
+            "FROM f JOIN pose_changes d ON d.id = f.change "
+            "WHERE d.numbers IS f.numbers OR d.edit = f.edit OR d.numbers IS NULL) "
+            f"SELECT f.frame, {rows.RECORD_COLUMNS} FROM f JOIN pose_changes c ON c.id = f.change "
+            "JOIN edits e ON e.id = c.edit LEFT JOIN program_settings t ON t.id = c.program_settings "
+            "WHERE c.numbers IS NOT f.numbers AND c.edit != f.edit AND c.numbers IS NOT NULL ORDER BY f.frame",
+            (person, frames.start, frames.stop - 1),
+        )
+        return {frame: rows.row_to_record(row) for frame, *row in found}
+
     def alternatives(self, person: str, frame: int) -> tuple[Alternative, ...]:
         """Return the alternatives to a person's pose in a frame, best first."""
         found = self._connection.all(

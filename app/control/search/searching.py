@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from tracker.tracking.chamfer.settings import TrackSettings, search_frame
 from tracker.tracking.contour.fit_steps import FitPlan, contour_steps
 from tracker.tracking.subjects import Subjects
 
+_ContourFit = Literal["body", "chains"]
 _SAVE_S = 0.5
 """A running search is saved at least this often."""
 
@@ -76,16 +78,20 @@ class SearchRunner:
         """Search to the end; continues a paused search of the same people, see `step`."""
         self._go(lambda _: False, person)
 
-    def fit_contours(self, person: int | None = None) -> None:
+    def fit_contours(self, person: int | None = None, by_chains: bool = False) -> None:
         """Fit people to the image contours as KRH08 does, one iteration after the other; see `step`.
 
         Every iteration is recorded, so that the replay shows it.
+
+        Args:
+            person: see `step`.
+            by_chains: fit a rough pose chain by chain: the root, the trunk, each limb, then the whole body.
         """
         self.halt()
         with self._activities.starting(self):
             if not self.running:
                 self.forget()
-                self._go(lambda _: False, person, contours=True)
+                self._go(lambda _: False, person, contours="chains" if by_chains else "body")
 
     def run_again(self, number: int | None = None, person: int | None = None) -> None:
         """Search again from the start of a recorded run of this frame, with the present settings.
@@ -150,7 +156,7 @@ class SearchRunner:
         until: Callable[[SearchStep], bool],
         person: int | None,
         start: tuple[Array, ...] | None = None,
-        contours: bool = False,
+        contours: _ContourFit | None = None,
     ) -> None:
         with self._activities.starting(self):
             if not self.running:
@@ -159,7 +165,7 @@ class SearchRunner:
                 job.run(until)
 
     def _paused_job(
-        self, person: int | None, start: tuple[Array, ...] | None = None, contours: bool = False
+        self, person: int | None, start: tuple[Array, ...] | None = None, contours: _ContourFit | None = None
     ) -> Job[SearchStep]:
         """Return the paused search of the same people, or a new one from given poses, by default the shown ones."""
         session_state, state = self._session_state, self._session_state.state
@@ -175,8 +181,8 @@ class SearchRunner:
             people = tuple(
                 p if p.values is v else ShownPose(v, p.source) for p, v in zip(state.people, poses, strict=True)
             )
-            plan = FitPlan(models, free) if contours else None
-            known_px = np.nan if contours or costs["cost_px"] is None else costs["cost_px"]
+            plan = None if contours is None else FitPlan(models, free, contours == "chains")
+            known_px = np.nan if plan is not None or costs["cost_px"] is None else costs["cost_px"]
             run = self._runs.begin(
                 frame, models, poses, known_px, settings, free, None if plan is None else plan.stages
             )

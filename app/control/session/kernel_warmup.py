@@ -37,9 +37,11 @@ class KernelWarmup:
     def _work(self) -> None:
         session_state = self._session_state
         while session_state.state.compiling and not self._closing.wait(_POLL_S):
-            stages = self._compiler.stages
+            stages = self._compiler.follow()
             if stages != session_state.state.compiled:
                 session_state.note_compiled(stages)
+            if "cost" not in stages:
+                session_state.score_interpreted()
         if self._compiler.has_failed and not self._closing.is_set():
             _LOG.warning(
                 "the kernels could not be compiled in the background; each is compiled when it is first needed"

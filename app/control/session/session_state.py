@@ -16,8 +16,10 @@ from app.state.search import SearchView
 from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel
+from tracker.compute.interpretation import interpreted
 from tracker.compute.kernel_cache import STAGES
 from tracker.errors import SessionError, TrackerError
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import value_mask, with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
@@ -201,7 +203,8 @@ class SessionState:
         with self.lock:
             self.set(compiled=stages)
             self.request_evidence()
-            self.set(**self.costs(self.state.poses))
+            if "cost" in stages:  # a cost that was interpreted stays until then
+                self.set(**self.costs(self.state.poses))
 
     def costs(
         self, poses: tuple[Array, ...], frame: int | None = None, models: tuple[BodyModel, ...] | None = None
@@ -219,7 +222,23 @@ class SessionState:
         views = self.frames.cached_evidence(self.state.frame if frame is None else frame)
         if views is None or "cost" not in self.state.compiled:
             return {"cost_px": None, "view_costs_px": ()}
-        cost = pose_cost(views, models or self.models, poses, self.state.settings)(poses)
+        return self._scored(views, models or self.models, poses)
+
+    def score_interpreted(self) -> None:
+        """Score the shown poses without compiled kernels, unless they are scored or move; takes up to a second."""
+        with self.lock:
+            scored, models = self.state, self.models
+            views = self.frames.cached_evidence(scored.frame)
+        if views is None or scored.cost_px is not None or scored.drag is not None:
+            return
+        with interpreted():
+            costs = self._scored(views, models, scored.poses)
+        with self.lock:
+            if self.state.people is scored.people and self.state.frame == scored.frame:
+                self.set(**costs)
+
+    def _scored(self, views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array]) -> Costs:
+        cost = pose_cost(views, models, poses, self.state.settings).at_prediction()
         return {
             "cost_px": finite_or_none(cost.total_px),
             "view_costs_px": tuple(finite_or_none(c) for c in cost.view_costs_px),

@@ -118,6 +118,29 @@ class Ranges:
             run = _Run(self._label(f"mark {where} {how}", people), "marked", by_program=False)
             self._begin(run, "marking", len(changes), iter(changes))
 
+    def take_replaced(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
+        """Put the poses back that those of a range replaced; keyframes stay. Doing it again takes the present ones.
+
+        Raises:
+            TrackerError: no pose of the range has replaced another.
+        """
+        first, last = self._within(first, last)
+        with self._activities.editing():
+            saver = self._session_state.saver
+            changes = [
+                PoseChange(self._name(i), frame, replace(other, keyframe=False))
+                for i in self._checked(people)
+                for frame, (now, other) in saver.replaced(i, range(first, last + 1)).items()
+                if not now.keyframe
+            ]
+            if not changes:
+                raise TrackerError(
+                    f"expected frames among {first} to {last} whose pose replaced another, found none; "
+                    "track them again by another method first"
+                )
+            label = self._label(f"take the other poses of frames {first} to {last}", people)
+            self._begin(_Run(label, "exchanged", by_program=True), "exchanging", len(changes), iter(changes))
+
     def toggle_keyframe(self) -> None:
         """Make the shown pose of the selected person a keyframe, or remove the mark; a draft is stored."""
         state, saver = self._session_state.state, self._session_state.saver

@@ -15,7 +15,8 @@ from tracker.formats.model_toml import format_model, load_model
 from tracker.session.session import load_session
 
 KEYS = {
-    "person", "frames", "views", "cost_before_px", "cost_after_px", "height_m", "sizes", "model",
+    "person", "frames", "views", "cost_before_px", "cost_after_px", "height_m", "sizes", "model", "evaluations",
+    "voxels",
 }  # fmt: skip
 """Those that docs/acquisition.md lists."""
 
@@ -109,6 +110,27 @@ def test_the_paper_s_way_names_its_views(run, placed, monkeypatch):
     assert f"from frame 20, front view {found['views'][0]}, side view {found['views'][1]}" in out
 
 
+@pytest.mark.slow
+def test_voxels_before_the_contours(run, placed, quick):
+    words = ("acquire", placed, "--method", "voxels", "--frames", "20:23", "--n-frames", "2")
+    status, out, err = run(*words, "--json", "--dry-run")
+    found = json.loads(out)
+    assert (status, err, found.keys()) == (0, "", KEYS)
+    assert found["voxels"].keys() == {"height_m", "overlap_before", "overlap_after"}
+    assert 0 < found["voxels"]["overlap_before"] < 1
+    assert found["evaluations"] > 2
+    before = format_model(load_session(placed).people[0].model)
+    status, out, _ = run(*words, "--voxels-only", "--json")
+    alone = json.loads(out)
+    assert (status, alone["evaluations"]) == (0, 0)
+    assert alone["height_m"] == alone["voxels"]["height_m"]
+    assert before != alone["model"] == format_model(load_session(placed).people[0].model)
+    status, out, _ = run(*words, "--dry-run")
+    assert status == 0
+    assert "voxels: " in out
+    assert "evaluations" in out
+
+
 def test_wrong_input(run, placed):
     before = files_of(placed)
     for words, expected in (
@@ -118,6 +140,8 @@ def test_wrong_input(run, placed):
         (("--paper", "--views", "FRONT", "TOP"), "two of FRONT, RIGHT, BACK, LEFT"),
         (("--paper", "--views", "FRONT", "BACK", "--frames", "20:21"), "FRONT and BACK show the person"),
         (("--n-frames", "0"), "at least 1"),
+        (("--paper", "--method", "voxels"), "--paper with --method contours"),
+        (("--voxels-only",), "--voxels-only with --method voxels"),
         (("--out", "body.json"), "a .toml file"),
         (("--out", "nowhere/body.toml"), "a folder that exists"),
         (("--frames", "3:9"), "place the body in the page"),

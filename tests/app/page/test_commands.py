@@ -7,9 +7,12 @@ from gestures import PAGE
 
 from app.control.posing import dragging
 from app.control.session import session_state
+from app.page import messages
+from app.page.client_messages import CompareRange, EditRange
 from app.page.commands import dispatch
 from app.page.message_parsing import MessageError
 from app.page.pose_messages import Drag, FitPose, LockDofs, Nudge, SetDof
+from tracker.errors import TrackerError
 
 
 def drag_to(u, phase, seq):
@@ -54,3 +57,13 @@ def test_what_the_session_does_not_have_is_refused(placed, message):
     with pytest.raises(MessageError, match=r"^expected "):
         dispatch(placed, PAGE, message)
     assert placed.state is before
+
+
+def test_a_comparison_without_replaced_poses_is_refused_and_its_end_is_sent(placed):
+    with pytest.raises(TrackerError, match="whose pose replaced another, found none"):
+        dispatch(placed, PAGE, CompareRange(first=0, last=3))
+    with pytest.raises(TrackerError, match="whose pose replaced another, found none"):
+        dispatch(placed, PAGE, EditRange(action="take_replaced", first=0, last=3))
+    dispatch(placed, PAGE, CompareRange(first=None, last=None))
+    assert placed.state.range_comparison is None
+    assert messages.range_comparison(None).first is None

@@ -102,6 +102,12 @@ def test_the_3d_view_is_chosen_and_kept_with_the_session(page, opened):
     assert "head" in updates["view_3d"].trail_points
     with pytest.raises(MessageError, match=r"a number >= 0\.1 as 'changes.opacity'"):
         page.send("view_3d", changes={"opacity": 0})
+    with pytest.raises(MessageError, match=r"knossow54.* as 'changes.character'"):
+        page.send("view_3d", changes={"character": "nobody"})
+    page.send("view_3d", changes={"character": "knossow54"})
+    assert "knossow54" in page.updates()["view_3d"].characters
+    view = page.controller.state.view_3d
+    assert view.character == "knossow54"
     page.controller.view_3d.note_prediction("from frame 3")
     assert page.updates()["view_3d"].prediction == "from frame 3"
     page.controller = opened()

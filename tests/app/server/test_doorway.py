@@ -2,6 +2,7 @@
 
 import http.client
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -9,8 +10,10 @@ import sys
 import pytest
 from gestures import wait_for
 
+from app.server import doorway as doorways
 from app.server.address import Serving
 from app.server.doorway import STEPS, Doorway
+from app.server.static_files import KEPT, PageFiles, static_folder
 
 
 @pytest.fixture
@@ -40,7 +43,42 @@ def test_the_page_says_what_the_program_is_doing(doorway):
         assert get(doorway, f"/{name}")[0] == 200
     for at, step in enumerate(STEPS):
         doorway.show(step)
-        assert json.loads(get(doorway, "/starting.json")[2]) == {"steps": list(STEPS), "at": at}
+        told = {"steps": list(STEPS), "at": at}
+        wait_for(lambda told=told: json.loads(get(doorway, "/starting.json")[2]) == told)
+
+
+def test_the_files_of_the_session_s_page_are_fetched_ahead(doorway):
+    addresses = json.loads(get(doorway, "/page-files.json")[2])
+    assert addresses == list(PageFiles(static_folder()).addresses().values())
+    assert any(address.endswith("/main.js") for address in addresses)
+    for address in addresses:
+        status, headers, _ = get(doorway, f"/{address}")
+        assert (status, headers["Cache-Control"]) == (200, KEPT)
+    assert get(doorway, "/")[1]["Cache-Control"] == "no-store"
+
+
+@pytest.mark.skipif(not doorways._FORKS, reason="threads answer on this system")
+def test_a_process_of_its_own_answers_and_ends_with_the_program(monkeypatch, tmp_path):
+    """However the program ends: the port is free again."""
+    code = "import os, sys; from app.server.doorway import Doorway; from app.server.address import Serving\n"
+    code += "with Doorway(Serving(port=0)) as d: print(d.port, d._process.pid, flush=True); os.kill(os.getpid(), 9)"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    port, process = map(int, ended.stdout.split())
+
+    def is_free():
+        with socket.socket() as probe:
+            return probe.connect_ex(("127.0.0.1", port)) != 0
+
+    assert process != os.getpid()
+    wait_for(is_free)
+
+
+def test_threads_answer_where_a_process_cannot(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    monkeypatch.setattr(doorways, "_FORKS", False)
+    with Doorway(Serving(port=0, browser=False)) as doorway:
+        doorway.show(STEPS[1])
+        assert json.loads(get(doorway, "/starting.json")[2])["at"] == 1
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,5 @@
 import asyncio
+import re
 import socket
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -114,6 +115,24 @@ async def test_page_and_modules_are_served_with_their_headers(client):
         tag = response.headers["ETag"]
     async with client.get("/static/main.js", headers={"If-None-Match": tag}) as response:
         assert response.status == 304
+
+
+async def test_files_are_kept_under_the_version_that_the_page_names(client):
+    async with client.get("/") as response:
+        page = await response.text()
+    (address,) = re.findall(r'src="(static/[0-9a-f]{16}/main\.js)"', page)
+    assert re.findall(r'"(static/(?:theme|styles)[^"]*)"', page) == []
+    async with client.get(f"/{address}") as response:
+        assert response.content_type == "text/javascript"
+        assert "immutable" in response.headers["Cache-Control"]
+        assert await response.read() == (static_folder() / "main.js").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "name", ["nothing.js", "index.html", "starting/starting.js", "..%2fmain.js", "%2e%2e/pyproject.toml"]
+)
+async def test_no_other_file_has_a_version(port, name):
+    assert (await raw_get(port, f"/static/{'0' * 16}/{name}"))[0] in (403, 404)
 
 
 @pytest.mark.parametrize("path", ["/", "/static/main.js", "/ws", "/viser/", "/viser", "/nothing"])

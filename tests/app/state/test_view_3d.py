@@ -17,6 +17,7 @@ OTHER = View3d(
     gizmos=False,
     ghost=True,
     voxels=True,
+    character="knossow54",
     trail_points=frozenset(("left_wrist", "head")),
     trail_frames=80,
 )
@@ -32,6 +33,7 @@ def test_every_field_comes_back():
     [
         None, 3, [], {}, {"colors": "rainbow"}, {"opacity": 0}, {"opacity": "much"}, {"trail_frames": 100_000},
         {"trail_frames": True}, {"trail_points": "head"}, {"trail_points": [3]}, {"bodies": "yes"}, {"no_such": 1},
+        {"character": "nobody"}, {"character": ["knossow54"]},
     ],
 )  # fmt: skip
 def test_what_makes_no_sense_is_as_usual(data):

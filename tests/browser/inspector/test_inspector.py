@@ -123,13 +123,15 @@ async def test_the_3d_view_is_chosen(page, endpoint):
     await row(page, "Look through").locator("select").select_option(label="RIGHT")
     await page.locator(".trail-points").get_by_label("head").check()
     await row(page, "Opacity").locator("input").fill("0.5")
+    await row(page, "Character").locator("select").select_option(label="knossow54")
     await page.get_by_role("button", name="Set floor…").click()
-    await until(lambda: len(endpoint.received) == 5)
+    await until(lambda: len(endpoint.received) == 6)
     assert endpoint.received == [
         {"type": "view_3d", "changes": {"floor": False}},
         {"type": "snap", "camera": 1},
         {"type": "view_3d", "changes": {"trail_points": ["head"]}},
         {"type": "view_3d", "changes": {"opacity": 0.5}},
+        {"type": "view_3d", "changes": {"character": "knossow54"}},
         {"type": "floor", "action": "begin"},
     ]
     await shows(page, "quadrille.state.state.snapped === 1")

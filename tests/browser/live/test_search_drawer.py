@@ -238,3 +238,14 @@ async def test_contours_are_fitted_and_replayed_with_their_residuals(page):
     await shows(page, "quadrille.state.overlay?.paths.some((p) => p.kind === 'residual')", 20)
     assert len(await drawn(page, "compared")) > 10  # the contours at the start
     assert len(await drawn(page, "residual")) > 10
+
+
+async def test_a_fit_chain_by_chain_is_replayed_from_the_root_on(page):
+    before = await page.evaluate(f"{RUNS}.length")
+    await page.get_by_role("button", name="Chains", exact=True).click()
+    await shows(page, f"{RUNS}.length > {before} && {OVER}", 60)
+    await page.get_by_role("button", name="Start of the search").click()
+    await page.get_by_role("button", name="One step forward").click()
+    await shows(page, "quadrille.state.searchRuns.replay?.stage === 'root'", 20)
+    await page.get_by_role("button", name="Last step of the search").click()
+    await shows(page, "quadrille.state.searchRuns.replay?.stage === 'whole body'", 20)

@@ -43,7 +43,7 @@ async def test_overlapping_joints_are_both_offered(page, endpoint):
     await page.mouse.down()
     await page.mouse.move(at[0] + 15, at[1])
     await page.mouse.up()
-    await until(lambda: endpoint.heard("drag") and endpoint.heard("drag")[-1]["phase"] == "end")
+    await until(lambda: endpoint.heard("drag")[-1]["phase"] == "end")
     assert {m["point"] for m in endpoint.heard("drag")} == {first}
     # Away from the pair the nearest joint is meant again.
     await page.mouse.move(*await to_client(page, 0, *await handle_of(page, 0, "l_wrist")))
@@ -61,7 +61,7 @@ async def test_a_held_joint_has_a_ring_and_is_released_by_shift_and_a_click(page
         await page.mouse.up()
         await page.keyboard.up("Shift")
         wanted = {"type": "pose", "action": "hold", "frame": 12, "person": 0, "point": "l_wrist", "held": held}
-        await until(lambda wanted=wanted: endpoint.heard("pose") and endpoint.heard("pose")[-1] == wanted)
+        await until(lambda wanted=wanted: endpoint.heard("pose")[-1] == wanted)
         held_in_page = "quadrille.state.overlay.handles.some((h) => h.point === 'l_wrist' && h.held)"
         await shows(page, held_in_page if held else f"!{held_in_page}")
         await page.wait_for_timeout(60)

@@ -49,7 +49,7 @@ async def test_a_frame_asked_for_after_an_undo_is_shown_although_it_was_on_the_s
     await shows(page, "quadrille.state.state.frame === 0 && quadrille.state.shown.frame === 0")
     assert await page.evaluate("quadrille.state.target") == 0
     await page.keyboard.press("Period")  # needs not wait
-    await shows(page, "quadrille.state.shown.frame === 1", 1)
+    await shows(page, "quadrille.state.shown.frame === 1", 5)
     assert [message["frame"] for message in endpoint.heard("seek")] == [0, 1]
     # Without another request the page goes along.
     await page.keyboard.press("Control+z")

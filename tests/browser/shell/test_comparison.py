@@ -37,7 +37,7 @@ async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_befor
     assert await page.locator("#toggle-before").get_attribute("aria-pressed") == "true"
     await page.keyboard.press("Escape")
     await shows(page, "document.querySelector('#before-badge').hidden")
-    assert [m["shown"] for m in endpoint.heard("before")] == [True, False]
+    await until(lambda: [m["shown"] for m in endpoint.heard("before")] == [True, False])
     endpoint.state["compared"] = None  # the pose has changed since
     await endpoint.broadcast(endpoint.state)
     await page.locator("#show-comparison").wait_for(state="hidden")

@@ -157,3 +157,15 @@ class TestLong:
             }"""
         )
         assert 1_000 < points < 50_000
+
+
+async def test_the_landscape_says_why_it_is_empty(page, endpoint):
+    await page.keyboard.press("v")
+    waiting = page.locator("#landscape p")
+    assert "Sampling the cost" in await waiting.inner_text()
+    await page.keyboard.press("v")
+    endpoint.state["compiling"] = "cost"
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "quadrille.state.state.compiling === 'cost'")
+    await page.keyboard.press("v")
+    assert "once the kernels are compiled" in await waiting.inner_text()

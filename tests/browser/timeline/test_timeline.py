@@ -119,16 +119,12 @@ async def test_a_hand_that_goes_elsewhere_while_it_plays_is_followed(page, endpo
     await page.keyboard.press("Space")
     await shows(page, "quadrille.state.shown.frame > 20")
     await page.evaluate(LOG_SEEKS)
-    before = len(endpoint.heard("seek"))
     await page.keyboard.press("Home")
-    await until(lambda: [m["frame"] for m in endpoint.heard("seek")[before:]].count(0), 10)
-    await until(lambda: len(endpoint.heard("seek")) > before + 4, 10)
+    await shows(page, "window.seeks.filter(([at]) => at > window.homeAt).length > 4")
     await page.keyboard.press("Space")
     seeks, home_at = await page.evaluate("window.seeks"), await page.evaluate("window.homeAt")
-    after_home = seeks[[frame for _, frame in seeks].index(0) + 1 :]
-    assert after_home
-    for at, frame in after_home:
-        assert 0 < frame <= 30 * (at - home_at) + 1
+    for at, frame in seeks:  # a busy page asks for a frame soon after the first, not for the first
+        assert at < home_at or frame <= 30 * (at - home_at) + 1
 
 
 async def test_the_wheel_zooms_where_the_pointer_is(page):
@@ -233,7 +229,10 @@ async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
     for name in names:
         await page.locator(f"#range-{name}").click()
     await page.keyboard.press("Shift+I")
-    await until(lambda: len(endpoint.heard("range")) == 8)
+    await page.locator("#range-compare").click()
+    await until(lambda: len(endpoint.heard("range")) == 8 and endpoint.heard("compare_range"))
+    assert endpoint.heard("compare_range") == [{"type": "compare_range", "first": 24, "last": 36}]
+    await shows(page, "quadrille.state.drawer === 'runs'")
     assert [m["action"] for m in endpoint.heard("range")] == [
         "track_backward", "track_forward", "interpolate", "clear", "keyframe", "reviewed", "unreviewed", "interpolate",
     ]  # fmt: skip

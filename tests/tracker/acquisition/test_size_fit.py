@@ -49,6 +49,7 @@ def lengths(body):
     return np.array([sizes[p].length_m for p in ("left_upper_arm", "left_thigh", "left_forearm", "left_calf")])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [pytest.param(3, marks=pytest.mark.slow), 4])
 def test_lengths_and_girths_of_another_body_are_found(seed):
     person = other_body(seed=seed)

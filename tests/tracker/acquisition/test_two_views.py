@@ -53,6 +53,7 @@ def noisy(views, seed=0):
             for v in views]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_known_superquadric_is_found():
     true = single((0.16, 0.23, 0.33), taper=(0.12, -0.1))
     model = single((0.13, 0.27, 0.33), taper=(0.0, 0.01))

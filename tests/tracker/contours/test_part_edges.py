@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from scipy.spatial import cKDTree
 from staging import at, camera_at, own_evidence, solid
 
@@ -83,6 +84,7 @@ def test_points_hidden_by_another_person():
     assert points_occluded([at(screen.model, 6, 0, 0)], [FRONT], points).tolist() == [[False] * 3]  # behind the camera
 
 
+@pytest.mark.slow
 def test_points_hidden_in_several_views_are_those_whose_sight_passes_a_part(gavrila):
     rng = np.random.default_rng(4)
     near = rng.normal(0.0, 0.2, gavrila.n_dofs)

@@ -86,6 +86,7 @@ def found():
     return run_contour_experiment(tiny, {"a": QUICK}, lambda done, total: ticks.append((done, total))), ticks
 
 
+@pytest.mark.slow
 def test_the_report_and_its_figures(found, tmp_path):
     report = write_contour_report(tmp_path / "r", found[0])
     assert found[1] == [(i + 1, 7) for i in range(7)]

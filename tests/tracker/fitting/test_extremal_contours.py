@@ -11,7 +11,6 @@ from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import trace
 from tracker.contours.surfaces import surfaces_of
 from tracker.fitting.contour_residuals import ContourResiduals, paper_match
-from tracker.fitting.sliding import add_sliding_twists
 from tracker.fitting.twists import add_twists, twists_to_dofs
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
@@ -170,13 +169,11 @@ def row_of_kernels(part, values, camera, point_world, normal_px, x, slope=None):
     unit = np.linalg.solve(W[:, :3], point_world - W[:, 3])
     pieces = np.array([*x, 1.0, *normal_px, *unit], np.float32)[:, None]
     pulls = np.array([1.0, 1.0, 0, 0, 0, 0, 0])[:, None]  # one residual across the piece, of value 1
-    if slope is None:
-        add_twists(np.array([0, 1]), pieces, pulls, camera.projection, W, M[part], b[part])
-    else:
+    if slope is not None:
         u, v = slope
         pulls = np.array([0, 0, u * u, u * v, v * v, u, v])[:, None]
-        eye = camera.center_world
-        add_sliding_twists(np.array([0, 1]), pieces, pulls, camera.projection, W, eye, M[part], b[part])
+    span, slides = np.array([0, 1]), slope is not None
+    add_twists(span, pieces, pulls, camera.projection, W, camera.center_world, slides, M[part], b[part])
     gradient, hessian = np.empty(BODY.n_dofs), np.empty((BODY.n_dofs, BODY.n_dofs))
     twists_to_dofs(
         M, b, kinematics.axes_world, kinematics.origins_world, BODY.dof_is_length, BODY.dof_joint, BODY.tree.parents,

@@ -41,6 +41,7 @@ def test_all_parts_are_found_left_and_right(pose):
     assert np.mean(list(errors.values())) < 80
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [n if n == "gavrila34" else pytest.param(n, marks=pytest.mark.slow) for n in PRESETS])
 def test_any_body_takes_the_start(name):
     voxels, joints = figure(turn_deg=40)

@@ -106,6 +106,50 @@ def test_a_person_cut_off_by_the_image(session, silhouettes, fits):
     assert "cut off by the image in view FRONT" in find(session).poses[0].notes
 
 
+def off_by(places, monkeypatch):
+    """Fits that are called good and have moved by metres along x, each by the next of some places."""
+    places = iter(places)
+
+    def fit(observer, models, start, frame, later, others):
+        moved = start.copy()
+        moved[0] += next(places) if later else 0.0
+        return FittedStart(moved, "good", 1.0)
+
+    monkeypatch.setattr(first_pose, "fit_start", fit)
+
+
+def test_a_body_in_empty_space_is_refused(session, silhouettes, monkeypatch):
+    silhouettes += silhouettes_of_figure(figure(noise=0.1)[0], CAMERAS)
+    off_by([0.6] * 10, monkeypatch)
+    with pytest.raises(TrackerError, match="expected a body that fills the silhouettes, found none: the body and"):
+        find(session)
+
+
+def test_another_start_takes_its_place(session, silhouettes, monkeypatch):
+    silhouettes += silhouettes_of_figure(figure(noise=0.1)[0], CAMERAS)
+    off_by([0.6] + [0.0] * 9, monkeypatch)
+    found = find(session).poses[0]
+    assert found.fitted.status == "good"
+    assert not any("share little" in note for note in found.notes)
+
+
+def test_a_start_that_one_view_contradicts_is_doubtful(session, silhouettes, fits, monkeypatch):
+    silhouettes += silhouettes_of_figure(figure(noise=0.1)[0], CAMERAS)
+    painted = first_pose.figure_masks
+
+    def with_upper_half(*arguments):
+        first, *others = painted(*arguments)
+        rows = np.flatnonzero(first.mask.any(axis=1))
+        mask = first.mask.copy()
+        mask[int(rows.mean()) :] = False
+        return first._replace(mask=mask), *others
+
+    monkeypatch.setattr(first_pose, "figure_masks", with_upper_half)
+    found = find(session).poses[0]
+    assert found.fitted.status == "doubtful"
+    assert "share little of their area in view FRONT" in " ".join(found.notes)
+
+
 def test_both_ways_of_facing_are_compared(session, silhouettes, fits):
     silhouettes += silhouettes_of_figure(figure(turn_deg=40)[0], CAMERAS)
     first = find(session).poses[0]

@@ -142,6 +142,7 @@ def walking(model, rng):
     return model.clip(values)
 
 
+@pytest.mark.slow
 def test_short_drags_of_an_ankle_do_not_fold_the_leg(model):
     """A leg that an ankle's drag stretches is another matter: its knee comes to the line from hip to ankle."""
     rng, moved_m, missed_m = np.random.default_rng(11), [], []

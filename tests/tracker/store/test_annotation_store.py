@@ -135,6 +135,27 @@ def first_of(alternatives):
     return [(a.values[0], a.cost_px) for a in alternatives]
 
 
+def test_former_poses_are_those_of_the_edit_before(store):
+    """Marks and steps within one edit do not count; undo is followed. A pose after a cleared one replaces nothing."""
+
+    def former():
+        return {frame: record.values[0] for frame, record in store.former_poses("ann", range(10)).items()}
+
+    store.commit("one", [put(1, 10.0), put(2, 20.0)])
+    assert former() == {}
+    edit = store.commit("two", [put(1, 11.0)]).edit
+    store.amend(edit, [put(1, 12.0), put(3, 30.0)])
+    assert former() == {1: 10.0}  # not 11, a step on the way
+    store.commit("mark", [MarkChange("ann", 1, True, True)])
+    assert former() == {1: 10.0}
+    store.commit("clear", [PoseChange("ann", 2, None)])
+    store.commit("again", [put(2, 21.0)])
+    assert former() == {1: 10.0}  # nothing was there to replace
+    for _ in range(4):
+        store.undo()
+    assert former() == {}
+
+
 def test_alternatives_come_and_go_with_their_pose(store, path):
     other = Alternative(np.array([7.0, 2.0, 1 / 3]), 1, 1.5)
     third = Alternative(np.array([8.0, 2.0, 1 / 3]), 1)

@@ -36,6 +36,7 @@ def test_sizes_of_solids_within_half_a_voxel(size_m, lens):
         np.testing.assert_allclose(found, expected, atol=size_m / 2)
 
 
+@pytest.mark.slow
 def test_axes_point_along_the_solid():
     voxels = carved(silhouettes_of([ellipsoid((0, 0, 0), AXES, TURNED)], cameras_around(30)), 0.01)
     found = principal_axes(voxels.points_world, 0.01)
@@ -97,6 +98,7 @@ def test_surface_voxels():
     assert np.array_equal(full.is_surface, voxels.is_surface)
 
 
+@pytest.mark.slow
 def test_the_bounding_volume_holds_the_solid_closely():
     for lens in ((), LENS):
         views = silhouettes_of([ellipsoid((0.1, 0, 0.05), AXES)], cameras_around(20, lens))
@@ -108,6 +110,7 @@ def test_the_bounding_volume_holds_the_solid_closely():
         assert box.center_miss_m < 0.02
 
 
+@pytest.mark.slow
 def test_a_person_cut_off_by_an_image_is_not_cut_off_in_space():
     views = silhouettes_of([ellipsoid((0, 0, 0), AXES)], cameras_around(10))
     cut = views[0]

@@ -15,7 +15,15 @@ from tracker.geometry.arrays import Array, FloatArray
 from tracker.search.best_first import SearchStep, Stage
 from tracker.tracking.contour.image_contours import with_unlimited_distances
 from tracker.tracking.contour.paper import paper_settings
-from tracker.tracking.contour.paper_fit import FitIteration, fit_by_iterations, paper_residuals, unlimited_views
+from tracker.tracking.contour.paper_fit import (
+    START,
+    FitIteration,
+    fit_by_iterations,
+    paper_residuals,
+    unlimited_views,
+)
+from tracker.tracking.estimation.incremental_fit import fit_chains
+from tracker.tracking.estimation.settings import MAX_ITERATIONS
 
 _SETTINGS = paper_settings()
 _STRIDE = 4
@@ -23,20 +31,23 @@ _STRIDE = 4
 
 
 class FitPlan(NamedTuple):
-    """Whom to fit, one after the other."""
+    """Whom to fit, one after the other, and in which order their joints."""
 
     models: Sequence[BodyModel]
     """The body of each person."""
     active_dofs: Sequence[NDArray[np.bool_]]
     """The degrees of freedom of each person that may move, (n_dofs,) each."""
+    by_chains: bool = False
+    """Whether a rough pose is fitted chain by chain (KRH08 Sect. 6), not all joints at once."""
 
     @property
     def stages(self) -> list[Stage]:
-        """One stage for each person who may move."""
+        """One stage for each person who may move; by chains one for each chain that may."""
         return [
-            Stage(p, SearchGroup("contours", tuple(np.array(m.dof_names)[active])), 1.0)
+            Stage(p, SearchGroup(name, tuple(np.array(m.dof_names)[dofs & active])), 1.0)
             for p, (m, active) in enumerate(zip(self.models, self.active_dofs, strict=True))
-            if active.any()
+            for name, dofs in (fit_chains(m) if self.by_chains else [("contours", active)])
+            if (dofs & active).any()
         ]
 
 
@@ -51,24 +62,35 @@ def contour_steps(views: Sequence[ViewEvidence], poses: Sequence[Array], plan: F
     Yields:
         The start and every iteration. Costs are RMS distances of the contours of the person who is fitted, px, over
         their length at the start, so that they fall as the minimized sum does. The number of evaluations is that of
-        iterations.
+        iterations. Of the chains of a person, only the first has a step for its start.
     """
     unlimited, now, done = unlimited_views(views, _SETTINGS), tuple(poses), 0
+    first: FitIteration | None = None
+    before: Stage | None = None
     for stage in plan.stages:
         person, model = stage.person, plan.models[stage.person]
-        bodies = [PosedBody(m, pose) for m, pose in zip(plan.models, now, strict=True)]
-        residuals = paper_residuals(unlimited, bodies, person, _SETTINGS)
-        active, most = plan.active_dofs[person], _SETTINGS.max_iterations
-        first: FitIteration | None = None
-        waiting: FitIteration | None = None
-        for i in fit_by_iterations(model, now[person], residuals, most, active):
-            first = first or i
-            if waiting is not None:
-                yield _step(stage, now, _relative(waiting, first), done, False, len(views))
-                done += 1
-            waiting, now = i, (*now[:person], i.pose, *now[person + 1 :])
-        if waiting is not None and first is not None:
-            yield _step(stage, now, _relative(waiting, first), done, True, len(views))
+        if before is None or before.person != person:
+            bodies = [PosedBody(m, pose) for m, pose in zip(plan.models, now, strict=True)]
+            residuals, first = paper_residuals(unlimited, bodies, person, _SETTINGS), None
+        active = np.isin(model.dof_names, stage.group.dofs)
+        most = MAX_ITERATIONS if plan.by_chains else _SETTINGS.max_iterations
+        for i, is_last in _with_last(fit_by_iterations(model, now[person], residuals, most, active)):
+            is_start = i.name == START
+            if is_start and first is not None and not is_last:
+                continue
+            first, done = first or i, done + (not is_start)
+            now = (*now[:person], i.pose, *now[person + 1 :])
+            yield _step(stage, now, _relative(i, first), done, is_last, len(views))
+        before = stage
+
+
+def _with_last(iterations: Iterator[FitIteration]) -> Iterator[tuple[FitIteration, bool]]:
+    """Pair each iteration with whether it is the last."""
+    now = next(iterations)
+    for after in iterations:
+        yield now, False
+        now = after
+    yield now, True
 
 
 def _relative(now: FitIteration, first: FitIteration) -> FitIteration:

@@ -16,6 +16,8 @@ from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.estimation.incremental_fit import fit_by_chains
 from tracker.tracking.estimation.settings import TOLERANCE
 
+START = "start"
+"""Name of the pose before the first iteration."""
 _NO_LIMIT_PX = 1e5
 """An outlier distance that no residual reaches, px of the footage."""
 
@@ -75,7 +77,7 @@ def fit_by_iterations(
     last = None
     for fit in iterate(model, start, [residuals], active_dofs, most, TOLERANCE):
         if last is None or fit.cost < last:
-            name = "start" if last is None else f"iteration {fit.iterations}"
+            name = START if last is None else f"iteration {fit.iterations}"
             yield FitIteration(name, fit.pose, _rms_px(residuals, fit.pose, fit.cost), fit.cost)
         last = fit.cost
 
@@ -83,7 +85,7 @@ def fit_by_iterations(
 def fit_incrementally(model: BodyModel, start: Array, residuals: ContourResiduals) -> Iterator[FitIteration]:
     """Fit a rough guess chain by chain (KRH08 Sect. 6, Fig. 9). Yields the start, then each step."""
     cost = residuals.linearize(model, start, model.kinematics(start)).cost
-    yield FitIteration("start", start, _rms_px(residuals, start, cost), cost)
+    yield FitIteration(START, start, _rms_px(residuals, start, cost), cost)
     for step in fit_by_chains(model, start, [residuals]):
         yield FitIteration(step.name, step.fit.pose, _rms_px(residuals, step.fit.pose, step.fit.cost), step.fit.cost)
 

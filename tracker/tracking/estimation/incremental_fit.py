@@ -38,7 +38,7 @@ def fit_by_chains(
         The steps. The last moves all degrees of freedom.
     """
     is_active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
-    for name, dofs in _chains(model):
+    for name, dofs in fit_chains(model):
         if not (dofs & is_active).any():
             continue
         fit = solve_compiled(model, pose, blocks, dofs & is_active, MAX_ITERATIONS, TOLERANCE)
@@ -46,8 +46,8 @@ def fit_by_chains(
         yield FitStep(name, fit)
 
 
-def _chains(model: BodyModel) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Return the names and degrees of freedom, (n_dofs,), of the steps."""
+def fit_chains(model: BodyModel) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Return the names and degrees of freedom, (n_dofs,), of the steps of an incremental fit."""
     is_root, all_limbs = model.dof_joint == 0, limbs(model)
     of_limbs = np.any([limb.dofs for limb in all_limbs], axis=0) if all_limbs else np.zeros(model.n_dofs, dtype=bool)
     trunk = ~is_root & ~of_limbs

@@ -1,6 +1,6 @@
 """Assess a tracked figure by the voxels: which limbs lie in them, and what they hold that no part explains."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from tracker.tracking.confidence import Status
 from tracker.tracking.voxel.figure import LIMBS
 from tracker.tracking.voxel.frame_voxels import FrameVoxels, axis_points, occupied_near
 from tracker.tracking.voxel.state import FilterState
+from tracker.voxels.voxel_grid import Voxels
 
 _AXIS = np.linspace(-0.75, 0.75, 10)
 """Places along the axis of a part that are looked up, in half sizes."""
@@ -30,19 +31,30 @@ class FigureAssessment(NamedTuple):
     status: Status
     note: str
     """The main reason against it, for people to read; empty where it is good."""
+    lost_limbs: frozenset[str] = frozenset()
+    """Names of the limbs outside of the voxels."""
 
 
 def assess(
-    state: FilterState, frame: FrameVoxels, unexplained: Array, innovation: float, coarse: Sequence[str]
+    state: FilterState,
+    frame: FrameVoxels,
+    unexplained: "UnexplainedVoxels",
+    innovation: float,
+    coarse: Sequence[str],
+    lost_before: Collection[str] = (),
 ) -> FigureAssessment:
     """Return the status of a figure.
+
+    A limb that was lost is lost until it lies in voxels like a good one: on its way through the trunk it has not been
+    found.
 
     Args:
         state: as tracked.
         frame: the voxels.
-        unexplained: voxels near the figure that belong to no part, (N, 3), metres.
+        unexplained: what the voxels hold besides.
         innovation: normalized innovation of the frame, per row.
         coarse: notes on the limbs that the voxels do not resolve.
+        lost_before: the `lost_limbs` of the frame before.
     """
     if frame.n_views < 2:
         return FigureAssessment("lost", "fewer than two views show anybody: the body is where it was predicted")
@@ -54,10 +66,13 @@ def assess(
     shares = {name: float(inside[list(parts)].min()) for name, parts in LIMBS.items()}
     worst = min(shares, key=lambda n: shares[n])
     display = worst.replace("_", " ")
-    volume = len(unexplained) * frame.voxels.grid.size_m**3 / _forearm_m3(state)
-    if shares[worst] < _LOST_SHARE or inside[:2].min() < _LOST_SHARE:
-        return FigureAssessment("lost", f"{display} outside of the voxels" if shares[worst] < _LOST_SHARE else
-                                "trunk or head outside of the voxels")  # fmt: skip
+    volume = len(unexplained.points) * frame.voxels.grid.size_m**3 / _forearm_m3(state)
+    lost = frozenset(n for n, s in shares.items() if s < (_DOUBTFUL_SHARE if n in lost_before else _LOST_SHARE))
+    if lost:
+        display = min(lost, key=lambda n: shares[n]).replace("_", " ")
+        return FigureAssessment("lost", f"{display} outside of the voxels", lost)
+    if inside[:2].min() < _LOST_SHARE:
+        return FigureAssessment("lost", "trunk or head outside of the voxels")
     if volume > _LOST_VOLUME:
         return FigureAssessment("lost", "voxels that no part explains: a limb is elsewhere")
     if coarse:
@@ -66,6 +81,8 @@ def assess(
         return FigureAssessment("doubtful", f"{display} partly outside of the voxels")
     if volume > _DOUBTFUL_VOLUME:
         return FigureAssessment("doubtful", "voxels that no part explains")
+    if unexplained.touches:
+        return FigureAssessment("doubtful", "touches another person in the voxels")
     if innovation > _MAX_INNOVATION:
         return FigureAssessment("doubtful", "moved farther than predicted")
     if frame.broken:
@@ -76,23 +93,53 @@ def assess(
     return FigureAssessment("good", "")
 
 
-def unexplained_voxels(points: Array, states: Sequence[FilterState]) -> Array:
-    """Return the voxels that lie beside all parts of all people, (N, 3), metres. Feet are no parts of a figure.
+class UnexplainedVoxels(NamedTuple):
+    """What the voxels around a person hold beside all figures."""
+
+    points: Array
+    """Voxels beside all parts of all people that are connected with the person and closest to them, (N, 3), metres."""
+    touches: bool
+    """Whether voxels connect the person with another one."""
+
+
+def unexplained_voxels(voxels: Voxels, states: Sequence[FilterState]) -> list[UnexplainedVoxels]:
+    """Return for each person the voxels that no figure explains. Feet are no parts of a figure.
+
+    Lines of sight to several people also meet where nobody is: voxels that are connected with nobody count for nobody.
 
     Args:
-        points: centres of the voxels, (M, 3), metres.
+        voxels: of the frame.
         states: the figures of all people.
     """
-    free = np.ones(len(points), dtype=bool)
-    for state in states:
-        halves = state.sizes[:, 2, None] * state.rotations[:, :, 2]
-        offsets = points[:, None] - state.centers
-        along = np.clip(np.einsum("nmi,mi->nm", offsets, halves) / np.sum(halves**2, axis=1), -1, 1)
-        distances = np.linalg.norm(offsets - along[..., None] * halves, axis=2)
-        free &= (distances > state.sizes[:, :2].max(axis=1) + _BESIDE_M).all(axis=1)
+    points = voxels.points_world
+    distances, is_free = np.empty((len(states), len(points))), np.ones(len(points), dtype=bool)
+    for p, state in enumerate(states):
+        distances[p] = _distances(points, state)
+        is_free &= distances[p] > _BESIDE_M
         for calf in (8, 9):
-            free &= np.linalg.norm(points - (state.centers[calf] - halves[calf]), axis=1) > _FOOT_M
-    return points[free]
+            foot = state.centers[calf] - state.sizes[calf, 2] * state.rotations[calf, :, 2]
+            is_free &= np.linalg.norm(points - foot, axis=1) > _FOOT_M
+    if len(states) == 1:
+        return [UnexplainedVoxels(points[is_free], False)]
+    from scipy.ndimage import label  # imported lazily: loading scipy takes 0.2 s
+
+    regions = label(voxels.occupied, np.ones((3, 3, 3)))[0][tuple(voxels.indices.T)]
+    touched = [np.unique(regions[d <= 0]) for d in distances]
+    closest, found = distances.argmin(axis=0), []
+    for p, own in enumerate(touched):
+        others = np.concatenate([t for q, t in enumerate(touched) if q != p])
+        mine = points[is_free & (closest == p) & np.isin(regions, own)]
+        found.append(UnexplainedVoxels(mine, bool(np.isin(own, others).any())))
+    return found
+
+
+def _distances(points: Array, state: FilterState) -> Array:
+    """Return the distance of points, (N, 3), from the surface of the closest part, (N,), metres; negative inside."""
+    halves = state.sizes[:, 2, None] * state.rotations[:, :, 2]
+    offsets = points[:, None] - state.centers
+    along = np.clip(np.einsum("nmi,mi->nm", offsets, halves) / np.sum(halves**2, axis=1), -1, 1)
+    distances = np.linalg.norm(offsets - along[..., None] * halves, axis=2) - state.sizes[:, :2].max(axis=1)
+    return np.asarray(distances.min(axis=1))
 
 
 def _forearm_m3(state: FilterState) -> float:

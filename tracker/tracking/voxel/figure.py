@@ -23,7 +23,7 @@ N_PARTS = len(PARTS)
 TORSO, HEAD = 0, 1
 LIMBS = {"left_arm": (2, 6), "right_arm": (3, 7), "left_leg": (4, 8), "right_leg": (5, 9)}
 """Upper and lower part of each limb."""
-_ROOTS = {
+ROOTS = {
     "head": "neck", "left_upper_arm": "left_shoulder", "right_upper_arm": "right_shoulder", "left_thigh": "left_hip",
     "right_thigh": "right_hip", "left_forearm": "left_elbow", "right_forearm": "right_elbow",
     "left_calf": "left_knee", "right_calf": "right_knee",
@@ -74,7 +74,7 @@ def figure_of(model: BodyModel) -> FigureOfBody:
     Raises:
         TrackerError: the body lacks the joints of ten parts.
     """
-    needed = {*_ROOTS.values(), *_ENDS.values()}
+    needed = {*ROOTS.values(), *_ENDS.values()}
     if not needed <= set(model.point_names):
         missing = ", ".join(sorted(needed - set(model.point_names)))
         raise TrackerError(
@@ -85,7 +85,7 @@ def figure_of(model: BodyModel) -> FigureOfBody:
     points = dict(zip(model.point_names, body.points_world, strict=True))
     members = _members(model)
     boxes = np.array([_box(body, m) for m in members])
-    joints = np.array([points[_ROOTS[n]] if n in _ROOTS else np.zeros(3) for n in PARTS])
+    joints = np.array([points[ROOTS[n]] if n in ROOTS else np.zeros(3) for n in PARTS])
     _between_joints(boxes, joints)
     centers, sizes = boxes.mean(axis=1), (boxes[:, 1] - boxes[:, 0]) / 2
     ends = np.array([points[_ENDS[n]] if n in _ENDS else np.full(3, np.nan) for n in PARTS])
@@ -124,7 +124,7 @@ def torso_center(body: PosedBody, of: FigureOfBody, rotation: Array) -> Array:
     found = []
     for part, weight in ((1, 2.0), (4, 1.0), (5, 1.0)):
         at = rotation @ (of.figure.parent_shares[part] * of.sizes[TORSO])
-        found.append(weight * (points[_ROOTS[PARTS[part]]] - at))
+        found.append(weight * (points[ROOTS[PARTS[part]]] - at))
     return np.asarray(np.sum(found, axis=0) / 4.0)
 
 
@@ -151,7 +151,7 @@ def joint_points(figure: FigureJoints, sizes: Array, rotations: Array, centers: 
     found = {}
     for i, name in enumerate(PARTS):
         if i:
-            found[_ROOTS[name]] = centers[i] + rotations[i] @ (figure.own_shares[i] * sizes[i])
+            found[ROOTS[name]] = centers[i] + rotations[i] @ (figure.own_shares[i] * sizes[i])
         if name in _ENDS:
             found[_ENDS[name]] = centers[i] + rotations[i] @ (figure.end_shares[i] * sizes[i])
     return found
@@ -159,13 +159,13 @@ def joint_points(figure: FigureJoints, sizes: Array, rotations: Array, centers: 
 
 def point_shares(figure: FigureJoints) -> tuple[tuple[str, int, Array], ...]:
     """Return the points of `joint_points`: name, index of the part, and position in its half sizes, (3,)."""
-    roots = tuple((_ROOTS[n], i, figure.own_shares[i]) for i, n in enumerate(PARTS) if i)
+    roots = tuple((ROOTS[n], i, figure.own_shares[i]) for i, n in enumerate(PARTS) if i)
     return roots + tuple((_ENDS[n], i, figure.end_shares[i]) for i, n in enumerate(PARTS) if n in _ENDS)
 
 
 def _members(model: BodyModel) -> tuple[IntArray, ...]:
     """Return the parts of a body that each part of the figure stands for, the first one at its joint."""
-    begins = {model.joints[j].child: PARTS.index(n) for n, root in _ROOTS.items()
+    begins = {model.joints[j].child: PARTS.index(n) for n, root in ROOTS.items()
               for j in [[x.name for x in model.joints].index(root)]}  # fmt: skip
     of = np.zeros(len(model.parts), dtype=np.int64)
     for i, part in enumerate(model.parts):

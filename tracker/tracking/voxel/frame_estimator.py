@@ -52,6 +52,7 @@ class VoxelEstimator:
         ]
         self._has_motion = [len(s) > 1 for s in starts]
         self._levels = [DetailLevels.finest()] * len(starts)
+        self._lost_limbs = [frozenset[str]()] * len(starts)
         self.labels: Labels | None = None
         self.voxels: FrameVoxels | None = None
 
@@ -78,7 +79,7 @@ class VoxelEstimator:
         if settings.levels:
             for p in updates:
                 self._find_levels(p, states, found, _PATIENCE)
-        return self._estimate(frame, found, points, updates)
+        return self._estimate(frame, found, updates)
 
     def _adjusted(self, p: int, states: list[FilterState], found: FrameVoxels) -> Update:
         """Return the adjustment of a person in the first frame, with the levels that its result shows."""
@@ -142,9 +143,10 @@ class VoxelEstimator:
         allowed = part_rotations(body, figure_of(model))
         return update(state, lambda s: linearize_rotations(s, allowed, sigma)).state
 
-    def _estimate(self, frame: int, found: FrameVoxels, points: Array, updates: dict[int, Update]) -> PoseEstimate:
+    def _estimate(self, frame: int, found: FrameVoxels, updates: dict[int, Update]) -> PoseEstimate:
         subjects = self._run.subjects
         n_views = len(self._run.observer.cameras)
+        free = unexplained_voxels(found.voxels, self.states)
         poses, statuses, notes, covariances = list(self._poses), list[Status](), list[str](), list[Array]()
         for p, model in enumerate(subjects.models):
             if p not in updates:
@@ -155,13 +157,17 @@ class VoxelEstimator:
             state = self.states[p]
             body = pose_of(model, state, poses[p], subjects.active_dofs[p])
             poses[p] = body.values
-            free = unexplained_voxels(points, self.states)
             per_row = updates[p].normalized_innovation / max(1, updates[p].n_rows)
-            verdict = assess(state, found, free, per_row, self._levels[p].notes)
+            verdict = assess(state, found, free[p], per_row, self._levels[p].notes, self._lost_limbs[p])
+            self._lost_limbs[p] = verdict.lost_limbs
             statuses.append(verdict.status)
             notes.append(verdict.note)
             covariances.append(body.covariance)
         self._poses = poses
+        if "lost" in statuses:  # whose voxels have no owner but the others
+            for p, status in enumerate(statuses):
+                if status == "good" and p in updates:
+                    statuses[p], notes[p] = "doubtful", "another person is lost: nothing tells their voxels apart"
         hidden = tuple(np.full(len(m.parts), np.nan) for m in subjects.models)
         return PoseEstimate(
             frame, tuple(poses), float("nan"), np.full(n_views, np.nan), 0, tuple(statuses), tuple(notes), hidden,

@@ -17,6 +17,15 @@ MIN_VOXEL_M, MAX_VOXEL_M = 0.01, 0.10
 """Smallest and largest edge of a voxel, metres: a forearm is no wider than the largest."""
 
 
+def check_voxel_size(voxel_m: float) -> None:
+    """Raise a `TrackerError` for an edge of a voxel, metres, that shows no limbs, or too much."""
+    if not MIN_VOXEL_M <= voxel_m <= MAX_VOXEL_M:
+        raise TrackerError(
+            f"expected voxels of {1000 * MIN_VOXEL_M:g} to {1000 * MAX_VOXEL_M:g} mm, found {1000 * voxel_m:g} mm; "
+            "25 to 50 mm are usual"
+        )
+
+
 @dataclass(frozen=True)
 class VoxelSettings:
     """Settings of the voxel tracker."""
@@ -61,11 +70,7 @@ class VoxelSettings:
 
     def __post_init__(self) -> None:
         """Check the settings; raise a TrackerError for a voxel size that shows no limbs, or too much."""
-        if not MIN_VOXEL_M <= self.voxel_m <= MAX_VOXEL_M:
-            raise TrackerError(
-                f"expected voxels of {1000 * MIN_VOXEL_M:g} to {1000 * MAX_VOXEL_M:g} mm, found "
-                f"{1000 * self.voxel_m:g} mm; 25 to 50 mm are usual"
-            )
+        check_voxel_size(self.voxel_m)
 
     @property
     def label_rule(self) -> LabelRule:

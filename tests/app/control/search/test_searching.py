@@ -222,6 +222,22 @@ def test_the_shown_source_is_the_stored_one(opened):
     assert source_of(controller) == "fitted"
 
 
+def test_contours_are_fitted_chain_by_chain(opened):
+    """The root comes first; every chain is a stage of the replay, and the run is one entry of the history."""
+    controller = opened()
+    controller.search.fit_contours(by_chains=True)
+    wait_for(lambda: controller.state.search.message)
+    with controller.lock:
+        run = controller.replay.runs()[-1]
+    stages = [run.stages[s.stage].name for s in run.steps]
+    assert stages[0] == "root"
+    assert stages[-1] == "whole body"
+    assert set(stages) == {s.name for s in run.stages}
+    assert run.is_contour_fit
+    controller.replay.show(run.number, 1)
+    assert controller.state.search_view.replay.stage == stages[1]
+
+
 def test_contours_are_fitted_iteration_by_iteration(opened):
     """Each iteration lowers the distance of the contours, and is replayed with the contours at the start beside it."""
     controller = opened()

@@ -3,7 +3,6 @@
 import os
 import signal
 import sys
-import threading
 import time
 from types import SimpleNamespace
 
@@ -17,6 +16,7 @@ from app.runtime import kernel_compiler
 from app.runtime.kernel_compiler import KernelCompiler
 from app.state.page_view import View
 from tracker.compute import kernel_cache
+from tracker.compute.interpretation import is_interpreted
 from tracker.compute.kernel_cache import STAGES, compiled_mark, compiled_stages, record_compiled, record_stage
 
 VIEW = View(frozenset({"contours"}), (1, 0, 0, 0))
@@ -57,10 +57,12 @@ def test_the_page_shows_each_thing_once_its_kernels_are_compiled(compiling):
     assert compiling.frames.cached_evidence(0) is None
     record_stage("evidence")
     wait_for(lambda: compiling.frames.cached_evidence(0) is not None)
-    assert state.state.cost_px is None
+    wait_for(lambda: state.state.cost_px is not None)  # interpreted
+    assert state.state.compiling == "cost"
+    interpreted_px = state.state.cost_px
     record_stage("cost")
-    wait_for(lambda: state.state.cost_px is not None)
-    assert state.state.compiling == "tracking"
+    wait_for(lambda: state.state.compiling == "tracking")
+    assert state.state.cost_px == pytest.approx(interpreted_px, rel=1e-4)
     record_compiled()
     wait_for(lambda: state.state.compiling is None)
 
@@ -108,17 +110,22 @@ def test_closing_ends_the_program_and_what_it_started(empty_cache):
     wait_for(is_gone)
 
 
-def test_the_first_kernels_are_waited_for_until_they_are_there_or_never_come(empty_cache):
+def test_bodies_are_placed_by_interpreted_kernels_until_these_are_compiled(empty_cache):
     compiler = KernelCompiler(WAITS)
-    waiting = threading.Thread(target=compiler.wait_for, args=("posing",))
-    waiting.start()
-    waiting.join(0.3)
-    assert waiting.is_alive()
+    assert is_interpreted("tracker.body.kinematics")
+    assert not is_interpreted("tracker.images.edges")
+    assert compiler.follow() == frozenset()
+    assert is_interpreted("tracker.body.kinematics")
     record_stage("posing")
-    waiting.join(5)
-    assert not waiting.is_alive()
+    assert compiler.follow() == {"posing"}
+    assert not is_interpreted("tracker.body.kinematics")
     compiler.close()
-    KernelCompiler(FAILS).wait_for("contours")
+
+
+@pytest.mark.parametrize("end", [KernelCompiler.close, lambda compiler: wait_for(compiler.follow)])
+def test_nothing_is_interpreted_after_the_program(empty_cache, end):
+    end(KernelCompiler(FAILS))
+    assert not is_interpreted("tracker.body.kinematics")
 
 
 def test_a_program_that_fails_is_reported_and_the_page_goes_on(opened, empty_cache, caplog):
@@ -163,7 +170,7 @@ def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monk
         compile_kernels, "_track", lambda cameras, settings, models, start: tracked.append((cameras, settings, models))
     )
     compile_kernels.main(background=True)
-    assert priorities == [19]
+    assert priorities == [19, 19]  # of the program, and of the process beside it after the evidence
     assert beside == ["started", "joined"]
     assert sorted(stages) == sorted(STAGES[:4])
     assert [(s.estimate, len(m), c[0].background is None) for c, s, m in tracked] == [

@@ -53,6 +53,7 @@ def test_poses_keep_the_limits_and_move_smoothly(performances, true_model):
         assert np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1).max() < 0.09, (scene, seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", [s if s == "tango" else pytest.param(s, marks=pytest.mark.slow) for s in TOGETHER])
 def test_people_together_keep_the_limits_and_their_distance_and_move_smoothly(scene):
     cast = cast_of(scene, 3)
@@ -70,6 +71,7 @@ def test_people_together_keep_the_limits_and_their_distance_and_move_smoothly(sc
         assert np.abs(apart.min() - wanted) < 0.15
 
 
+@pytest.mark.slow
 def test_the_tango_turns_once_in_sixty_frames_face_to_face():
     cast = cast_of("tango")
     models = [altered_model(load_model("gavrila22", role.height_m), role.build.bone_factors) for role in cast]

@@ -25,6 +25,7 @@ def standing(model, x=0.0, y=0.0):
     return values
 
 
+@pytest.mark.slow
 def test_the_person_stands_out_and_the_room_stays(backdrops, skin):
     moment = freeze([skin], [standing(skin.model)])
     for backdrop in backdrops:

@@ -300,6 +300,7 @@ def test_a_sample_frame_is_drawn_to_its_truth(real_frame, sample_folder):
     assert last.best_px < pose_cost(views, [model], [start], TrackSettings())([start]).total_px
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_people", [1, 2])
 def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypatch, n_people):
     """One person of the sample, and two, as if there were another: each as they stand a frame before."""
@@ -327,6 +328,7 @@ def test_poses_do_not_depend_on_what_was_looked_at_ahead(sample_folder, monkeypa
             np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_a_real_recording(data_folder, tmp_path):
     """Three frames of a cluttered room from the reference's pose, as `init --method joints` sets it."""
     folder = data_folder("balance_real")

@@ -9,6 +9,9 @@ from staging import cameras_around, in_posture, own_evidence
 from tracker.body.model import PosedBody
 from tracker.formats.model_toml import load_model
 from tracker.tracking.contour.fit_steps import FitPlan, contour_steps, residual_segments
+from tracker.tracking.contour.paper import paper_settings
+from tracker.tracking.contour.paper_fit import paper_residuals, unlimited_views
+from tracker.tracking.estimation.incremental_fit import fit_by_chains, fit_chains
 
 BODY = load_model("gavrila22_cones")
 
@@ -38,6 +41,38 @@ def test_locked_degrees_of_freedom_stay(views):
     *_, last = contour_steps(views, [moved(0.02)], FitPlan([BODY], [active]))
     np.testing.assert_array_equal(last.best[0][~active], moved(0.02)[~active])
     assert FitPlan([BODY], [np.zeros(BODY.n_dofs, bool)]).stages == []
+
+
+def test_a_rough_pose_is_fitted_chain_by_chain(views):
+    """Root, limbs, whole body: each stage moves its own chain alone, and ends as the tracker's start does."""
+    rough = moved(0.03) + np.where(np.char.find(BODY.dof_names, "left_elbow") >= 0, 0.3, 0.0)
+    plan = FitPlan([BODY], [np.ones(BODY.n_dofs, bool)], by_chains=True)
+    names = [name for name, dofs in fit_chains(BODY) if dofs.any()]  # this body has no joints in the trunk
+    assert [s.name for s in plan.stages] == names
+    assert (names[0], names[-1]) == ("root", "whole body")
+    steps, before, left = list(contour_steps(views, [rough], plan)), rough, {n: 0 for n in names}
+    for step in steps:
+        moves = np.flatnonzero(step.best[0] != before)
+        assert set(np.array(BODY.dof_names)[moves]) <= set(step.stage.group.dofs)
+        before, left[step.stage.name] = step.best[0], left[step.stage.name] + 1
+    assert min(left.values()) >= 1
+    assert [s.evaluations for s in steps] == sorted(s.evaluations for s in steps)
+    assert [s.stage.name for s in steps if s.stage_done] == names
+    px = [s.best_px for s in steps]
+    assert px == sorted(px, reverse=True)
+    assert px[-1] < 0.3 * px[0]
+    unlimited, settings = unlimited_views(views, paper_settings()), paper_settings()
+    residuals = paper_residuals(unlimited, [PosedBody(BODY, rough)], 0, settings)
+    *_, last = fit_by_chains(BODY, rough, [residuals])
+    np.testing.assert_allclose(steps[-1].best[0], last.fit.pose, atol=2e-3)
+
+
+def test_locked_chains_are_left_out(views):
+    active = np.array([not n.startswith("torso") for n in BODY.dof_names])
+    plan = FitPlan([BODY], [active], by_chains=True)
+    assert "root" not in [s.name for s in plan.stages]
+    *_, last = contour_steps(views, [moved(0.02)], plan)
+    np.testing.assert_array_equal(last.best[0][~active], moved(0.02)[~active])
 
 
 def test_residuals_end_on_the_image_contours(views):

@@ -68,6 +68,7 @@ LOST = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "colors", "least"), [("gavrila22", True, 7), ("gavrila22", False, 7), ("gavrila34", True, 8)]
 )

@@ -1,0 +1,98 @@
+"""Compare the poses of a range of frames with those that they replaced, such as those of another tracker."""
+
+import numpy as np
+
+from app.control.session.session_state import SessionState
+from app.runtime.jobs import LatestWinsWorker
+from app.state.comparison import ComparedFrame, RangeComparison
+from app.state.state import State
+from tracker.body.limbs import display_name
+from tracker.errors import TrackerError
+from tracker.geometry.arrays import Array
+from tracker.pipeline.tracked_changes import recorded_method
+from tracker.store.records import SOURCES, PoseRecord
+
+_REST_S = 0.3
+"""Minimum time between two comparisons: a tracker writes twice a second."""
+
+
+class ComparingRuns:
+    """Compares one range at a time. The comparison follows every edit."""
+
+    def __init__(self, session_state: SessionState) -> None:
+        """Compare nothing yet."""
+        self._session_state = session_state
+        self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._refresh, "comparison", _REST_S)
+        self._offered = session_state.state.timeline_version
+        session_state.subscribe(self._changed)
+
+    def compare(self, first: int, last: int) -> None:
+        """Compare the poses of a range, `last` included, with those before them.
+
+        Raises:
+            TrackerError: no pose of the range has replaced another.
+        """
+        first, last = sorted((first, last))
+        found = self._compared(first, last)
+        if not any(found.frames):
+            raise TrackerError(
+                f"expected frames among {first} to {last} whose pose replaced another, found none; "
+                "track them again by another method first"
+            )
+        with self._session_state.lock:
+            self._session_state.set(range_comparison=found)
+
+    def leave(self) -> None:
+        """End the comparison."""
+        with self._session_state.lock:
+            self._session_state.set(range_comparison=None)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._latest.close()
+
+    def _changed(self, state: State) -> None:
+        if state.timeline_version != self._offered:
+            self._offered = state.timeline_version
+            if state.range_comparison is not None:
+                self._latest.offer(state.timeline_version)
+
+    def _refresh(self, _: int) -> None:
+        before = self._session_state.state.range_comparison
+        if before is None:
+            return
+        found = self._compared(before.first, before.last)
+        with self._session_state.lock:
+            if self._session_state.state.range_comparison is before:
+                self._session_state.set(range_comparison=found)
+
+    def _compared(self, first: int, last: int) -> RangeComparison:
+        session_state, frames = self._session_state, range(first, last + 1)
+        rows, poses = list[tuple[ComparedFrame, ...]](), dict[int, dict[int, Array]]()
+        for person in range(len(session_state.models)):
+            of_person = list[ComparedFrame]()
+            with session_state.lock:
+                pairs = session_state.saver.replaced(person, frames)
+            for frame, (now, other) in pairs.items():
+                found = self._frame(person, frame, now, other)
+                of_person.append(found)
+                poses.setdefault(frame, {})[person] = found.other_pose
+            rows.append(tuple(of_person))
+        return RangeComparison(first, last, tuple(rows), poses)
+
+    def _frame(self, person: int, frame: int, now: PoseRecord, other: PoseRecord) -> ComparedFrame:
+        revisions = self._session_state.saver.revisions
+        model = self._session_state.session.people[person].model
+        pair = [revisions.in_present_body(person, r.values, r.model_revision) for r in (now, other)]
+        apart_m = np.linalg.norm(model.points_world(pair[0]) - model.points_world(pair[1]), axis=1)
+        at = int(apart_m.argmax())
+        return ComparedFrame(
+            frame, method_of(now), method_of(other), now.cost_px, other.cost_px, now.status, other.status,
+            float(apart_m.mean()), float(apart_m[at]), display_name(model.point_names[at]), pair[1],
+        )  # fmt: skip
+
+
+def method_of(record: PoseRecord) -> str:
+    """Return how a pose was made, as text: the tracker's method, otherwise the most manual source of its values."""
+    source = min(record.sources, key=SOURCES.index)
+    return recorded_method(record.settings) if source == "tracked" else source

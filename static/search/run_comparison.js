@@ -1,0 +1,147 @@
+/** Tab of the drawer that compares the poses of a range with those that they replaced, such as those of another tracker. */
+
+import { button, byId } from "../widgets/elements.js";
+import { count, displayName } from "../widgets/text.js";
+
+/** @typedef {import("../model/protocol.js").ComparedPose} ComparedPose */
+
+/** Smallest difference of costs that counts, px: as much as is displayed. */
+const LEAST_PX = 0.005;
+
+export class RunComparison {
+  #store;
+  #navigation;
+  #panel = byId("run-comparison", HTMLElement);
+  #controls = byId("run-comparison-controls", HTMLElement);
+  #text = byId("run-comparison-text", HTMLElement);
+  #empty = byId("run-comparison-empty", HTMLElement);
+  #table = byId("run-comparison-table", HTMLTableElement);
+  #rows = byId("run-comparison-rows", HTMLElement);
+  #heads = [byId("run-comparison-now", HTMLElement), byId("run-comparison-other", HTMLElement)];
+  #take;
+  #end;
+
+  /**
+   * @param {import("../model/store.js").Store} store
+   * @param {import("../model/navigation.js").Navigation} navigation
+   * @param {import("../model/actions.js").Actions} actions
+   */
+  constructor(store, navigation, actions) {
+    this.#store = store;
+    this.#navigation = navigation;
+    this.#take = button("run-comparison-take", () => actions.takeReplaced());
+    this.#end = button("run-comparison-end", () => actions.compareRange(false));
+    store.subscribe((changed) => {
+      const isOpen = store.facts.drawer === "runs";
+      this.#panel.hidden = this.#controls.hidden = !isOpen;
+      if (!isOpen) return;
+      if (["drawer", "rangeComparison", "state", "connected"].some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) this.#show();
+      if (changed.has("drawer") || changed.has("rangeComparison") || changed.has("target")) this.#mark();
+    });
+  }
+
+  #show() {
+    const { rangeComparison, state, session, connected } = this.#store.facts;
+    const person = state?.person ?? 0;
+    const poses = rangeComparison?.people[person] ?? [];
+    const name = (session?.people.length ?? 1) > 1 ? ` of ${session?.people[person].name}` : "";
+    const isBusy = !connected || !!state?.range?.running || !!state?.track.running;
+    this.#take.disabled = isBusy || poses.length === 0;
+    this.#end.disabled = !connected || !rangeComparison;
+    this.#empty.hidden = poses.length > 0;
+    this.#table.hidden = poses.length === 0;
+    this.#empty.textContent = rangeComparison
+      ? `No pose${name} in this range replaced another.`
+      : "Track a range by one method, then by the other. Mark the range in the timeline and press Compare.";
+    this.#text.textContent = poses.length > 0 ? summary(poses, name) : "";
+    this.#heads[0].textContent = `Present: ${methods(poses.map(({ method }) => method))}, cost in px and status`;
+    this.#heads[1].textContent = `Replaced: ${methods(poses.map(({ other_method }) => other_method))}, cost in px and status`;
+    const largest = Math.max(1, ...poses.map(({ apart_mm }) => apart_mm));
+    this.#rows.replaceChildren(...poses.map((pose) => this.#row(pose, largest)));
+    this.#mark();
+  }
+
+  /**
+   * @param {ComparedPose} pose
+   * @param {number} largest mean distance of all rows, mm
+   */
+  #row(pose, largest) {
+    const row = document.createElement("tr");
+    row.dataset.frame = String(pose.frame);
+    row.addEventListener("click", () => this.#navigation.goTo(pose.frame));
+    const head = document.createElement("th");
+    head.scope = "row";
+    const go = document.createElement("button");
+    go.type = "button";
+    go.textContent = String(pose.frame);
+    go.title = `Go to frame ${pose.frame}`;
+    head.append(go);
+    const [now, other] = [pose.cost_px, pose.other_cost_px];
+    const apart = cell(pose.apart_mm.toFixed(1));
+    apart.className = "run-comparison-apart";
+    apart.style.setProperty("--share", String(pose.apart_mm / largest));
+    row.append(
+      head,
+      cost(now, other),
+      status(pose.status),
+      cost(other, now),
+      status(pose.other_status),
+      apart,
+      cell(`${pose.farthest_mm.toFixed(1)}, ${pose.farthest}`),
+    );
+    return row;
+  }
+
+  #mark() {
+    const { target } = this.#store.facts;
+    for (const row of this.#rows.children) {
+      const isCurrent = /** @type {HTMLElement} */ (row).dataset.frame === String(target);
+      if (row.classList.contains("is-current") === isCurrent) continue;
+      row.classList.toggle("is-current", isCurrent);
+      row.setAttribute("aria-current", String(isCurrent));
+      if (isCurrent) row.scrollIntoView({ block: "nearest" });
+    }
+  }
+}
+
+/**
+ * @param {ComparedPose[]} poses
+ * @param {string} name
+ */
+function summary(poses, name) {
+  const mean = poses.reduce((sum, { apart_mm }) => sum + apart_mm, 0) / poses.length;
+  const known = poses.filter(({ cost_px, other_cost_px }) => cost_px !== null && other_cost_px !== null);
+  const better = known.filter(({ cost_px, other_cost_px }) => (cost_px ?? 0) < (other_cost_px ?? 0) - LEAST_PX).length;
+  const lost = [poses.filter(({ status: s }) => s === "lost").length, poses.filter(({ other_status: s }) => s === "lost").length];
+  const frames = `${count(poses.length)} frame${poses.length === 1 ? "" : "s"}`;
+  return `${frames}${name}: ${mean.toFixed(1)} mm apart, present pose cheaper on ${count(better)}, lost ${lost[0]} against ${lost[1]}`;
+}
+
+/** @param {string[]} all */
+function methods(all) {
+  return [...new Set(all)].map(displayName).join(", ");
+}
+
+/** @param {string} text */
+function cell(text) {
+  const element = document.createElement("td");
+  element.textContent = text;
+  return element;
+}
+
+/**
+ * @param {number | null} own
+ * @param {number | null} other
+ */
+function cost(own, other) {
+  const element = cell(own === null ? "–" : own.toFixed(2));
+  element.classList.toggle("is-better", own !== null && other !== null && own < other - LEAST_PX);
+  return element;
+}
+
+/** @param {string} text */
+function status(text) {
+  const element = cell(text || "–");
+  element.dataset.status = text;
+  return element;
+}

@@ -1,0 +1,44 @@
+"""Voxels at the command line: `track --method voxel` and `init --method voxels`, their options and refusals."""
+
+import json
+
+import pytest
+from command_line import SAMPLE, assert_refused, stored
+
+
+@pytest.fixture
+def placed(run, session):
+    """The sample with the known pose of one frame."""
+    assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "20", "--json")[0] == 0
+    return session
+
+
+def test_track_by_voxels(run, placed):
+    words = ("track", placed, "--frames", "20:23", "--method", "voxel", "--voxel-size", "50", "--sizes", "frozen")
+    status, out, _ = run(*words, "--json")
+    assert status == 0
+    assert json.loads(out)["frames"] == 3
+    poses = stored(placed)
+    assert {poses[k].settings["method"] for k in (21, 22)} == {"voxel"}
+
+
+def test_options_of_other_methods_are_refused(run, placed):
+    before = sorted(stored(placed))
+    for words, expected in (
+        (("--method", "voxel", "--theta", "20"), "'voxel', found --theta"),
+        (("--method", "voxel", "--order", "1", "--window", "4"), "'voxel', found --order, --window"),
+        (("--voxel-size", "30"), "'chamfer', found --voxel-size"),
+        (("--method", "contour", "--sizes", "always"), "'contour', found --sizes"),
+        (("--method", "voxel", "--voxel-size", "0"), "voxels of 10 to 100 mm, found 0 mm"),
+        (("--method", "voxel", "--voxel-size", "nan"), "found nan"),
+        (("--method", "voxel", "--paper"), "the paper's body mikic10"),
+    ):
+        assert_refused(run("track", placed, "--frames", "20:22", *words), [expected])
+        assert sorted(stored(placed)) == before
+
+
+def test_init_by_voxels_refuses_sizes_that_show_no_limbs(run, session):
+    for size in ("0", "-5", "500"):
+        expected = f"voxels of 10 to 100 mm, found {size} mm"
+        assert_refused(run("init", session, "--method", "voxels", "--frame", "3", "--voxel-size", size), [expected])
+    assert not (session / "annotations.sqlite").exists()

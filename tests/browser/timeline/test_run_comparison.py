@@ -1,0 +1,58 @@
+"""The drawer's comparison of the poses of a range with those that they replaced."""
+
+from page_driver import shows, until
+
+ROWS = "[...document.querySelectorAll('#run-comparison-rows tr')]"
+
+
+def pose(frame, cost_px, other_cost_px, status, other_status, apart_mm):
+    return {
+        "frame": frame, "method": "contour", "other_method": "chamfer", "cost_px": cost_px,
+        "other_cost_px": other_cost_px, "status": status, "other_status": other_status, "apart_mm": apart_mm,
+        "farthest_mm": 3 * apart_mm, "farthest": "left wrist",
+    }  # fmt: skip
+
+
+COMPARED = {
+    "type": "range_comparison", "first": 24, "last": 36,
+    "people": [[pose(24, 2.5, 3.0, "good", "lost", 20.0), pose(25, 2.5, 2.25, "doubtful", "good", 40.0),
+                pose(26, None, 2.0, "", "good", 30.0)]],
+}  # fmt: skip
+
+
+async def open_comparison(page, endpoint):
+    await page.locator("#show-curves").click()
+    await page.locator("#drawer-tabs").get_by_text("Compare").click()
+    await page.locator("#run-comparison-empty").wait_for()
+    assert await page.locator("#run-comparison-take").is_disabled()
+    await endpoint.broadcast(COMPARED)
+    await shows(page, f"{ROWS}.length === 3")
+
+
+async def test_a_range_is_compared_frame_by_frame(page, endpoint):
+    await open_comparison(page, endpoint)
+    heads = await page.locator("#run-comparison-table thead th").all_inner_texts()
+    assert heads[1:3] == ["Present: contour, cost in px and status", "Replaced: chamfer, cost in px and status"]
+    texts = [row.split("\t") for row in await page.locator("#run-comparison-rows tr").all_inner_texts()]
+    assert texts[0] == ["24", "2.50", "good", "3.00", "lost", "20.0", "60.0, left wrist"]
+    assert texts[2][1:3] == ["–", "–"]
+    summary = await page.locator("#run-comparison-text").inner_text()
+    assert summary == "3 frames: 30.0 mm apart, present pose cheaper on 1, lost 0 against 1"
+    await page.locator("#run-comparison-rows tr").nth(1).click()
+    await until(lambda: endpoint.heard("seek"))
+    assert endpoint.heard("seek")[-1]["frame"] == 25
+    await shows(page, f"{ROWS}[1].classList.contains('is-current') && !{ROWS}[0].classList.contains('is-current')")
+
+
+async def test_the_replaced_poses_are_taken_and_the_comparison_ends(page, endpoint):
+    await open_comparison(page, endpoint)
+    await page.locator("#run-comparison-take").click()
+    await until(lambda: endpoint.heard("range"))
+    assert endpoint.heard("range") == [
+        {"type": "range", "action": "take_replaced", "first": 24, "last": 36, "person": None}
+    ]
+    await page.locator("#run-comparison-end").click()
+    await until(lambda: endpoint.heard("compare_range"))
+    assert endpoint.heard("compare_range") == [{"type": "compare_range", "first": None, "last": None}]
+    await endpoint.broadcast({"type": "range_comparison", "first": None, "last": None, "people": []})
+    await shows(page, f"{ROWS}.length === 0 && !document.querySelector('#run-comparison-empty').hidden")

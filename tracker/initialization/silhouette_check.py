@@ -1,0 +1,65 @@
+"""Check a start pose against the silhouettes of its person: never a body in empty space."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.body.model import PosedBody
+from tracker.contours.body_silhouette import body_silhouette
+from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.geometry.arrays import Array
+from tracker.images.background_subtraction import Mask
+from tracker.voxels.figure_masks import FigureMask
+
+_MIN_OVERLAP = 0.55
+"""Smallest overlap with the silhouettes in half of the views. A body of other proportions in about the right pose has
+two thirds or more, one that stands beside the person or upside down a half or less."""
+
+
+class SilhouetteCheck(NamedTuple):
+    """How well a body fills the silhouettes of its person."""
+
+    cameras: tuple[str, ...]
+    """Names of the views that show the person alone."""
+    overlaps: Array
+    """In each of these views the area that body and silhouette share, as a share of that of both, (n_views,)."""
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the body is elsewhere in at least half of the views."""
+        return bool(len(self.overlaps)) and float(np.median(self.overlaps)) < _MIN_OVERLAP
+
+    @property
+    def note(self) -> str:
+        """A sentence on what is wrong, as seen by the views; empty if nothing is."""
+        if not self.cameras:
+            return "no view shows the person alone, so that the silhouettes do not check the pose"
+        poor = [
+            f"{name} {100 * share:.0f}%"
+            for name, share in zip(self.cameras, self.overlaps, strict=True)
+            if share < _MIN_OVERLAP
+        ]
+        return f"the body and the silhouette share little of their area in view {', '.join(poor)}" if poor else ""
+
+
+def check_against_silhouettes(
+    body: PosedBody, silhouettes: Sequence[ViewSilhouette], masks: Sequence[FigureMask]
+) -> SilhouetteCheck:
+    """Compare a body with the silhouettes of its person in the views that show the person alone.
+
+    Args:
+        body: the body.
+        silhouettes: of everybody in all views.
+        masks: that of the person in each of them.
+    """
+    found = [
+        (s.camera.name, _overlap(body_silhouette([body], s.camera), m.mask))
+        for s, m in zip(silhouettes, masks, strict=True)
+        if m.is_apart and m.mask.any()
+    ]
+    return SilhouetteCheck(tuple(name for name, _ in found), np.array([share for _, share in found]))
+
+
+def _overlap(one: Mask, other: Mask) -> float:
+    return int(np.count_nonzero(one & other)) / max(1, int(np.count_nonzero(one | other)))
