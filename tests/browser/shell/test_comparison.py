@@ -76,3 +76,16 @@ async def test_a_result_that_disagrees_with_the_placement_is_reported_once(page,
     assert await notices.count() == 1
     await page.locator("#show-comparison").click()
     assert await page.locator("#comparison-warning").inner_text() == WARNING
+
+
+@pytest.mark.parametrize("width", [1280, 1510, 1600, 1640])
+async def test_both_costs_have_room_in_the_top_bar(page, endpoint, width):
+    await page.set_viewport_size({"width": width, "height": 900})
+    endpoint.state |= {"compared": COMPARED, "cost_px": 5.44}
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, f"{TEXT} === '5.74 →'")
+    cost, bar = await page.evaluate(
+        "['.cost', '.top-bar'].map((name) => document.querySelector(name).getBoundingClientRect()).map((box) => box.height)"
+    )
+    assert cost <= bar
+    await page.set_viewport_size({"width": 1440, "height": 900})
