@@ -74,9 +74,8 @@ async def main(runs: int) -> None:
             print(f"{'':12}" + "".join(f"{name:>10}" for name in MARKS))
             for run in range(runs + 1):
                 seen = await start(browser, environment)
-                print(
-                    f"{'later' if run else 'first':12}" + "".join(f"{seen[name]:10.1f}" for name in MARKS), flush=True
-                )
+                times = "".join(f"{seen[name]:10.1f}" for name in MARKS)
+                print(f"{'later' if run else 'first':12}{times}", flush=True)
                 if run == 0:
                     subprocess.run([sys.executable, "-m", "app.bench.compile_kernels"], env=environment, check=True)
         await browser.close()

@@ -84,8 +84,7 @@ async def test_both_costs_have_room_in_the_top_bar(page, endpoint, width):
     endpoint.state |= {"compared": COMPARED, "cost_px": 5.44}
     await endpoint.broadcast(endpoint.state)
     await shows(page, f"{TEXT} === '5.74 →'")
-    cost, bar = await page.evaluate(
-        "['.cost', '.top-bar'].map((name) => document.querySelector(name).getBoundingClientRect()).map((box) => box.height)"
-    )
+    heights = "['.cost', '.top-bar'].map((name) => document.querySelector(name).getBoundingClientRect().height)"
+    cost, bar = await page.evaluate(heights)
     assert cost <= bar
     await page.set_viewport_size({"width": 1440, "height": 900})
