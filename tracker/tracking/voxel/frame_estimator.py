@@ -167,7 +167,7 @@ class VoxelEstimator:
         if "lost" in statuses:  # whose voxels have no owner but the others
             for p, status in enumerate(statuses):
                 if status == "good" and p in updates:
-                    statuses[p], notes[p] = "doubtful", "another person is lost: nothing tells their voxels apart"
+                    statuses[p], notes[p] = "doubtful", "another person is lost: their voxels cannot be separated"
         hidden = tuple(np.full(len(m.parts), np.nan) for m in subjects.models)
         return PoseEstimate(
             frame, tuple(poses), float("nan"), np.full(n_views, np.nan), 0, tuple(statuses), tuple(notes), hidden,

@@ -64,7 +64,7 @@ def test_people_who_stand_apart_are_followed():
 def test_a_person_who_has_gone_is_lost_and_the_other_one_not_good():
     found, errors = tracked(1.4, 4, lambda k, offsets: offsets[:1] if k > 1 else offsets)
     assert found[-1].statuses == ("doubtful", "lost")
-    assert found[-1].notes[0] == "another person is lost: nothing tells their voxels apart"
+    assert found[-1].notes[0] == "another person is lost: their voxels cannot be separated"
     assert errors[0] < 0.06
 
 
