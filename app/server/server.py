@@ -19,7 +19,7 @@ from aiohttp.typedefs import Handler, Middleware
 
 from app.server import connections, viser_proxy
 from app.server.access import Access
-from app.server.static_files import KEPT, PREFIX, PageFiles
+from app.server.static_files import KEPT, PREFIX, ROUTE, PageFiles
 
 _LOG = logging.getLogger(__name__)
 _SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
@@ -92,7 +92,7 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
 
     app.router.add_get("/", page)
     app.router.add_get("/ws", pane_socket)
-    app.router.add_get(f"/{PREFIX}{{version:[0-9a-f]{{16}}}}/{{name:.+}}", page_file)
+    app.router.add_get(ROUTE, page_file)
     app.router.add_static(f"/{PREFIX}", static)
     app.router.add_get("/viser", proxy.handle)
     app.router.add_get("/viser/{path:.*}", proxy.handle)

@@ -10,7 +10,10 @@ PREFIX = "static/"
 """Beginning of their addresses, relative to that of the page."""
 KEPT = "private, max-age=31536000, immutable"
 """`Cache-Control` of files whose address names their version."""
-_ADDRESS = re.compile(rf"/{PREFIX}[0-9a-f]{{16}}/(?P<name>.+)")
+_VERSION = "[0-9a-f]{16}"
+ROUTE = f"/{PREFIX}{{version:{_VERSION}}}/{{name:.+}}"
+"""The route of these addresses, for aiohttp."""
+_ADDRESS = re.compile(f"/{PREFIX}{_VERSION}/(?P<name>.+)")
 _TYPES = {".js": "text/javascript", ".css": "text/css"}
 
 

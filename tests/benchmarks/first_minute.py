@@ -15,16 +15,17 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "support")]
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
 
 from chromium import FLAGS, chromium_path
+from page_driver import OPENED
 from playwright.async_api import Browser, Error, async_playwright
+from program import READY, ROOT
 
 MARKS = {
     "words": "document.querySelector('#steps li') || window.quadrille",
-    "pictures": "window.quadrille?.state.overlay && quadrille.state.shown?.frame === quadrille.state.overlay.frame",
-    "cost": "window.quadrille?.state.state && quadrille.state.state.cost_px !== null",
+    "pictures": OPENED,
+    "cost": READY,
 }
 """What is timed, with the JavaScript that holds from then on."""
 TIMEOUT_S = 180.0

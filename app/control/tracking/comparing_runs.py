@@ -35,10 +35,7 @@ class ComparingRuns:
         first, last = sorted((first, last))
         found = self._compared(first, last)
         if not any(found.frames):
-            raise TrackerError(
-                f"expected frames among {first} to {last} whose pose replaced another, found none; "
-                "track them again by another method first"
-            )
+            raise nothing_replaced(first, last)
         with self._session_state.lock:
             self._session_state.set(range_comparison=found)
 
@@ -90,6 +87,14 @@ class ComparingRuns:
             frame, method_of(now), method_of(other), now.cost_px, other.cost_px, now.status, other.status,
             float(apart_m.mean()), float(apart_m[at]), display_name(model.point_names[at]), pair[1],
         )  # fmt: skip
+
+
+def nothing_replaced(first: int, last: int) -> TrackerError:
+    """Return the error that no pose of a range, `last` included, has replaced another."""
+    return TrackerError(
+        f"expected frames among {first} to {last} whose pose replaced another, found none; "
+        "track them again by another method first"
+    )
 
 
 def method_of(record: PoseRecord) -> str:

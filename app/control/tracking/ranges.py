@@ -9,6 +9,7 @@ import numpy as np
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
+from app.control.tracking.comparing_runs import nothing_replaced
 from app.control.tracking.tracking import Tracking
 from app.runtime.jobs import Job
 from app.state.progress import RangeState
@@ -134,10 +135,7 @@ class Ranges:
                 if not now.keyframe
             ]
             if not changes:
-                raise TrackerError(
-                    f"expected frames among {first} to {last} whose pose replaced another, found none; "
-                    "track them again by another method first"
-                )
+                raise nothing_replaced(first, last)
             label = self._label(f"take the other poses of frames {first} to {last}", people)
             self._begin(_Run(label, "exchanged", by_program=True), "exchanging", len(changes), iter(changes))
 
