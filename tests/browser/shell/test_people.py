@@ -160,3 +160,12 @@ async def test_a_joint_tells_by_whom_it_is_hidden_and_solo_shows_it(couple, endp
     await couple.keyboard.press("Shift+A")
     await shows(couple, "document.querySelector('.pane-joint').innerText.includes('behind person 1')")
     assert "who is dimmed" in await corner.get_attribute("title")
+
+
+async def test_the_top_bar_has_room_while_kernels_are_compiled(couple, endpoint):
+    await couple.set_viewport_size({"width": 1280, "height": 720})
+    endpoint.state["compiling"] = "contours"
+    await endpoint.broadcast(endpoint.state)
+    await shows(couple, "!document.querySelector('#compiling').hidden")
+    bar = "document.querySelector('.top-bar')"
+    assert await couple.evaluate(f"{bar}.scrollWidth <= {bar}.clientWidth")
