@@ -49,7 +49,7 @@ class KernelLocator:
     def from_function(cls, py_func: Callable[..., object], py_file: str) -> "KernelLocator | None":
         """Return the locator of a function, or None to leave it to numba's ordinary cache."""
         key = kernel_keys().get(f"{py_func.__module__}.{py_func.__qualname__}")
-        if key is None or _PACKAGE not in Path(py_file).resolve().parents:
+        if key is None or not _is_in_package(py_file):
             return None
         locator = cls(py_file, key)
         try:
@@ -60,8 +60,7 @@ class KernelLocator:
 
     def ensure_cache_path(self) -> None:
         """Make the cache folder; raises OSError unless it can be written."""
-        os.makedirs(self.get_cache_path(), exist_ok=True)
-        tempfile.TemporaryFile(dir=self.get_cache_path()).close()
+        _check_writable(self.get_cache_path())
 
     def get_cache_path(self) -> str:
         """Return the folder of the cache."""
@@ -96,6 +95,18 @@ def use_kernel_cache() -> None:
         return
     if KernelLocator not in locators:
         locators.insert(0, KernelLocator)
+
+
+@lru_cache
+def _is_in_package(py_file: str) -> bool:
+    return _PACKAGE in Path(py_file).resolve().parents
+
+
+@lru_cache
+def _check_writable(folder: str) -> None:
+    """Make the folder, once for all kernels; raises OSError unless it can be written."""
+    os.makedirs(folder, exist_ok=True)
+    tempfile.TemporaryFile(dir=folder).close()
 
 
 @lru_cache(maxsize=1)
