@@ -1,4 +1,4 @@
-/** Mount the rooms of the page in order, then connect to the program. */
+/** Mount the rooms of the page in order, then connect to the program, once it has started. */
 
 import * as inspectorRoom from "./inspector/index.js";
 import * as model from "./model/index.js";
@@ -8,10 +8,8 @@ import * as sceneRoom from "./scene/index.js";
 import * as searchRoom from "./search/index.js";
 import * as shellRoom from "./shell/index.js";
 import { exposeState } from "./shell/test_hook.js";
+import { started } from "./starting/index.js";
 import * as timelineRoom from "./timeline/index.js";
-
-// The access token is in a cookie by now. It should not stay in the address.
-if (location.search) window.history.replaceState(null, "", location.pathname);
 
 const context = model.mount();
 const panes = panesRoom.mount(context);
@@ -22,4 +20,8 @@ const scene = sceneRoom.mount(context, panes);
 const inspector = inspectorRoom.mount(context, { panes, posing, scene });
 shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector });
 exposeState(context, panes.grid);
+
+await started;
+// The access token is in a cookie by now. It should not stay in the address.
+if (location.search) window.history.replaceState(null, "", location.pathname);
 context.connect(scene.isSoftware ? { type: "pause_3d", pause: true } : null);

@@ -1,7 +1,7 @@
-"""Answer at once: a page that says what the program is doing, until the session's own page is served at the same port.
+"""Answer at once: the page, which says what the program is doing and waits until the program serves the same port.
 
-Loading the program takes seconds, on a busy machine many. This module imports little. Its page holds
-nothing of the session, so it needs no token; Host and Origin are checked as for every request.
+Loading the program takes seconds, on a busy machine many. The browser loads the page meanwhile. This module imports
+little. The page holds nothing of the session, so it needs no token; Host and Origin are checked as for every request.
 """
 
 import json
@@ -12,7 +12,6 @@ import socket
 import sys
 import threading
 import webbrowser
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from http import HTTPStatus
@@ -26,19 +25,10 @@ from platformdirs import user_state_path
 from app.runtime.restart import inherited
 from app.server.access import Access, Invitation, access_for
 from app.server.address import Serving, listen, page_address, port_of
-from app.server.static_files import KEPT, PageFiles, static_folder
+from app.server.static_files import KEPT, POLICY, PREFIX, PageFiles, connect_sources, static_folder
 
 STEPS = ("Loading the program", "Opening the session", "Preparing the views")
-_POLICY = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; base-uri 'none'"
-_FILES: Mapping[str, tuple[str, str]] = {
-    "/": ("starting/index.html", "text/html; charset=utf-8"),
-    "/static/starting/starting.js": ("starting/starting.js", "text/javascript"),
-    "/static/starting/starting.css": ("starting/starting.css", "text/css"),
-    "/static/styles/tokens.css": ("styles/tokens.css", "text/css"),
-    "/static/theme.js": ("theme.js", "text/javascript"),
-    "/static/icon.svg": ("icon.svg", "image/svg+xml"),
-}
-"""What is served, by path, with its type; besides it the files of the session's page, which it fetches ahead."""
+_ICON = "icon.svg"
 _NOT_KEPT = "no-store"
 _FORKS = sys.platform == "linux"
 """Whether a process of its own answers. Threads would take turns with the loading program, and hold it up."""
@@ -59,7 +49,7 @@ class Answer(NamedTuple):
 
 
 class Doorway:
-    """Serves the starting page at listening sockets, from `with` to `close`."""
+    """Serves the page at listening sockets, from `with` to `close`."""
 
     def __init__(self, serving: Serving) -> None:
         """Listen, and read the page.
@@ -73,10 +63,10 @@ class Doorway:
         self.serving = serving
         tokens = user_state_path("quadrille", appauthor=False)
         self.access = access_for(serving.host, serving.allow_hosts, serving.token, tokens)
-        """What the session's page asks for; this page asks for no token."""
+        """What the program asks for; the doorway asks for no token."""
         self._without_token = replace(self.access, token=None, invitation=None)
         static = static_folder()
-        self._files = {path: ((static / name).read_bytes(), kind) for path, (name, kind) in _FILES.items()}
+        self._icon = (static / _ICON).read_bytes()
         self._page_files = PageFiles(static)
         self._step = 0
         self.sockets = inherited() or listen(serving.host, serving.port)
@@ -118,6 +108,7 @@ class Doorway:
         os.close(self._steps)
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C is for the program
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        self._page_files.index()  # joined before the first request, while the program loads
         self._start_threads()
         while step := os.read(steps, 1):
             self._step = step[0]
@@ -166,11 +157,10 @@ class Doorway:
             return Answer(HTTPStatus.FORBIDDEN, f"Quadrille refused this request: {why}.\n".encode(), "text/plain")
         if path == "/starting.json":
             return Answer(HTTPStatus.OK, json.dumps({"steps": STEPS, "at": self._step}).encode(), "application/json")
-        if path == "/page-files.json":
-            addresses = list(self._page_files.addresses().values())
-            return Answer(HTTPStatus.OK, json.dumps(addresses).encode(), "application/json")
-        if path in self._files:
-            return Answer(HTTPStatus.OK, *self._files[path])
+        if path == "/":
+            return Answer(HTTPStatus.OK, self._page_files.index(is_starting=True).encode(), "text/html; charset=utf-8")
+        if path == f"/{PREFIX}{_ICON}":
+            return Answer(HTTPStatus.OK, self._icon, "image/svg+xml")
         found = self._page_files.find(path)
         if found is not None:
             return Answer(HTTPStatus.OK, *found, KEPT)
@@ -199,12 +189,13 @@ class _Handler(BaseHTTPRequestHandler):
         host = hosts[0] if len(hosts) == 1 else None
         path = self.path.partition("?")[0]
         answer = self.server.doorway.answer(path, host, self.headers.get("Origin"))
+        sources = "'none'" if host is None or answer.status == HTTPStatus.FORBIDDEN else connect_sources(host)
         with suppress(OSError):
             self.send_response(answer.status)
             for name, value in (
                 ("Content-Type", answer.kind),
                 ("Content-Length", str(len(answer.content))),
-                ("Content-Security-Policy", _POLICY),
+                ("Content-Security-Policy", POLICY.format(sources=sources)),
                 ("X-Content-Type-Options", "nosniff"),
                 ("Referrer-Policy", "no-referrer"),
                 ("Cache-Control", answer.caching),

@@ -19,14 +19,10 @@ from aiohttp.typedefs import Handler, Middleware
 
 from app.server import connections, viser_proxy
 from app.server.access import Access
-from app.server.static_files import KEPT, PREFIX, ROUTE, PageFiles
+from app.server.static_files import KEPT, POLICY, PREFIX, ROUTE, PageFiles, connect_sources
 
 _LOG = logging.getLogger(__name__)
 _SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
-_PAGE_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src {sources}; "
-    "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
 _MAX_MESSAGE_BYTES = 1 << 20  # what a page sends is a line or two of JSON
 _MAX_PATH_CHARACTERS = 2000
 _MAX_NAME_BYTES = 255
@@ -161,10 +157,9 @@ def _refused(status: int, text: str) -> web.Response:
 
 async def _add_headers(request: web.Request, response: web.StreamResponse) -> None:
     host = request.headers.get("Host", "")
-    # 'self' covers WebSockets in some browsers only. The guard has seen the Host header by now: it is a plain name,
-    # or the answer is a refusal, which connects nowhere.
-    sources = f"'self' ws://{host} wss://{host}" if response.status != 403 else "'none'"
-    policy = viser_proxy.POLICY if viser_proxy.is_viser(request.path) else _PAGE_POLICY
+    # The guard has seen the Host header by now: it is a plain name, or the answer is a refusal, which connects nowhere.
+    sources = connect_sources(host) if response.status != 403 else "'none'"
+    policy = viser_proxy.POLICY if viser_proxy.is_viser(request.path) else POLICY
     response.headers["Content-Security-Policy"] = policy.format(sources=sources)
     response.headers["X-Content-Type-Options"] = "nosniff"
     response.headers["Referrer-Policy"] = "no-referrer"
