@@ -62,8 +62,9 @@ async def test_the_page_waits_for_the_program_and_connects_without_being_loaded_
 async def test_a_page_without_its_token_is_refused_once_the_program_has_started(browser, doorway, blank_viser):
     async with opened(browser, doorway.address.partition("?")[0]) as page:
         await shows(page, "document.querySelector('#steps li')")
-        async with program(doorway, blank_viser):
-            await shows(page, "document.body.innerText.includes('expected the token of this start')")
+        async with page.expect_event("load") as refused, program(doorway, blank_viser):
+            await refused.value
+        assert "expected the token of this start" in await page.inner_text("body")
 
 
 async def test_a_page_whose_program_has_ended_says_so(browser, doorway):
