@@ -131,8 +131,10 @@ async def test_reduced_motion_is_respected(page):
 async def test_a_change_of_the_systems_scheme_recolours_the_3d_view_without_loading_it_again(page):
     frame = page.frame_locator("#scene").locator("body")
     ground = "(body) => getComputedStyle(body).backgroundColor"
+    around = "getComputedStyle(document.querySelector('#scene')).backgroundColor"
+    inside = "getComputedStyle(document.querySelector('#scene').contentDocument.body).backgroundColor"
+    await shows(page, f"{inside} === {around}")
     dark = await frame.evaluate(ground)
-    assert dark == await page.evaluate("getComputedStyle(document.querySelector('#scene')).backgroundColor")
     await frame.evaluate("() => (window.isLoadedOnce = true)")
     await page.emulate_media(color_scheme="light")
     await shows(page, "getComputedStyle(document.querySelector('#scene')).backgroundColor === 'rgb(201, 205, 210)'")
