@@ -13,17 +13,16 @@ async def shows(page, expression, timeout_s=20.0):
 
     The page's policy forbids evaluating strings, which Playwright's own waiting does inside the page.
     """
-    drawn = f"""async () => {{
-      if (!({expression})) return false;
+    drawn = f"""async (timeout) => {{
+      const pause = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
+      for (const until = performance.now() + timeout; !({expression}); await pause(20)) {{
+        if (performance.now() > until) return false;
+      }}
       await new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
       return true;
     }}"""
-    try:
-        async with asyncio.timeout(timeout_s):
-            while not await page.evaluate(drawn):
-                await asyncio.sleep(0.04)
-    except TimeoutError:
-        raise AssertionError(f"after {timeout_s} s the page still does not show: {expression}") from None
+    if not await page.evaluate(drawn, 1000 * timeout_s):
+        raise AssertionError(f"after {timeout_s} s the page still does not show: {expression}")
 
 
 async def until(condition, timeout_s=20.0):

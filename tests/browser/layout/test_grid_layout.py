@@ -1,6 +1,7 @@
 """The arrangement of the panes, called in the page: how much of the grid the images fill."""
 
 import numpy as np
+import pytest
 
 PORTRAIT, LANDSCAPE = 1080 / 1920, 1920 / 1080
 SIZES = [(794, 505), (698, 253), (1187, 862), (1190, 504), (990, 253), (634, 672)]
@@ -49,6 +50,7 @@ def best_in_equal_cells(aspects, width, height):
     return max(shown(aspects, [(width / columns, height / rows)] * n).sum() for columns, rows in grids)
 
 
+@pytest.mark.slow
 async def test_images_fill_the_grid_as_well_as_they_can_and_none_is_tiny(page):
     cases = [(kind, n, size) for kind in KINDS for n in range(1, 13) for size in SIZES]
     layouts = await page.evaluate(ARRANGED, [[aspects_of(kind, n), *size] for kind, n, size in cases])

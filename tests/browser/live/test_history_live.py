@@ -78,6 +78,7 @@ async def test_two_tabs_are_in_step_and_a_drag_is_seen_live(tabs):
     await shows(one, "quadrille.state.state.redo === 'drag left wrist, frame 4'")
 
 
+@pytest.mark.slow
 async def test_the_history_is_gone_along_also_after_a_restart(tabs, program):
     page, _ = tabs
     await page.bring_to_front()

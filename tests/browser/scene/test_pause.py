@@ -2,6 +2,7 @@
 
 import asyncio
 
+import pytest
 from page_driver import dragging, shows, until
 
 COUNT = """async () => {
@@ -38,6 +39,7 @@ async def draws(page, n=4, seconds=8):
     return True
 
 
+@pytest.mark.slow
 async def test_it_waits_for_the_panes(page, endpoint):
     await shows(page, "document.querySelector('#scene').contentDocument.readyState === 'complete'")
     await page.evaluate(COUNT)

@@ -193,6 +193,7 @@ async def test_nothing_is_cut_off_in_small_windows(page):
         await shows(page, "quadrille.state.views[0].scale > 0.5")
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_people=2)
 async def test_the_bar_of_two_people_fits_every_window(page):
     for width in (1600, 1500, 1410, 1280, 1110, 1024):

@@ -45,6 +45,7 @@ async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_befor
     await until(lambda: len(endpoint.heard("before")) == 2)
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_people=2)
 async def test_the_top_bar_has_room_for_a_comparison(page, endpoint):
     job = endpoint.idle_job("done: 12,345 poses scored")

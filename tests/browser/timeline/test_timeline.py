@@ -251,6 +251,7 @@ async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
     assert await page.locator("#range-bar").is_hidden()
 
 
+@pytest.mark.slow
 async def test_the_bar_stays_within_the_window(page):
     await page.set_viewport_size({"width": 1280, "height": 720})
     for first, last in ((0, 3), (60, 61), (116, 119)):

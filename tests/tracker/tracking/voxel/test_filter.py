@@ -138,6 +138,7 @@ def simulated_innovations(process, noise, seed):
     return np.array(out), n_rows
 
 
+@pytest.mark.slow
 def test_normalized_innovations_lie_within_their_bounds():
     """Their sum is chi-square distributed where the filter knows the noise of the data."""
     found = [simulated_innovations(PROCESS, NOISE, seed) for seed in range(4)]
