@@ -1,12 +1,31 @@
 """Tests of the page against the program, which needs its kernels."""
 
+import shutil
 import subprocess
 import sys
 
 import pytest
+import pytest_asyncio
+from program import ROOT, started, visited
+
+SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 
 
 @pytest.fixture(scope="session", autouse=True)
 def kernels():
     """Compile the kernels, or wait for another program that compiles them."""
     subprocess.run([sys.executable, "-m", "app.bench.compile_kernels"], check=True)
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def program(tmp_path_factory):
+    """The program on a copy of the sample, for all tests of a module that make none of their own."""
+    async with started(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("live") / "session")) as running:
+        yield running
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def tab(browser, program):
+    """Its page, for `visit_again`."""
+    async with visited(browser, program.address) as page:
+        yield page

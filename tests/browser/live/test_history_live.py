@@ -2,21 +2,12 @@
 
 import asyncio
 import resource
-import shutil
 
 import pytest
 import pytest_asyncio
 from page_driver import dragging, handle_of, state_of, to_client
 from page_driver import shows as shows_within
-from program import ROOT, WITHOUT_3D, started
-
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
-
-
-@pytest_asyncio.fixture(loop_scope="session", scope="module")
-async def program(tmp_path_factory):
-    async with started(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("history") / "session")) as running:
-        yield running
+from program import WITHOUT_3D
 
 
 @pytest_asyncio.fixture(loop_scope="session")

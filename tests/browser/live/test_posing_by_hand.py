@@ -1,27 +1,12 @@
 """Posing by drags on the real program: joint, part and torso under the cursor, turns and depth, locks."""
 
 import asyncio
-import shutil
 
 import pytest
 import pytest_asyncio
 from page_driver import handle_of, state_of, to_client
 from page_driver import shows as shows_within
-from program import ROOT, started, visit_again, visited
-
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
-
-
-@pytest_asyncio.fixture(loop_scope="session", scope="module")
-async def program(tmp_path_factory):
-    async with started(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("dragging") / "session")) as running:
-        yield running
-
-
-@pytest_asyncio.fixture(loop_scope="session", scope="module")
-async def tab(browser, program):
-    async with visited(browser, program.address) as page:
-        yield page
+from program import visit_again
 
 
 @pytest_asyncio.fixture(loop_scope="session")

@@ -1,28 +1,14 @@
 """The joint bar and its keys on the real program: a frame is posed without a mouse; numbers, locks, copies."""
 
 import asyncio
-import shutil
 
 import pytest
 import pytest_asyncio
 from page_driver import handle_of, state_of
 from page_driver import shows as shows_within
-from program import ROOT, started, visit_again, visited
+from program import visit_again
 
 pytestmark = pytest.mark.slow
-SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
-
-
-@pytest_asyncio.fixture(loop_scope="session", scope="module")
-async def program(tmp_path_factory):
-    async with started(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("posing") / "session")) as running:
-        yield running
-
-
-@pytest_asyncio.fixture(loop_scope="session", scope="module")
-async def tab(browser, program):
-    async with visited(browser, program.address) as page:
-        yield page
 
 
 @pytest_asyncio.fixture(loop_scope="session")
