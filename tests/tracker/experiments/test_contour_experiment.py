@@ -17,6 +17,7 @@ from tracker.experiments.smooth_motion import smooth_motion
 from tracker.experiments.staged_views import StagedObserver
 from tracker.formats.model_toml import load_model
 from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.contour.settings import ContourSettings
 
 SMALL = ContourExperiment(n_frames=3, n_cameras=3, camera_counts=(2,))
 QUICK = TrackSettings(recover=None, backward_pass=False)
@@ -76,6 +77,14 @@ def test_a_tracker_follows_the_own_shape():
     assert np.degrees(found.mean_error) < 1.5
     assert np.all(found.after_px < 0.6)
     assert found.before_px[1:].mean() > 2 * found.after_px.mean()
+
+
+def test_priors_pull_less_where_the_body_fits_well():
+    """The own shape fits to a fraction of a pixel; a person of another shape does not, and is tracked as before."""
+    on, off = (ContourSettings(recover=None, measure_noise=m) for m in (True, False))
+    own, other = (make_scene(SMALL, actor, 3) for actor in ("own shape", "skinned person"))
+    assert track_scene(own, on).mean_error < 0.6 * track_scene(own, off).mean_error
+    np.testing.assert_array_equal(track_scene(other, on).poses, track_scene(other, off).poses)
 
 
 @pytest.fixture(scope="module")
