@@ -9,7 +9,7 @@ import pytest
 
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.experiments.contour_experiment import ContourExperiment, make_scene, run_contour_experiment
+from tracker.experiments.contour_experiment import ACTORS, ContourExperiment, make_scene, run_contour_experiment
 from tracker.experiments.contour_report import write_contour_report
 from tracker.experiments.contour_run import RunResult, contour_rms_px, observable_angles, track_scene
 from tracker.experiments.line_chart import Line, line_chart
@@ -98,7 +98,7 @@ def found():
 @pytest.mark.slow
 def test_the_report_and_its_figures(found, tmp_path):
     report = write_contour_report(tmp_path / "r", found[0])
-    assert found[1] == [(i + 1, 7) for i in range(7)]
+    assert found[1] == [(i + 1, 10) for i in range(10)]
     text = report.read_text("utf-8")
     figures = re.findall(r"\]\(([^)]+)\)", text)
     assert {"fig5a_a.svg", "fig5b_a.svg", "fig6_left_elbow_extension.svg", "fig7_right_shoulder_abduction.svg"} <= set(
@@ -109,6 +109,9 @@ def test_the_report_and_its_figures(found, tmp_path):
         ElementTree.parse(tmp_path / "r" / name)
     assert "| a | " in text
     assert "| | 1 | 2 |" in text
+    for actor in ACTORS:
+        assert f"| {actor}, a | " in text
+        assert f"| {actor}, contour, paper | " in text
     assert "fig13.svg" in figures
 
 
@@ -127,6 +130,7 @@ def test_impossible_parameters(change):
         run_contour_experiment(replace(SMALL, **change), {"a": QUICK})
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written(found, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(TrackerError, match=r"cannot write the report .*choose a folder"):
