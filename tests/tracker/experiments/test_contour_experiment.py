@@ -124,6 +124,18 @@ def test_a_chart_has_gaps_and_escaped_names():
     ElementTree.fromstring(flat)
 
 
+def test_names_of_many_curves_stand_apart_and_above_the_curves():
+    names = [f"a person of another shape, method {i}" for i in range(7)]
+    root = ElementTree.fromstring(line_chart("t", np.arange(2.0), [Line(n, np.ones(2)) for n in names], "x", "y"))
+    texts = [t for t in root.findall("{http://www.w3.org/2000/svg}text") if t.text in names]
+    at = np.array([[float(t.get("x")), float(t.get("y"))] for t in texts])
+    lines = root.findall("{http://www.w3.org/2000/svg}polyline")
+    assert at[:, 1].max() < min(float(p.split(",")[1]) for line in lines for p in line.get("points").split())
+    for i in range(7):
+        beside = np.delete(at, i, axis=0) - at[i]
+        assert np.all((np.abs(beside[:, 1]) >= 12) | (np.abs(beside[:, 0]) >= 200))
+
+
 @pytest.mark.parametrize("change", [{"n_frames": 1}, {"n_cameras": 0}, {"camera_counts": (2, 99)}, {"noise_px": -1.0}])
 def test_impossible_parameters(change):
     with pytest.raises(TrackerError, match="expected at least 2 frames, 1 to 32 cameras"):
