@@ -112,7 +112,8 @@ def candidates(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> It
     bodies = (("superquadrics", frame, 15, 25), ("cones", cones, 28, 50))
     for name, of, must, aim in bodies:
         cost, poses = of.cost(threads=1), of.candidates(_CANDIDATES)
-        timed = yardstick.beside(partial(cost.of_person, 0, poses, [of.values]), 60, _CANDIDATES)
+        # By processor time, see `Yardstick.beside_difference`.
+        timed = yardstick.beside(partial(cost.of_person, 0, poses, [of.values]), 60, _CANDIDATES, time.thread_time)
         yield Row(f"candidate_{name}", f"one candidate pose, {name}, 4 views", *timed, 1 / must, 1 / aim)
     painted = PaintedCost(frame.views, frame.model, frame.cost().edge_points_px)
     poses, cost = frame.candidates(20), frame.cost()
