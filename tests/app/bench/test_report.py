@@ -67,7 +67,7 @@ def test_differences_do_not_grow_with_what_other_programs_do():
 def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
     """Not how fast, only that they run and tell what they should."""
 
-    def beside(self, work, runs, times=1):
+    def beside(self, work, runs, times=1, clock=None):
         done = work()
         return bench_rows.Timed(2.0 * (done if isinstance(done, int) else 1), 1.0)
 
