@@ -75,29 +75,36 @@ class Yardstick:
         """Do the work once."""
         cv2.distanceTransform(self._image, cv2.DIST_L2, cv2.DIST_MASK_5)
 
-    def beside(self, work: Callable[[], object], runs: int, times: int = 1) -> Timed:
+    def beside(
+        self, work: Callable[[], object], runs: int, times: int = 1, clock: Callable[[], float] = time.perf_counter
+    ) -> Timed:
         """Time some work and the yardstick alternately, so that both meet the same load, after one untimed run.
 
         Args:
             work: the work to time.
             runs: number of runs.
             times: number of pieces of work in one run.
+            clock: returns a time, s.
         """
-        spent = np.array([(_seconds(work), _seconds(self)) for _ in range(runs + 1)][1:])
+        spent = np.array([(_seconds(work, clock), _seconds(self, clock)) for _ in range(runs + 1)][1:])
         work_s, yardstick_s = np.median(spent, axis=0)
         return Timed(1e6 * work_s / times, 1e6 * yardstick_s)
 
     def beside_difference(self, long: Callable[[], object], short: Callable[[], object], runs: int) -> Timed:
-        """Time the difference between two works, alternately with the yardstick; otherwise as `beside`."""
-        more_s = list[float]()
-        timed = self.beside(lambda: more_s.append(_seconds(long) - _seconds(short)), runs)
+        """Time the difference between two works, alternately with the yardstick; otherwise as `beside`.
+
+        Works of one thread are timed by the processor time of that thread. Other programs interrupt a long work more
+        often than the yardstick, so that by the clock the ratio grows with their load.
+        """
+        more_s, clock = list[float](), time.thread_time
+        timed = self.beside(lambda: more_s.append(_seconds(long, clock) - _seconds(short, clock)), runs, clock=clock)
         return timed._replace(work_us=1e6 * float(np.median(more_s[1:])))
 
 
-def _seconds(work: Callable[[], object]) -> float:
-    start = time.perf_counter()
+def _seconds(work: Callable[[], object], clock: Callable[[], float]) -> float:
+    start = clock()
     work()
-    return time.perf_counter() - start
+    return clock() - start
 
 
 def candidates(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
@@ -105,7 +112,8 @@ def candidates(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> It
     bodies = (("superquadrics", frame, 15, 25), ("cones", cones, 28, 50))
     for name, of, must, aim in bodies:
         cost, poses = of.cost(threads=1), of.candidates(_CANDIDATES)
-        timed = yardstick.beside(partial(cost.of_person, 0, poses, [of.values]), 60, _CANDIDATES)
+        # By processor time, see `Yardstick.beside_difference`.
+        timed = yardstick.beside(partial(cost.of_person, 0, poses, [of.values]), 60, _CANDIDATES, time.thread_time)
         yield Row(f"candidate_{name}", f"one candidate pose, {name}, 4 views", *timed, 1 / must, 1 / aim)
     painted = PaintedCost(frame.views, frame.model, frame.cost().edge_points_px)
     poses, cost = frame.candidates(20), frame.cost()

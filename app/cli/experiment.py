@@ -34,14 +34,13 @@ def command(
         noise: noise of the contours across themselves, px.
         seed: of motion, cameras and noise.
     """
-    from tracker.experiments.contour_experiment import ACTORS, N_PAPER_RUNS, ContourExperiment, run_contour_experiment
+    from tracker.experiments.contour_experiment import ContourExperiment, count_runs, run_contour_experiment
     from tracker.experiments.contour_report import write_contour_report
 
     experiment = ContourExperiment(frames, cameras, camera_counts, noise, seed)
     experiment.check()
     methods, reporter = _methods(), Reporter()
-    n_runs = len({*camera_counts, cameras}) * len(ACTORS) * len(methods) + N_PAPER_RUNS
-    with reporter.over(n_runs, "runs") as tick:
+    with reporter.over(count_runs(experiment, len(methods)), "runs") as tick:
         found = run_contour_experiment(experiment, methods, lambda *_: tick())
     print(f"wrote {write_contour_report(out, found)}")
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -29,10 +30,8 @@ _SKELETON = "gavrila22"
 _HEIGHT_M = 1.75
 _SIZE = (640, 480)
 FPS = 30.0
-_PAPER_RUNS = {"contour, paper": True, "contour, paper, no sliding": False}
-"""Main runs in the paper's mode, and whether the sliding term is part of the Jacobian."""
-N_PAPER_RUNS = len(_PAPER_RUNS) + 1
-"""Number of runs besides those of the methods that are compared."""
+PAPER, _NO_SLIDING = "contour, paper", "contour, paper, no sliding"
+"""Names of the runs in the paper's mode, with and without the sliding term in the Jacobian."""
 
 
 @dataclass(frozen=True)
@@ -84,10 +83,10 @@ class ExperimentResult(NamedTuple):
     """True poses of the main run, (n_frames, n_values)."""
     runs: Sequence[Comparison]
     """All runs, for each actor, method and number of cameras."""
-    paper: Mapping[str, RunResult]
-    """The main run in the paper's mode, by what the report calls it: with and without the sliding term."""
+    no_sliding: Mapping[str, RunResult]
+    """The main run in the paper's mode without the sliding term, by what the report calls it."""
     convergence: Sequence[Convergence]
-    """Fits with and without the sliding term, on the main run's scene."""
+    """Fits on the main run's scene, see `measure_convergence`."""
     rough: tuple[Sequence[RoughStep], Sequence[RoughStep]]
     """Steps from a rough guess on its first frame, see `fit_rough_guess`."""
 
@@ -97,12 +96,17 @@ class ExperimentResult(NamedTuple):
         return next(r.result for r in self.runs if (r.actor, r.n_cameras, r.method) == wanted)
 
 
+def count_runs(experiment: ContourExperiment, n_methods: int) -> int:
+    """Return the number of runs that `run_contour_experiment` reports for a number of methods."""
+    return len({*experiment.camera_counts, experiment.n_cameras}) * len(ACTORS) * (n_methods + 1) + 2
+
+
 def run_contour_experiment(
     experiment: ContourExperiment,
     methods: Mapping[str, TrackerSettings],
     progress: Callable[[int, int], None] | None = None,
 ) -> ExperimentResult:
-    """Track the synthetic recordings with every method and number of cameras.
+    """Track the synthetic recordings with every method, in the paper's mode too, and every number of cameras.
 
     Args:
         experiment: its parameters.
@@ -114,24 +118,25 @@ def run_contour_experiment(
     """
     experiment.check()
     counts = sorted({*experiment.camera_counts, experiment.n_cameras})
-    wanted = [(actor, n, name) for actor in ACTORS for n in counts for name in methods]
-    runs = list[Comparison]()
-    for actor, n, name in wanted:
+    settings = {**methods, PAPER: paper_settings("edges")}
+    runs, total = list[Comparison](), count_runs(experiment, len(methods))
+
+    def report(done: int) -> None:
+        if progress is not None:
+            progress(done, total)
+
+    for actor, n, name in product(ACTORS, counts, settings):
         scene = make_scene(experiment, actor, n)
-        runs.append(Comparison(actor, n, name, track_scene(scene, methods[name], experiment.seed)))
-        if progress is not None:
-            progress(len(runs), len(wanted) + N_PAPER_RUNS)
-    scene, paper = make_scene(experiment, "own shape", experiment.n_cameras), dict[str, RunResult]()
-    for name, sliding in _PAPER_RUNS.items():
-        paper[name] = track_scene(scene, paper_settings("edges", sliding), experiment.seed)
-        if progress is not None:
-            progress(len(wanted) + len(paper), len(wanted) + N_PAPER_RUNS)
+        runs.append(Comparison(actor, n, name, track_scene(scene, settings[name], experiment.seed)))
+        report(len(runs))
+    scene = make_scene(experiment, "own shape", experiment.n_cameras)
+    no_sliding = {_NO_SLIDING: track_scene(scene, paper_settings("edges", sliding=False), experiment.seed)}
+    report(total - 1)
     convergence, rough = measure_convergence(scene, experiment.seed), fit_rough_guess(scene, experiment.seed)
-    if progress is not None:
-        progress(len(wanted) + N_PAPER_RUNS, len(wanted) + N_PAPER_RUNS)
+    report(total)
     models = {actor: load_model(_BODIES[actor], _HEIGHT_M) for actor in ACTORS}
     truth = _truth(experiment, models["own shape"])
-    return ExperimentResult(experiment, models, truth, runs, paper, convergence, rough)
+    return ExperimentResult(experiment, models, truth, runs, no_sliding, convergence, rough)
 
 
 def make_scene(experiment: ContourExperiment, actor: ActorKind, n_cameras: int) -> Scene:

@@ -84,18 +84,15 @@ def track_scene(scene: Scene, settings: TrackerSettings, seed: int = 0) -> RunRe
     observer = StagedObserver(scene.actor, scene.truth, scene.cameras, scene.noise_px, seed)
     model, frames = scene.model, range(len(scene.truth))
     run = TrackingRun(observer, Subjects.of([model]), [scene.truth[0]], frames, scene.fps)
-    return compare(scene, np.array([e.poses[0] for e in make_tracker(settings).estimates(run)]), observer)
-
-
-def compare(scene: Scene, poses: Array, observer: StagedObserver) -> RunResult:
-    """Compare estimated poses, (n_frames, n_values), with the truth and with the image contours."""
-    model, frames = scene.model, range(len(scene.truth))
-    px = np.array([
-        [contour_rms_px(views, PosedBody(model, p)) for p in (poses[max(k - 1, 0)], poses[k], scene.truth[k])]
-        for k, views in ((k, observer.evidence(k)) for k in frames)
-    ])  # fmt: skip
+    poses, px = list[Array](), list[list[float]]()
+    for k, found in enumerate(make_tracker(settings).estimates(run)):
+        poses.append(found.poses[0])
+        views = observer.evidence(k)  # at once, while it is cached: a skinned person takes long to draw
+        px.append(
+            [contour_rms_px(views, PosedBody(model, p)) for p in (poses[max(k - 1, 0)], poses[k], scene.truth[k])]
+        )
     errors = np.array([model.difference(p, t) for p, t in zip(poses, scene.truth, strict=True)])
-    return RunResult(poses, _unwrapped(model, errors), observable_angles(scene), *px.T)
+    return RunResult(np.array(poses), _unwrapped(model, errors), observable_angles(scene), *np.array(px).T)
 
 
 def observable_angles(scene: Scene) -> NDArray[np.bool_]:

@@ -1,14 +1,18 @@
-"""Convergence of the paper's minimization: with and without the sliding term (KRH08 Fig. 13), and from a rough guess by
+"""Convergence of the minimization: in the paper's modes (KRH08 Fig. 13), in the default mode, and from a rough guess by
 incremental pose estimation (Fig. 9)."""
 
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from tracker.body.model import PosedBody
+from tracker.body.model import BodyModel, PosedBody
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.experiments.contour_run import Scene
 from tracker.experiments.staged_views import StagedObserver
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.gauss_newton import iterate
 from tracker.geometry.arrays import Array
 from tracker.tracking.contour.paper import paper_settings
 from tracker.tracking.contour.paper_fit import (
@@ -16,9 +20,15 @@ from tracker.tracking.contour.paper_fit import (
     fit_by_iterations,
     fit_incrementally,
     paper_residuals,
+    rms_at,
     unlimited_views,
 )
+from tracker.tracking.contour.settings import ContourSettings
+from tracker.tracking.estimation.settings import TOLERANCE, prior_blocks
 
+Mode = Literal["paper", "paper, no sliding", "default"]
+MODES: tuple[Mode, ...] = ("paper", "paper, no sliding", "default")
+"""How a frame is fitted: in the paper's mode with and without the sliding term, and in the default mode."""
 MAX_ITERATIONS = 15
 MIN_GAIN = 0.01
 """Relative decrease of the RMS distance below which an iteration is the last that counts."""
@@ -47,14 +57,14 @@ class Convergence(NamedTuple):
 
     back: int
     """Number of frames between the start pose and the frame that is fitted."""
-    sliding: bool
+    mode: Mode
     fits: tuple[TracedFit, ...]
 
     @property
-    def mean_rms_px(self) -> Array:
-        """Mean RMS distance after each iteration, (MAX_ITERATIONS + 1,), px; a fit that has ended keeps its last."""
-        padded = [[*f.rms_px, *[f.rms_px[-1]] * (MAX_ITERATIONS + 1 - len(f.rms_px))] for f in self.fits]
-        return np.asarray(np.mean(padded, axis=0))
+    def rms_px(self) -> Array:
+        """RMS distance of each fit after each iteration, (n_fits, MAX_ITERATIONS + 1), px; its last once it has
+        ended."""
+        return np.array([[*f.rms_px, *[f.rms_px[-1]] * (MAX_ITERATIONS + 1 - len(f.rms_px))] for f in self.fits])
 
     @property
     def mean_iterations(self) -> float:
@@ -74,21 +84,33 @@ class RoughStep(NamedTuple):
 
 
 def measure_convergence(scene: Scene, seed: int = 0) -> tuple[Convergence, ...]:
-    """Fit every fifth frame of a scene from true poses of earlier frames, with and without the sliding term.
+    """Fit every fifth frame of a scene from true poses of earlier frames, in every mode.
 
     Args:
         scene: of a body of elliptical cones.
         seed: of the noise.
     """
     observer = StagedObserver(scene.actor, scene.truth, scene.cameras, scene.noise_px, seed)
-    found: dict[tuple[int, bool], list[TracedFit]] = {(back, on): [] for back in BACK for on in (True, False)}
+    found: dict[tuple[int, Mode], list[TracedFit]] = {(back, mode): [] for back in BACK for mode in MODES}
     for k in range(min(max(BACK), len(scene.truth) - 1), len(scene.truth), _EVERY):
-        for back, sliding in found:
-            settings, start = paper_settings("edges", sliding), scene.truth[max(k - back, 0)]
-            unlimited = unlimited_views(observer.evidence(k), settings)
-            residuals = paper_residuals(unlimited, [PosedBody(scene.model, start)], 0, settings)
-            found[back, sliding].append(_traced([*fit_by_iterations(scene.model, start, residuals, MAX_ITERATIONS)]))
-    return tuple(Convergence(back, sliding, tuple(fits)) for (back, sliding), fits in found.items())
+        for back, mode in found:
+            start = scene.truth[max(k - back, 0)]
+            found[back, mode].append(_traced([*_iterations(scene.model, start, observer.evidence(k), mode)]))
+    return tuple(Convergence(back, mode, tuple(fits)) for (back, mode), fits in found.items())
+
+
+def _iterations(model: BodyModel, start: Array, views: Sequence[ViewEvidence], mode: Mode) -> Iterator[FitIteration]:
+    """Fit a frame from a pose. Yields the start and each iteration, with the distances of the paper's mode."""
+    paper, body = paper_settings("edges", mode == "paper"), PosedBody(model, start)
+    distances = paper_residuals(unlimited_views(views, paper), [body], 0, paper)
+    if mode != "default":
+        yield from fit_by_iterations(model, start, distances, MAX_ITERATIONS)
+        return
+    settings = ContourSettings()
+    priors = prior_blocks(model, start, np.where(model.dof_is_length, settings.trust_m, settings.trust_rad))
+    contours = ContourResiduals(views, [body], settings=settings.match, everywhere=True)
+    for fit in iterate(model, start, [contours, *priors], max_iterations=MAX_ITERATIONS, tolerance=TOLERANCE):
+        yield rms_at(model, fit.pose, distances, f"iteration {fit.iterations}")
 
 
 def fit_rough_guess(scene: Scene, seed: int = 0) -> tuple[tuple[RoughStep, ...], tuple[RoughStep, ...]]:

@@ -9,7 +9,9 @@ import numpy as np
 from tracker.geometry.arrays import Array, IntArray
 
 _SIZE, _MARGIN = (760, 260), (56, 14, 26, 40)
-"""Width and height of a chart, and its margins left, right, top and bottom."""
+"""Width and height of a chart without its legend, and its margins left, right, top and bottom."""
+_COLUMNS, _ROW = 3, 14
+"""Columns of the legend, and the height of its rows."""
 _COLORS = ("#1f6fb2", "#d1495b", "#3a8f5c", "#8a5fb5", "#b07a2a", "#555555")
 _TICKS = 5
 _FONT = 'font-family="sans-serif" font-size="11"'
@@ -35,6 +37,8 @@ def line_chart(title: str, x: Array, lines: Sequence[Line], x_label: str, y_labe
         y_label: name and unit of the vertical axis.
     """
     (width, height), (left, right, top, bottom) = _SIZE, _MARGIN
+    legend = _ROW * -(-len(lines) // _COLUMNS)
+    height, top = height + legend, top + legend
     finite = np.concatenate([line.values[np.isfinite(line.values)] for line in lines])
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 1.0)
     low, high = min(low, 0.0), high if high > low else low + 1.0
@@ -65,11 +69,9 @@ def line_chart(title: str, x: Array, lines: Sequence[Line], x_label: str, y_labe
         for run in _runs(line.values):
             points = " ".join(f"{u(float(x[k])):.1f},{v(float(line.values[k])):.1f}" for k in run)
             out.append(f'<polyline points="{points}" fill="none" stroke="{color}" stroke-width="1.6"{dash}/>')
-        at = left + 8 + i * (width - left - right) / max(len(lines), 3)
-        out.append(
-            f'<line x1="{at}" x2="{at + 20}" y1="{top + 6}" y2="{top + 6}" stroke="{color}" stroke-width="2"{dash}/>'
-        )
-        out.append(f'<text x="{at + 25}" y="{top + 10}" fill="#222222">{escape(line.name)}</text>')
+        at, y = left + i % _COLUMNS * (width - left - right) // _COLUMNS, _MARGIN[2] + _ROW * (i // _COLUMNS)
+        out.append(f'<line x1="{at}" x2="{at + 20}" y1="{y}" y2="{y}" stroke="{color}" stroke-width="2"{dash}/>')
+        out.append(f'<text x="{at + 25}" y="{y + 4}" fill="#222222">{escape(line.name)}</text>')
     out.append(f'<text x="{(left + width - right) / 2}" y="{height - 8}" text-anchor="middle">{escape(x_label)}</text>')
     middle = (top + height - bottom) / 2
     out.append(

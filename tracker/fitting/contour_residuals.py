@@ -234,6 +234,12 @@ class ContourResiduals:
         out._model, out._term = model, self._term._replace(surfaces=surfaces)
         return out
 
+    def with_information(self, factor: float) -> "ContourResiduals":
+        """Return the same residuals with their information multiplied by a factor. Both use the same buffers."""
+        out, views = copy(self), self._term.views
+        out._term = self._term._replace(views=views._replace(weights=factor * views.weights))
+        return out
+
     def piece_sums(self, pose: Array) -> tuple[float, PieceSums]:
         """Return the cost of a pose, (n_values,), and the residuals piece by piece.
 

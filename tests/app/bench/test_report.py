@@ -1,5 +1,6 @@
 import json
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -51,16 +52,22 @@ def test_work_and_yardstick_are_timed_in_turns():
 def test_differences_are_taken_in_turns(monkeypatch):
     """A machine that becomes slower from run to run adds as much to both, and the first run is for nothing."""
     took_s = {"long": iter((9.0, 3.0, 4.0, 5.0)), "short": iter((1.0, 1.0, 2.0, 3.0))}
-    monkeypatch.setattr(bench_rows, "_seconds", lambda work: work() or 0.0)
+    monkeypatch.setattr(bench_rows, "_seconds", lambda work, _: work() or 0.0)
     timed = Yardstick().beside_difference(lambda: next(took_s["long"]), lambda: next(took_s["short"]), 3)
     assert timed.work_us == 2e6
+
+
+def test_differences_do_not_grow_with_what_other_programs_do():
+    timed = Yardstick().beside_difference(lambda: time.sleep(0.02), lambda: None, 3)
+    assert abs(timed.work_us) < 5_000
+    assert timed.yardstick_us > 0
 
 
 @pytest.mark.slow
 def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
     """Not how fast, only that they run and tell what they should."""
 
-    def beside(self, work, runs, times=1):
+    def beside(self, work, runs, times=1, clock=None):
         done = work()
         return bench_rows.Timed(2.0 * (done if isinstance(done, int) else 1), 1.0)
 

@@ -9,7 +9,7 @@ import pytest
 
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.experiments.contour_experiment import ContourExperiment, make_scene, run_contour_experiment
+from tracker.experiments.contour_experiment import ACTORS, ContourExperiment, make_scene, run_contour_experiment
 from tracker.experiments.contour_report import write_contour_report
 from tracker.experiments.contour_run import RunResult, contour_rms_px, observable_angles, track_scene
 from tracker.experiments.line_chart import Line, line_chart
@@ -17,6 +17,7 @@ from tracker.experiments.smooth_motion import smooth_motion
 from tracker.experiments.staged_views import StagedObserver
 from tracker.formats.model_toml import load_model
 from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.contour.settings import ContourSettings
 
 SMALL = ContourExperiment(n_frames=3, n_cameras=3, camera_counts=(2,))
 QUICK = TrackSettings(recover=None, backward_pass=False)
@@ -78,6 +79,14 @@ def test_a_tracker_follows_the_own_shape():
     assert found.before_px[1:].mean() > 2 * found.after_px.mean()
 
 
+def test_priors_pull_less_where_the_body_fits_well():
+    """The own shape fits to a fraction of a pixel; a person of another shape does not, and is tracked as before."""
+    on, off = (ContourSettings(recover=None, measure_noise=m) for m in (True, False))
+    own, other = (make_scene(SMALL, actor, 3) for actor in ("own shape", "skinned person"))
+    assert track_scene(own, on).mean_error < 0.6 * track_scene(own, off).mean_error
+    np.testing.assert_array_equal(track_scene(other, on).poses, track_scene(other, off).poses)
+
+
 @pytest.fixture(scope="module")
 def found():
     """The smallest experiment, and the numbers of runs that were done."""
@@ -89,7 +98,7 @@ def found():
 @pytest.mark.slow
 def test_the_report_and_its_figures(found, tmp_path):
     report = write_contour_report(tmp_path / "r", found[0])
-    assert found[1] == [(i + 1, 7) for i in range(7)]
+    assert found[1] == [(i + 1, 10) for i in range(10)]
     text = report.read_text("utf-8")
     figures = re.findall(r"\]\(([^)]+)\)", text)
     assert {"fig5a_a.svg", "fig5b_a.svg", "fig6_left_elbow_extension.svg", "fig7_right_shoulder_abduction.svg"} <= set(
@@ -100,6 +109,9 @@ def test_the_report_and_its_figures(found, tmp_path):
         ElementTree.parse(tmp_path / "r" / name)
     assert "| a | " in text
     assert "| | 1 | 2 |" in text
+    for actor in ACTORS:
+        assert f"| {actor}, a | " in text
+        assert f"| {actor}, contour, paper | " in text
     assert "fig13.svg" in figures
 
 
@@ -112,12 +124,25 @@ def test_a_chart_has_gaps_and_escaped_names():
     ElementTree.fromstring(flat)
 
 
+def test_names_of_many_curves_stand_apart_and_above_the_curves():
+    names = [f"a person of another shape, method {i}" for i in range(7)]
+    root = ElementTree.fromstring(line_chart("t", np.arange(2.0), [Line(n, np.ones(2)) for n in names], "x", "y"))
+    texts = [t for t in root.findall("{http://www.w3.org/2000/svg}text") if t.text in names]
+    at = np.array([[float(t.get("x")), float(t.get("y"))] for t in texts])
+    lines = root.findall("{http://www.w3.org/2000/svg}polyline")
+    assert at[:, 1].max() < min(float(p.split(",")[1]) for line in lines for p in line.get("points").split())
+    for i in range(7):
+        beside = np.delete(at, i, axis=0) - at[i]
+        assert np.all((np.abs(beside[:, 1]) >= 12) | (np.abs(beside[:, 0]) >= 200))
+
+
 @pytest.mark.parametrize("change", [{"n_frames": 1}, {"n_cameras": 0}, {"camera_counts": (2, 99)}, {"noise_px": -1.0}])
 def test_impossible_parameters(change):
     with pytest.raises(TrackerError, match="expected at least 2 frames, 1 to 32 cameras"):
         run_contour_experiment(replace(SMALL, **change), {"a": QUICK})
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written(found, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(TrackerError, match=r"cannot write the report .*choose a folder"):

@@ -388,3 +388,12 @@ def test_parts_by_hand():
     # Beyond the outlier distance a piece costs no more.
     off = ContourResiduals([seen(points, across, 35.0)], [BALL], 0, FORWARD, THETA)
     assert off.part_costs(BALL.values).forward_px.item() == pytest.approx(THETA)
+
+
+def test_information_multiplies_the_normal_equations(gavrila):
+    views, body, _ = staged(gavrila)
+    block = ContourResiduals(views, [body])
+    once, four = normal(block, body), normal(block.with_information(4.0), body)
+    for a, b in zip(once, four, strict=True):
+        np.testing.assert_allclose(b, 4 * a, rtol=1e-6, atol=1e-6 * np.abs(a).max())
+    np.testing.assert_array_equal(normal(block, body).hessian, once.hessian)

@@ -84,10 +84,15 @@ def fit_by_iterations(
 
 def fit_incrementally(model: BodyModel, start: Array, residuals: ContourResiduals) -> Iterator[FitIteration]:
     """Fit a rough guess chain by chain (KRH08 Sect. 6, Fig. 9). Yields the start, then each step."""
-    cost = residuals.linearize(model, start, model.kinematics(start)).cost
-    yield FitIteration(START, start, _rms_px(residuals, start, cost), cost)
+    yield rms_at(model, start, residuals, START)
     for step in fit_by_chains(model, start, [residuals]):
         yield FitIteration(step.name, step.fit.pose, _rms_px(residuals, step.fit.pose, step.fit.cost), step.fit.cost)
+
+
+def rms_at(model: BodyModel, pose: Array, residuals: ContourResiduals, name: str) -> FitIteration:
+    """Measure the distances of a body in a pose, (n_values,), that something else found."""
+    cost = residuals.linearize(model, pose, model.kinematics(pose)).cost
+    return FitIteration(name, pose, _rms_px(residuals, pose, cost), cost)
 
 
 def _rms_px(residuals: ContourResiduals, pose: Array, cost: float) -> float:

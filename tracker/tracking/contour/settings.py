@@ -19,6 +19,8 @@ class ContourSettings(EstimationSettings):
     """Weights of the contour residuals, with the motion of contour points in full."""
     max_iterations: int = 50
     """Largest number of Gauss-Newton iterations of a whole body."""
+    measure_noise: bool = True
+    """See `EstimationSettings.measure_noise`."""
     incremental_start: bool = True
     """Whether a start that does not fit is fitted chain by chain."""
     image_contours: ImageContours = "edges"

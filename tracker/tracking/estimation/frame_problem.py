@@ -26,6 +26,9 @@ from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePoo
 _SAME_ASSIGNMENT_M = 0.01
 """Evidence is assigned again where a person has moved farther, metres."""
 
+_ROUNDING_PX2 = 1 / 12
+"""Variance of rounding to whole pixels, px^2."""
+
 Bodies = tuple[PosedBody, ...]
 """All people in their poses."""
 
@@ -121,12 +124,16 @@ class FrameProblem:
         """Refine a fit again from its pose, which takes the place of the prediction.
 
         The prediction holds the first refinement back where the person moves otherwise than predicted. The result has
-        the normal matrix with the prediction.
+        the normal matrix with the prediction. With `EstimationSettings.measure_noise` the contours have the variance
+        of the first refinement's distances, if that is below 1 px^2. Priors then pull less where the body fits well.
         """
         untrusted, pose = found.untrusted_limbs or (), found.fit.pose
         around = self.priors(person, found.bodies, untrusted)
         around[0] = PosePrior(pose, 1 / (OWN_TRUST * self.sigma(person)))
-        pose = self.solve(person, pose, [found.residuals, *around], MAX_ITERATIONS, MIN_DECREASE).pose
+        residuals = found.residuals
+        if self.settings.measure_noise:
+            residuals = residuals.with_information(1 / min(1.0, _variance_px2(residuals.part_costs(pose))))
+        pose = self.solve(person, pose, [residuals, *around], MAX_ITERATIONS, MIN_DECREASE).pose
         fit = self.solve(person, pose, [found.residuals, *self.priors(person, found.bodies, untrusted)], 0)
         return found._replace(fit=fit, body=PosedBody(self.people[person].model, fit.pose), assessment=None)
 
@@ -203,6 +210,18 @@ class FrameProblem:
     def around(self, person: int, bodies: Bodies) -> tuple[list[PosedBody], int]:
         """Return the bodies that may occlude a person, the person included, and the person's index among them."""
         return (list(bodies), person) if self.settings.occlusion else ([bodies[person]], 0)
+
+
+def _variance_px2(costs: PartCosts) -> float:
+    """Estimate the variance of the contours' distances to the edges, px^2; 1 where nothing is visible.
+
+    It follows from the mean distance as for a normal distribution, and is at least that of rounding to whole pixels.
+    """
+    length_px = costs.length_px.sum()
+    if length_px == 0:
+        return 1.0
+    mean_px = np.nansum(costs.forward_px * costs.length_px) / length_px
+    return float(max(np.pi / 2 * mean_px**2, _ROUNDING_PX2))
 
 
 def with_body(bodies: Bodies, person: int, body: PosedBody) -> Bodies:

@@ -99,6 +99,9 @@ class EstimationSettings:
     """Weight of the term against people passing through each other; 0 leaves it out."""
     max_iterations: int = MAX_ITERATIONS
     """Largest number of Gauss-Newton iterations of a whole body from its prediction."""
+    measure_noise: bool = False
+    """Whether the last refinement trusts contours more where they fit better than to a pixel, see
+    `frame_problem.FrameProblem.converge`."""
     incremental_start: bool = False
     """Whether a start that does not fit is fitted chain by chain before it is searched."""
 

@@ -147,21 +147,22 @@ def test_twenty_bad_starts(data_folder, tmp_path, settings):
     model, reference = session.people[0].model, read_joints(folder / "ground_truth.trc", session.fps)
     places = dict(zip(reference.names, reference.points[0], strict=True))
     right = fit_to_points(model, {n: places[n] for n in LIMB_JOINTS}).pose
-    errors_mm, flagged = [], []
-    for seed in range(N_SEEDS):
-        start = beside(model, right, seed)
-        keyframes = {0: {0: start}}
+
+    def tracked(start):
+        """The error on each frame after the first, mm, and the status of the last."""
         with Recording(session.cameras) as recording:
-            observer = Observer(session.cameras, recording)
+            observer, keyframes = Observer(session.cameras, recording), {0: {0: start}}
             found = list(track(observer, [model], [start], range(N_FRAMES), settings, keyframes=keyframes))
         joints = joints_of_poses(model, {f.frame: f.poses[0] for f in found}, session.fps)
-        errors_mm.append([evaluate_joints(joints, reference, range(k, k + 1)).mpjpe_mm for k in range(1, N_FRAMES)])
-        flagged.append(found[10].statuses[0] != "good")
-        print(seed, " ".join(f"{e:.1f}{f.statuses[0][0]}" for e, f in zip(errors_mm[-1], found[1:], strict=True)))
-    at_5 = np.array(errors_mm)[:, 4]
+        errors_mm = [evaluate_joints(joints, reference, range(k, k + 1)).mpjpe_mm for k in range(1, N_FRAMES)]
+        print(" ".join(f"{e:.1f}{f.statuses[0][0]}" for e, f in zip(errors_mm, found[1:], strict=True)))
+        return errors_mm, found[10].statuses[0]
+
+    runs = [tracked(beside(model, right, seed)) for seed in range(N_SEEDS)]
+    errors_mm = np.array([errors for errors, _ in runs])
     if settings.method == "chamfer":
-        assert at_5.max() <= 30
-    else:  # one of them reaches 30 mm on frame 2 and is at 30.7 mm on frame 5
-        assert np.sum(at_5 <= 30) >= N_SEEDS - 1
-        assert np.array(errors_mm)[:, :5].min(axis=1).max() <= 30
-    assert not any(flagged)
+        assert errors_mm[:, 4].max() <= 30
+    else:  # on frame 5 the generic body is no nearer if the start is right
+        assert errors_mm[:, :5].min(axis=1).max() <= 30
+        assert errors_mm[:, 4].max() <= max(30, tracked(right)[0][4])
+    assert {status for _, status in runs} == {"good"}
