@@ -21,7 +21,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
 from tracker.geometry.arrays import Array
-from tracker.tracking.silhouette_overlap import axis_samples
+from tracker.tracking.silhouette_overlap import AxisSamples, axis_samples
 from tracker.tracking.view_regions import px_per_m
 
 Status = Literal["good", "doubtful", "lost"]
@@ -82,7 +82,8 @@ class LimbFeatures(NamedTuple):
     explained: float
     """Number of edge and silhouette points that it explains, per pixel of its visible contour."""
     outside: float
-    """Share of its axis outside the silhouette, mean over the views with a trusted one; 0 where there is none."""
+    """Share of its axis outside the silhouette, mean over the views that show it and have a trusted one; 0 where there
+    is none."""
     at_limits: float
     """Share of its degrees of freedom at a limit. A limb that is drawn to wrong edges bends as far as it can."""
 
@@ -118,6 +119,10 @@ class PoseQuality(NamedTuple):
     def search_odds(self) -> Array:
         """Log odds by which limbs are searched, (n_limbs,)."""
         return _search_odds(self)
+
+    def search_odds_of(self, limb: str) -> float:
+        """Return the log odds by which the limb of a name is searched."""
+        return float(self.search_odds[[x.name for x in self.limbs].index(limb)])
 
     def doubtful_limbs(self, alone: bool) -> tuple[str, ...]:
         """Return the names of limbs that are worth a search themselves, of a single person or of one of several."""
@@ -224,12 +229,17 @@ def quality(
             LimbFeatures(
                 c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread),
                 *_of_contour(costs, far, beside_px, c.parts),
-                float(np.mean([x.share_outside(c.parts) for x in samples])) if samples else 0.0,
+                _share_outside(samples, c.parts),
                 _share_at_limits(model, body.values, c),
             )
             for c, spread in zip(chains, spreads, strict=True)
         ),
     )  # fmt: skip
+
+
+def _share_outside(samples: Sequence[AxisSamples], parts: NDArray[np.int64]) -> float:
+    """Return the share of some parts outside the silhouette, mean over the views that show them; 0 without a view."""
+    return float(np.mean([x.share_outside(parts) for x in samples if x.shown[parts].any()] or [0.0]))
 
 
 def _share_at_limits(model: BodyModel, pose: Array, limb: Limb) -> float:

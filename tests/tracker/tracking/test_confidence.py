@@ -18,11 +18,13 @@ from tracker.tracking.confidence import (
     LOST_FROM,
     LimbFeatures,
     PoseQuality,
+    _share_outside,
     classify,
     quality,
     reason,
     worst,
 )
+from tracker.tracking.silhouette_overlap import AxisSamples
 
 
 def names_of(model, parts):
@@ -180,6 +182,14 @@ def test_quality_of_a_pose_and_of_a_lost_arm(gavrila, colors):
         assert wrong.limbs[arm].worst_drop > right.limbs[arm].worst_drop + 0.5
     else:  # they say nothing
         assert all((x.color, x.worst_drop) == (np.inf, -np.inf) or x.worst_drop == 0 for x in right.limbs)
+
+
+def test_views_beside_the_person_do_not_thin_out_what_lies_outside_the_silhouette():
+    shown = np.array([[True] * 4, [True] * 4])
+    half, hidden = AxisSamples(shown, np.array([[True, True, False, False]] * 2)), AxisSamples(~shown, ~shown)
+    parts = np.array([0, 1])
+    assert _share_outside([half], parts) == _share_outside([half, hidden], parts) == 0.5
+    assert _share_outside([hidden], parts) == _share_outside([], parts) == 0.0
 
 
 def test_quality_where_nothing_is_seen(gavrila):

@@ -77,6 +77,28 @@ def test_a_limb_of_somebody_alone_that_is_lost_does_not_wait(memory, gavrila):
     assert "left_calf" not in {x.name for x in alone.limbs_to_search(suspect)}
 
 
+def test_a_limb_of_somebody_alone_is_searched_again_once_the_frame_contradicts_it_more(gavrila):
+    """A search that failed says nothing about a limb that has left its place since."""
+    memory = PersonMemory(gavrila, gavrila.neutral())
+    doubtful, worse = (_with_spread(seen(memory), "left_calf", px) for px in (5.0, 12.0))
+    assert doubtful.search_odds_of("left_calf") + 2.0 < worse.search_odds_of("left_calf") < 0.0
+    (limb,) = memory.limbs_to_search(doubtful)
+    memory.record_search(limb, doubtful, found=False)
+    assert memory.limbs_to_search(doubtful) == []
+    assert memory.limbs_to_search(worse) == [limb]
+    memory.record_search(limb, worse, found=False)
+    assert memory.limbs_to_search(worse) == []
+    others = PersonMemory(gavrila, gavrila.neutral(), alone=False)
+    others.record_search(limb, doubtful, found=False)
+    assert others.limbs_to_search(worse) == []
+
+
+def _with_spread(quality, name, spread_px):
+    """The same with a limb whose end is uncertain."""
+    limbs = tuple(x._replace(spread_px=spread_px, color=0.6) if x.name == name else x for x in quality.limbs)
+    return quality._replace(limbs=limbs)
+
+
 def test_limbs_that_nothing_speaks_against_wait_longer(gavrila):
     memory = PersonMemory(gavrila, gavrila.neutral(), alone=False)
     everything = seen(memory, unexplained=0.2)
