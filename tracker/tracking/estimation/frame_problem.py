@@ -110,8 +110,7 @@ class FrameProblem:
         untrusted = None if before is None else before.untrusted_limbs
         residuals = self.residuals(person, bodies, everywhere=untrusted is not None)
         blocks = [residuals, *self.priors(person, bodies, untrusted or ())]
-        min_decrease = MIN_DECREASE if len(self.people) > 1 else 0.0  # several people are refined more than once
-        fit = self.solve(person, bodies[person].values, blocks, self.settings.max_iterations, min_decrease)
+        fit = self.solve(person, bodies[person].values, blocks, self.settings.max_iterations, MIN_DECREASE)
         body = PosedBody(self.people[person].model, fit.pose)
         if before is None:
             return PersonFit(residuals, bodies, fit, body)
@@ -123,12 +122,12 @@ class FrameProblem:
         The prediction holds the first refinement back where the person moves otherwise than predicted. The result has
         the normal matrix with the prediction.
         """
-        untrusted, pose = found.untrusted_limbs or (), found.fit.pose
-        around = self.priors(person, found.bodies, untrusted)
-        around[0] = PosePrior(pose, 1 / (OWN_TRUST * self.sigma(person)))
-        pose = self.solve(person, pose, [found.residuals, *around], MAX_ITERATIONS, MIN_DECREASE).pose
-        fit = self.solve(person, pose, [found.residuals, *self.priors(person, found.bodies, untrusted)], 0)
-        return found._replace(fit=fit, body=PosedBody(self.people[person].model, fit.pose), assessment=None)
+        prediction, *others = self.priors(person, found.bodies, found.untrusted_limbs or ())
+        assert isinstance(prediction, PosePrior)
+        model, own = self.people[person].model, PosePrior(found.fit.pose, 1 / (OWN_TRUST * self.sigma(person)))
+        fit = self.solve(person, own.pose, [found.residuals, own, *others], MAX_ITERATIONS, MIN_DECREASE)
+        fit = fit.with_prior(model, own, prediction)
+        return found._replace(fit=fit, body=PosedBody(model, fit.pose), assessment=None)
 
     def solve(
         self, person: int, start: Array, blocks: Sequence[ResidualBlock], max_iterations: int, min_decrease: float = 0.0
