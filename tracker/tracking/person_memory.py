@@ -85,9 +85,9 @@ class PersonMemory:
     def limbs_to_search(self, quality: PoseQuality) -> list[Limb]:
         """Return the limbs to search now. After each failed search a limb's back-off doubles.
 
-        A single person's limb that is more likely lost than found does not back off. A fast limb is elsewhere in each
-        frame, and predictions from a wrong pose get worse. Nor does one that the frame contradicts much more than that
-        of the last search.
+        A single person's limb that is lost, or more likely elsewhere than not, does not back off. A fast limb is
+        elsewhere in each frame, and predictions from a wrong pose get worse. Nor does one that the frame contradicts
+        much more than that of the last search.
 
         With several people, an unexplained part of the silhouette alone makes no limb due while another limb of the
         person seems lost.
@@ -98,9 +98,10 @@ class PersonMemory:
         candidates, alone = self.search_candidates(quality), self.alone
         doubtful = [] if alone else [x for x in candidates if x.name in quality.doubtful_limbs(alone)]
         longest = _MAX_BACKOFF_FRAMES if alone or doubtful else _MAX_CALM_BACKOFF_FRAMES
+        urgent = {*quality.missing_limbs, *quality.lost_limbs}
 
         def cooled_down(limb: Limb) -> bool:
-            if alone and (limb.name in quality.missing_limbs or self._is_worse(limb, quality)):
+            if alone and (limb.name in urgent or self._is_worse(limb, quality)):
                 return True
             last, backoff = self._backoffs.get(limb.name, (-1, 0))
             return self._n_frames > last + min(backoff, longest)

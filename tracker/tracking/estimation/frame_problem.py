@@ -122,12 +122,22 @@ class FrameProblem:
         The prediction holds the first refinement back where the person moves otherwise than predicted. The result has
         the normal matrix with the prediction.
         """
-        prediction, *others = self.priors(person, found.bodies, found.untrusted_limbs or ())
-        assert isinstance(prediction, PosePrior)
-        model, own = self.people[person].model, PosePrior(found.fit.pose, 1 / (OWN_TRUST * self.sigma(person)))
+        prediction, own, *others = self._priors_of(person, found)
+        model = self.people[person].model
         fit = self.solve(person, own.pose, [found.residuals, own, *others], MAX_ITERATIONS, MIN_DECREASE)
         fit = fit.with_prior(model, own, prediction)
         return found._replace(fit=fit, body=PosedBody(model, fit.pose), assessment=None)
+
+    def freed(self, person: int, found: PersonFit) -> Fit:
+        """Return a fit as if its pose, little trusted, were the prediction of all limbs."""
+        prediction, own, *_ = self._priors_of(person, found)
+        return found.fit.with_prior(self.people[person].model, prediction, own)
+
+    def _priors_of(self, person: int, found: PersonFit) -> tuple[PosePrior, PosePrior, *tuple[ResidualBlock, ...]]:
+        """Return the prediction of a fit, its pose as a weak prior in that place, and the other prior terms."""
+        prediction, *others = self.priors(person, found.bodies, found.untrusted_limbs or ())
+        assert isinstance(prediction, PosePrior)
+        return prediction, PosePrior(found.fit.pose, 1 / (OWN_TRUST * self.sigma(person))), *others
 
     def solve(
         self, person: int, start: Array, blocks: Sequence[ResidualBlock], max_iterations: int, min_decrease: float = 0.0
