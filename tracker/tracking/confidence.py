@@ -239,7 +239,7 @@ def quality(
         score, known = colors
         color = np.where(score.samples >= _MIN_SAMPLES, score.parts, np.inf)
         worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
-    spreads, free_spreads = (scale * _end_spreads(body, fit) for fit in fits)
+    spreads, free_spreads = scale * _end_spreads(body, fits)
     innovations = np.linalg.norm(model.points_world(predicted) - body.points_world, axis=1) / model.height_m
     trusted = np.array([v.silhouette is not None and v.silhouette.trust > _MIN_TRUST for v in views], dtype=bool)
     trunk = np.flatnonzero(~np.isin(np.arange(len(model.parts)), [p for c in chains for p in c.parts]))
@@ -330,9 +330,10 @@ def worst(statuses: Sequence[Status]) -> Status:
     return max(statuses, key=("good", "doubtful", "lost").index, default="good")
 
 
-def _end_spreads(body: PosedBody, fit: Fit) -> Array:
-    """Return the standard deviation of the end of each limb, (n_limbs,), metres."""
+def _end_spreads(body: PosedBody, fits: Sequence[Fit]) -> Array:
+    """Return the standard deviation of the end of each limb by each fit, (n_fits, n_limbs), metres."""
     model = body.model
     ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in limbs(model)], dtype=np.int64)
     J = model.point_jacobian(body.kinematics, model.point_parts[ends], body.points_world[ends])
-    return np.sqrt(np.trace(J @ covariance(model, fit) @ np.swapaxes(J, 1, 2), axis1=1, axis2=2))
+    variances = [np.trace(J @ covariance(model, fit) @ np.swapaxes(J, 1, 2), axis1=1, axis2=2) for fit in fits]
+    return np.sqrt(np.array(variances))
