@@ -16,6 +16,9 @@ OFF_MM, LOST_MM = 100.0, 150.0
 """A limb is off, and lost, where the error of a joint is larger."""
 UNSEARCHED_WEIGHT, REPLACED_WEIGHT = 0.3, 0.5
 """Weight of a limb that was tracked without search, where more is lost, and of a pose that was replaced."""
+FEW_CAMERAS_WEIGHT = 0.2
+"""Weight of a limb that two or three cameras saw. Errors along the line of sight leave no trace in any feature, and the
+weights would follow them instead of what four cameras show."""
 RIDGE = 3e-3
 
 
@@ -104,6 +107,7 @@ def load_rows(path: Path) -> LimbRows:
 def weights_of(run: Run) -> Array:
     """Return the weight of each row of a run in the fit, (n,); 0 where the error is unknown."""
     weight = np.where(run.rows.replaced, REPLACED_WEIGHT, 1.0) * (1.0 if run.searched else UNSEARCHED_WEIGHT)
+    weight = weight * (FEW_CAMERAS_WEIGHT if run.condition in ("2 cameras", "3 cameras") else 1.0)
     return np.where(np.isfinite(run.rows.error_mm), weight, 0.0)
 
 

@@ -57,7 +57,7 @@ def write_results(runs: Sequence[Run], outside: Sequence[Run]) -> None:
         "all simulated people. Each cell: lost frames that are flagged (doubtful or lost) / good "
         "frames that are off / flagged frames that are fine.",
         "",
-        "A limb is doubtful where it is off with a probability above 5%, and lost where it is lost with one above 15%: "
+        "A limb is doubtful where it is off with a probability above 5%, and lost where it is lost with one above 25%: "
         "to call a wrong pose good is the worse error. The goals are 95% of the lost frames flagged, 5% of the good "
         "frames off, 40% of the flagged frames fine. With four cameras, the first two hold to within two points; the "
         "third is missed nearly everywhere. Few limbs are off, and they look much like others, so that most flagged "

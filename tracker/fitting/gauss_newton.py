@@ -97,6 +97,11 @@ class PosePrior:
         r = model.difference(pose, self.pose) * self.weights
         return NormalEquations(0.5 * float(r @ r), self.weights * r, self._hessian)
 
+    def cost(self, model: BodyModel, pose: Array) -> float:
+        """Return the cost of a pose, (n_values,)."""
+        r = model.difference(pose, self.pose) * self.weights
+        return 0.5 * float(r @ r)
+
     @cached_property
     def _hessian(self) -> Array:
         return np.diag(self.weights**2)
@@ -112,6 +117,13 @@ class Fit(NamedTuple):
     iterations: int
     hessian: Array
     """Second derivative of the cost at the pose, (n_dofs, n_dofs), for `covariance`."""
+
+    def with_prior(self, model: BodyModel, old: PosePrior, new: PosePrior) -> "Fit":
+        """Return the fit as if one prior were in the place of another, at the same pose."""
+        return self._replace(
+            cost=self.cost - old.cost(model, self.pose) + new.cost(model, self.pose),
+            hessian=self.hessian + np.diag(new.weights**2 - old.weights**2),
+        )
 
 
 def solve(

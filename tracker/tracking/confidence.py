@@ -12,7 +12,6 @@ from functools import lru_cache
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import ColorScore, PartColors
 from tracker.body.limbs import Limb, limb_display_name, limbs
@@ -20,8 +19,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
-from tracker.geometry.arrays import Array
-from tracker.tracking.silhouette_overlap import axis_samples
+from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.view_regions import px_per_m
 
 Status = Literal["good", "doubtful", "lost"]
@@ -32,11 +30,17 @@ _MIN_LENGTH_PX = 5.0
 """Shortest contour length that the explained points are divided by, px."""
 _MIN_TRUST = 0.5
 """Silhouettes trusted less are left out."""
+_MIN_SHOWN = 0.2
+"""A view shows a limb where more of its contour is visible, relative to that seen from the side."""
+_MIN_EXPLAINED = 0.05
+"""Fewest points per pixel of the body's contour to which a part is compared."""
+_STILL = 0.005
+"""Innovations that differ by less hardly count, body heights."""
 _LIMIT_RAD = 0.05
 """An angle is at its limit where it is nearer, rad."""
-_WEIGHTS = np.array([-0.241, 0.309, 2.037, 8.293, -2.248, 1.241, 5.118, -0.869])
+_WEIGHTS = np.array([2.893, 4.401, -2.282, -2.963, 3.508, 0.282, 13.031, -1.814])
 """Weights of `features`, in their order."""
-_OFF_CONSTANT, _LOST_CONSTANT = -6.34, -7.585
+_OFF_CONSTANT, _LOST_CONSTANT = 1.042, -0.973
 """Constants of the log odds that a joint of a limb is off by more than 100 mm, and by more than 150 mm."""
 
 
@@ -45,7 +49,7 @@ def _odds(probability: float) -> float:
     return float(np.log(probability / (1.0 - probability)))
 
 
-OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.15)
+OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.25)
 """A limb is doubtful above these log odds that a joint is off by more than 100 mm, and lost above these that one is by
 more than 150 mm. To call a wrong pose good is the worse error."""
 _DOUBTFUL_ODDS = OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT
@@ -81,10 +85,19 @@ class LimbFeatures(NamedTuple):
     """Length of its visible contour in the views that see the body, relative to that seen from the side."""
     explained: float
     """Number of edge and silhouette points that it explains, per pixel of its visible contour."""
-    outside: float
-    """Share of its axis outside the silhouette, mean over the views with a trusted one; 0 where there is none."""
     at_limits: float
     """Share of its degrees of freedom at a limit. A limb that is drawn to wrong edges bends as far as it can."""
+    free_spread_px: float
+    """`spread_px` where the prediction of each pose counts alike, and little."""
+    second_forward: float
+    """`forward` in the second worst of the views that show it; that of the body where none does. A limb at wrong edges
+    fits those of some views only."""
+    end_color: float
+    """`color` of its last part; infinite where little of it is visible."""
+    end_explained: float
+    """`explained` of its last part, relative to that of the body. Without silhouettes all parts explain less."""
+    innovation: float
+    """Largest distance of its points from the prediction, in body heights."""
 
 
 class PoseQuality(NamedTuple):
@@ -96,6 +109,8 @@ class PoseQuality(NamedTuple):
     """Number of views that see the body."""
     unexplained: float
     """Share of the silhouette's contour that no part explains, in the second worst trusted view."""
+    trunk_forward: float
+    """`forward` of the parts of no limb."""
     limbs: tuple[LimbFeatures, ...]
     """Features of each limb."""
 
@@ -118,6 +133,15 @@ class PoseQuality(NamedTuple):
     def search_odds(self) -> Array:
         """Log odds by which limbs are searched, (n_limbs,)."""
         return _search_odds(self)
+
+    @property
+    def lost_limbs(self) -> tuple[str, ...]:
+        """Names of limbs that make the pose lost."""
+        return tuple(x.name for x, odds in zip(self.limbs, self.log_odds, strict=True) if odds > LOST_ODDS)
+
+    def search_odds_of(self, limb: str) -> float:
+        """Return the log odds by which the limb of a name is searched."""
+        return float(self.search_odds[[x.name for x in self.limbs].index(limb)])
 
     def doubtful_limbs(self, alone: bool) -> tuple[str, ...]:
         """Return the names of limbs that are worth a search themselves, of a single person or of one of several."""
@@ -147,13 +171,13 @@ class PoseQuality(NamedTuple):
 def features(pose: PoseQuality, limb: LimbFeatures) -> Array:
     """Return the features of a limb from which its status follows, (8,)."""
     return np.array([
-        np.clip(limb.color, -2, 1),
-        np.clip(limb.worst_drop, -0.5, 3),
-        np.log(np.clip(limb.spread_px, 0.5, 50)),
-        limb.forward,
-        np.log(np.clip(limb.shown, 0.02, 2)),
-        limb.outside,
+        np.log(np.clip(limb.free_spread_px, 0.5, 80)),
+        limb.second_forward,
+        np.clip(limb.end_color, -2, 1),
+        min(limb.end_explained, 2),
         limb.at_limits,
+        np.log(min(limb.innovation, 0.5) + _STILL),
+        pose.trunk_forward,
         np.log(max(1, pose.views)),
     ])  # fmt: skip
 
@@ -187,47 +211,54 @@ def _search_odds(found: PoseQuality) -> Array:
 
 def quality(
     body: PosedBody,
-    fit: Fit,
+    fits: tuple[Fit, Fit],
     costs: PartCosts,
     views: Sequence[ViewEvidence],
     thetas_px: Array,
+    predicted: Array,
     colors: tuple[ColorScore, PartColors] | None,
 ) -> PoseQuality:
     """Compute the features of a pose.
 
     Args:
         body: in the pose.
-        fit: the pose, and the normal matrix there.
+        fits: the pose with its normal matrix, and with that where the prediction counts little.
         costs: of its parts.
         views: the evidence of each view.
         thetas_px: outlier distance of each view, (V,), working px.
+        predicted: the predicted pose, (n_values,).
         colors: scores of the colours, and the colours that were learnt; None before the first frame.
     """
     model, chains = body.model, limbs(body.model)
     far = np.nan_to_num(costs.forward_px) / thetas_px[:, None] * costs.length_px
     n_views = int(np.count_nonzero(costs.length_px.sum(axis=1) > 0))
     scale = px_per_m([v.camera for v in views], body)
-    beside_px = 2.0 * scale * max(1, n_views) * np.array([2.0 * s.half_axes[2] for s in model.shapes])
+    beside_px = 2.0 * scale * np.array([2.0 * s.half_axes[2] for s in model.shapes])
     color, worst_drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
     if colors is not None:
         score, known = colors
         color = np.where(score.samples >= _MIN_SAMPLES, score.parts, np.inf)
         worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
-    spreads = scale * _end_spreads(body, fit)
+    spreads, free_spreads = scale * _end_spreads(body, fits)
+    innovations = np.linalg.norm(model.points_world(predicted) - body.points_world, axis=1) / model.height_m
     trusted = np.array([v.silhouette is not None and v.silhouette.trust > _MIN_TRUST for v in views], dtype=bool)
-    samples = [axis_samples(v, body) for v, is_trusted in zip(views, trusted, strict=True) if is_trusted]
+    trunk = np.flatnonzero(~np.isin(np.arange(len(model.parts)), [p for c in chains for p in c.parts]))
+    contours = _Contours(costs, far, beside_px, n_views)
+    forward, explained = contours.forward(slice(None)), contours.explained(slice(None))
     return PoseQuality(
-        float(far.sum() / max(1e-9, costs.length_px.sum())),
+        forward,
         n_views,
         _second_largest(1.0 - costs.silhouette[trusted]),
+        contours.forward(trunk),
         tuple(
             LimbFeatures(
                 c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread),
-                *_of_contour(costs, far, beside_px, c.parts),
-                float(np.mean([x.share_outside(c.parts) for x in samples])) if samples else 0.0,
-                _share_at_limits(model, body.values, c),
+                contours.forward(c.parts), contours.shown(c.parts), contours.explained(c.parts),
+                _share_at_limits(model, body.values, c), float(free_spread), contours.second_forward(c.parts, forward),
+                float(color[c.parts[-1]]), contours.explained(c.parts[-1:]) / max(_MIN_EXPLAINED, explained),
+                float(innovations[np.isin(model.point_parts, c.parts)].max()),
             )
-            for c, spread in zip(chains, spreads, strict=True)
+            for c, spread, free_spread in zip(chains, spreads, free_spreads, strict=True)
         ),
     )  # fmt: skip
 
@@ -238,22 +269,36 @@ def _share_at_limits(model: BodyModel, pose: Array, limb: Limb) -> float:
     return float(np.mean(np.abs(model.limits[limb.dofs] - values).min(axis=1) < _LIMIT_RAD))
 
 
-def _of_contour(costs: PartCosts, far: Array, beside_px: Array, parts: NDArray[np.int64]) -> tuple[float, float, float]:
-    """Return the features `forward`, `shown` and `explained` of some parts.
+class _Contours(NamedTuple):
+    """Visible contours of all parts, for the features of some of them."""
 
-    Args:
-        costs: of all parts.
-        far: summed distance of their contours, (V, n_parts), px times outlier distances.
-        beside_px: length of their contours seen from the side, summed over the views, (n_parts,), px.
-        parts: indices of the parts.
-    """
-    length = float(costs.length_px[:, parts].sum())
-    forward = float(far[:, parts].sum()) / max(1e-9, length)
-    return (
-        forward,
-        length / float(beside_px[parts].sum()),
-        float(costs.points[:, parts].sum()) / max(_MIN_LENGTH_PX, length),
-    )
+    costs: PartCosts
+    far: Array
+    """Summed distance to the edges, (V, n_parts), px times outlier distances."""
+    beside_px: Array
+    """Length seen from the side in one view, (n_parts,), px."""
+    n_views: int
+    """Number of views that see the body."""
+
+    def forward(self, parts: IntArray | slice) -> float:
+        """Return the feature `forward` of some parts."""
+        return float(self.far[:, parts].sum()) / max(1e-9, float(self.costs.length_px[:, parts].sum()))
+
+    def shown(self, parts: IntArray) -> float:
+        """Return the feature `shown` of some parts."""
+        return float(self.costs.length_px[:, parts].sum()) / (max(1, self.n_views) * float(self.beside_px[parts].sum()))
+
+    def explained(self, parts: IntArray | slice) -> float:
+        """Return the feature `explained` of some parts."""
+        length = float(self.costs.length_px[:, parts].sum())
+        return float(self.costs.points[:, parts].sum()) / max(_MIN_LENGTH_PX, length)
+
+    def second_forward(self, parts: IntArray, otherwise: float) -> float:
+        """Return the feature `second_forward` of some parts, or another value where no view shows them."""
+        lengths = self.costs.length_px[:, parts].sum(axis=1)
+        shows = lengths > _MIN_SHOWN * self.beside_px[parts].sum()
+        forward = np.sort(self.far[:, parts].sum(axis=1)[shows] / lengths[shows])
+        return float(forward[max(0, len(forward) - 2)]) if len(forward) else otherwise
 
 
 def _second_largest(shares: Array) -> float:
@@ -285,9 +330,10 @@ def worst(statuses: Sequence[Status]) -> Status:
     return max(statuses, key=("good", "doubtful", "lost").index, default="good")
 
 
-def _end_spreads(body: PosedBody, fit: Fit) -> Array:
-    """Return the standard deviation of the end of each limb, (n_limbs,), metres."""
+def _end_spreads(body: PosedBody, fits: Sequence[Fit]) -> Array:
+    """Return the standard deviation of the end of each limb by each fit, (n_fits, n_limbs), metres."""
     model = body.model
     ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in limbs(model)], dtype=np.int64)
     J = model.point_jacobian(body.kinematics, model.point_parts[ends], body.points_world[ends])
-    return np.sqrt(np.trace(J @ covariance(model, fit) @ np.swapaxes(J, 1, 2), axis1=1, axis2=2))
+    variances = [np.trace(J @ covariance(model, fit) @ np.swapaxes(J, 1, 2), axis1=1, axis2=2) for fit in fits]
+    return np.sqrt(np.array(variances))

@@ -18,6 +18,9 @@ _MAX_BACKOFF_FRAMES = 8
 _CALM_BACKOFF_FRAMES, _MAX_CALM_BACKOFF_FRAMES = 31, 64
 """First and longest back-off of a limb that does not seem lost itself, where there are several people: the unexplained
 part of the silhouette may be anybody's."""
+_WORSE_NATS = 2.0
+"""The back-off of a limb ends where its search odds are higher by this than before the search that failed, nats. That
+search has not seen what now contradicts the limb."""
 _AROUND = "around"
 """Key of the back-off of the search around a pose."""
 _LEARN_FRAMES = 3
@@ -58,6 +61,7 @@ class PersonMemory:
         """The colours of the parts; None before the first frame."""
         self._n_frames = 0
         self._backoffs: dict[str, tuple[int, int]] = {}  # by limb: frame of the last search, back-off
+        self._odds_searched: dict[str, float] = {}  # by limb: search odds before the last search
 
     def predict(self, settings: PredictSettings) -> Array:
         """Return the predicted pose of the next frame, (n_values,)."""
@@ -81,8 +85,9 @@ class PersonMemory:
     def limbs_to_search(self, quality: PoseQuality) -> list[Limb]:
         """Return the limbs to search now. After each failed search a limb's back-off doubles.
 
-        A single person's limb that is more likely lost than found does not back off. A fast limb is elsewhere in each
-        frame, and predictions from a wrong pose get worse.
+        A single person's limb that is lost, or more likely elsewhere than not, does not back off. A fast limb is
+        elsewhere in each frame, and predictions from a wrong pose get worse. Nor does one that the frame contradicts
+        much more than that of the last search.
 
         With several people, an unexplained part of the silhouette alone makes no limb due while another limb of the
         person seems lost.
@@ -93,10 +98,13 @@ class PersonMemory:
         candidates, alone = self.search_candidates(quality), self.alone
         doubtful = [] if alone else [x for x in candidates if x.name in quality.doubtful_limbs(alone)]
         longest = _MAX_BACKOFF_FRAMES if alone or doubtful else _MAX_CALM_BACKOFF_FRAMES
+        urgent = {*quality.missing_limbs, *quality.lost_limbs}
 
         def cooled_down(limb: Limb) -> bool:
+            if alone and (limb.name in urgent or self._is_worse(limb, quality)):
+                return True
             last, backoff = self._backoffs.get(limb.name, (-1, 0))
-            return (alone and limb.name in quality.missing_limbs) or self._n_frames > last + min(backoff, longest)
+            return self._n_frames > last + min(backoff, longest)
 
         return [x for x in doubtful or candidates if cooled_down(x)]
 
@@ -111,6 +119,11 @@ class PersonMemory:
         calm = not (self.alone or limb.name in before.doubtful_limbs(self.alone))
         longer = max(_CALM_BACKOFF_FRAMES if calm else 1, 2 * self._backoffs.get(limb.name, (0, 0))[1] + 1)
         self._backoffs[limb.name] = (self._n_frames, 0 if found else min(_MAX_CALM_BACKOFF_FRAMES, longer))
+        self._odds_searched[limb.name] = before.search_odds_of(limb.name)
+
+    def _is_worse(self, limb: Limb, quality: PoseQuality) -> bool:
+        """Return whether a limb is much more likely lost than before its last search."""
+        return quality.search_odds_of(limb.name) > self._odds_searched.get(limb.name, np.inf) + _WORSE_NATS
 
     def samples_around(self, quality: PoseQuality) -> bool:
         """Return whether to search around a refined pose now: that of a single person that is not good.

@@ -135,6 +135,18 @@ def test_prior_against_a_target_by_hand():
     assert found.cost == pytest.approx(0.5 * (9 * 0.1**2 + 0.9**2))
 
 
+def test_a_prior_is_exchanged_as_if_it_had_been_there(gavrila):
+    rng = np.random.default_rng(0)
+    pose, mean, other = (posed(gavrila, seed) for seed in range(3))
+    weights, block = rng.uniform(1, 5, gavrila.n_dofs), target(gavrila, "left_wrist", 0.3, 0.2, 1.1)
+    old, new = PosePrior(mean, weights), PosePrior(other, 2 * weights)
+    found = solve(gavrila, pose, [block, old], max_iterations=0).with_prior(gavrila, old, new)
+    expected = solve(gavrila, pose, [block, new], max_iterations=0)
+    np.testing.assert_allclose(found.cost, expected.cost)
+    np.testing.assert_allclose(found.hessian, expected.hessian, atol=1e-9)
+    np.testing.assert_array_equal(found.pose, expected.pose)
+
+
 def test_two_bone_arm_by_the_law_of_cosines():
     # Bones of 0.3 and 0.4 m, the hand 0.5 m away: a right angle at the elbow.
     found = solve(ARM, ARM.neutral(), [target(ARM, "hand", 0.3, 0, -0.4)], active_dofs=ROTATIONS)

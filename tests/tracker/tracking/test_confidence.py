@@ -10,7 +10,7 @@ from staging import SUIT, cameras_around, dressed, own_evidence, posed
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
-from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.contour_residuals import ContourResiduals, PartCosts
 from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.tracking.confidence import (
@@ -18,6 +18,7 @@ from tracker.tracking.confidence import (
     LOST_FROM,
     LimbFeatures,
     PoseQuality,
+    _Contours,
     classify,
     quality,
     reason,
@@ -86,20 +87,24 @@ figures = st.builds(
     forward=st.floats(0, 1),
     shown=st.floats(0, 1.2),
     explained=st.floats(0, 1.5),
-    outside=st.floats(0, 1),
     at_limits=st.floats(0, 1),
+    free_spread_px=st.floats(0.1, 80),
+    second_forward=st.floats(0, 1),
+    end_color=st.floats(-3, 3),
+    end_explained=st.floats(0, 1.5),
+    innovation=st.floats(0, 0.3),
 )
-CLEAR = LimbFeatures("leg", 1.0, 0.0, 1.2, 0.05, 0.6, 0.5, 0.0, 0.0)
-ASTRAY = (0.3, 0.2, 0.1, 0.5, 0.25)
-"""Contours far from edges, hardly seen, that explain little; half of the axis is outside the silhouette."""
+CLEAR = LimbFeatures("leg", 1.0, 0.0, 1.2, 0.05, 0.6, 0.5, 0.0, 1.2, 0.06, 1.0, 0.5, 0.01)
+ASTRAY = (0.3, 0.2, 0.1, 0.25, 6.0, 0.4, -1.0, 0.1, 0.2)
+"""Contours far from edges, hardly seen, that explain little, with the wrong colour, far from the prediction."""
 
 
-@given(before=figures, worse=st.tuples(*[st.floats(0, 3)] * 8), body=st.tuples(*[st.floats(0, 0.1)] * 2))
+@given(before=figures, worse=st.tuples(*[st.floats(0, 3)] * 12), body=st.tuples(*[st.floats(0, 0.1)] * 2))
 def test_worse_figures_never_clear_a_limb(before, worse, body):
-    signs = (-1, 1, 1, 1, -1, -1, 1, 1)
+    signs = (-1, 1, 1, 1, -1, -1, 1, 1, 1, -1, -1, 1)
     after = LimbFeatures("arm", *(b + s * w for b, s, w in zip(before[1:], signs, worse, strict=True)))
-    better = PoseQuality(0.05, 3, 0.0, (before, CLEAR))
-    worst_of = PoseQuality(0.05 + body[0], 3, body[1], (after, CLEAR))
+    better = PoseQuality(0.05, 3, 0.0, 0.05, (before, CLEAR))
+    worst_of = PoseQuality(0.05 + body[0], 3, body[1], 0.05, (after, CLEAR))
     assert (worst_of.log_odds >= better.log_odds).all()
     for alone in (True, False):
         assert set(better.search_candidates(alone)) <= set(worst_of.search_candidates(alone))
@@ -109,17 +114,20 @@ def test_worse_figures_never_clear_a_limb(before, worse, body):
 
 def test_what_is_plain():
     undressed, vague = LimbFeatures("x", -2.0, 3.0, 4.0, *ASTRAY), LimbFeatures("y", 0.2, 1.0, 40.0, *ASTRAY)
-    assert classify(PoseQuality(0.05, 3, 0.0, (CLEAR, CLEAR))) == "good"
+    assert classify(PoseQuality(0.05, 3, 0.0, 0.05, (CLEAR, CLEAR))) == "good"
     for limb in (undressed, vague):
-        found = PoseQuality(0.15, 3, 0.03, (CLEAR, CLEAR, limb))
+        found = PoseQuality(0.15, 3, 0.03, 0.05, (CLEAR, CLEAR, limb))
         assert found.search_candidates(True) == found.search_candidates(False) == (limb.name,)
         assert classify(found) == "lost"
         assert not found.is_body_lost
-    assert PoseQuality(0.15, 3, 0.03, (CLEAR, undressed, vague)).is_body_lost  # most of it
-    assert classify(PoseQuality(1.0, 3, 0.0, (CLEAR, CLEAR))) == "lost"  # no edge anywhere near
-    assert classify(PoseQuality(0.0, 0, 0.0, ())) == "lost"  # nothing sees the body
+    assert PoseQuality(0.15, 3, 0.03, 0.05, (CLEAR, undressed, vague)).is_body_lost  # most of it
+    assert classify(PoseQuality(1.0, 3, 0.0, 0.05, (CLEAR, CLEAR))) == "lost"  # no edge anywhere near
+    assert classify(PoseQuality(0.0, 0, 0.0, 0.05, ())) == "lost"  # nothing sees the body
     # What no part explains is a reason to search every limb.
-    unexplained, explained = PoseQuality(0.05, 3, 0.12, (CLEAR, vague)), PoseQuality(0.05, 3, 0.0, (CLEAR, vague))
+    unexplained, explained = (
+        PoseQuality(0.05, 3, 0.12, 0.05, (CLEAR, vague)),
+        PoseQuality(0.05, 3, 0.0, 0.05, (CLEAR, vague)),
+    )
     assert (unexplained.search_odds > explained.search_odds).all()
     assert set(unexplained.search_candidates(alone=True)) == {"leg", "y"}
 
@@ -127,17 +135,17 @@ def test_what_is_plain():
 @pytest.mark.parametrize(
     ("found", "words"),
     [
-        (PoseQuality(0.05, 3, 0.0, (CLEAR, CLEAR)), ""),
+        (PoseQuality(0.05, 3, 0.0, 0.05, (CLEAR, CLEAR)), ""),
         (
-            PoseQuality(0.15, 3, 0.03, (CLEAR, LimbFeatures("left_forearm", -2.0, 3.0, 4.0, *ASTRAY))),
+            PoseQuality(0.15, 3, 0.03, 0.05, (CLEAR, LimbFeatures("left_forearm", -2.0, 3.0, 4.0, *ASTRAY))),
             "left arm uncertain",
         ),
         (
-            PoseQuality(0.15, 3, 0.03, (LimbFeatures("right_calf", -2.0, 3.0, 4.0, *ASTRAY), CLEAR)),
+            PoseQuality(0.15, 3, 0.03, 0.05, (LimbFeatures("right_calf", -2.0, 3.0, 4.0, *ASTRAY), CLEAR)),
             "right leg uncertain",
         ),
-        (PoseQuality(1.0, 3, 0.0, (CLEAR, CLEAR)), "no edges near the body"),
-        (PoseQuality(0.0, 0, 0.0, ()), "no view shows the body"),
+        (PoseQuality(1.0, 3, 0.0, 0.05, (CLEAR, CLEAR)), "no edges near the body"),
+        (PoseQuality(0.0, 0, 0.0, 0.05, ()), "no view shows the body"),
     ],
 )
 def test_what_is_said_against_a_pose(found, words):
@@ -156,7 +164,7 @@ def judged(model, truth, values, colors=False):
     if colors:
         known = Colors(views, bodies).learn()
         score = Colors(views, [body]).score(values, known), known
-    return quality(body, fit, match.part_costs(values), views, thetas, score)
+    return quality(body, (fit, fit), match.part_costs(values), views, thetas, values, score)
 
 
 @pytest.mark.parametrize("colors", [False, True])
@@ -171,6 +179,11 @@ def test_quality_of_a_pose_and_of_a_lost_arm(gavrila, colors):
     assert wrong.log_odds[arm] > right.log_odds[arm]
     assert wrong.limbs[arm].forward > right.limbs[arm].forward + 0.1
     assert wrong.limbs[arm].explained < right.limbs[arm].explained
+    assert wrong.limbs[arm].second_forward > right.limbs[arm].second_forward + 0.05
+    assert wrong.limbs[arm].end_explained < right.limbs[arm].end_explained - 0.3
+    assert 0.5 < right.limbs[arm].end_explained < 1.5
+    assert right.trunk_forward < 0.05
+    assert all(x.innovation == 0 for x in (*right.limbs, *wrong.limbs))  # as predicted
     assert all(0.1 < x.shown < 1.2 for x in right.limbs)
     assert (right.unexplained, wrong.unexplained) == (0, 0)
     assert all(0 < x.spread_px < 10 for x in right.limbs)
@@ -182,6 +195,19 @@ def test_quality_of_a_pose_and_of_a_lost_arm(gavrila, colors):
         assert all((x.color, x.worst_drop) == (np.inf, -np.inf) or x.worst_drop == 0 for x in right.limbs)
 
 
+def test_contours_view_by_view():
+    """Two parts in four views; the last hardly shows them, and their first part is long."""
+    length = np.array([[40.0, 10.0], [40.0, 10.0], [40.0, 10.0], [2.0, 1.0]])
+    far = length * np.array([[0.1], [0.4], [0.2], [1.0]])
+    costs = PartCosts(length, np.zeros((4, 2)), length / 5, np.ones(4))
+    contours, both = _Contours(costs, far, np.array([50.0, 15.0]), 4), np.array([0, 1])
+    assert contours.second_forward(both, 0.7) == pytest.approx(0.2)
+    assert contours._replace(beside_px=np.array([500.0, 50.0])).second_forward(both, 0.7) == 0.7
+    one = contours._replace(costs=costs._replace(length_px=length * [[0], [1], [0], [0]]))
+    assert one.second_forward(both, 0.7) == pytest.approx(0.4)
+    assert contours.explained(both) == pytest.approx(0.2)
+
+
 def test_quality_where_nothing_is_seen(gavrila):
     truth = posed(gavrila, 1)
     found = judged(gavrila, truth, gavrila.retract(truth, np.pad([0.0, 0.0, 30.0], (0, gavrila.n_dofs - 3))))
@@ -190,9 +216,9 @@ def test_quality_where_nothing_is_seen(gavrila):
 
 
 def test_limbs_are_doubtful_and_lost_from_the_probabilities_that_make_the_pose_so():
-    for worst_drop in np.linspace(-0.5, 3.0, 15):
-        limb = LimbFeatures("left_forearm", 0.5, worst_drop, 2.0, 0.2, 0.5, 0.8, 0.1, 0.0)
-        found = PoseQuality(0.05, 3, 0.0, (CLEAR, CLEAR, CLEAR, limb))
+    for second_forward in np.linspace(0.0, 1.0, 15):
+        limb = LimbFeatures("left_forearm", 0.5, 0.5, 2.0, 0.2, 0.5, 0.8, 0.1, 2.0, second_forward, 0.5, 0.5, 0.01)
+        found = PoseQuality(0.05, 3, 0.0, 0.05, (CLEAR, CLEAR, CLEAR, limb))
         p = found.lost_probabilities.max()
         status = "lost" if p > LOST_FROM else "doubtful" if p > DOUBTFUL_FROM else "good"
         assert status == classify(found)

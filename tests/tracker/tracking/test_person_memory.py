@@ -5,7 +5,8 @@ from tracker.motion.prediction import PredictSettings
 from tracker.tracking.confidence import LimbFeatures, PoseQuality
 from tracker.tracking.person_memory import PersonMemory
 
-CLEAR, ASTRAY = (1.0, 0.0, 1.2, 0.05, 0.6, 0.5, 0.0, 0.0), (-2.0, 3.0, 4.0, 0.3, 0.2, 0.1, 0.5, 0.25)
+CLEAR = (1.0, 0.0, 1.2, 0.05, 0.6, 0.5, 0.0, 1.2, 0.06, 1.0, 0.5, 0.01)
+ASTRAY = (-2.0, 3.0, 4.0, 0.3, 0.2, 0.1, 0.25, 6.0, 0.4, -1.0, 0.1, 0.2)
 
 
 class NoColors:
@@ -18,7 +19,7 @@ class NoColors:
 def seen(memory, unexplained=0.0, astray=()):
     """What the evidence says where some limbs are astray and the others clear."""
     limbs = [LimbFeatures(x.name, *(ASTRAY if x.name in astray else CLEAR)) for x in memory.limbs]
-    return PoseQuality(0.05, 4, unexplained, tuple(limbs))
+    return PoseQuality(0.05, 4, unexplained, 0.05, tuple(limbs))
 
 
 def searched_at(memory, found, n_frames):
@@ -75,6 +76,40 @@ def test_a_limb_of_somebody_alone_that_is_lost_does_not_wait(memory, gavrila):
     assert searched_at(memory, lost, 6) == [0, 2]
     assert searched_at(alone, suspect, 1) == [0]
     assert "left_calf" not in {x.name for x in alone.limbs_to_search(suspect)}
+
+
+def test_a_limb_that_makes_the_pose_lost_does_not_wait(gavrila):
+    """Even where its search odds alone would let it wait."""
+    memory = PersonMemory(gavrila, gavrila.neutral())
+    found = _with_spread(seen(memory), "left_calf", 5.0)
+    limbs = tuple(x._replace(free_spread_px=40.0) if x.name == "left_calf" else x for x in found.limbs)
+    lost = found._replace(limbs=limbs)
+    assert (lost.lost_limbs, lost.missing_limbs, found.lost_limbs) == (("left_calf",), (), ())
+    assert searched_at(memory, lost, 3) == [0, 1, 2]
+    assert searched_at(PersonMemory(gavrila, gavrila.neutral()), found, 3) == [0, 2]
+    assert searched_at(PersonMemory(gavrila, gavrila.neutral(), alone=False), lost, 3) == [0, 2]
+
+
+def test_a_limb_of_somebody_alone_is_searched_again_once_the_frame_contradicts_it_more(gavrila):
+    """A search that failed says nothing about a limb that has left its place since."""
+    memory = PersonMemory(gavrila, gavrila.neutral())
+    doubtful, worse = (_with_spread(seen(memory), "left_calf", px) for px in (5.0, 12.0))
+    assert doubtful.search_odds_of("left_calf") + 2.0 < worse.search_odds_of("left_calf") < 0.0
+    (limb,) = memory.limbs_to_search(doubtful)
+    memory.record_search(limb, doubtful, found=False)
+    assert memory.limbs_to_search(doubtful) == []
+    assert memory.limbs_to_search(worse) == [limb]
+    memory.record_search(limb, worse, found=False)
+    assert memory.limbs_to_search(worse) == []
+    others = PersonMemory(gavrila, gavrila.neutral(), alone=False)
+    others.record_search(limb, doubtful, found=False)
+    assert others.limbs_to_search(worse) == []
+
+
+def _with_spread(quality, name, spread_px):
+    """The same with a limb whose end is uncertain."""
+    limbs = tuple(x._replace(spread_px=spread_px, color=0.6) if x.name == name else x for x in quality.limbs)
+    return quality._replace(limbs=limbs)
 
 
 def test_limbs_that_nothing_speaks_against_wait_longer(gavrila):

@@ -77,7 +77,8 @@ def assess(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFit)
     if known is not None:
         colors = problem.colors(person, bodies).score(found.fit.pose, known), known
     costs = found.residuals.part_costs(found.fit.pose)
-    quality = confidence.quality(found.body, found.fit, costs, problem.views, problem.thetas_px, colors)
+    predicted, fits = problem.people[person].predicted, (found.fit, problem.freed(person, found))
+    quality = confidence.quality(found.body, fits, costs, problem.views, problem.thetas_px, predicted, colors)
     return Assessment(quality, costs)
 
 

@@ -16,7 +16,7 @@ from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solve_compiled
 from tracker.geometry.arrays import Array
-from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN, PoseScorer
+from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN, PoseScorer, ScoredFit
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE
 
 _N_SAMPLES = 16
@@ -46,34 +46,29 @@ def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigm
 
     own = OWN_TRUST * sigma
 
-    def refined(scorer: PoseScorer, pose: Array) -> Fit:
-        found = solve_compiled(
-            model, pose, _blocks(scorer, pose, own), scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
-        )
-        # At the mean of its own prior a pose costs what it does without one.
-        return solve_compiled(model, found.pose, _blocks(scorer, found.pose, own), scorer.active_dofs, 0)
+    def refined(scorer: PoseScorer, pose: Array) -> ScoredFit:
+        held = PosePrior(pose, 1 / own)
+        blocks: list[ResidualBlock] = [scorer.residuals, held, *scorer.priors[1:]]
+        found = solve_compiled(model, pose, blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+        return ScoredFit(found, scorer.cost(found) - held.cost(model, found.pose))
 
-    fits = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, own)])
-    costs = [scorer.cost(f) for f in fits]
-    cheapest = int(np.argmin(costs))
-    best = fits[cheapest if costs[cheapest] < costs[0] - MIN_COST_GAIN else 0]
-    return solve_compiled(model, best.pose, scorer.blocks, scorer.active_dofs, 0)
-
-
-def _blocks(scorer: PoseScorer, pose: Array, sigma: Array) -> list[ResidualBlock]:
-    """Return the residual blocks with a pose, (n_values,), in place of the prediction."""
-    return [scorer.residuals, PosePrior(pose, 1 / sigma), *scorer.priors[1:]]
+    here, *others = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, own)])
+    cheapest = min(others, key=lambda x: x.cost)
+    best = cheapest if cheapest.cost < here.cost - MIN_COST_GAIN else here
+    return solve_compiled(model, best.fit.pose, scorer.blocks, scorer.active_dofs, 0)
 
 
 def _samples(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array) -> Sequence[Array]:
     """Return poses drawn around a fit, (n_values,) each."""
     free = np.flatnonzero(np.ones(model.n_dofs, dtype=bool) if scorer.active_dofs is None else scorer.active_dofs)
-    blocks = _blocks(scorer, fit.pose, _FREE * sigma)
+    held = PosePrior(fit.pose, 1 / (_FREE * sigma))
+    blocks: list[ResidualBlock] = [scorer.residuals, held, *scorer.priors[1:]]
     around = solve_compiled(model, fit.pose, blocks, scorer.active_dofs, 0)
-    precisions, directions = np.linalg.eigh(around.hessian[np.ix_(free, free)])
+    # Steps with the inverse Hessian as covariance. Its eigenvalues would take a hundred times as long.
+    factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])
     steps = np.zeros((_N_SAMPLES, model.n_dofs))
-    spread = _SCALE / np.sqrt(np.maximum(precisions, np.finfo(np.float64).eps))
-    steps[:, free] = np.clip((_normal(_N_SAMPLES, len(free)) * spread) @ directions.T, -_MAX_STEP, _MAX_STEP)
+    drawn = _SCALE * np.linalg.solve(factor.T, _normal(_N_SAMPLES, len(free)).T).T
+    steps[:, free] = np.clip(drawn, -_MAX_STEP, _MAX_STEP)
     return [model.clip(model.retract(fit.pose, step)) for step in steps]
 
 

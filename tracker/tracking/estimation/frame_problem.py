@@ -113,8 +113,7 @@ class FrameProblem:
         untrusted = None if before is None else before.untrusted_limbs
         residuals = self.residuals(person, bodies, everywhere=untrusted is not None)
         blocks = [residuals, *self.priors(person, bodies, untrusted or ())]
-        min_decrease = MIN_DECREASE if len(self.people) > 1 else 0.0  # several people are refined more than once
-        fit = self.solve(person, bodies[person].values, blocks, self.settings.max_iterations, min_decrease)
+        fit = self.solve(person, bodies[person].values, blocks, self.settings.max_iterations, MIN_DECREASE)
         body = PosedBody(self.people[person].model, fit.pose)
         if before is None:
             return PersonFit(residuals, bodies, fit, body)
@@ -127,15 +126,32 @@ class FrameProblem:
         the normal matrix with the prediction. With `EstimationSettings.measure_noise` the contours have the variance
         of the first refinement's distances, if that is below 1 px^2. Priors then pull less where the body fits well.
         """
-        untrusted, pose = found.untrusted_limbs or (), found.fit.pose
-        around = self.priors(person, found.bodies, untrusted)
-        around[0] = PosePrior(pose, 1 / (OWN_TRUST * self.sigma(person)))
-        residuals = found.residuals
-        if self.settings.measure_noise:
-            residuals = residuals.with_information(1 / min(1.0, _variance_px2(residuals.part_costs(pose))))
-        pose = self.solve(person, pose, [residuals, *around], MAX_ITERATIONS, MIN_DECREASE).pose
-        fit = self.solve(person, pose, [found.residuals, *self.priors(person, found.bodies, untrusted)], 0)
-        return found._replace(fit=fit, body=PosedBody(self.people[person].model, fit.pose), assessment=None)
+        prediction, own, *others = self._priors_of(person, found)
+        model, residuals = self.people[person].model, self._as_precise_as_measured(found)
+        fit = self.solve(person, own.pose, [residuals, own, *others], MAX_ITERATIONS, MIN_DECREASE)
+        if residuals is found.residuals:
+            fit = fit.with_prior(model, own, prediction)
+        else:
+            fit = self.solve(person, fit.pose, [found.residuals, prediction, *others], 0)
+        return found._replace(fit=fit, body=PosedBody(model, fit.pose), assessment=None)
+
+    def _as_precise_as_measured(self, found: PersonFit) -> ContourResiduals:
+        """Return the residuals of a fit with the variance of their distances, if that is wanted and below 1 px^2."""
+        if not self.settings.measure_noise:
+            return found.residuals
+        variance_px2 = _variance_px2(found.residuals.part_costs(found.fit.pose))
+        return found.residuals.with_information(1 / variance_px2) if variance_px2 < 1 else found.residuals
+
+    def freed(self, person: int, found: PersonFit) -> Fit:
+        """Return a fit as if its pose, little trusted, were the prediction of all limbs."""
+        prediction, own, *_ = self._priors_of(person, found)
+        return found.fit.with_prior(self.people[person].model, prediction, own)
+
+    def _priors_of(self, person: int, found: PersonFit) -> tuple[PosePrior, PosePrior, *tuple[ResidualBlock, ...]]:
+        """Return the prediction of a fit, its pose as a weak prior in that place, and the other prior terms."""
+        prediction, *others = self.priors(person, found.bodies, found.untrusted_limbs or ())
+        assert isinstance(prediction, PosePrior)
+        return prediction, PosePrior(found.fit.pose, 1 / (OWN_TRUST * self.sigma(person))), *others
 
     def solve(
         self, person: int, start: Array, blocks: Sequence[ResidualBlock], max_iterations: int, min_decrease: float = 0.0

@@ -3,6 +3,7 @@ import pytest
 from staging import SUIT, cameras_around, dressed, posed
 
 from tracker.appearance.part_colors import Colors
+from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import solve
@@ -95,3 +96,16 @@ def test_a_fit_is_drawn_on_from_a_wrong_prediction(model):
     assert cost(found) < cost(first) - 1.0
     assert found.assessment is None
     np.testing.assert_array_equal(found.body.values, found.fit.pose)
+
+
+def test_a_freed_fit_does_not_depend_on_which_limbs_are_trusted(model):
+    truth = posed(model, 1)
+    problem = FrameProblem(
+        dressed([PosedBody(model, truth)], cameras_around(4), SUIT), [PersonPrior(model, truth)], TrackSettings()
+    )
+    found = problem.refine(0, (PosedBody(model, truth),))
+    untrusted = (limbs(model)[1],)
+    blocks = [found.residuals, *problem.priors(0, found.bodies, untrusted)]
+    weaker = found._replace(fit=problem.solve(0, found.fit.pose, blocks, 0), untrusted_limbs=untrusted)
+    assert not np.allclose(weaker.fit.hessian, found.fit.hessian)
+    np.testing.assert_allclose(problem.freed(0, weaker).hessian, problem.freed(0, found).hessian, atol=1e-6)
