@@ -78,7 +78,8 @@ class ContourEstimator(FrameEstimator):
         fit = problem.solve(person, start, blocks, settings.max_iterations)
         body = PosedBody(model, fit.pose)
         # The status follows from the same features as that of other methods.
-        return PersonFit(problem.residuals(person, bodies), with_body(bodies, person, body), fit, body)
+        residuals, found = problem.residuals(person, bodies), with_body(bodies, person, body)
+        return PersonFit(residuals, found, fit, body, is_predicted=False)
 
     def _paper_residuals(self, person: int) -> ContourResiduals:
         around, index = self.problem.around(person, self.bodies)

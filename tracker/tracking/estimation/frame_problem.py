@@ -72,6 +72,8 @@ class PersonFit(NamedTuple):
     """What was done to find the person, for people to read."""
     alternatives: tuple[Array, ...] = ()
     """Poses that are about as good, (n_values,) each, best first."""
+    is_predicted: bool = True
+    """Whether the prediction is a term of the fit."""
 
 
 class FrameProblem:
@@ -143,7 +145,9 @@ class FrameProblem:
         return found.residuals.with_information(1 / variance_px2) if variance_px2 < 1 else found.residuals
 
     def freed(self, person: int, found: PersonFit) -> Fit:
-        """Return a fit as if its pose, little trusted, were the prediction of all limbs."""
+        """Return a fit as if its pose, little trusted, were the prediction of all limbs, if it has one."""
+        if not found.is_predicted:
+            return found.fit
         prediction, own, *_ = self._priors_of(person, found)
         return found.fit.with_prior(self.people[person].model, prediction, own)
 

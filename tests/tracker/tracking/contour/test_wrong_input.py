@@ -14,6 +14,8 @@ from tracker.images.silhouette_contour import trace_silhouette
 from tracker.tracking.contour.paper import paper_settings
 from tracker.tracking.contour.settings import ContourSettings
 
+pytestmark = pytest.mark.filterwarnings("error:invalid value")
+
 MODES = [ContourSettings(), paper_settings("edges"), paper_settings()]
 mode = pytest.mark.parametrize("settings", MODES, ids=["default", "paper, edges", "paper, silhouettes"])
 
