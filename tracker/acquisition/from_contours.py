@@ -7,7 +7,7 @@ so that any poses will do and joints are found where the flesh turns about them.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,8 @@ from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior
 from tracker.tracking.estimation.settings import chamfer_cost
 from tracker.tracking.view_regions import regions, visible_pieces_px
 
+SizeMethod = Literal["contours", "voxels"]
+"""Whether the fit to contours starts at the body before, or at a fit to voxels."""
 Report = Callable[[str, float], None]
 """Is given a stage and the share of all work that is done, 0 to 1. What it raises ends the acquisition."""
 _CHOOSING, _OBSERVING, _VOXELS = 0.1, 0.25, 0.5
