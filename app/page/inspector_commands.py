@@ -62,7 +62,7 @@ def _draft(controller: Controller, _: int, message: wire.DraftSizes) -> None:
 
 def _acquire(controller: Controller, _: int, message: wire.AcquireSizes) -> None:
     if message.action == "start":
-        controller.body_acquisition.start(message.person)
+        controller.body_acquisition.start(message.person, message.method)
     else:
         controller.body_acquisition.stop()
 

@@ -9,6 +9,7 @@ from app.page.message_types import Command, Index, Message, Name, Part
 from app.page.search_messages import OutlierMode
 from app.state.run_choices import MAX_STRIDE
 from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
+from tracker.acquisition.from_contours import SizeMethod
 from tracker.motion.prediction import MAX_ORDER
 from tracker.pipeline.methods import MethodName
 
@@ -129,6 +130,8 @@ class AcquireSizes(Command, frozen=True, tag="acquire"):
 
     action: Literal["start", "stop"]
     person: Index
+    method: SizeMethod = "contours"
+    """What sizes are fitted to: contours alone, or voxels first and then contours."""
 
 
 class FindPeople(Command, frozen=True, tag="find_people"):

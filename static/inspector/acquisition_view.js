@@ -1,12 +1,13 @@
 /** Sizes from the footage: start and stop an acquisition, its progress, and the body before and after. */
 
 import { capital } from "../widgets/text.js";
-import { textButton } from "./rows.js";
+import { choiceRow, textButton } from "./rows.js";
 
 /**
  * @typedef {import("../model/protocol.js").AcquisitionMessage} Acquisition
  * @typedef {import("../model/protocol.js").AcquisitionResult} Result
  * @typedef {import("../model/protocol.js").OutlinePair} OutlinePair
+ * @typedef {NonNullable<import("../model/protocol.js").AcquireSizes["method"]>} Method
  */
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -21,9 +22,22 @@ export function acquisitionView({ store, send }) {
   const element = document.createElement("div");
   element.className = "acquisition";
   let person = 0;
-  const start = textButton("Acquire from footage", "Fit all sizes to the contours of several frames; nothing changes until you apply them", () =>
-    send({ type: "acquire", action: "start", person }),
+  /** @type {Method} */
+  let method = "contours";
+  const start = textButton("Acquire from footage", "Fit all sizes to several frames; nothing changes until you apply them", () =>
+    send({ type: "acquire", action: "start", person, method }),
   );
+  const choice = choiceRow({
+    label: "Fit to",
+    title:
+      "Contours: fit all sizes to the contours of several frames in all views. " +
+      "Voxels first: fit lengths and girths to the labelled voxels of the silhouettes, and start the fit to contours there",
+    options: [
+      ["contours", "Contours"],
+      ["voxels", "Voxels first"],
+    ],
+    change: (/** @type {Method} */ value) => (method = value),
+  });
   const stop = textButton("Stop", "Stop the acquisition; the sizes stay as they are", () => send({ type: "acquire", action: "stop", person }));
   const progress = document.createElement("progress");
   const status = document.createElement("span");
@@ -33,7 +47,7 @@ export function acquisitionView({ store, send }) {
   work.className = "acquisition-work";
   work.append(progress, stop);
   const result = document.createElement("div");
-  element.append(start, work, status, result);
+  element.append(choice.element, start, work, status, result);
   /** @type {Result | null} */
   let drawn = null;
 
@@ -43,7 +57,7 @@ export function acquisitionView({ store, send }) {
       person = active;
       const { acquisition, people } = { acquisition: store.facts.acquisition, people: store.facts.session?.people ?? [] };
       const running = acquisition?.running ?? false;
-      start.hidden = running;
+      start.hidden = choice.element.hidden = running;
       work.hidden = !running;
       progress.value = acquisition?.share ?? 0;
       const name = people[acquisition?.person ?? 0]?.name ?? "";

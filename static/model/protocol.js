@@ -83,7 +83,7 @@
  * @typedef {{type: "body_sizes", action: "couple", on: boolean}} CoupleSides
  * @typedef {{type: "body_sizes", action: "apply", person: number, refit: boolean}} ApplySizes
  * @typedef {{type: "body_sizes", action: "discard" | "previous", person: number}} DraftSizes
- * @typedef {{type: "acquire", action: "start" | "stop", person: number}} AcquireSizes
+ * @typedef {{type: "acquire", action: "start" | "stop", person: number, method?: "contours" | "voxels"}} AcquireSizes
  * @typedef {{type: "find_people", action: "start" | "stop"}} FindPeople
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor

@@ -7,7 +7,7 @@ so that any poses will do and joints are found where the flesh turns about them.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,8 @@ from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior
 from tracker.tracking.estimation.settings import chamfer_cost
 from tracker.tracking.view_regions import regions, visible_pieces_px
 
+SizeMethod = Literal["contours", "voxels"]
+"""Whether the fit to contours starts at the body before, or at a fit to voxels."""
 Report = Callable[[str, float], None]
 """Is given a stage and the share of all work that is done, 0 to 1. What it raises ends the acquisition."""
 _CHOOSING, _OBSERVING, _VOXELS = 0.1, 0.25, 0.5
@@ -49,6 +51,9 @@ class AcquisitionSettings:
     """Number of frames that are fitted at once."""
     candidates: int = 24
     """Number of frames, evenly spread, from which they are chosen."""
+    rounds: int = 1
+    """Where frames are tracked for it: largest number of times that they are tracked and sizes are fitted. Each round
+    tracks with the body of the one before. It is the last where most frames are good."""
     coupled: bool = True
     """Whether left and right have the same sizes."""
     priors: SizePriors = field(default_factory=SizePriors)
@@ -103,7 +108,8 @@ def acquire_from_contours(
     """
     if not bodies:
         raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
-    parameters = SizeParameters(next(iter(bodies.values()))[person].model, settings.coupled, settings.priors)
+    priors = settings.priors if placed or seen else settings.priors.anatomical()
+    parameters = SizeParameters(next(iter(bodies.values()))[person].model, settings.coupled, priors)
     report("choosing frames", 0.0)
     # Placed joints are used wherever there are few of them; of many, the frames that show most.
     few = 0 < len(placed) <= settings.n_frames

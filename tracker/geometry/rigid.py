@@ -91,9 +91,16 @@ def quaternion_exp(rotvec: Array) -> Array:
 def quaternion_multiply(a: Array, b: Array) -> Array:
     """Multiply quaternions (w, x, y, z): the product `a b` rotates by b, then by a; `(..., 4)`."""
     a, b = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-    aw, av, bw, bv = a[..., :1], a[..., 1:], b[..., :1], b[..., 1:]
-    w = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
-    return np.concatenate([w, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+    (aw, ax, ay, az), (bw, bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
+    return np.stack(
+        [
+            aw * bw - (ax * bx + ay * by + az * bz),
+            aw * bx + bw * ax + (ay * bz - az * by),
+            aw * by + bw * ay + (az * bx - ax * bz),
+            aw * bz + bw * az + (ax * by - ay * bx),
+        ],
+        axis=-1,
+    )
 
 
 def clip_swing_twist(wxyz: Array, cone: float, twist: float) -> Array:

@@ -1,6 +1,6 @@
 """Fit start poses to the contours of a frame, and compare them by short tracks in both directions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +11,16 @@ from tracker.geometry.arrays import Array
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.confidence import Status
+from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
 _LOST_PX, _DOUBTFUL_PX = 2.0, 0.5
 """What a lost and a doubtful frame of a short track add to its cost, px."""
+_MAX_FITS = 4
+"""Largest number of fits to the frame of the start, each from the one before."""
+_MIN_GAIN = 0.01
+"""Smallest decrease of the cost, as a share, for another fit."""
 
 
 class FittedStart(NamedTuple):
@@ -47,17 +52,28 @@ def fit_start(
         later: for each direction the frames of a short track, without the first.
         others: pose of each other person on that frame, (n_values,) each.
     """
-    pose, costs = start, list[float]()
-    status: Status = "lost"
-    for number, frames in enumerate([(), *later]):
-        own = [frame, *frames]
-        run = TrackingRun(observer, Subjects.of(models, [0]), [pose, *others], own)
-        for estimate in ChamferTracker(TrackSettings(backward_pass=False)).estimates(run):
-            found = estimate.statuses[0]
-            extra = _LOST_PX if found == "lost" else _DOUBTFUL_PX if found == "doubtful" else 0.0
-            if number == 0:
-                pose, status = estimate.poses[0], found
-            if number == 0 or estimate.frame != frame:
-                costs.append(estimate.cost_px + extra)
+    subjects = Subjects.of(models, [0])
+
+    def estimates(pose: Array, frames: Sequence[int]) -> Iterator[PoseEstimate]:
+        run = TrackingRun(observer, subjects, [pose, *others], frames)
+        return ChamferTracker(TrackSettings(backward_pass=False)).estimates(run)
+
+    (fitted,) = estimates(start, [frame])
+    # A fit reaches as far as its prior and the edges around its start do. Tracks show which starts are worth more.
+    for _ in range(_MAX_FITS - 1 if later else 0):
+        (again,) = estimates(fitted.poses[0], [frame])
+        gained = fitted.cost_px - again.cost_px
+        fitted = again if gained > 0 else fitted
+        if not gained > _MIN_GAIN * fitted.cost_px:
+            break
+    pose, costs = fitted.poses[0], [_cost_px(fitted)]
+    for frames in later:
+        costs += [_cost_px(e) for e in estimates(pose, [frame, *frames]) if e.frame != frame]
     cost = float(np.mean(costs))
-    return FittedStart(pose, status, cost if np.isfinite(cost) else np.inf)
+    return FittedStart(pose, fitted.statuses[0], cost if np.isfinite(cost) else np.inf)
+
+
+def _cost_px(estimate: PoseEstimate) -> float:
+    """Return the cost of a frame of the first person with what its status adds, px."""
+    extra = {"lost": _LOST_PX, "doubtful": _DOUBTFUL_PX}.get(estimate.statuses[0], 0.0)
+    return estimate.cost_px + extra

@@ -38,6 +38,8 @@ _HAND = 3.0
 """Standard deviation of where a hand puts a point, in that of a pin that pulls a pose."""
 _MOST_TRACKED = 90
 """Largest number of frames that are tracked for an acquisition where too few poses are stored."""
+_ENOUGH = 0.5
+"""Share of these frames with good poses above which another round would show little more."""
 _TRACKING = 0.4
 """Share of the work up to the end of that tracking."""
 
@@ -79,17 +81,33 @@ def acquire_body(
         TrackerError: the person has no pose on these frames, or the views show nothing of them.
     """
     known = known or posed_frames(session, person, frames)
-    begun = 0.0
-    if len(known.bodies) < settings.n_frames < len(frames):
-        begun = _TRACKING
-        known = _with_tracked(session, observer, person, frames, known, lambda share: report("tracking", begun * share))
+    if not len(known.bodies) < settings.n_frames < len(frames):
+        return _acquire(observer, known, settings, report)
+    rounds = settings.rounds if isinstance(settings, AcquisitionSettings) else 1
+    body, found = session.people[person].model, list[Acquisition]()
+    for number in range(rounds):
 
-    def report_rest(stage: str, share: float) -> None:
-        report(stage, begun + (1 - begun) * share)
+        def report_tracking(share: float, number: int = number) -> None:
+            report("tracking", (number + _TRACKING * share) / rounds)
 
+        def report_rest(stage: str, share: float, number: int = number) -> None:
+            report(stage, (number + _TRACKING + (1 - _TRACKING) * share) / rounds)
+
+        tracked = _tracked_with(body, session, observer, person, frames, known, report_tracking)
+        found.append(_acquire(observer, tracked, settings, report_rest))
+        body = found[-1].body
+        is_enough = len(tracked.bodies) > _ENOUGH * min(len(frames), _MOST_TRACKED)
+        if is_enough or found[-1].cost_after_px >= found[-1].cost_before_px:
+            break
+    return found[-1]
+
+
+def _acquire(
+    observer: Observer, known: PosedFrames, settings: AcquisitionSettings | TwoViewSettings, report: Report
+) -> Acquisition:
     if isinstance(settings, TwoViewSettings):
-        return acquire_from_two_views(observer, known.bodies, 0, settings, report_rest)
-    return acquire_from_contours(observer, known.bodies, 0, known.placed, settings, report_rest, known.seen)
+        return acquire_from_two_views(observer, known.bodies, 0, settings, report)
+    return acquire_from_contours(observer, known.bodies, 0, known.placed, settings, report, known.seen)
 
 
 def has_preset_sizes(model: BodyModel) -> bool:
@@ -210,6 +228,30 @@ def _placed(stored: StoredPose, observed: Sequence[PointObservation]) -> PointTa
     if observed:
         return None
     return place_joints(model, dict(zip(model.point_names, stored.body.points_world, strict=True)), PLACED_M)
+
+
+def _tracked_with(
+    body: BodyModel, session: Session, observer: Observer, person: int, frames: Sequence[int], known: PosedFrames,
+    report: Callable[[float], None],
+) -> PosedFrames:  # fmt: skip
+    """Track the person with a body of other sizes, and return the poses of the present one."""
+    present = session.people[person].model
+    if body is present:
+        return _with_tracked(session, observer, person, frames, known, report)
+    people = [replace(p, model=body) if i == person else p for i, p in enumerate(session.people)]
+    resized = replace(session, people=tuple(people))
+    tracked = _with_tracked(resized, observer, person, frames, _in_body(known, body), report)
+    return _in_body(tracked, present)
+
+
+def _in_body(frames: PosedFrames, body: BodyModel) -> PosedFrames:
+    """Return the same frames with the poses of the person in another body."""
+    return frames._replace(
+        bodies={
+            k: (PosedBody(body, retarget_pose(own.values, own.model, body)), *others)
+            for k, (own, *others) in frames.bodies.items()
+        }
+    )
 
 
 def _with_tracked(

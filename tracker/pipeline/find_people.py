@@ -42,7 +42,7 @@ class FindSettings:
     """First frame to try; None for the middle of the recording first, where people are seen from all sides."""
     acquire: bool = True
     """Whether the sizes of the bodies are acquired from the contours."""
-    acquisition: AcquisitionSettings = field(default_factory=AcquisitionSettings)
+    acquisition: AcquisitionSettings = field(default_factory=lambda: AcquisitionSettings(rounds=2))
 
 
 class FoundPeople(NamedTuple):

@@ -13,8 +13,8 @@ from tracker.voxels.carving import DEFAULT_CARVING, Carver, CarveSettings
 from tracker.voxels.figure_masks import needed_figures, paint
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
-MIN_FIGURE_M3 = 0.02
-"""Smallest volume of a figure, cubic metres: half of a small child."""
+MIN_FIGURE_M3 = 0.008
+"""Smallest volume of a figure, cubic metres: a child of a year has 10 litres."""
 _MIN_SHARE = 0.25
 """Smallest volume of a figure, as a share of the largest one."""
 _MIN_NEEDED = 0.15

@@ -7,7 +7,8 @@ from dataclasses import replace
 from app.control.session.session_state import SessionState
 from app.drawing.body_outlines import body_outlines
 from app.state.people import AcquiredSize, AcquisitionState, SizeDraft
-from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings
+from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, SizeMethod
+from tracker.acquisition.from_voxels import VoxelSizeSettings
 from tracker.acquisition.size_report import size_changes
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
@@ -31,8 +32,12 @@ class BodyAcquisition:
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
 
-    def start(self, person: int) -> None:
+    def start(self, person: int, method: SizeMethod = "contours") -> None:
         """Begin to acquire the sizes of a person from all frames.
+
+        Args:
+            person: index of the person.
+            method: whether voxels are fitted before the contours.
 
         Raises:
             TrackerError: another acquisition is at work, or the person has no pose.
@@ -49,9 +54,9 @@ class BodyAcquisition:
             couple, model = session_state.state.sides_alike, session_state.present[person]
             session_state.set(acquisition=AcquisitionState(running=True, person=person, stage="starting"))
         self._stopping.clear()
-        self._thread = threading.Thread(
-            target=self._work, args=(person, model, AcquisitionSettings(coupled=couple)), name="acquire", daemon=True
-        )
+        voxels = VoxelSizeSettings() if method == "voxels" else None
+        settings = AcquisitionSettings(coupled=couple, voxels=voxels)
+        self._thread = threading.Thread(target=self._work, args=(person, model, settings), name="acquire", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:

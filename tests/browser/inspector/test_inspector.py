@@ -268,12 +268,14 @@ async def test_the_palette_finds_people(page, endpoint):
 async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page, endpoint):
     await opened(page, "body")
     await page.get_by_role("button", name="Acquire from footage").click()
-    await until(lambda: endpoint.heard("acquire") == [{"type": "acquire", "action": "start", "person": 0}])
+    start = {"type": "acquire", "action": "start", "person": 0, "method": "contours"}
+    await until(lambda: endpoint.heard("acquire") == [start])
     work = {"type": "acquisition", "person": 0, "running": True, "stage": "fitting sizes", "share": 0.4}
     await endpoint.broadcast(work | {"message": "", "result": None})
     await shows(page, "document.querySelector('[data-section=body] progress').value === 0.4")
     assert "fitting sizes" in await page.locator(".acquisition-status").inner_text()
     assert await page.get_by_role("button", name="Acquire from footage").is_hidden()
+    assert await row(page, "Fit to").is_hidden()
     await page.locator("[data-section=body] .acquisition").get_by_role("button", name="Stop").click()
     await until(lambda: endpoint.heard("acquire")[-1]["action"] == "stop")
     lines = {"before": [[0, 0, 10, 10]], "after": [[0, 0, 12, 10], [12, 10, 20, 20]]}
@@ -293,3 +295,22 @@ async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page,
     # Nobody else's result is shown as one's own.
     await endpoint.broadcast(endpoint.body_sizes | {"person": 1})
     await page.locator(".acquisition-sizes").wait_for(state="hidden")
+
+
+async def test_sizes_are_acquired_from_voxels_first(page, endpoint):
+    await opened(page, "body")
+    choice = row(page, "Fit to")
+    assert await choice.locator("option").all_inner_texts() == ["Contours", "Voxels first"]
+    assert "labelled voxels" in await choice.get_attribute("title")
+    await choice.locator("select").select_option(label="Voxels first")
+    start = page.get_by_role("button", name="Acquire from footage")
+    await start.click()
+    await until(lambda: len(endpoint.heard("acquire")) == 1)
+    work = {"type": "acquisition", "person": 0, "running": True, "stage": "fitting sizes to voxels", "share": 0.3}
+    await endpoint.broadcast(work | {"message": "", "result": None})
+    await start.wait_for(state="hidden")
+    await endpoint.broadcast(work | {"running": False, "stage": "", "message": "Stopped.", "result": None})
+    await start.click()  # the choice stays
+    await until(lambda: len(endpoint.heard("acquire")) == 2)
+    sent = {"type": "acquire", "action": "start", "person": 0, "method": "voxels"}
+    assert endpoint.heard("acquire") == [sent, sent]

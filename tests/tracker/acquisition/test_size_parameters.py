@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tracker.acquisition.size_parameters import SizeArrays, SizeParameters
+from tracker.acquisition.size_parameters import SizeArrays, SizeParameters, SizePriors
 from tracker.body.dimensions import dimensions_of
 from tracker.formats.model_toml import PRESETS, format_model, load_model, parse_model
 
@@ -12,6 +12,17 @@ each_model = pytest.mark.parametrize("name", PRESETS)
 
 def drawn(parameters, seed=0, share=0.7):
     return share * np.random.default_rng(seed).normal(size=len(parameters.names)) * parameters.sigmas
+
+
+@pytest.mark.parametrize("coupled", [True, False])
+def test_anatomy_tells_more_of_hips_and_soles_than_of_other_joints_and_ends(coupled):
+    parameters = SizeParameters(load_model("gavrila34", 1.7), coupled, SizePriors().anatomical())
+    sigmas, side = dict(zip(parameters.names, parameters.sigmas, strict=True)), "" if coupled else "right_"
+    priors = parameters.priors
+    assert sigmas[f"{side}hip.joint_y"] == priors.hip_side < sigmas[f"{side}hip.joint_z"] == priors.joint
+    assert sigmas[f"{side}calf.free_end"] == priors.sole < sigmas[f"{side}forearm.free_end"] == priors.free_end
+    # They are free in the same rounds as the others of their kind.
+    assert parameters.of_kinds("joint")[parameters.names.index(f"{side}hip.joint_y")]
 
 
 @each_model

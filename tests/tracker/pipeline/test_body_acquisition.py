@@ -3,6 +3,7 @@
 import shutil
 from contextlib import closing
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.triangulation import sigma_px
+from tracker.pipeline import body_acquisition
 from tracker.pipeline.body_acquisition import (
     PLACED_M,
     SIZES_EDITS,
@@ -155,3 +157,40 @@ def test_too_few_poses_are_completed_by_tracking(session, store):
             acquire_body(session, observer, 0, range(6), AcquisitionSettings(n_frames=3), report)
     assert 0 < max(shares) <= 1
     assert [row.frame for row in store.frames(session.people[0].name)] == [0]
+
+
+def test_each_round_tracks_with_the_body_of_the_one_before(session, store, monkeypatch):
+    """The sizes are fitted from the present body each time, and a round that fits worse is the last."""
+    put(session, store, f3=record(session, store, status="good"))
+    present, tracked_with, fitted_from, costs = session.people[0].model, [], [], [2.0, 1.0, 4.0, 0.0]
+
+    def track(own, observer, person, frames, known, report):
+        tracked_with.append(own.people[person].model.height_m)
+        assert all(b[0].model is own.people[person].model for b in known.bodies.values())
+        return known
+
+    def acquire(observer, bodies, person, placed, settings, report, seen):
+        fitted_from.append(bodies[3][0].model)
+        body = present.with_height(present.height_m + 0.1 * len(fitted_from))
+        return SimpleNamespace(body=body, cost_before_px=3.0, cost_after_px=costs[len(fitted_from) - 1])
+
+    monkeypatch.setattr(body_acquisition, "_with_tracked", track)
+    monkeypatch.setattr(body_acquisition, "acquire_from_contours", acquire)
+    found = acquire_body(session, None, 0, range(10), AcquisitionSettings(n_frames=2, rounds=4))
+    assert tracked_with == pytest.approx([present.height_m, present.height_m + 0.1, present.height_m + 0.2])
+    assert fitted_from == [present] * 3
+    assert found.cost_after_px == 4.0
+
+
+def test_a_round_in_which_most_frames_are_good_is_the_last(session, store, monkeypatch):
+    put(session, store, f3=record(session, store, status="good"))
+    found = SimpleNamespace(body=session.people[0].model, cost_before_px=3.0, cost_after_px=2.0)
+    rounds = []
+
+    def track(own, observer, person, frames, known, report):
+        return known._replace(bodies=dict.fromkeys(range(6), known.bodies[3]))
+
+    monkeypatch.setattr(body_acquisition, "_with_tracked", track)
+    monkeypatch.setattr(body_acquisition, "acquire_from_contours", lambda *_: rounds.append(1) or found)
+    acquire_body(session, None, 0, range(10), AcquisitionSettings(n_frames=2, rounds=4))
+    assert len(rounds) == 1

@@ -60,5 +60,10 @@ def test_no_view_is_left_out_where_several_could_be():
 
 
 def test_nothing_of_the_size_of_a_person():
-    with pytest.raises(TrackerError, match="a figure of at least 20 litres"):
+    with pytest.raises(TrackerError, match="a figure of at least 8 litres"):
         carve_people(silhouettes_of([ellipsoid((0, 0, 0), np.full(3, 0.1))], CAMERAS), SIZE_M)
+
+
+def test_a_small_child_is_a_figure():
+    child = ellipsoid((0, 0, 0), np.array([0.09, 0.11, 0.33]))
+    assert carve_people(silhouettes_of([child], CAMERAS), SIZE_M).figures[0].volume_m3 < 0.02

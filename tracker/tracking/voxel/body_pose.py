@@ -11,8 +11,9 @@ from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock,
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
+from tracker.tracking.voxel.kalman import product
 from tracker.tracking.voxel.settings import VoxelSettings
-from tracker.tracking.voxel.state import FilterState, Layout, center_jacobian, point_jacobian
+from tracker.tracking.voxel.state import FilterState, Layout, point_jacobians
 
 _PLACE_M = 0.015
 """Standard deviation between the joints of a figure and those of a body whose trunk bends, metres."""
@@ -73,7 +74,11 @@ def state_of(
 
 
 def pose_of(
-    model: BodyModel, state: FilterState, near: Array, active_dofs: NDArray[np.bool_] | None = None
+    model: BodyModel,
+    state: FilterState,
+    near: Array,
+    active_dofs: NDArray[np.bool_] | None = None,
+    start: Array | None = None,
 ) -> BodyPose:
     """Return the pose of a body that comes closest to the joints of a state, within the limits of the body.
 
@@ -84,21 +89,20 @@ def pose_of(
         state: of the filter.
         near: the other pose, (n_values,).
         active_dofs: degrees of freedom that may move, (n_dofs,); None: all.
+        start: initial pose, (n_values,); by default the other pose.
     """
-    by_center = center_jacobian(state)
-    indices, targets, weights = [], [], []
+    points = point_shares(state.figure)
     names = {n: i for i, n in enumerate(model.point_names)}
-    for name, part, shares in point_shares(state.figure):
-        J = point_jacobian(state, by_center, part, shares)
-        variance = float(np.einsum("ij,jk,ik->", J, state.covariance, J)) / 3
-        indices.append(names[name])
-        targets.append(state.centers[part] + state.rotations[part] @ (shares * state.sizes[part]))
-        weights.append(1 / np.sqrt(variance + _PLACE_M**2))
+    arms = points.shares * state.sizes[points.parts]
+    targets = state.centers[points.parts] + (state.rotations[points.parts] @ arms[..., None])[..., 0]
+    J = point_jacobians(state, points.parts, points.shares)
+    JP = product(J.reshape(-1, state.layout.n), state.covariance).reshape(J.shape)
+    variances = np.einsum("pij,pij->p", JP, J) / 3
     rest = np.where(model.dof_is_length, 1 / _NEAR_M, 1 / _NEAR_RAD)
     blocks: list[ResidualBlock] = [
-        PointTargets(np.array(indices), np.array(targets), np.array(weights)),
+        PointTargets(np.array([names[n] for n in points.names]), targets, 1 / np.sqrt(variances + _PLACE_M**2)),
         PosePrior(model.neutral(), 1 / model.spreads),
         PosePrior(near, rest),
     ]
-    fit = solve(model, near, blocks, active_dofs, _MAX_ITERATIONS, _TOLERANCE)
+    fit = solve(model, near if start is None else start, blocks, active_dofs, _MAX_ITERATIONS, _TOLERANCE)
     return BodyPose(fit.pose, covariance(model, fit))

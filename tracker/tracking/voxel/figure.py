@@ -157,10 +157,23 @@ def joint_points(figure: FigureJoints, sizes: Array, rotations: Array, centers: 
     return found
 
 
-def point_shares(figure: FigureJoints) -> tuple[tuple[str, int, Array], ...]:
-    """Return the points of `joint_points`: name, index of the part, and position in its half sizes, (3,)."""
-    roots = tuple((ROOTS[n], i, figure.own_shares[i]) for i, n in enumerate(PARTS) if i)
-    return roots + tuple((_ENDS[n], i, figure.end_shares[i]) for i, n in enumerate(PARTS) if n in _ENDS)
+class PointShares(NamedTuple):
+    """The points of `joint_points`."""
+
+    names: tuple[str, ...]
+    """(N,)."""
+    parts: IntArray
+    """Index of the part of each, (N,)."""
+    shares: Array
+    """Position of each in half sizes of its part, (N, 3)."""
+
+
+def point_shares(figure: FigureJoints) -> PointShares:
+    """Return where the points of `joint_points` lie on the parts."""
+    roots, ends = list(range(1, N_PARTS)), [i for i, n in enumerate(PARTS) if n in _ENDS]
+    names = [ROOTS[PARTS[i]] for i in roots] + [_ENDS[PARTS[i]] for i in ends]
+    shares = np.concatenate([figure.own_shares[roots], figure.end_shares[ends]])
+    return PointShares(tuple(names), np.array(roots + ends), shares)
 
 
 def _members(model: BodyModel) -> tuple[IntArray, ...]:

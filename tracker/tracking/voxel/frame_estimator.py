@@ -50,6 +50,7 @@ class VoxelEstimator:
         self.states = [
             state_of(m, list(s), self._dt, settings) for m, s in zip(run.subjects.models, starts, strict=True)
         ]
+        self._near: dict[int, Array] = {}  # poses close to those of the frame, where the fits of poses start
         self._has_motion = [len(s) > 1 for s in starts]
         self._levels = [DetailLevels.finest()] * len(starts)
         self._lost_limbs = [frozenset[str]()] * len(starts)
@@ -78,7 +79,7 @@ class VoxelEstimator:
         self.labels = label_voxels(points, states, settings.voxel_m, settings.label_rule)
         if settings.levels:
             for p in updates:
-                self._find_levels(p, states, found, _PATIENCE)
+                self._find_levels(p, states[p], found, self.labels, _PATIENCE)
         return self._estimate(frame, found, updates)
 
     def _adjusted(self, p: int, states: list[FilterState], found: FrameVoxels) -> Update:
@@ -87,7 +88,10 @@ class VoxelEstimator:
         result = self._update(p, states, points, True)
         if not self._settings.levels:
             return result
-        self._find_levels(p, [*states[:p], result.state, *states[p + 1 :]], found, 1)
+        labels = label_voxels(
+            points, [*states[:p], result.state, *states[p + 1 :]], self._settings.voxel_m, self._settings.label_rule
+        )
+        self._find_levels(p, result.state, found, labels, 1)
         return result if self._levels[p].is_resolved.all() else self._update(p, states, points, True)
 
     def _constrained(self, p: int, state: FilterState) -> FilterState:
@@ -98,10 +102,8 @@ class VoxelEstimator:
             state = self._carried(p, state)
         return state if self._settings.limit_rad is None else self._within_limits(p, state)
 
-    def _find_levels(self, p: int, states: Sequence[FilterState], found: FrameVoxels, patience: int) -> None:
-        settings, voxels = self._settings, found.voxels
-        labels = label_voxels(voxels.points_world, states, settings.voxel_m, settings.label_rule).labels
-        self._levels[p] = find_levels(self._levels[p], states[p], voxels, labels, N_PARTS * p, patience)
+    def _find_levels(self, p: int, state: FilterState, found: FrameVoxels, labels: Labels, patience: int) -> None:
+        self._levels[p] = find_levels(self._levels[p], state, found.voxels, labels.labels, N_PARTS * p, patience)
 
     def _predicted(self, p: int, frame: int, keyframe: Array | None) -> FilterState:
         model, state = self._run.subjects.models[p], self.states[p]
@@ -139,8 +141,8 @@ class VoxelEstimator:
         """Return the state drawn to the closest pose of the body, whose joints have limits and fewer axes."""
         model, sigma = self._run.subjects.models[p], self._settings.limit_rad
         assert sigma is not None
-        body = PosedBody(model, pose_of(model, state, self._poses[p], self._run.subjects.active_dofs[p]).values)
-        allowed = part_rotations(body, figure_of(model))
+        self._near[p] = pose_of(model, state, self._poses[p], self._run.subjects.active_dofs[p]).values
+        allowed = part_rotations(PosedBody(model, self._near[p]), figure_of(model))
         return update(state, lambda s: linearize_rotations(s, allowed, sigma)).state
 
     def _estimate(self, frame: int, found: FrameVoxels, updates: dict[int, Update]) -> PoseEstimate:
@@ -155,7 +157,7 @@ class VoxelEstimator:
                 covariances.append(np.zeros((model.n_dofs, model.n_dofs)))
                 continue
             state = self.states[p]
-            body = pose_of(model, state, poses[p], subjects.active_dofs[p])
+            body = pose_of(model, state, poses[p], subjects.active_dofs[p], self._near.get(p))
             poses[p] = body.values
             per_row = updates[p].normalized_innovation / max(1, updates[p].n_rows)
             verdict = assess(state, found, free[p], per_row, self._levels[p].notes, self._lost_limbs[p])

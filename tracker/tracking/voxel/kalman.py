@@ -67,10 +67,11 @@ def update(
             break
         H, HP = found.jacobian, product(found.jacobian, P)
         S = product(HP, H.T) + found.noise
-        gain = np.asarray(np.linalg.solve((S + S.T) / 2, HP).T)
-        residual = found.residual + H @ state.difference(predicted)
+        residual = found.residual if i == 0 else found.residual + H @ state.difference(predicted)
+        solved = np.linalg.solve((S + S.T) / 2, np.column_stack([HP, residual]))
+        gain = np.asarray(solved[:, :-1].T)
         if i == 0:
-            innovation, n_rows = float(residual @ np.linalg.solve(S, residual)), len(residual)
+            innovation, n_rows = float(residual @ solved[:, -1]), len(residual)
         state = predicted.retract(gain @ residual).with_covariance(joseph(P, gain, found))
     return Update(state, innovation, n_rows)
 

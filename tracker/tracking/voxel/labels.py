@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.figure import N_PARTS
+from tracker.tracking.voxel.kalman import product
 from tracker.tracking.voxel.label_kernels import N_MOMENTS, label_and_sum
-from tracker.tracking.voxel.state import FilterState, center_jacobian
+from tracker.tracking.voxel.state import FilterState
 
 NO_PART = -1
 """Label of a voxel that belongs to no part."""
+_UPPER = np.triu_indices(3)
 
 
 class PartClouds(NamedTuple):
@@ -63,7 +65,7 @@ def label_voxels(points: Array, states: Sequence[FilterState], size_m: float, ru
     centers, rotations, metrics = _parts(states, size_m, rule.widened)
     labels = np.empty(len(points), dtype=np.int16)
     moments = np.zeros((len(centers), N_MOMENTS))
-    packed = np.column_stack([metrics[0][:, *np.triu_indices(3)], metrics[1]])
+    packed = np.column_stack([metrics[0][:, *_UPPER], metrics[1]])
     label_and_sum(np.ascontiguousarray(points), centers, rotations, packed, rule.gate, labels, moments)
     return Labels(labels, _clouds(moments, size_m))
 
@@ -79,7 +81,7 @@ def label_voxels_plainly(points: Array, states: Sequence[FilterState], size_m: f
     moments = np.zeros((len(centers), N_MOMENTS))
     for m in range(len(centers)):
         own = local[labels == m, m]
-        moments[m] = [len(own), *own.sum(axis=0), *(own.T @ own)[np.triu_indices(3)]]
+        moments[m] = [len(own), *own.sum(axis=0), *(own.T @ own)[_UPPER]]
     return Labels(labels, _clouds(moments, size_m))
 
 
@@ -99,8 +101,9 @@ def _parts(states: Sequence[FilterState], size_m: float, widened: bool) -> tuple
 
 def _center_covariances(state: FilterState) -> Array:
     """Return the covariance of the centre of each part, (10, 3, 3), square metres."""
-    J = center_jacobian(state)
-    return np.asarray(J @ state.covariance @ np.swapaxes(J, 1, 2))
+    J = state.center_jacobian
+    JP = product(J.reshape(3 * N_PARTS, -1), state.covariance).reshape(J.shape)
+    return np.asarray(JP @ np.swapaxes(J, 1, 2))
 
 
 def _clouds(moments: Array, size_m: float) -> PartClouds:
@@ -108,7 +111,7 @@ def _clouds(moments: Array, size_m: float) -> PartClouds:
     n = np.maximum(counts, 1.0)[:, None]
     means = moments[:, 1:4] / n
     second = np.empty((len(moments), 3, 3))
-    rows, columns = np.triu_indices(3)
+    rows, columns = _UPPER
     second[:, rows, columns] = second[:, columns, rows] = moments[:, 4:] / n
     covariances = second - means[:, :, None] * means[:, None, :] + np.eye(3) * size_m**2 / 12
     return PartClouds(counts, means, covariances)

@@ -15,7 +15,7 @@ from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.figure import LIMBS, N_PARTS, PARENTS
 from tracker.tracking.voxel.kalman import LinearizedMeasurement
 from tracker.tracking.voxel.labels import PartClouds
-from tracker.tracking.voxel.state import FilterState, center_jacobian
+from tracker.tracking.voxel.state import FilterState
 from tracker.voxels.voxel_grid import Voxels
 
 _MERGED, _APART = 0.4, 0.25
@@ -75,15 +75,16 @@ def find_levels(
         first_label: label of its torso.
         patience: number of frames in a row on which a part must be merged before its level is coarser.
     """
-    grid = np.full(voxels.grid.shape, -1, dtype=np.int16)
-    at = tuple(voxels.indices.T)
+    grid = np.full(np.add(voxels.grid.shape, 2), -1, dtype=np.int16)  # with a margin of one voxel
     own = labels - first_label
-    grid[at] = np.where((own >= 0) & (own < N_PARTS), own, -1)
+    own = np.where((own >= 0) & (own < N_PARTS), own, -1)
+    at = np.ravel_multi_index(tuple(voxels.indices.T + 1), grid.shape)
+    grid.flat[at] = own
     size_m, sizes = voxels.grid.size_m, state.sizes
-    volumes = np.bincount(grid[at][grid[at] >= 0], minlength=N_PARTS) * size_m**3 / (2 * np.pi * sizes.prod(axis=1))
+    volumes = np.bincount(own[own >= 0], minlength=N_PARTS) * size_m**3 / (2 * np.pi * sizes.prod(axis=1))
     shares = np.zeros(N_PARTS)
     for leg, other in (pair for a, b in _LEG_PAIRS for pair in ((a, b), (b, a))):
-        shares[leg] = _touching(grid, leg, other) * size_m**2 / (4 * sizes[leg, 1] * sizes[leg, 2])
+        shares[leg] = _touching(grid, at[own == leg], other) * size_m**2 / (4 * sizes[leg, 1] * sizes[leg, 2])
     finer, coarser = (shares < _APART) & (volumes > _WHOLE), (shares > _MERGED) | (volumes < _SWALLOWED)
     n_merged = np.where(coarser, before.n_merged + 1, 0)
     resolved = np.where(before.is_resolved, n_merged < patience, finer)
@@ -93,14 +94,11 @@ def find_levels(
     return DetailLevels(resolved, n_merged)
 
 
-def _touching(grid: NDArray[np.int16], part: int, other: int) -> int:
-    """Return the number of voxels of a part with a face on another part."""
-    padded = np.pad(grid, 1, constant_values=-1)
-    own, beside = padded == part, padded == other
-    touches = np.zeros(own.shape, dtype=bool)
-    for axis in range(3):
-        touches |= np.roll(beside, 1, axis) | np.roll(beside, -1, axis)
-    return int(np.count_nonzero(own & touches))
+def _touching(grid: NDArray[np.int16], own: NDArray[np.int64], part: int) -> int:
+    """Return the number of voxels, given by flat indices (N,), with a face on a part."""
+    steps = np.array(grid.strides) // grid.itemsize
+    beside = grid.ravel()[own + np.concatenate([steps, -steps])[:, None]]
+    return int(np.count_nonzero((beside == part).any(axis=0)))
 
 
 def measure_together(
@@ -113,7 +111,7 @@ def measure_together(
         clouds: the voxels of its parts.
         pairs: indices of the parts.
     """
-    rows, jacobians, by_center = [], [], center_jacobian(state)
+    rows, jacobians = [], []
     for pair in pairs:
         own = list(pair)
         n = clouds.counts[own]
@@ -121,7 +119,7 @@ def measure_together(
             offsets = np.einsum("pij,pj->pi", state.rotations[own], clouds.means[own])
             weights = n / n.sum()
             rows.append(weights @ offsets)
-            jacobians.append(np.einsum("p,pij->ij", weights, by_center[own]))
+            jacobians.append(np.einsum("p,pij->ij", weights, state.center_jacobian[own]))
     if not rows:
         return None
     H: Array = np.concatenate(jacobians)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.voxel.figure import N_PARTS
-from tracker.tracking.voxel.kalman import LinearizedMeasurement
+from tracker.tracking.voxel.kalman import LinearizedMeasurement, product
 from tracker.tracking.voxel.labels import PartClouds
 from tracker.tracking.voxel.motion_model import left_jacobian_inverse
-from tracker.tracking.voxel.state import FilterState, center_jacobian
+from tracker.tracking.voxel.state import FilterState
 
 MIN_VOXELS = 4
 """Fewest voxels of a part that is measured: fewer have no three principal axes."""
@@ -103,29 +103,29 @@ def linearize(
     parts = np.flatnonzero(used & found.is_measured)
     if not len(parts):
         return None
-    n_rows = 9 if with_sizes else 6
-    residual, H = np.zeros((len(parts), n_rows)), np.zeros((len(parts), n_rows, state.layout.n))
-    R = np.zeros((len(parts) * n_rows,) * 2)
-    by_center, by_turn = center_jacobian(state), left_jacobian_inverse(found.turns)
-    turn_variances = _turn_variances(found, noise)
-    doubt = _doubt(state, found, noise) if noise.independent_m3 is not None else np.ones(N_PARTS)
-    for row, i in enumerate(parts):
-        rotation, at = state.rotations[i], row * n_rows
-        residual[row, :3] = rotation @ found.offsets[i]
-        residual[row, 3:6] = found.turns[i]
-        H[row, :3] = by_center[i]
-        H[row, 3:6, 3 * i : 3 * i + 3] = by_turn[i]
-        spread = np.array([noise.across_m, noise.across_m, max(noise.across_m, noise.along * state.sizes[i, 2])])
-        R[at : at + 3, at : at + 3] = (rotation * spread**2 * doubt[i]) @ rotation.T
-        R[at + 3 : at + 6, at + 3 : at + 6] = np.diag(np.minimum(turn_variances[i] * doubt[i], _MAX_TURN_VARIANCE))
-        if with_sizes:
-            first = state.layout.sizes_at.start + 3 * i
-            residual[row, 6:] = found.sizes[i] - state.sizes[i]
-            H[row, 6:, first : first + 3] = np.eye(3)
-            R[at + 6 : at + 9, at + 6 : at + 9] = np.eye(3) * noise.size_m**2
-        if noise.independent_m3 is not None:
-            _limit_influence(state, residual[row, :6], H[row, :6], R[at : at + 6, at : at + 6])
-    return LinearizedMeasurement(residual.ravel(), H.reshape(-1, state.layout.n), R)
+    n, n_rows, n_states = len(parts), 9 if with_sizes else 6, state.layout.n
+    residual, H, R = np.zeros((n, n_rows)), np.zeros((n, n_rows, n_states)), np.zeros((n, n_rows, n_rows))
+    one, xyz = np.arange(n)[:, None], np.arange(3)
+    rotations, sizes, columns = state.rotations[parts], state.sizes[parts], 3 * parts[:, None] + xyz
+    doubt = _doubt(state, found, noise)[parts] if noise.independent_m3 is not None else np.ones(n)
+    residual[:, :3] = (rotations @ found.offsets[parts, :, None])[..., 0]
+    residual[:, 3:6] = found.turns[parts]
+    H[:, :3] = state.center_jacobian[parts]
+    H[one[..., None], 3 + xyz[:, None], columns[:, None]] = left_jacobian_inverse(found.turns[parts])
+    spreads = np.full((n, 3), noise.across_m)
+    spreads[:, 2] = np.maximum(noise.across_m, noise.along * sizes[:, 2])
+    R[:, :3, :3] = (rotations * (spreads**2 * doubt[:, None])[:, None]) @ np.swapaxes(rotations, 1, 2)
+    turn_variances = _turn_variances(found, noise)[parts] * doubt[:, None]
+    R[:, 3 + xyz, 3 + xyz] = np.minimum(turn_variances, _MAX_TURN_VARIANCE)
+    if with_sizes:
+        residual[:, 6:] = found.sizes[parts] - sizes
+        H[one, 6 + xyz, state.layout.sizes_at.start + columns] = 1.0
+        R[:, 6 + xyz, 6 + xyz] = noise.size_m**2
+    if noise.independent_m3 is not None:
+        R[:, :6, :6] *= _influence_limits(state, residual[:, :6], H[:, :6], R[:, :6, :6])[:, None, None]
+    noises = np.zeros((n, n_rows, n, n_rows))
+    noises[one[:, 0], :, one[:, 0]] = R
+    return LinearizedMeasurement(residual.ravel(), H.reshape(-1, n_states), noises.reshape(n * n_rows, -1))
 
 
 def linearize_rotations(state: FilterState, rotations: Array, sigma_rad: float) -> LinearizedMeasurement:
@@ -168,12 +168,18 @@ def _doubt(state: FilterState, found: PartAxes, noise: MeasurementNoise) -> Arra
     return np.asarray(np.clip(thick, 1.0, 3.0) ** 2 * np.clip(missing, 1.0, 10.0))
 
 
-def _limit_influence(state: FilterState, residual: Array, H: Array, R: Array) -> None:
-    """Enlarge the noise, (6, 6), of a part whose innovation is improbable, so that its influence is bounded."""
-    S = H @ state.covariance @ H.T + R
-    squared = float(residual @ np.linalg.solve(S, residual))
-    if squared > _IMPROBABLE:
-        R *= squared / _IMPROBABLE
+def _influence_limits(state: FilterState, residual: Array, H: Array, R: Array) -> Array:
+    """Return the factor on the noise of each part, (M,), at least 1, that bounds the influence of its innovation.
+
+    Args:
+        state: the state.
+        residual: innovation of each part, (M, 6).
+        H: its derivative, (M, 6, n).
+        R: its noise, (M, 6, 6).
+    """
+    HP = product(H.reshape(-1, H.shape[2]), state.covariance).reshape(H.shape)
+    solved = np.linalg.solve(HP @ np.swapaxes(H, 1, 2) + R, residual[..., None])[..., 0]
+    return np.maximum(np.sum(residual * solved, axis=1) / _IMPROBABLE, 1.0)
 
 
 def _turn_variances(found: PartAxes, noise: MeasurementNoise) -> Array:

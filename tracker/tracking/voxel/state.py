@@ -11,11 +11,18 @@ from functools import cached_property
 import numpy as np
 
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.voxel.figure import N_PARTS, PARENTS, TORSO, FigureJoints, chain_centers
 
 MIN_SIZE_M = 0.01
 """Smallest half size of a part, metres."""
+_COLUMNS = 3 * np.arange(N_PARTS)[:, None] + np.arange(3)
+"""Columns of the error state that belong to each part, from the first of their kind, (10, 3)."""
+_ON_CHAIN = np.eye(N_PARTS)
+"""Whether each part lies on the way from the torso to a part, (10, 10); the torso itself does not."""
+_ON_CHAIN[TORSO, TORSO] = 0.0
+for _part in range(1, N_PARTS):
+    _ON_CHAIN[_part] += _ON_CHAIN[PARENTS[_part]]
 
 
 @dataclass(frozen=True)
@@ -92,6 +99,24 @@ class FilterState:
         """Centre of each part, (10, 3), metres (MTHC01 Eq. 3). Parts are connected whatever the state holds."""
         return chain_centers(self.figure, self.sizes, self.rotations, self.center)
 
+    @cached_property
+    def center_jacobian(self) -> Array:
+        """Derivative of the centres of all parts by the error state, (10, 3, n) (MTHC01 Sect. 4)."""
+        at, figure, sizes, parents = self.layout, self.figure, self.sizes, list(PARENTS)
+        own, parent = self.rotations, self.rotations[parents]
+        by_link = np.zeros((N_PARTS, at.n, 3))  # of the way from the parent's centre, transposed
+        rows = np.arange(N_PARTS)[:, None]
+        own_arm, parent_arm = figure.own_shares * sizes, figure.parent_shares * sizes[parents]
+        by_link[rows, _COLUMNS] = np.swapaxes(own @ rigid.skew(own_arm), 1, 2)
+        by_link[rows, _COLUMNS[parents]] -= np.swapaxes(parent @ rigid.skew(parent_arm), 1, 2)
+        if at.sizes:
+            first = at.sizes_at.start
+            by_link[rows, first + _COLUMNS] = -np.swapaxes(own * figure.own_shares[:, None], 1, 2)
+            by_link[rows, first + _COLUMNS[parents]] += np.swapaxes(parent * figure.parent_shares[:, None], 1, 2)
+        out = (_ON_CHAIN @ by_link.reshape(N_PARTS, -1)).reshape(N_PARTS, at.n, 3)
+        out[:, at.center_at] += np.eye(3)
+        return np.ascontiguousarray(np.swapaxes(out, 1, 2))
+
     def retract(self, step: Array) -> "FilterState":
         """Return the state moved by an error state, (n,); the covariance stays."""
         at = self.layout
@@ -137,44 +162,18 @@ class FilterState:
         return replace(self, covariance=covariance)
 
 
-def center_jacobian(state: FilterState) -> Array:
-    """Return the derivative of the centres of all parts by the error state, (10, 3, n) (MTHC01 Sect. 4)."""
-    at, R, parents = state.layout, state.rotations, list(PARENTS)
-    figure, sizes = state.figure, state.sizes
-    by_parent = -R[parents] @ rigid.skew(figure.parent_shares * sizes[parents])
-    by_own = R @ rigid.skew(figure.own_shares * sizes)
-    out = np.zeros((N_PARTS, 3, at.n))
-    out[TORSO, :, at.center_at] = np.eye(3)
-    for i in range(1, N_PARTS):
-        p = PARENTS[i]
-        out[i] = out[p]
-        out[i, :, 3 * p : 3 * p + 3] += by_parent[i]
-        out[i, :, 3 * i : 3 * i + 3] += by_own[i]
-        if at.sizes:
-            first = at.sizes_at.start
-            out[i, :, first + 3 * p : first + 3 * p + 3] += R[p] * figure.parent_shares[i]
-            out[i, :, first + 3 * i : first + 3 * i + 3] -= R[i] * figure.own_shares[i]
-    return out
-
-
-def point_jacobian(state: FilterState, by_center: Array, part: int, shares: Array) -> Array:
-    """Return the derivative of a point of a part by the error state, (3, n).
+def point_jacobians(state: FilterState, parts: IntArray, shares: Array) -> Array:
+    """Return the derivatives of points of parts by the error state, (N, 3, n).
 
     Args:
         state: the state.
-        by_center: derivatives of the centres, see `center_jacobian`.
-        part: index of the part.
-        shares: position of the point in half sizes of the part, (3,).
+        parts: index of the part of each point, (N,).
+        shares: position of each point in half sizes of its part, (N, 3).
     """
-    return np.asarray(by_center[part] + _point(state, part, shares))
-
-
-def _point(state: FilterState, part: int, shares: Array) -> Array:
-    """Return the derivative of a point of a part relative to the part's centre, (3, n)."""
-    at, R = state.layout, state.rotations[part]
-    out = np.zeros((3, at.n))
-    out[:, 3 * part : 3 * part + 3] = -R @ rigid.skew(shares * state.sizes[part])
+    at, R = state.layout, state.rotations[parts]
+    out, rows = state.center_jacobian[parts], np.arange(len(parts))[:, None, None]
+    xyz = np.arange(3)[:, None]
+    out[rows, xyz, _COLUMNS[parts][:, None]] -= R @ rigid.skew(shares * state.sizes[parts])
     if at.sizes:
-        first = at.sizes_at.start + 3 * part
-        out[:, first : first + 3] = R * shares
+        out[rows, xyz, at.sizes_at.start + _COLUMNS[parts][:, None]] += R * shares[:, None]
     return out

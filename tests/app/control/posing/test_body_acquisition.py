@@ -27,7 +27,7 @@ def acquiring(monkeypatch):
     go = threading.Event()
 
     def acquire(session, observer, person, frames, settings, report):
-        report("fitting sizes", 0.5)
+        report("fitting sizes to voxels" if settings.voxels else "fitting sizes", 0.5)
         assert go.wait(10)
         report("done", 1.0)
         parameters = SizeParameters(session.people[person].model, settings.coupled)
@@ -42,8 +42,8 @@ def acquiring(monkeypatch):
     return go
 
 
-def begun(controller):
-    controller.body_acquisition.start(0)
+def begun(controller, method="contours"):
+    controller.body_acquisition.start(0, method)
     wait_for(lambda: controller.state.acquisition.share > 0)
 
 
@@ -71,6 +71,14 @@ def test_the_result_is_a_draft_that_is_applied_and_undone(posed, acquiring):
     np.testing.assert_allclose(posed.state.poses[0], posed.models[0].neutral() + 0.01)
     posed.history.undo()
     assert posed.models[0].height_m == before.height_m
+
+
+def test_voxels_are_fitted_first_where_they_are_chosen(posed, acquiring):
+    begun(posed, "voxels")
+    assert posed.state.acquisition.stage == "fitting sizes to voxels"
+    acquiring.set()
+    wait_for(lambda: not posed.state.acquisition.running)
+    assert posed.state.draft is not None
 
 
 def test_a_stopped_acquisition_changes_nothing(posed, acquiring):

@@ -12,7 +12,7 @@ from tracker.tracking.voxel.labels import PartClouds
 from tracker.tracking.voxel.measurement import MeasurementNoise, linearize, linearize_rotations, measure_parts
 from tracker.tracking.voxel.motion_model import ProcessNoise, predict, process_covariance, transition
 from tracker.tracking.voxel.settings import VoxelSettings
-from tracker.tracking.voxel.state import center_jacobian, point_jacobian
+from tracker.tracking.voxel.state import point_jacobians
 
 STEP = 1e-6
 NOISE = MeasurementNoise(0.02, 0.2, 0.1, 0.02, None)
@@ -39,11 +39,11 @@ def test_retract_and_difference_are_inverse():
 
 def test_derivatives_of_centers_and_joints():
     state = some_state()
-    by_center = center_jacobian(state)
-    np.testing.assert_allclose(by_center, differences(state, lambda s: s.centers), atol=1e-6)
-    for _, part, shares in point_shares(state.figure):
-        expected = differences(state, lambda s, i=part, a=shares: s.centers[i] + s.rotations[i] @ (a * s.sizes[i]))
-        np.testing.assert_allclose(point_jacobian(state, by_center, part, shares), expected, atol=1e-6)
+    np.testing.assert_allclose(state.center_jacobian, differences(state, lambda s: s.centers), atol=1e-6)
+    _, parts, shares = point_shares(state.figure)
+    for i, a, found in zip(parts, shares, point_jacobians(state, parts, shares), strict=True):
+        expected = differences(state, lambda s, i=i, a=a: s.centers[i] + s.rotations[i] @ (a * s.sizes[i]))
+        np.testing.assert_allclose(found, expected, atol=1e-6)
 
 
 def test_derivative_of_the_transition():
@@ -128,7 +128,7 @@ def simulated_innovations(process, noise, seed):
 
         def measure(s, centers=truth.centers + offsets, rotations=turned):
             found = linearize_rotations(s, rotations, noise.turn)
-            H = np.concatenate([center_jacobian(s).reshape(3 * N_PARTS, -1), found.jacobian])
+            H = np.concatenate([s.center_jacobian.reshape(3 * N_PARTS, -1), found.jacobian])
             R = np.diag(np.repeat([noise.across_m**2, noise.turn**2], 3 * N_PARTS))
             return LinearizedMeasurement(np.concatenate([(centers - s.centers).ravel(), found.residual]), H, R)
 
