@@ -36,6 +36,8 @@ _MIN_EXPLAINED = 0.05
 """Fewest points per pixel of the body's contour to which a part is compared."""
 _STILL = 0.005
 """Innovations that differ by less hardly count, body heights."""
+_HEAD = "head"
+"""Name of the limb that looks different from each side."""
 _LIMIT_RAD = 0.05
 """An angle is at its limit where it is nearer, rad."""
 _WEIGHTS = np.array([2.893, 4.401, -2.282, -2.963, 3.508, 0.282, 13.031, -1.814])
@@ -93,7 +95,7 @@ class LimbFeatures(NamedTuple):
     """`forward` in the second worst of the views that show it; that of the body where none does. A limb at wrong edges
     fits those of some views only."""
     end_color: float
-    """`color` of its last part; infinite where little of it is visible."""
+    """`color` of its last part; infinite where little of it is visible, and of the head: hair and face differ."""
     end_explained: float
     """`explained` of its last part, relative to that of the body. Without silhouettes all parts explain less."""
     innovation: float
@@ -255,7 +257,8 @@ def quality(
                 c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread),
                 contours.forward(c.parts), contours.shown(c.parts), contours.explained(c.parts),
                 _share_at_limits(model, body.values, c), float(free_spread), contours.second_forward(c.parts, forward),
-                float(color[c.parts[-1]]), contours.explained(c.parts[-1:]) / max(_MIN_EXPLAINED, explained),
+                np.inf if c.name == _HEAD else float(color[c.parts[-1]]),
+                contours.explained(c.parts[-1:]) / max(_MIN_EXPLAINED, explained),
                 float(innovations[np.isin(model.point_parts, c.parts)].max()),
             )
             for c, spread, free_spread in zip(chains, spreads, free_spreads, strict=True)

@@ -195,6 +195,14 @@ def test_quality_of_a_pose_and_of_a_lost_arm(gavrila, colors):
         assert all((x.color, x.worst_drop) == (np.inf, -np.inf) or x.worst_drop == 0 for x in right.limbs)
 
 
+def test_the_colours_of_a_head_say_nothing():
+    """Hair and face differ."""
+    model = load_model("gavrila34")
+    found = judged(model, posed(model, 1), posed(model, 1), colors=True)
+    assert [x.name for x in found.limbs if np.isinf(x.end_color)] == ["head"]
+    assert np.isfinite([x.color for x in found.limbs]).all()
+
+
 def test_contours_view_by_view():
     """Two parts in four views; the last hardly shows them, and their first part is long."""
     length = np.array([[40.0, 10.0], [40.0, 10.0], [40.0, 10.0], [2.0, 1.0]])
