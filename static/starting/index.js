@@ -55,7 +55,7 @@ async function untilStarted() {
 
 const isStarting = "starting" in root.dataset;
 if (isStarting) {
-  // Who answers the request for the main module may end during it.
+  // The process that sends the main module ends when the program answers, perhaps before all is sent.
   document.querySelector('script[src$="/main.js"]')?.addEventListener("error", () => location.reload());
 }
 

@@ -62,11 +62,12 @@ class SizePriors:
     """Of an exponent."""
 
     def anatomical(self) -> "SizePriors":
-        """Return the priors where nobody has placed a joint: what anatomy tells of joints that contours hardly show.
+        """Return the priors with the anthropometric spread of hip width and ankle height, where no joints were placed.
 
-        Placed joints may be defined otherwise, and are learnt. Across the pelvis a hip is known to 6 mm from the
-        pelvis's width (Seidel et al. 1995), which differs by 7%. The height of the malleolus differs by 6 mm (ANSUR
-        II for both); shoes and bent feet add 2 cm to the way from the ankle to the sole.
+        Contours hardly show these sizes. Placed joints may have other definitions, so that their offsets are fitted.
+        Regression from the pelvic width (Seidel et al. 1995) predicts the hip centre to 6 mm across the pelvis. The
+        pelvic width varies by 7%, the height of the lateral malleolus by 6 mm (ANSUR II). Shoes and plantar flexion
+        add 2 cm.
         """
         return replace(self, hip_side=min(0.005, self.hip_side), sole=min(0.015, self.sole))
 

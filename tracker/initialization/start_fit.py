@@ -59,7 +59,8 @@ def fit_start(
         return ChamferTracker(TrackSettings(backward_pass=False)).estimates(run)
 
     (fitted,) = estimates(start, [frame])
-    # A fit reaches as far as its prior and the edges around its start do. Tracks show which starts are worth more.
+    # A fit reaches only as far as its prior and the edges around its start. Starts that short tracks compare are few
+    # enough to be fitted again.
     for _ in range(_MAX_FITS - 1 if later else 0):
         (again,) = estimates(fitted.poses[0], [frame])
         gained = fitted.cost_px - again.cost_px

@@ -31,7 +31,7 @@ _STRIDE = 4
 
 
 class FitPlan(NamedTuple):
-    """Whom to fit, one after the other, and in which order their joints."""
+    """The people to fit in their order, and whether each is fitted chain by chain."""
 
     models: Sequence[BodyModel]
     """The body of each person."""

@@ -166,7 +166,7 @@ class VoxelEstimator:
             notes.append(verdict.note)
             covariances.append(body.covariance)
         self._poses = poses
-        if "lost" in statuses:  # whose voxels have no owner but the others
+        if "lost" in statuses:  # whose voxels are labelled as those of the others
             for p, status in enumerate(statuses):
                 if status == "good" and p in updates:
                     statuses[p], notes[p] = "doubtful", "another person is lost: their voxels cannot be separated"
