@@ -301,14 +301,4 @@ def range_comparison(found: RangeComparison | None) -> search_messages.RangeComp
     """Describe the poses of a range against those that they replaced."""
     if found is None:
         return search_messages.RangeComparisonMessage(None, None, ())
-    people = (
-        tuple(
-            search_messages.ComparedPose(
-                f.frame, f.method, f.other_method, f.cost_px, f.other_cost_px, f.status, f.other_status,
-                1000 * f.apart_m, 1000 * f.farthest_m, f.farthest,
-            )
-            for f in of_person
-        )
-        for of_person in found.frames
-    )  # fmt: skip
-    return search_messages.RangeComparisonMessage(found.first, found.last, tuple(people))
+    return search_messages.RangeComparisonMessage(found.first, found.last, found.frames)

@@ -7,6 +7,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from app.control.search.search_settings import SearchLeaf
 from app.page.message_types import MAX_INT, Command, Index, Message, Name, Number, Part
+from app.state.comparison import ComparedPose
 
 OutlierMode: TypeAlias = Literal["truncated", "paper"]
 RunState: TypeAlias = Literal["running", "paused", "over"]
@@ -191,26 +192,6 @@ class SearchRunsMessage(Message, frozen=True, tag="search_runs"):
     replay: Replay | None
     compared: int | None
     """Number of the run whose result is drawn."""
-
-
-class ComparedPose(Part, frozen=True):
-    """The pose of a person in a frame, against the pose that it replaced."""
-
-    frame: int
-    method: str
-    """Method of the tracker, or the source of the values."""
-    other_method: str
-    cost_px: float | None
-    other_cost_px: float | None
-    status: str
-    """As its tracker assessed it; empty if none did."""
-    other_status: str
-    apart_mm: float
-    """Mean distance between the joints of both poses."""
-    farthest_mm: float
-    """Largest of these distances."""
-    farthest: str
-    """Name of that joint, for display."""
 
 
 class RangeComparisonMessage(Message, frozen=True, tag="range_comparison"):

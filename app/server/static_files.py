@@ -83,7 +83,8 @@ class PageFiles:
         match = _ADDRESS.fullmatch(address)
         if match is None:
             return None
-        self._read()
+        if not self._contents:  # pages that were opened before the program started again
+            self._read()
         name = match["name"]
         return (self._contents[name], _TYPES[Path(name).suffix]) if name in self._contents else None
 

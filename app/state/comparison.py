@@ -36,29 +36,25 @@ class PoseComparison:
     """Whether the views show the poses before."""
 
 
-@dataclass(frozen=True, eq=False)
-class ComparedFrame:
-    """The pose of a person in a frame, and the pose that it replaced."""
+@dataclass(frozen=True)
+class ComparedPose:
+    """The pose of a person in a frame, against the pose that it replaced."""
 
     frame: int
     method: str
-    """How the present pose was made: a tracker's method, or the source of its values."""
+    """Method of the tracker, or the source of the values."""
     other_method: str
-    """How the replaced pose was made."""
     cost_px: float | None
-    """Mean cost of the present pose over the views, px; None if unknown."""
     other_cost_px: float | None
     status: str
     """As its tracker assessed it; empty if none did."""
     other_status: str
-    apart_m: float
-    """Mean distance between the body's points in both poses, metres."""
-    farthest_m: float
-    """Largest of these distances, metres."""
+    apart_mm: float
+    """Mean distance between the joints of both poses."""
+    farthest_mm: float
+    """Largest of these distances."""
     farthest: str
-    """Display name of that point."""
-    other_pose: Array
-    """The replaced pose, (n_values,), in the present body."""
+    """Name of that joint, for display."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +64,7 @@ class RangeComparison:
     first: int
     last: int
     """Included."""
-    frames: tuple[tuple[ComparedFrame, ...], ...]
+    frames: tuple[tuple[ComparedPose, ...], ...]
     """By person; frames whose pose replaced none are left out."""
     others: Mapping[int, Mapping[int, Array]]
-    """The replaced poses, (n_values,), by frame and index of the person."""
+    """The replaced poses, (n_values,), in the present body, by frame and index of the person."""

@@ -23,7 +23,7 @@ from tracker.contours.body_silhouette import body_silhouette
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.fitting.gauss_newton import NormalEquations, PosePrior
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, intersection_over_union
 from tracker.tracking.voxel.body_pose import state_of
 from tracker.tracking.voxel.frame_voxels import FrameVoxels, carve_around
 from tracker.tracking.voxel.labels import label_voxels
@@ -186,8 +186,7 @@ class _Frame:
         seen = carve_around(self._frame.silhouettes, self._states, size_m)
         own = carve_around(self._own_silhouettes(), self._states, size_m)
         found = self._measurements(self._measured(seen), self._measured(own), by_sizes, by_figure)
-        a, b = seen.voxels.occupied, own.voxels.occupied
-        overlap = float(int(np.count_nonzero(a & b)) / max(1, int(np.count_nonzero(a | b))))
+        overlap = intersection_over_union(seen.voxels.occupied, own.voxels.occupied)
         return _FrameEquations(self._with_priors(found), overlap)
 
     def _measurements(

@@ -94,13 +94,16 @@ class PosePrior:
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         # d(difference)/d(step) is the identity to first order; for ball joints up to the curvature of the rotation.
-        r = model.difference(pose, self.pose) * self.weights
+        r = self._residual(model, pose)
         return NormalEquations(0.5 * float(r @ r), self.weights * r, self._hessian)
 
     def cost(self, model: BodyModel, pose: Array) -> float:
         """Return the cost of a pose, (n_values,)."""
-        r = model.difference(pose, self.pose) * self.weights
+        r = self._residual(model, pose)
         return 0.5 * float(r @ r)
+
+    def _residual(self, model: BodyModel, pose: Array) -> Array:
+        return model.difference(pose, self.pose) * self.weights
 
     @cached_property
     def _hessian(self) -> Array:

@@ -1,4 +1,4 @@
-"""Type aliases of arrays."""
+"""Type aliases of arrays, and how much masks overlap."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,3 +11,8 @@ IntArray = NDArray[np.int64]
 """Indices and counts."""
 Image = NDArray[np.uint8]
 """Pixels, (H, W) or (H, W, 3) in BGR, as each function states."""
+
+
+def intersection_over_union(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
+    """Return the share of two masks of one shape that both cover, of all that either covers; 0 for empty masks."""
+    return int(np.count_nonzero(one & other)) / max(1, int(np.count_nonzero(one | other)))

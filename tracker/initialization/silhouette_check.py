@@ -8,8 +8,7 @@ import numpy as np
 from tracker.body.model import PosedBody
 from tracker.contours.body_silhouette import body_silhouette
 from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.geometry.arrays import Array
-from tracker.images.background_subtraction import Mask
+from tracker.geometry.arrays import Array, intersection_over_union
 from tracker.voxels.figure_masks import FigureMask
 
 _MIN_OVERLAP = 0.55
@@ -54,12 +53,8 @@ def check_against_silhouettes(
         masks: that of the person in each of them.
     """
     found = [
-        (s.camera.name, _overlap(body_silhouette([body], s.camera), m.mask))
+        (s.camera.name, intersection_over_union(body_silhouette([body], s.camera), m.mask))
         for s, m in zip(silhouettes, masks, strict=True)
         if m.is_apart and m.mask.any()
     ]
     return SilhouetteCheck(tuple(name for name, _ in found), np.array([share for _, share in found]))
-
-
-def _overlap(one: Mask, other: Mask) -> float:
-    return int(np.count_nonzero(one & other)) / max(1, int(np.count_nonzero(one | other)))

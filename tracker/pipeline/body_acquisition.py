@@ -84,7 +84,7 @@ def acquire_body(
     if not len(known.bodies) < settings.n_frames < len(frames):
         return _acquire(observer, known, settings, report)
     rounds = settings.rounds if isinstance(settings, AcquisitionSettings) else 1
-    body, found = session.people[person].model, list[Acquisition]()
+    body = session.people[person].model
     for number in range(rounds):
 
         def report_tracking(share: float, number: int = number) -> None:
@@ -94,12 +94,12 @@ def acquire_body(
             report(stage, (number + _TRACKING + (1 - _TRACKING) * share) / rounds)
 
         tracked = _tracked_with(body, session, observer, person, frames, known, report_tracking)
-        found.append(_acquire(observer, tracked, settings, report_rest))
-        body = found[-1].body
+        found = _acquire(observer, tracked, settings, report_rest)
+        body = found.body
         is_enough = len(tracked.bodies) > _ENOUGH * min(len(frames), _MOST_TRACKED)
-        if is_enough or found[-1].cost_after_px >= found[-1].cost_before_px:
+        if is_enough or found.cost_after_px >= found.cost_before_px:
             break
-    return found[-1]
+    return found
 
 
 def _acquire(

@@ -4,7 +4,7 @@ import numpy as np
 
 from app.control.session.session_state import SessionState
 from app.runtime.jobs import LatestWinsWorker
-from app.state.comparison import ComparedFrame, RangeComparison
+from app.state.comparison import ComparedPose, RangeComparison
 from app.state.state import State
 from tracker.body.limbs import display_name
 from tracker.errors import TrackerError
@@ -65,28 +65,31 @@ class ComparingRuns:
 
     def _compared(self, first: int, last: int) -> RangeComparison:
         session_state, frames = self._session_state, range(first, last + 1)
-        rows, poses = list[tuple[ComparedFrame, ...]](), dict[int, dict[int, Array]]()
+        rows, others = list[tuple[ComparedPose, ...]](), dict[int, dict[int, Array]]()
         for person in range(len(session_state.models)):
-            of_person = list[ComparedFrame]()
+            of_person = list[ComparedPose]()
             with session_state.lock:
                 pairs = session_state.saver.replaced(person, frames)
             for frame, (now, other) in pairs.items():
-                found = self._frame(person, frame, now, other)
-                of_person.append(found)
-                poses.setdefault(frame, {})[person] = found.other_pose
+                former = self._in_present_body(person, other)
+                of_person.append(self._pose(person, frame, now, other, former))
+                others.setdefault(frame, {})[person] = former
             rows.append(tuple(of_person))
-        return RangeComparison(first, last, tuple(rows), poses)
+        return RangeComparison(first, last, tuple(rows), others)
 
-    def _frame(self, person: int, frame: int, now: PoseRecord, other: PoseRecord) -> ComparedFrame:
-        revisions = self._session_state.saver.revisions
+    def _pose(self, person: int, frame: int, now: PoseRecord, other: PoseRecord, former: Array) -> ComparedPose:
+        """Compare a stored pose with another, which has the values `former`, (n_values,), in the present body."""
         model = self._session_state.session.people[person].model
-        pair = [revisions.in_present_body(person, r.values, r.model_revision) for r in (now, other)]
-        apart_m = np.linalg.norm(model.points_world(pair[0]) - model.points_world(pair[1]), axis=1)
-        at = int(apart_m.argmax())
-        return ComparedFrame(
+        present = self._in_present_body(person, now)
+        apart_mm = 1000 * np.linalg.norm(model.points_world(present) - model.points_world(former), axis=1)
+        at = int(apart_mm.argmax())
+        return ComparedPose(
             frame, method_of(now), method_of(other), now.cost_px, other.cost_px, now.status, other.status,
-            float(apart_m.mean()), float(apart_m[at]), display_name(model.point_names[at]), pair[1],
+            float(apart_mm.mean()), float(apart_mm[at]), display_name(model.point_names[at]),
         )  # fmt: skip
+
+    def _in_present_body(self, person: int, record: PoseRecord) -> Array:
+        return self._session_state.saver.revisions.in_present_body(person, record.values, record.model_revision)
 
 
 def nothing_replaced(first: int, last: int) -> TrackerError:

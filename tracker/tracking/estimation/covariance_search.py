@@ -48,8 +48,9 @@ def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigm
 
     def refined(scorer: PoseScorer, pose: Array) -> ScoredFit:
         held = PosePrior(pose, 1 / own)
-        blocks: list[ResidualBlock] = [scorer.residuals, held, *scorer.priors[1:]]
-        found = solve_compiled(model, pose, blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+        found = solve_compiled(
+            model, pose, _blocks(scorer, held), scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
+        )
         return ScoredFit(found, scorer.cost(found) - held.cost(model, found.pose))
 
     here, *others = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, own)])
@@ -58,11 +59,15 @@ def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigm
     return solve_compiled(model, best.fit.pose, scorer.blocks, scorer.active_dofs, 0)
 
 
+def _blocks(scorer: PoseScorer, held: PosePrior) -> list[ResidualBlock]:
+    """Return the residual blocks with a prior in place of the prediction."""
+    return [scorer.residuals, held, *scorer.priors[1:]]
+
+
 def _samples(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array) -> Sequence[Array]:
     """Return poses drawn around a fit, (n_values,) each."""
     free = np.flatnonzero(np.ones(model.n_dofs, dtype=bool) if scorer.active_dofs is None else scorer.active_dofs)
-    held = PosePrior(fit.pose, 1 / (_FREE * sigma))
-    blocks: list[ResidualBlock] = [scorer.residuals, held, *scorer.priors[1:]]
+    blocks = _blocks(scorer, PosePrior(fit.pose, 1 / (_FREE * sigma)))
     around = solve_compiled(model, fit.pose, blocks, scorer.active_dofs, 0)
     # Steps with the inverse Hessian as covariance. Its eigenvalues would take a hundred times as long.
     factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.body.limbs import display_name
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import Status
 from tracker.tracking.voxel.figure import LIMBS
@@ -51,7 +52,7 @@ def assess(
     Args:
         state: as tracked.
         frame: the voxels.
-        unexplained: what the voxels hold besides.
+        unexplained: voxels near the person that no figure explains.
         innovation: normalized innovation of the frame, per row.
         coarse: notes on the limbs that the voxels do not resolve.
         lost_before: the `lost_limbs` of the frame before.
@@ -65,11 +66,10 @@ def assess(
         )
     shares = {name: float(inside[list(parts)].min()) for name, parts in LIMBS.items()}
     worst = min(shares, key=lambda n: shares[n])
-    display = worst.replace("_", " ")
     volume = len(unexplained.points) * frame.voxels.grid.size_m**3 / _forearm_m3(state)
     lost = frozenset(n for n, s in shares.items() if s < (_DOUBTFUL_SHARE if n in lost_before else _LOST_SHARE))
     if lost:
-        display = min(lost, key=lambda n: shares[n]).replace("_", " ")
+        display = display_name(min(lost, key=lambda n: shares[n]))
         return FigureAssessment("lost", f"{display} outside of the voxels", lost)
     if inside[:2].min() < _LOST_SHARE:
         return FigureAssessment("lost", "trunk or head outside of the voxels")
@@ -78,7 +78,7 @@ def assess(
     if coarse:
         return FigureAssessment("doubtful", "; ".join(coarse))
     if shares[worst] < _DOUBTFUL_SHARE:
-        return FigureAssessment("doubtful", f"{display} partly outside of the voxels")
+        return FigureAssessment("doubtful", f"{display_name(worst)} partly outside of the voxels")
     if volume > _DOUBTFUL_VOLUME:
         return FigureAssessment("doubtful", "voxels that no part explains")
     if unexplained.touches:
@@ -94,7 +94,7 @@ def assess(
 
 
 class UnexplainedVoxels(NamedTuple):
-    """What the voxels around a person hold beside all figures."""
+    """Voxels near a person that no figure explains."""
 
     points: Array
     """Voxels beside all parts of all people that are connected with the person and closest to them, (N, 3), metres."""
@@ -105,7 +105,7 @@ class UnexplainedVoxels(NamedTuple):
 def unexplained_voxels(voxels: Voxels, states: Sequence[FilterState]) -> list[UnexplainedVoxels]:
     """Return for each person the voxels that no figure explains. Feet are no parts of a figure.
 
-    Lines of sight to several people also meet where nobody is: voxels that are connected with nobody count for nobody.
+    The visual hull of several people has phantom volumes: voxels that are connected with no figure are ignored.
 
     Args:
         voxels: of the frame.

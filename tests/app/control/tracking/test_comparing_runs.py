@@ -42,8 +42,8 @@ def test_a_range_is_compared_with_the_poses_that_it_replaced(twice):
     assert (one.method, one.other_method) == ("contour", "chamfer")
     assert (one.cost_px, one.other_cost_px, one.status, one.other_status) == (0.8, 0.5, "good", "lost")
     apart_m = np.linalg.norm(model.points_world(after) - model.points_world(before), axis=1)
-    assert one.apart_m == pytest.approx(apart_m.mean())
-    assert one.farthest_m == pytest.approx(apart_m.max())
+    assert one.apart_mm == pytest.approx(1000 * apart_m.mean())
+    assert one.farthest_mm == pytest.approx(1000 * apart_m.max())
     assert one.farthest == "left wrist"
     np.testing.assert_array_equal(controller.state.range_comparison.others[3][0], before)
     controller.comparing_runs.leave()
