@@ -1,4 +1,4 @@
-"""Fit the weights of `tracker/tracking/confidence.py` and measure what its statuses are worth (docs/accuracy.md).
+"""Fit the weights of `tracker/tracking/run_confidence.py` and measure what statuses are worth (docs/accuracy.md).
 
 `python tests/benchmarks/calibrate_status.py --data DIR` films simulated people of ten builds, couples and a crowd, with
 clutter and noise. It tracks them with the generic body of the height that their joints give, and with the body acquired
@@ -6,16 +6,18 @@ from one of the recordings: with two to eight cameras, at half the frame rate, w
 search for lost limbs. The weights are fitted to all of that. What they are worth is measured on each body by weights
 fitted to the others, and on the recordings in DIR, to which nothing is fitted.
 
-It prints the weights, to be copied into the code, and writes the tables and docs/images/reliability.svg. `--work DIR`
-keeps scenes, bodies and features there: after a change of the tracker, remove `DIR/rows` and run it again.
+It prints the weights, and those of `confidence.py`, by which statuses are given while a run goes on; they are to be
+copied into the code. It writes the tables and docs/images/reliability.svg. `--work DIR` keeps scenes, bodies and
+features there: after a change of the tracker, remove `DIR/rows` and run it again.
 """
 
 import argparse
+import itertools
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from acquisition import PLAYED, RECORDED, quadrille, recorded
@@ -35,6 +37,8 @@ from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.model_toml import format_model, load_model, parse_model
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
+from tracker.pipeline.smoothing import TrackedRows
+from tracker.pipeline.tracked_changes import StoredPerson, tracked_changes
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
@@ -42,6 +46,7 @@ from tracker.tracking import confidence
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.estimate import PoseEstimate, TrackedFrame
+from tracker.tracking.run_confidence import N_FEATURES
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
@@ -90,8 +95,9 @@ RING = {
 
 def _scenes() -> Iterator[Scene]:
     """Return all scenes; those that bodies are acquired from come first."""
+    views = {4: FOUR, 3: THREE, 2: TWO}
     for name, (scene, seed) in PLAYED.items():
-        yield Scene(f"{name}_1", (name,), Simulation(scene, 4, _FIRST, seed, person=name), {4: FOUR, 2: TWO})
+        yield Scene(f"{name}_1", (name,), Simulation(scene, 4, _FIRST, seed, person=name), views)
     for scene in ("couple_near", "tango", "couple_touching", "crowd_of_three", "couple_overlapping"):
         crowd = scene.startswith("crowd")
         bodies = ("man of a crowd", "woman of a crowd", "man of a crowd 2") if crowd else ("man", "woman")
@@ -139,69 +145,63 @@ def passes(cameras: Mapping[int, tuple[int, ...]]) -> Iterator[Pass]:
 
 
 def track(footage: Footage, models: Sequence[BodyModel], how: Pass) -> tuple[LimbRows, list[PoseEstimate]]:
-    """Track all people from their joints in frame 0; return the rows, and the estimates of the first pass."""
+    """Track all people from their joints in frame 0; return the rows, and the estimates of the first pass.
+
+    The rows are of the final poses: those of the backward pass where it found better ones.
+    """
     starts = [_start_of(m, t) for m, t in zip(models, footage.references, strict=True)]
     cameras = [footage.cameras[i] for i in how.cameras]
     cameras = cameras if how.background else [replace(c, background=None, masks=None) for c in cameras]
     settings = TrackSettings() if how.searched else replace(TrackSettings(), recover=None, backward_pass=False)
-    rows = _RowList(models, footage.references)
+    frames = range(0, footage.n_frames, how.stride)
     with Recording(cameras) as recording:
         subjects = Subjects.of(models, keyframes={0: dict(enumerate(starts))})
-        frames = range(0, footage.n_frames, how.stride)
         run = TrackingRun(Observer(cameras, recording), subjects, starts, frames, footage.fps / how.stride)
         tracker = ChamferTracker(settings)
         found = list(tracker.estimates(run))
-        for estimate in found:
-            rows.add(estimate, range(len(models)))
+        final = [dict.fromkeys(range(len(models)), f) for f in found]
         for step in tracker.backward_pass(run, [TrackedFrame.of(f) for f in found]):
             for better in step.better:
-                rows.replace(better, step.person)
-    return rows.collected(), found
+                final[frames.index(better.frame)][step.person] = better
+    people = [_rows_of(p, [f[p] for f in final], subjects, settings, footage) for p in range(len(models))]
+    return LimbRows(*(np.array(c) for c in zip(*itertools.chain(*people), strict=True))), found
 
 
-class _RowList:
-    """Rows of the limbs of a run while it is tracked."""
+def _rows_of(
+    person: int, final: Sequence[PoseEstimate], subjects: Subjects, settings: TrackSettings, footage: Footage
+) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of the limbs of one person, whose final poses are given."""
+    kept, model, truth = TrackedRows(), subjects.models[person], footage.references[person]
+    stored = [StoredPerson(str(p), 1) for p in range(len(subjects.models))]
+    for found in final:
+        for change in tracked_changes([found], stored, [person], subjects.keyframes, settings):
+            kept.add(change, found.covariances[person], found.qualities[person])
+    features = kept.run_features(model, kept.smoothed(subjects, person, footage.fps))
+    joints = {int(f): dict(zip(truth.names, p, strict=True)) for f, p in zip(truth.frames, truth.points, strict=True)}
+    for found in final:
+        if found.qualities[person] is not None and found.frame in joints:
+            errors = _errors_mm(model, joints[found.frame], found.poses[person])
+            yield from _frame_rows(person, model, found, errors, features.get(found.frame))
 
-    def __init__(self, models: Sequence[BodyModel], references: Sequence[MarkerTable]) -> None:
-        self._models = models
-        self._joints = [dict(zip(t.frames.tolist(), t.points, strict=True)) for t in references]
-        self._names = [list(t.names) for t in references]
-        self._rows: list[tuple] = []
 
-    def add(self, found: PoseEstimate, people: Sequence[int]) -> None:
-        """Add the limbs of some people."""
-        for person in people:
-            quality = found.qualities[person]
-            if quality is None or found.frame not in self._joints[person]:
-                continue
-            model = self._models[person]
-            errors = self._errors_mm(person, found.frame, found.poses[person])
-            worst = np.nanmax([errors.get(n, np.nan) for n in LIMB_JOINTS])
-            for limb in quality.limbs:
-                own = [errors[n] for n in _joints_of(model, limb.name) if n in errors]
-                self._rows.append((
-                    confidence.features(quality, limb), max(own, default=np.nan), worst, person, found.frame, False,
-                    quality.is_unseen, bool(found.alternatives[person]),
-                ))  # fmt: skip
+def _frame_rows(
+    person: int, model: BodyModel, found: PoseEstimate, errors: Mapping[str, float], of_run: Array | None
+) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of one frame; `of_run` has the features of the run, (n_limbs, n), if there are any."""
+    quality = found.qualities[person]
+    assert quality is not None
+    worst, of_frame = np.nanmax([errors.get(n, np.nan) for n in LIMB_JOINTS]), confidence.frame_features(quality)
+    of_run = np.zeros((len(of_frame), N_FEATURES)) if of_run is None else of_run
+    for limb, of_limb, own in zip(limbs(model), of_run, of_frame, strict=True):
+        error = max([errors[n] for n in _joints_of(model, limb.name) if n in errors], default=np.nan)
+        yield of_limb, own, error, worst, person, found.frame, quality.is_unseen, bool(found.alternatives[person])
 
-    def replace(self, better: PoseEstimate, person: int) -> None:
-        """Mark the rows of a person on a frame as replaced, and add those of a better pose."""
-        same = (person, better.frame)
-        self._rows = [(*r[:5], True, *r[6:]) if (r[3], r[4]) == same else r for r in self._rows]
-        self.add(better, [person])
 
-    def collected(self) -> LimbRows:
-        """Return all rows."""
-        columns = list(zip(*self._rows, strict=True))
-        return LimbRows(*(np.array(c) for c in columns))
-
-    def _errors_mm(self, person: int, frame: int, pose: Array) -> dict[str, float]:
-        """Return the error of each known joint."""
-        model = self._models[person]
-        estimate = dict(zip(model.point_names, model.joint_centers_world(pose), strict=True))
-        truth = dict(zip(self._names[person], self._joints[person][frame], strict=True))
-        known = [n for n in JOINTS if n in estimate and n in truth and np.all(np.isfinite(truth[n]))]
-        return {n: 1000 * float(np.linalg.norm(estimate[n] - truth[n])) for n in known}
+def _errors_mm(model: BodyModel, truth: Mapping[str, Array], pose: Array) -> dict[str, float]:
+    """Return the error of each known joint."""
+    estimate = dict(zip(model.point_names, model.joint_centers_world(pose), strict=True))
+    known = [n for n in JOINTS if n in estimate and n in truth and np.all(np.isfinite(truth[n]))]
+    return {n: 1000 * float(np.linalg.norm(estimate[n] - truth[n])) for n in known}
 
 
 def _joints_of(model: BodyModel, limb: str) -> list[str]:

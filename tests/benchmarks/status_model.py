@@ -10,23 +10,28 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from tracker.geometry.arrays import Array
-from tracker.tracking import confidence
+from tracker.tracking.confidence import Status
+from tracker.tracking.run_confidence import classify_limbs
 
 OFF_MM, LOST_MM = 100.0, 150.0
 """A limb is off, and lost, where the error of a joint is larger."""
-UNSEARCHED_WEIGHT, REPLACED_WEIGHT = 0.3, 0.5
-"""Weight of a limb that was tracked without search, where more is lost, and of a pose that was replaced."""
-FEW_CAMERAS_WEIGHT = 0.2
-"""Weight of a limb that two or three cameras saw. Errors along the line of sight leave no trace in any feature, and the
-weights would follow them instead of what four cameras show."""
+UNSEARCHED_WEIGHT = 0.3
+"""Weight of a limb that was tracked without search, where more is lost."""
+TWO_CAMERAS_WEIGHT = 0.2
+"""Weight of a limb that two cameras saw. Errors along the line of sight leave no trace in any feature, and the weights
+would follow them instead of what more cameras show."""
 RIDGE = 3e-3
+LOST_GOAL, OFF_GOAL = 0.95, 0.05
+"""Smallest share of the lost frames that are flagged, and largest share of the good frames that are off."""
 
 
 class LimbRows(NamedTuple):
     """The limbs of all frames of one or several runs, one row each."""
 
     features: Array
-    """See `confidence.features`, (n, n_features)."""
+    """See `run_confidence.run_features`, (n, n_features); zeros where no edge is near the body."""
+    frame_features: Array
+    """See `confidence.features`, (n, 8)."""
     error_mm: Array
     """Largest error of a joint of the limb, of the head for a head, (n,)."""
     worst_mm: Array
@@ -35,8 +40,6 @@ class LimbRows(NamedTuple):
     """Index of the person in the recording, (n,)."""
     frame: NDArray[np.int64]
     """Number of the frame, (n,)."""
-    replaced: NDArray[np.bool_]
-    """Whether the backward pass has replaced the pose, (n,)."""
     unseen: NDArray[np.bool_]
     """Whether no edge is near the body, (n,)."""
     alternatives: NDArray[np.bool_]
@@ -106,9 +109,9 @@ def load_rows(path: Path) -> LimbRows:
 
 def weights_of(run: Run) -> Array:
     """Return the weight of each row of a run in the fit, (n,); 0 where the error is unknown."""
-    weight = np.where(run.rows.replaced, REPLACED_WEIGHT, 1.0) * (1.0 if run.searched else UNSEARCHED_WEIGHT)
-    weight = weight * (FEW_CAMERAS_WEIGHT if run.condition in ("2 cameras", "3 cameras") else 1.0)
-    return np.where(np.isfinite(run.rows.error_mm), weight, 0.0)
+    weight = 1.0 if run.searched else UNSEARCHED_WEIGHT
+    weight *= TWO_CAMERAS_WEIGHT if run.condition == "2 cameras" else 1.0
+    return np.where(np.isfinite(run.rows.error_mm) & ~run.rows.unseen, weight, 0.0)
 
 
 def fit_weights(features: Array, error_mm: Array, weights: Array) -> Array:
@@ -138,11 +141,13 @@ def fit_weights(features: Array, error_mm: Array, weights: Array) -> Array:
     return np.append(scaled, b[n:] - scaled @ middle)
 
 
-def fitted(runs: Sequence[Run], without: str | None = None) -> Array:
+def fitted(
+    runs: Sequence[Run], without: str | None = None, features: Callable[[LimbRows], Array] = lambda rows: rows.features
+) -> Array:
     """Fit to all rows of some runs, without those of one body."""
     parts = [(r.rows, weights_of(r) * _is_other(r, without)) for r in runs]
     return fit_weights(
-        np.concatenate([rows.features for rows, _ in parts]), np.concatenate([rows.error_mm for rows, _ in parts]),
+        np.concatenate([features(rows) for rows, _ in parts]), np.concatenate([rows.error_mm for rows, _ in parts]),
         np.concatenate([w for _, w in parts]),
     )  # fmt: skip
 
@@ -181,12 +186,28 @@ def statuses(rows: LimbRows, odds: Array) -> Statuses:
     return Statuses(*(np.array(column) for column in zip(*out, strict=True)))
 
 
-def _status(odds: Array, unseen: bool, alternatives: bool) -> str:
-    """Return the status from the odds of the limbs of a person, (n_limbs, 2); the rules of `confidence`."""
-    off, lost = odds[:, 0] > confidence.OFF_ODDS, odds[:, 1] > confidence.LOST_ODDS
-    if unseen or lost.any():
-        return "lost"
-    return "doubtful" if off.any() or alternatives else "good"
+def _status(odds: Array, unseen: bool, alternatives: bool) -> Status:
+    """Return the status from the odds of the limbs of a person, (n_limbs, 2), as a finished run does."""
+    status = "lost" if unseen else classify_limbs(odds)
+    return "doubtful" if status == "good" and alternatives else status
+
+
+def least_fine(found: Sequence[Statuses]) -> tuple[float, float]:
+    """Return what the best threshold for some frames would reach while it meets the other two goals.
+
+    Args:
+        found: the frames. The threshold is that of the probability that a limb is off.
+
+    Returns:
+        The share of the flagged frames that are fine, and the share of all frames that are flagged.
+    """
+    odds, worst = (np.concatenate([getattr(s, name) for s in found]) for name in ("odds", "worst_mm"))
+    off, lost = ((worst > limit)[np.argsort(-odds, kind="stable")] for limit in (OFF_MM, LOST_MM))
+    flagged = np.arange(len(odds) + 1)
+    n_off, n_lost = (np.append(0, np.cumsum(x)) for x in (off, lost))
+    meets = (n_lost >= LOST_GOAL * n_lost[-1]) & (n_off[-1] - n_off <= OFF_GOAL * (len(odds) - flagged))
+    best = int(flagged[meets][np.argmin((1 - n_off / np.maximum(flagged, 1))[meets] * (flagged[meets] > 0))])
+    return (best - int(n_off[best])) / max(1, best), best / len(odds)
 
 
 def first_off(found: Sequence[Statuses], shares: Sequence[float]) -> list[float]:
@@ -197,11 +218,10 @@ def first_off(found: Sequence[Statuses], shares: Sequence[float]) -> list[float]
 
 
 def _by_frame(rows: LimbRows) -> Iterable[NDArray[np.int64]]:
-    """Yield the rows of each person and frame whose pose is final."""
-    final = np.flatnonzero(~rows.replaced)
-    keys = rows.person[final] * (int(rows.frame.max(initial=0)) + 1) + rows.frame[final]
+    """Yield the rows of each person and frame."""
+    keys = rows.person * (int(rows.frame.max(initial=0)) + 1) + rows.frame
     order = np.argsort(keys, kind="stable")
-    return np.split(final[order], np.flatnonzero(np.diff(keys[order])) + 1)
+    return np.split(order, np.flatnonzero(np.diff(keys[order])) + 1)
 
 
 def summed(counts: Iterable[Counts]) -> Counts:
@@ -225,8 +245,8 @@ def reliability(
 
 
 def pooled(runs: Sequence[Run], odds: Sequence[Array], keep: Callable[[Run], bool]) -> tuple[Array, Array]:
-    """Return the probabilities of off and lost, (n, 2), and the errors, (n,), of the final limbs of some runs."""
+    """Return the probabilities of off and lost, (n, 2), and the errors, (n,), of the limbs of some runs."""
     chosen = [(r.rows, o) for r, o in zip(runs, odds, strict=True) if keep(r)]
-    use = [np.isfinite(rows.error_mm) & ~rows.replaced for rows, _ in chosen]
+    use = [np.isfinite(rows.error_mm) & ~rows.unseen for rows, _ in chosen]
     probabilities = np.concatenate([1 / (1 + np.exp(-o[u])) for (_, o), u in zip(chosen, use, strict=True)])
     return probabilities, np.concatenate([rows.error_mm[u] for (rows, _), u in zip(chosen, use, strict=True)])

@@ -1,4 +1,7 @@
-"""Smooth the poses of a finished run: what a run keeps of its frames for that, and the rows that take their place."""
+"""Finish a run: smooth its poses, and classify them again.
+
+A run keeps of its frames what that needs, and gets rows that take the place of those of the tracked poses.
+"""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -13,42 +16,84 @@ from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
 from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.confidence import LOST_FROM
+from tracker.tracking.confidence import PoseQuality, frame_features, is_uncertainty, uncertain
+from tracker.tracking.run_confidence import LOST_FROM, classify_limbs, log_odds, run_features, smoothing_steps
 from tracker.tracking.subjects import Subjects
 
 
 class TrackedRows:
-    """The rows that a run has stored for one person, with the covariances of their poses."""
+    """The rows that a run has stored for one person, with the covariances of their poses and what tells how sure they
+    are."""
 
     def __init__(self) -> None:
         """Hold no row yet."""
         self._changes: dict[int, PoseChange] = {}
         self._covariances: dict[int, NDArray[np.float32]] = {}  # upper triangle: half of the memory
+        self._features: dict[int, NDArray[np.float32]] = {}  # of frames whose limbs were assessed
 
-    def add(self, change: PoseChange, covariance: Array) -> None:
-        """Add a row, or replace that of the same frame; `covariance` is (n_dofs, n_dofs)."""
-        self._changes[change.frame] = change
-        self._covariances[change.frame] = covariance[np.triu_indices(len(covariance))].astype(np.float32)
+    def add(self, change: PoseChange, covariance: Array, quality: PoseQuality | None) -> None:
+        """Add a row, or replace that of the same frame.
 
-    def record(self) -> dict[str, str]:
-        """Return the covariances by frame as texts, for a run that is resumed later."""
-        return {str(f): base64.b64encode(c.tobytes()).decode() for f, c in self._covariances.items()}
+        Args:
+            change: the row.
+            covariance: of its pose, (n_dofs, n_dofs).
+            quality: of its pose; None where it was not assessed.
+        """
+        frame = change.frame
+        self._changes[frame] = change
+        self._covariances[frame] = covariance[np.triu_indices(len(covariance))].astype(np.float32)
+        self._features.pop(frame, None)
+        if quality is not None and not quality.is_unseen:
+            self._features[frame] = frame_features(quality).astype(np.float32)
 
-    def restore(self, change: PoseChange, text: str) -> None:
-        """Add a row of an interrupted run with what `record` returned of its frame."""
-        self._changes[change.frame] = change
-        self._covariances[change.frame] = np.frombuffer(base64.b64decode(text), np.float32)
+    def record(self) -> dict[str, list[str]]:
+        """Return covariances and features by frame as texts, for a run that is resumed later."""
+        arrays = {f: [c, *([self._features[f]] if f in self._features else [])] for f, c in self._covariances.items()}
+        return {str(f): [base64.b64encode(a.tobytes()).decode() for a in some] for f, some in arrays.items()}
 
-    def smoothed(self, subjects: Subjects, person: int, fps: float) -> list[PoseChange]:
-        """Return the rows with smoothed poses, in the order of time.
+    def restore(self, change: PoseChange, texts: Sequence[str] | str) -> None:
+        """Add a row of an interrupted run with what `record` returned of its frame; older versions knew no features."""
+        known = [texts] if isinstance(texts, str) else texts
+        covariance, *features = [np.frombuffer(base64.b64decode(text), np.float32) for text in known]
+        self._changes[change.frame], self._covariances[change.frame] = change, covariance
+        if features and change.pose is not None:
+            self._features[change.frame] = features[0].reshape(len(change.pose.limbs_lost), -1)
 
-        Status, costs, notes and alternatives stay those of the tracked pose. A lost limb, or all of a lost frame if no
-        limb is known to be lost, is not a measurement. Locked degrees of freedom keep their values.
+    def finished(self, subjects: Subjects, person: int, fps: float) -> list[PoseChange]:
+        """Return the rows with smoothed poses and their final statuses, in the order of time.
+
+        Costs and alternatives stay those of the tracked pose, and so does the status of a pose whose limbs were not
+        assessed.
 
         Args:
             subjects: of the run; keyframes are exact.
             person: index of the person.
             fps: frame rate, 1/s.
+        """
+        smoothed, model = self.smoothed(subjects, person, fps), subjects.models[person]
+        features = self.run_features(model, smoothed)
+        return [_classified(model, c, features[c.frame]) if c.frame in features else c for c in smoothed]
+
+    def run_features(self, model: BodyModel, smoothed: Sequence[PoseChange]) -> dict[int, Array]:
+        """Return the features of all limbs by frame, (n_limbs, 8) each, from which their final statuses follow.
+
+        Args:
+            model: the body.
+            smoothed: what `smoothed` returned.
+        """
+        after = {c.frame: c.pose.values for c in smoothed if c.pose is not None and c.frame in self._features}
+        before = {f: pose.values for f in after if (pose := self._changes[f].pose) is not None}
+        if not before:
+            return {}
+        steps = smoothing_steps(model, np.array([*before.values()]), np.array([after[f] for f in before]))
+        found = run_features(np.array([self._features[f] for f in before], dtype=np.float64), steps)
+        return dict(zip(before, found, strict=True))
+
+    def smoothed(self, subjects: Subjects, person: int, fps: float) -> list[PoseChange]:
+        """Return the rows with smoothed poses, in the order of time.
+
+        Everything else stays. A lost limb, or all of a lost frame if no limb is known to be lost, is not a measurement.
+        Locked degrees of freedom keep their values. The arguments are those of `finished`.
         """
         model = subjects.models[person]
         keyframes = {f: of_people[person] for f, of_people in subjects.keyframes.items() if person in of_people}
@@ -74,7 +119,7 @@ class TrackedRows:
 
 
 def resumed_rows(
-    rows: Mapping[int, tuple[PoseChange, ...]], records: Mapping[str, Mapping[str, str]]
+    rows: Mapping[int, tuple[PoseChange, ...]], records: Mapping[str, Mapping[str, Sequence[str] | str]]
 ) -> dict[int, TrackedRows]:
     """Return the rows of an interrupted run by person; those whose covariance is not recorded are left out.
 
@@ -89,6 +134,20 @@ def resumed_rows(
             if str(change.frame) in known:
                 out[person].restore(change, known[str(change.frame)])
     return out
+
+
+def _classified(model: BodyModel, change: PoseChange, features: Array) -> PoseChange:
+    """Return a row with the status that follows from the features of its limbs, (n_limbs, 8)."""
+    assert change.pose is not None
+    odds = log_odds(features)
+    status = classify_limbs(odds)
+    if status == "good" and change.alternatives:
+        status = "doubtful"
+    remarks = [r for r in change.pose.remark.split(", ") if r and not is_uncertainty(r)]
+    if not remarks and status != "good":
+        remarks = [uncertain(limbs(model)[int(odds[:, 1].argmax())].name)]
+    lost = tuple(map(float, 1 / (1 + np.exp(-odds[:, 1]))))
+    return replace(change, pose=replace(change.pose, status=status, limbs_lost=lost, remark=", ".join(remarks)))
 
 
 def _unpacked(packed: NDArray[np.float32], n: int) -> Array:

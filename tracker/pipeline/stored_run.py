@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple
 
 from tracker.errors import SessionError
 from tracker.evidence.observer import Observer
@@ -18,7 +18,7 @@ from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Person, Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.confidence import Status
+from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import TrackedFrame
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackerSettings, TrackingRun
@@ -162,8 +162,7 @@ def _rows_before(
 
 def _status(record: PoseRecord | None) -> Status:
     """Return the status of a stored pose; "good" for a keyframe and for a pose without a status."""
-    statuses: tuple[Status, ...] = get_args(Status)
-    return "good" if record is None else next((s for s in statuses if s == record.status), "good")
+    return "good" if record is None else status_named(record.status)
 
 
 def _start_poses(store: AnnotationStore, person: Person, frames: Sequence[int], needed: bool) -> list[Array]:

@@ -9,13 +9,13 @@ from tracker.pipeline.smoothing import TrackedRows
 from tracker.pipeline.tracked_changes import StoredPerson, tracked_changes
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
-from tracker.tracking.confidence import Status
+from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
 from tracker.tracking.tracker import Tracker, TrackingRun
 
 
 class SmoothedRows(NamedTuple):
-    """The result of smoothing a run."""
+    """The result of smoothing a run and of classifying its poses again."""
 
     changes: tuple[PoseChange, ...]
     """The rows of all people, which take the place of those with tracked poses."""
@@ -146,7 +146,7 @@ class TrackSession:
         """Smooth the poses of all people; a single step, so that a run is smoothed as a whole or not at all."""
         if self.tracker.settings.smooth:
             subjects = self.run.subjects
-            found = (rows.smoothed(subjects, person, self.run.fps) for person, rows in self._rows.items())
+            found = (rows.finished(subjects, person, self.run.fps) for person, rows in self._rows.items())
             yield SmoothedRows(tuple(change for changes in found for change in changes))
         self.finished = True
 
@@ -159,9 +159,7 @@ class TrackSession:
             self._take_improved(step)
             return
         if isinstance(step, SmoothedRows):
-            self.save()
-            self._write(step.changes)
-            self.finished = True
+            self._take_finished(step)
             return
         self._waiting += self._rows_of([step], self.run.subjects.tracked)
         self._n_waiting += 1
@@ -208,6 +206,15 @@ class TrackSession:
         self.n_improved += len(step.better)
         self._write(self._rows_of(step.better, [step.person]))
 
+    def _take_finished(self, step: SmoothedRows) -> None:
+        self.save()
+        for i, person in enumerate(self._stored):
+            statuses = {c.frame: c.pose.status for c in step.changes if c.person == person.name and c.pose is not None}
+            for frame in statuses.keys() & self.tracked.keys():
+                self.tracked[frame] = self.tracked[frame].with_status(i, status_named(statuses[frame]))
+        self._write(step.changes)
+        self.finished = True
+
     def _rows_of(self, found: Sequence[PoseEstimate], people: Sequence[int]) -> list[PoseChange]:
         """Return the rows of estimates, and keep them for smoothing."""
         keyframes, settings = self.run.subjects.keyframes, self.tracker.settings
@@ -216,7 +223,7 @@ class TrackSession:
             for person in people:
                 rows = tracked_changes([estimate], self._stored, [person], keyframes, settings)
                 for change in rows:
-                    self._rows[person].add(change, estimate.covariances[person])
+                    self._rows[person].add(change, estimate.covariances[person], estimate.qualities[person])
                 changes += rows
         return changes
 

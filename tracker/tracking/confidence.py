@@ -4,12 +4,13 @@ The log odds that a limb is off are linear in its features. One set of weights s
 limb is off by more than 100 mm, or by more than 150 mm. The weights were fitted on simulated people of many builds,
 where the error is known (`tests/benchmarks/calibrate_status.py`).
 
-Searches have odds of their own: they begin before the pose is settled, and a needless search costs only time.
+Searches have odds of their own: they begin before the pose is settled, and a needless search costs only time. At the
+end of a run `run_confidence` classifies its poses again.
 """
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -38,6 +39,8 @@ _STILL = 0.005
 """Innovations that differ by less hardly count, body heights."""
 _HEAD = "head"
 """Name of the limb that looks different from each side."""
+_UNCERTAIN = " uncertain"
+"""Last word of the reason against a pose of which a limb may be off."""
 _LIMIT_RAD = 0.05
 """An angle is at its limit where it is nearer, rad."""
 _WEIGHTS = np.array([2.893, 4.401, -2.282, -2.963, 3.508, 0.282, 13.031, -1.814])
@@ -56,8 +59,6 @@ OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.25)
 more than 150 mm. To call a wrong pose good is the worse error."""
 _DOUBTFUL_ODDS = OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT
 """Log odds of a lost limb where the odds that it is off are `OFF_ODDS`."""
-DOUBTFUL_FROM, LOST_FROM = (float(1.0 / (1.0 + np.exp(-odds))) for odds in (_DOUBTFUL_ODDS, LOST_ODDS))
-"""Probabilities of a lost limb above which it is doubtful, and lost."""
 
 _SEARCH_WEIGHTS = np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704])
 """Weights of `search_features`, in their order, and the constant."""
@@ -182,6 +183,11 @@ def features(pose: PoseQuality, limb: LimbFeatures) -> Array:
         pose.trunk_forward,
         np.log(max(1, pose.views)),
     ])  # fmt: skip
+
+
+def frame_features(pose: PoseQuality) -> Array:
+    """Return the `features` of all limbs, (n_limbs, 8)."""
+    return np.array([features(pose, limb) for limb in pose.limbs])
 
 
 def search_features(pose: PoseQuality, limb: LimbFeatures) -> Array:
@@ -325,7 +331,23 @@ def reason(found: PoseQuality) -> str:
         return "no view shows the body"
     if found.forward > _LOST_FORWARD:
         return "no edges near the body"
-    return f"{limb_display_name(found.limbs[int(found.log_odds.argmax())].name)} uncertain"
+    return uncertain(found.limbs[int(found.log_odds.argmax())].name)
+
+
+def uncertain(limb: str) -> str:
+    """Return the reason against a pose of which the limb of a name may be off."""
+    return f"{limb_display_name(limb)}{_UNCERTAIN}"
+
+
+def is_uncertainty(reason: str) -> bool:
+    """Return whether a reason is that a limb may be off."""
+    return reason.endswith(_UNCERTAIN)
+
+
+def status_named(name: str) -> Status:
+    """Return the status of a name; "good" for a name of none."""
+    statuses: tuple[Status, ...] = get_args(Status)
+    return next((s for s in statuses if s == name), "good")
 
 
 def worst(statuses: Sequence[Status]) -> Status:

@@ -72,6 +72,10 @@ class TrackedFrame(NamedTuple):
         alternatives = tuple(tuple(a.values for a in of_one) for of_one in estimate.alternatives)
         return cls(estimate.frame, estimate.poses, estimate.statuses, alternatives)
 
+    def with_status(self, person: int, status: Status) -> "TrackedFrame":
+        """Return the same with another status of a person."""
+        return self._replace(statuses=(*self.statuses[:person], status, *self.statuses[person + 1 :]))
+
 
 class BackwardStep(NamedTuple):
     """A step of a backward pass: one visit to one frame of a lost interval."""

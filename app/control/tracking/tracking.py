@@ -218,27 +218,27 @@ class Tracking:
             if run is self._run:
                 run.session.take(step)
                 if isinstance(step, SmoothedRows):
-                    self._show_smoothed()
+                    self._show_finished(run)
                 elif isinstance(step, BackwardStep):
                     self._show_improved(run, step, seconds)
                     self._session_state.refresh_saving()
                 else:
                     self._show_tracked(run, step, seconds)
 
-    def _show_smoothed(self) -> None:
-        """Show the smoothed pose of the shown frame."""
+    def _show_finished(self, run: _Run) -> None:
+        """Show the smoothed pose of the shown frame, and how many frames are doubtful or lost in the end."""
         session_state = self._session_state
         session_state.note_stored()
         session_state.refresh_saving()
-        session_state.show_frame(session_state.state.frame, follow=session_state.state.follow)
+        state = session_state.state
+        session_state.show_frame(state.frame, follow=state.follow, track=_with_doubts(state.track, run))
 
     def _show_improved(self, run: _Run, step: BackwardStep, seconds: float) -> None:
         """Show the progress of the backward pass, and what it improved at the end of an interval."""
         session_state, tracked = self._session_state, run.session.tracked
         track = session_state.state.track
         if step.better:  # not at every step: there may be many frames
-            worst = Counter(confidence.worst([f.statuses[i] for i in run.subjects.tracked]) for f in tracked.values())
-            track = replace(track, doubtful=worst["doubtful"], lost=worst["lost"])
+            track = _with_doubts(track, run)
         steps = len(tracked) + step.done
         track = replace(
             track, running=run.job.running, back=True, done=step.done, total=step.total,
@@ -326,6 +326,13 @@ class Tracking:
             track=TrackState(message=f"{how}: {_summary(len(run.session.tracked), track)}", failed=failed)
         )
         run.on_end(how == "done")
+
+
+def _with_doubts(track: TrackState, run: _Run) -> TrackState:
+    """Return the progress of a run with the numbers of frames that are doubtful and lost by now."""
+    statuses = (frame.statuses for frame in run.session.tracked.values())
+    worst = Counter(confidence.worst([of_frame[i] for i in run.subjects.tracked]) for of_frame in statuses)
+    return replace(track, doubtful=worst["doubtful"], lost=worst["lost"])
 
 
 def _summary(frames: int, track: TrackState) -> str:

@@ -1,4 +1,4 @@
-"""Smoothing at the end of a stored run: rows, keyframes, undo, and a run that was interrupted."""
+"""The end of a stored run: smoothed rows, final statuses, keyframes, undo, and a run that was interrupted."""
 
 import shutil
 from dataclasses import dataclass, replace
@@ -6,18 +6,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from tracker.formats.model_toml import format_model
+from tracker.body.limbs import limbs
+from tracker.formats.model_toml import format_model, load_model
 from tracker.motion import smoothing
 from tracker.pipeline.methods import METHODS
+from tracker.pipeline.smoothing import TrackedRows
 from tracker.pipeline.stored_run import TrackTask, stored_run
 from tracker.pipeline.track_session import SmoothedRows
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.confidence import LimbFeatures, PoseQuality
 from tracker.tracking.estimate import AlternativePose, PoseEstimate
+from tracker.tracking.subjects import Subjects
 
 N = 12
+CLEAR = PoseQuality(
+    0.05, 4, 0.0, 0.02,
+    tuple(LimbFeatures(n, 1.0, 0.0, 1.2, 0.05, 0.6, 0.5, 0.0, 1.2, 0.06, 1.0, 1.0, 0.01) for n in "abcde"),
+)  # fmt: skip
+"""Of a pose that its own frame does not contradict."""
 SETTINGS = TrackSettings()
 
 
@@ -26,17 +35,18 @@ class Jittery:
     """Stands for a tracker: walks along x, 2 cm to and fro beside the path; has alternatives on frame 4."""
 
     settings: TrackSettings
+    quality: PoseQuality | None = None
 
     def estimates(self, run):
         for frame in run.frames:
             pose = np.array(run.start[0][-1])
-            pose[0] = tracked_x(frame)
+            pose[0] = tracked_x(frame) + (0.4 if frame == 9 and self.quality else 0)
             pose = run.subjects.keyframes_at(frame).get(0, pose)
             n = run.subjects.models[0].n_dofs
             alternatives = ((AlternativePose(pose + 0.1, 3.0),),) if frame == 4 else ((),)
             yield PoseEstimate(
                 frame, (pose,), 1.0 + frame, np.ones(4), 0, ("good",), (f"note {frame}",), (np.ones(10),),
-                (1e-4 * np.eye(n),), (None,), alternatives, "chamfer",
+                (1e-4 * np.eye(n),), (self.quality,), alternatives, "chamfer",
             )  # fmt: skip
 
     def backward_pass(self, run, tracked):
@@ -164,3 +174,61 @@ def test_a_run_interrupted_before_its_smoothed_poses_are_written_is_not_smoothed
     assert jitter(x_of(store)[7:]) == pytest.approx(0.08)
     track(session, store)
     assert jitter(x_of(store)[7:]) < 0.03
+
+
+@pytest.fixture
+def with_a_leap(monkeypatch):
+    """The person is 40 cm ahead on frame 9, where the frame does not contradict that."""
+    monkeypatch.setitem(METHODS, "chamfer", lambda settings: Jittery(settings, CLEAR._replace(limbs=CLEAR.limbs[:4])))
+    monkeypatch.setitem(globals(), "tracked_x", lambda frame: 0.05 * frame)
+
+
+def test_a_leap_is_doubted_at_the_end_of_the_run(session, store, with_a_leap):
+    track(session, store, replace(SETTINGS, smooth=False))
+    assert {r.status for r in records(store) if not r.keyframe} == {"good"}
+    store.undo()
+    run = track(session, store)
+    leap, far = records(store)[9], records(store)[2]
+    assert (far.status, far.remark) == ("good", "note 2")
+    assert leap.status != "good"
+    assert max(leap.limbs_lost) > 3 * max(far.limbs_lost)
+    assert len(leap.limbs_lost) == 4
+    assert records(store)[4].status == "doubtful"  # it has alternatives
+    assert run.status_counts()[0][leap.status] >= 1
+    assert sum(run.status_counts()[0].values()) == N
+
+
+def test_a_resumed_run_has_the_same_statuses(session, store, with_a_leap):
+    track(session, store)
+    whole = [(r.status, r.limbs_lost, r.remark) for r in records(store)]
+    store.undo()
+    track(session, store, n=10)
+    track(session, store)
+    assert [(r.status, r.limbs_lost, r.remark) for r in records(store)] == whole
+
+
+def test_reasons_follow_the_final_status():
+    """Another reason than a doubtful limb stays."""
+    rows = TrackedRows()
+    model = load_model("gavrila34")
+    doubtful = CLEAR._replace(
+        limbs=tuple(x._replace(name=y.name) for x, y in zip(CLEAR.limbs, limbs(model), strict=True))
+    )
+    remarks = ["left arm uncertain", "left arm relocated", "", "body searched"]
+    for frame, remark in enumerate(remarks):
+        pose = PoseRecord(model.neutral(), (), 1, status="doubtful", remark=remark, limbs_lost=(0.1,) * 5)
+        rows.add(PoseChange("person", frame, pose), 1e-4 * np.eye(model.n_dofs), doubtful)
+    found = [c.pose for c in rows.finished(Subjects.of([model]), 0, 25.0)]
+    assert [p.status for p in found] == ["good"] * 4
+    assert [p.remark for p in found] == ["", "left arm relocated", "", "body searched"]
+
+
+def test_an_interrupted_run_of_an_older_version_keeps_its_statuses():
+    """It recorded covariances alone, one text per frame."""
+    model, rows, old = load_model("gavrila34"), TrackedRows(), TrackedRows()
+    for frame in range(4):
+        pose = PoseRecord(model.neutral(), (), 1, status="doubtful", remark="x", limbs_lost=(0.1,) * 5)
+        rows.add(PoseChange("person", frame, pose), 1e-4 * np.eye(model.n_dofs), CLEAR)
+        old.restore(PoseChange("person", frame, pose), rows.record()[str(frame)][0])
+    assert [c.pose.status for c in old.finished(Subjects.of([model]), 0, 25.0)] == ["doubtful"] * 4
+    assert [c.pose.status for c in rows.finished(Subjects.of([model]), 0, 25.0)] == ["good"] * 4

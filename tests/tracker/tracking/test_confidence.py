@@ -14,8 +14,6 @@ from tracker.fitting.contour_residuals import ContourResiduals, PartCosts
 from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.tracking.confidence import (
-    DOUBTFUL_FROM,
-    LOST_FROM,
     LimbFeatures,
     PoseQuality,
     _Contours,
@@ -221,13 +219,3 @@ def test_quality_where_nothing_is_seen(gavrila):
     found = judged(gavrila, truth, gavrila.retract(truth, np.pad([0.0, 0.0, 30.0], (0, gavrila.n_dofs - 3))))
     assert found.views == 0
     assert classify(found) == "lost"
-
-
-def test_limbs_are_doubtful_and_lost_from_the_probabilities_that_make_the_pose_so():
-    for second_forward in np.linspace(0.0, 1.0, 15):
-        limb = LimbFeatures("left_forearm", 0.5, 0.5, 2.0, 0.2, 0.5, 0.8, 0.1, 2.0, second_forward, 0.5, 0.5, 0.01)
-        found = PoseQuality(0.05, 3, 0.0, 0.05, (CLEAR, CLEAR, CLEAR, limb))
-        p = found.lost_probabilities.max()
-        status = "lost" if p > LOST_FROM else "doubtful" if p > DOUBTFUL_FROM else "good"
-        assert status == classify(found)
-    assert np.all((found.lost_probabilities > 0) & (found.lost_probabilities < 1))

@@ -1,0 +1,72 @@
+"""Classify the poses of a finished run, of which the frames around each are known.
+
+The log odds that a limb is off are linear, as in `confidence`: one set of weights serves both thresholds. Two features
+are of the run. A wrong limb seldom moves smoothly, so that smoothing moves it far. A body of wrong sizes fits badly on
+all frames. The weights were fitted as those of `confidence` were (`tests/benchmarks/calibrate_status.py`).
+"""
+
+import numpy as np
+
+from tracker.body.limbs import limbs
+from tracker.body.model import BodyModel
+from tracker.geometry.arrays import Array
+from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS, Status
+
+_WEIGHTS = np.array([1.623, 2.136, -1.529, -1.445, 4.644, -1.302, 1.014, 0.628])
+"""Weights of `run_features`, in their order."""
+N_FEATURES = len(_WEIGHTS)
+_OFF_CONSTANT, _LOST_CONSTANT = 5.433, 3.683
+"""Constants of the log odds that a joint of a limb is off by more than 100 mm, and by more than 150 mm."""
+_OF_FRAME = [0, 1, 2, 3, 4, 7]
+"""Features of `confidence` that are features of a run too."""
+_TRUNK = 6
+"""Index of the trunk's distance to the edges among the features of `confidence`."""
+_AROUND = 2
+"""Number of frames before and after a frame whose steps by smoothing count for it."""
+_MAX_STEP, _LEAST_STEP = 0.5, 0.005
+"""Steps beyond the first, and differences below the second, hardly count, body heights."""
+_LEAST_TRUNK = 0.005
+"""Smaller distances of the trunk hardly count, outlier distances."""
+
+DOUBTFUL_FROM, LOST_FROM = (
+    float(1.0 / (1.0 + np.exp(-odds))) for odds in (OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT, LOST_ODDS)
+)
+"""Probabilities of a lost limb above which it is doubtful, and lost."""
+
+
+def smoothing_steps(model: BodyModel, tracked: Array, smoothed: Array) -> Array:
+    """Return how far smoothing moves each limb on each frame, (T, n_limbs), body heights.
+
+    Args:
+        model: the body.
+        tracked: poses, (T, n_values).
+        smoothed: the same poses after smoothing, (T, n_values).
+    """
+    before, after = (np.array([model.points_world(p) for p in poses]) for poses in (tracked, smoothed))
+    steps = np.linalg.norm(after - before, axis=-1) / model.height_m
+    return np.stack([steps[:, np.isin(model.point_parts, x.parts)].max(axis=1) for x in limbs(model)], axis=1)
+
+
+def run_features(frame_features: Array, steps: Array) -> Array:
+    """Return the features of all limbs from which their final statuses follow, (T, n_limbs, 8).
+
+    Args:
+        frame_features: those of `confidence.features` on each frame, (T, n_limbs, 8), in the order of time.
+        steps: see `smoothing_steps`, (T, n_limbs).
+    """
+    padded = np.pad(steps, ((_AROUND, _AROUND), (0, 0)))
+    largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * _AROUND + 1, axis=0).max(axis=-1)
+    trunk = np.log(frame_features[..., _TRUNK].mean() + _LEAST_TRUNK)
+    of_run = np.stack([np.log(np.minimum(largest, _MAX_STEP) + _LEAST_STEP), np.full_like(steps, trunk)], axis=-1)
+    return np.concatenate([frame_features[..., _OF_FRAME], of_run], axis=-1)
+
+
+def log_odds(found: Array) -> Array:
+    """Return the log odds of off and lost, (..., 2), of features, (..., 8)."""
+    return np.asarray((found @ _WEIGHTS)[..., None] + (_OFF_CONSTANT, _LOST_CONSTANT))
+
+
+def classify_limbs(odds: Array) -> Status:
+    """Return the status of a pose from the log odds of its limbs, (n_limbs, 2)."""
+    off, lost = odds.max(axis=0)
+    return "lost" if lost > LOST_ODDS else "doubtful" if off > OFF_ODDS else "good"
