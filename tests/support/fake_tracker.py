@@ -11,8 +11,8 @@ from tracker.tracking.estimate import PoseEstimate
 
 STEP_M = 0.01
 N_PARTS, N_VIEWS = 10, 4
-LIMBS = SimpleNamespace(lost_probabilities=np.array([0.25, 0.0001]))
-"""What it knows of the limbs of a frame."""
+LIMBS = SimpleNamespace(lost_probabilities=np.array([0.25, 0.0001]), is_unseen=True)
+"""What it knows of the limbs of a frame. Its statuses stay at the end of a run."""
 
 
 class FakeTracker:
