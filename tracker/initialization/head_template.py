@@ -15,13 +15,25 @@ from tracker.geometry.arrays import Array
 from tracker.voxels.paths import path_lengths
 from tracker.voxels.voxel_grid import Voxels
 
-INNER_M, OUTER_M = 0.055, 0.11
-"""Radii of the crust, metres: it holds the surface of heads from the age of three."""
-SURROUNDING_M = 0.13
-"""Outer radius of the shell in which a head has only its neck, metres. A child's shoulders begin there."""
-MIN_SCORE = 0.5
-"""Smallest score of a head: the surface voxels in the crust less the voxels around it, as a share of the surface voxels
-of a sphere of the crust's mean radius."""
+
+class Template(NamedTuple):
+    """A crust that holds the surface of a head, and the shell around it."""
+
+    inner_m: float
+    """Inner radius of the crust, metres."""
+    outer_m: float
+    """Outer radius of the crust, metres."""
+    surrounding_m: float
+    """Outer radius of the shell in which a head has only its neck, metres."""
+    min_score: float
+    """Smallest score of a head: the surface voxels in the crust less the voxels around it, as a share of the surface
+    voxels of a sphere of the crust's mean radius."""
+
+
+_TEMPLATES = (Template(0.07, 0.135, 0.20, 0.25), Template(0.055, 0.11, 0.13, 0.5))
+"""In the order in which they are tried. The first has half the smallest and half the largest dimension of an adult's
+head, with a wide shell, which hands and feet in the hull of few views do not pass. The second also fits heads beside an
+arm, and heads of children, whose shoulders are near."""
 _MAX_PIECE = 0.02
 """Largest share of a figure's voxels that may be cut off from the rest without the head: hair and stray voxels."""
 _TRIED = 5
@@ -44,7 +56,7 @@ class Head(NamedTuple):
     is_head: NDArray[np.bool_]
     """Whether each voxel of the figure belongs to it, (N,)."""
     score: float
-    """See `MIN_SCORE`."""
+    """See `Template.min_score`."""
     path_m: float
     """Length of the longest path through the body from the top of the head, metres: with straight legs the stature."""
     scale: float
@@ -58,13 +70,13 @@ def find_head(figure: Voxels) -> Head | None:
         figure: voxels of one person, at most about 5 cm each.
     """
     points = figure.points_world
-    ends = (place for place in _places(figure) if _is_end(figure, place.distances <= OUTER_M))
-    best = next(ends, None)
+    places = ((t.outer_m, place) for t in _TEMPLATES for place in _places(figure, t))
+    best = next(((r, place) for r, place in places if _is_end(figure, place.distances <= r)), None)
     if best is None:
         return None
-    score, distances = best
-    lengths = path_lengths(points, distances <= OUTER_M, figure.grid.size_m)
-    path_m = OUTER_M + float(lengths[np.isfinite(lengths)].max())
+    radius_m, (score, distances) = best
+    lengths = path_lengths(points, distances <= radius_m, figure.grid.size_m)
+    path_m = radius_m + float(lengths[np.isfinite(lengths)].max())
     # A person whom an image cuts off has short paths, yet the volume of more than a child.
     scale = min(1.0, max(path_m / _ADULT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
     is_head = distances <= _GROWN_M * (_CHILD_SHARE + (1 - _CHILD_SHARE) * scale)
@@ -78,34 +90,34 @@ class _Place(NamedTuple):
     """A place that may be the centre of a head."""
 
     score: float
-    """See `MIN_SCORE`."""
+    """See `Template.min_score`."""
     distances: Array
     """Of the figure's voxels from there, (N,), metres."""
 
 
-def _places(figure: Voxels) -> Iterator[_Place]:
+def _places(figure: Voxels, template: Template) -> Iterator[_Place]:
     """Yield the places that score enough, and their scores, from the highest down."""
     from scipy.signal import fftconvolve  # imported lazily: loading it takes 0.5 s
 
-    size = figure.grid.size_m
-    reach = int(np.ceil(SURROUNDING_M / size))
+    size, (inner_m, outer_m, surrounding_m, min_score) = figure.grid.size_m, template
+    reach = int(np.ceil(surrounding_m / size))
     distance = size * np.sqrt(np.sum(np.square(np.indices((2 * reach + 1,) * 3) - reach), axis=0))
-    crust = ((distance >= INNER_M) & (distance <= OUTER_M)).astype(np.float64)
-    around = ((distance > OUTER_M + size / 2) & (distance <= SURROUNDING_M)).astype(np.float64)
+    crust = ((distance >= inner_m) & (distance <= outer_m)).astype(np.float64)
+    around = ((distance > outer_m + size / 2) & (distance <= surrounding_m)).astype(np.float64)
     surface = np.zeros(figure.grid.shape)
     surface[tuple(figure.indices[figure.is_surface].T)] = 1.0
     counts = fftconvolve(surface, crust, mode="same")
     counts -= fftconvolve(figure.occupied.astype(np.float64), around, mode="same")
-    expected = np.pi * (INNER_M + OUTER_M) ** 2 / size**2
+    expected = np.pi * (inner_m + outer_m) ** 2 / size**2
     points = figure.points_world
     scores = counts[tuple(figure.indices.T)] / expected
     for _ in range(_TRIED):
         best = int(np.argmax(scores))
-        if scores[best] < MIN_SCORE:
+        if scores[best] < min_score:
             return
         distances = np.linalg.norm(points - points[best], axis=1)
         yield _Place(float(scores[best]), distances)
-        scores[distances <= OUTER_M] = -np.inf
+        scores[distances <= outer_m] = -np.inf
 
 
 def _is_end(figure: Voxels, is_head: NDArray[np.bool_]) -> bool:
