@@ -28,13 +28,16 @@ def joints_of(arms_deg=35.0, legs_deg=12.0, turn_deg=0.0):
     return {n: R @ np.array(p, float) for n, p in found.items()}, R
 
 
-def figure(size_m=0.025, noise=0.0, **pose):
-    """Voxels of such a person, and the true joints. `noise` is the share of surface voxels that are missing."""
+def figure(size_m=0.025, noise=0.0, head=1.0, **pose):
+    """Voxels of such a person, and the true joints.
+
+    `noise` is the share of surface voxels that are missing, `head` the size of the head as a share of an adult's.
+    """
     joints, R = joints_of(**pose)
     grid = VoxelGrid.over(np.array([-0.9, -0.9, -0.05]), np.array([0.9, 0.9, 2.25]), size_m)
     points = grid.centers(np.argwhere(np.ones(grid.shape, bool)))
     trunk = (points - (0, 0, 1.16)) @ R
-    inside = np.linalg.norm((points - joints["head"]) / (0.09, 0.09, 0.125), axis=1) <= 1
+    inside = np.linalg.norm((points - joints["head"]) / np.multiply(head, (0.09, 0.09, 0.125)), axis=1) <= 1
     inside |= (np.linalg.norm(trunk[:, :2] / (0.12, 0.18), axis=1) <= 1) & (np.abs(trunk[:, 2]) < 0.30)
     inside |= _capsule(points, joints["neck"] - (0, 0, 0.05), joints["neck"] + (0, 0, 0.08), 0.055)
     for side in ("left", "right"):
@@ -50,6 +53,12 @@ def figure(size_m=0.025, noise=0.0, **pose):
         occupied[tuple(lost.T)] = False
         voxels = Voxels(grid, occupied)
     return voxels.cropped(), joints
+
+
+def child(share=0.6, head=0.8, size_m=0.025, **pose):
+    """Voxels of a child, and the true joints; the sizes of body and head as shares of an adult's."""
+    voxels, joints = figure(size_m / share, head=head / share, **pose)
+    return voxels.scaled(share), {n: share * p for n, p in joints.items()}
 
 
 def _capsule(points, a, b, radius):

@@ -108,8 +108,7 @@ def acquire_from_contours(
     """
     if not bodies:
         raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
-    priors = settings.priors if placed or seen else settings.priors.anatomical()
-    parameters = SizeParameters(next(iter(bodies.values()))[person].model, settings.coupled, priors)
+    parameters = SizeParameters(next(iter(bodies.values()))[person].model, settings.coupled, settings.priors)
     report("choosing frames", 0.0)
     # Placed joints are used wherever there are few of them; of many, the frames that show most.
     few = 0 < len(placed) <= settings.n_frames

@@ -12,8 +12,8 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 
-JOINT_M = 0.01
-"""Standard deviation of a known joint, metres: conventions and measurements differ by about that."""
+JOINT_M = 0.005
+"""Standard deviation of a known joint, metres: markers and rigs repeat a joint to some millimetres."""
 _LENGTHS: Mapping[str, Sequence[tuple[Sequence[str], Sequence[str]]]] = {
     **{
         f"{a}-{b}": [([f"left_{a}"], [f"left_{b}"]), ([f"right_{a}"], [f"right_{b}"])]

@@ -28,7 +28,12 @@ shift of its own joint on the parent, fraction of height."""
 _N_COLUMNS = 16
 _EXPONENT_LIMITS, _TAPER_LIMIT = (0.15, 1.0), 0.8
 """Limits of shapes: convex, with finite derivatives."""
-_OWN_PRIORS = {"hip.joint_y": "hip_side", "calf.free_end": "sole"}
+_LIMB_JOINTS, _LIMB_PARTS = ("shoulder", "elbow", "hip", "knee"), ("upper_arm", "forearm", "thigh", "calf")
+_OWN_PRIORS = {
+    **{f"{joint}.joint_{a}": "limb_joint" for joint in _LIMB_JOINTS for a in "xyz"},
+    **{f"{part}.side_{a}": "limb_side" for part in _LIMB_PARTS for a in "xy"},
+    "calf.free_end": "sole",
+}
 """Parameters whose standard deviation is not that of their kind."""
 
 
@@ -46,10 +51,12 @@ class SizePriors:
     """Of the logarithm of a part's girth, front to back or side to side."""
     joint: float = 0.012
     """Of the place of a joint on its parent along each axis, fraction of height."""
-    hip_side: float = 0.012
-    """Of the place of a hip across the pelvis, fraction of height."""
+    limb_joint: float = 0.012
+    """Of the place of a joint of a limb on its parent along each axis, fraction of height."""
     side: float = 0.012
     """Of the flesh across a part, fraction of height."""
+    limb_side: float = 0.012
+    """Of the flesh across a part of a limb, fraction of height."""
     end: float = 0.015
     """Of an end of the flesh along a part, fraction of height."""
     free_end: float = 0.05
@@ -62,14 +69,20 @@ class SizePriors:
     """Of an exponent."""
 
     def anatomical(self) -> "SizePriors":
-        """Return the priors with the anthropometric spread of hip width and ankle height, where no joints were placed.
+        """Return the priors of joints as anatomy defines them, for a person of whom no joints were placed.
 
         Contours hardly show these sizes. Placed joints may have other definitions, so that their offsets are fitted.
-        Regression from the pelvic width (Seidel et al. 1995) predicts the hip centre to 6 mm across the pelvis. The
-        pelvic width varies by 7%, the height of the lateral malleolus by 6 mm (ANSUR II). Shoes and plantar flexion
-        add 2 cm.
+        Elbows and knees are the midpoints between the epicondyles (Wu et al. 2002 and 2005), so that flesh lies evenly
+        around them. Regressions predict a hip to 6 mm from the pelvic width (Seidel et al. 1995), and a shoulder to 3
+        mm from the scapula (Meskers et al. 1998). The height of the lateral malleolus varies by 6 mm (ANSUR II). Shoes
+        and plantar flexion add 2 cm.
         """
-        return replace(self, hip_side=min(0.005, self.hip_side), sole=min(0.015, self.sole))
+        return replace(
+            self,
+            limb_joint=min(0.004, self.limb_joint),
+            limb_side=min(0.004, self.limb_side),
+            sole=min(0.015, self.sole),
+        )
 
 
 class SizeArrays(NamedTuple):

@@ -11,6 +11,7 @@ from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.initialization.axis_start import AxisStart, search_on_axes
 from tracker.initialization.body_axis import BodyAxis, find_body_axes
+from tracker.initialization.head_template import Head
 from tracker.initialization.outline_evidence import outline_evidence
 from tracker.initialization.silhouette_axis import MajorAxis, major_axis
 from tracker.initialization.voxel_start import facing_cues, locate_parts, start_pose, turned_round
@@ -22,9 +23,13 @@ StartMethod: TypeAlias = Literal["voxels", "axis", "search"]
 
 _UPRIGHT = 0.9
 """Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
-_NECK, _NECK_SPREAD = 0.88, 0.04
-"""Height of the base of the head of a person who stands, as a fraction of the body's height, and its largest relative
-difference from that: folded legs make it lower."""
+_NECK, _NECK_GROWTH, _NECK_SPREAD = 0.70, 0.18, 0.04
+"""Height of the base of the head of a person who stands, as a fraction of the body's height: of somebody without
+stature, what is added up to an adult, and the largest relative difference. Folded legs and hands on the head change it.
+"""
+_MAX_PATH = 1.25
+"""Largest path from the top of the head to the soles, as a share of the height of a person who stands: folded legs make
+it longer. The grid lengthens paths by up to a tenth."""
 _AXES_TRIED = 3
 _RAISED = (0.0, 0.10, 0.20)
 """Tops of the head that a search tries, below the end of the figure, as fractions of the height: hands may be above."""
@@ -81,7 +86,7 @@ def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[St
     parts = locate_parts(scene.figure, scene.motion)
     head = scene.figure.points_world[parts.head.is_head]
     top = head[int(np.argmax(head @ scene.up))] + scene.figure.grid.size_m / 2 * scene.up
-    height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], top, parts.head.neck)
+    height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], top, parts.head)
     own = model if height_m is None else model.with_height(height_m)
     return [
         StartCandidate(
@@ -149,23 +154,25 @@ def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
     return axes
 
 
-def standing_height(scene: PersonScene, trunk_up: Array, top: Array, neck: Array | None = None) -> float | None:
+def standing_height(scene: PersonScene, trunk_up: Array, top: Array, head: Head | None = None) -> float | None:
     """Return the height of a person who stands upright, metres; None if the person does not.
 
     Args:
         scene: the person on a frame.
         trunk_up: direction of the trunk towards the head, (3,).
         top: top of the head, (3,), metres; raised hands are above it.
-        neck: base of the head, (3,), metres, where it was found.
+        head: the head, where voxels show it.
     """
     if trunk_up @ scene.up < _UPRIGHT:
         return None
     low = float((scene.figure.points_world @ scene.up).min()) - scene.figure.grid.size_m / 2
     height_m = float(top @ scene.up) - low
-    if neck is None:
+    if head is None:
         return height_m
-    share = (float(neck @ scene.up) - low) / height_m
-    return height_m if abs(share / _NECK - 1) < _NECK_SPREAD else None
+    neck = (float(head.neck @ scene.up) - low) / height_m
+    usual = _NECK + _NECK_GROWTH * head.scale
+    stands = abs(neck / usual - 1) < _NECK_SPREAD and head.path_m <= _MAX_PATH * height_m
+    return height_m if stands else None
 
 
 def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:

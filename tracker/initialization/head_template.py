@@ -1,24 +1,49 @@
 """Find the head of a figure by a spherical crust template (MTHC01 Sect. 3).
 
 The paper counts the surface voxels within the crust. A trunk may hold as many. A head also has nothing around it but
-the neck, so that the occupied voxels in a shell around the crust are subtracted.
+the neck, so that the occupied voxels in a shell around the crust are subtracted. And it is an end of the figure, which
+falls apart without a knee or an elbow.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
+from tracker.voxels.paths import path_lengths
 from tracker.voxels.voxel_grid import Voxels
 
-INNER_M, OUTER_M = 0.07, 0.135
-"""Radii of the crust: half the smallest and half the largest dimension of a head, metres."""
-SURROUNDING_M = 0.20
-"""Outer radius of the shell in which a head has only its neck, metres."""
-MIN_SCORE = 0.25
-"""Smallest score of a head: the surface voxels in the crust less the voxels around it, as a share of the surface voxels
-of a sphere of the crust's mean radius."""
+
+class Template(NamedTuple):
+    """A crust that holds the surface of a head, and the shell around it."""
+
+    inner_m: float
+    """Inner radius of the crust, metres."""
+    outer_m: float
+    """Outer radius of the crust, metres."""
+    surrounding_m: float
+    """Outer radius of the shell in which a head has only its neck, metres."""
+    min_score: float
+    """Smallest score of a head: the surface voxels in the crust less the voxels around it, as a share of the surface
+    voxels of a sphere of the crust's mean radius."""
+
+
+_TEMPLATES = (Template(0.07, 0.135, 0.20, 0.25), Template(0.055, 0.11, 0.13, 0.5))
+"""In the order in which they are tried. The first has half the smallest and half the largest dimension of an adult's
+head, with a wide shell, which hands and feet in the hull of few views do not pass. The second also fits heads beside an
+arm, and heads of children, whose shoulders are near."""
+_MAX_PIECE = 0.02
+"""Largest share of a figure's voxels that may be cut off from the rest without the head: hair and stray voxels."""
+_TRIED = 5
+"""Number of places that are tried, from the highest score down."""
+_ADULT_M, _ADULT_M3 = 1.75, 0.10
+"""Stature of a typical adult, metres, and the volume of the visual hull, cubic metres."""
+_GROWN_M = 0.135
+"""Distance from the centre within which voxels belong to the head of an adult, metres."""
+_CHILD_SHARE = 0.7
+"""Share of that in somebody without stature: a head grows by 0.3 of the share by which the body does."""
 
 
 class Head(NamedTuple):
@@ -31,7 +56,11 @@ class Head(NamedTuple):
     is_head: NDArray[np.bool_]
     """Whether each voxel of the figure belongs to it, (N,)."""
     score: float
-    """See `MIN_SCORE`."""
+    """See `Template.min_score`."""
+    path_m: float
+    """Length of the longest path through the body from the top of the head, metres: with straight legs the stature."""
+    scale: float
+    """Size of the person, as a share of an adult's, at most 1."""
 
 
 def find_head(figure: Voxels) -> Head | None:
@@ -40,33 +69,66 @@ def find_head(figure: Voxels) -> Head | None:
     Args:
         figure: voxels of one person, at most about 5 cm each.
     """
-    score, center = _best_center(figure)
-    if score < MIN_SCORE:
-        return None
     points = figure.points_world
-    is_head = np.linalg.norm(points - center, axis=1) <= OUTER_M
+    places = ((t.outer_m, place) for t in _TEMPLATES for place in _places(figure, t))
+    best = next(((r, place) for r, place in places if _is_end(figure, place.distances <= r)), None)
+    if best is None:
+        return None
+    radius_m, (score, distances) = best
+    lengths = path_lengths(points, distances <= radius_m, figure.grid.size_m)
+    path_m = radius_m + float(lengths[np.isfinite(lengths)].max())
+    # A person whom an image cuts off has short paths, yet the volume of more than a child.
+    scale = min(1.0, max(path_m / _ADULT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
+    is_head = distances <= _GROWN_M * (_CHILD_SHARE + (1 - _CHILD_SHARE) * scale)
     neck = _neck(figure, is_head)
     if neck is None:
         return None
-    return Head(points[is_head].mean(axis=0), neck, is_head, score)
+    return Head(points[is_head].mean(axis=0), neck, is_head, score, path_m, scale)
 
 
-def _best_center(figure: Voxels) -> tuple[float, Array]:
+class _Place(NamedTuple):
+    """A place that may be the centre of a head."""
+
+    score: float
+    """See `Template.min_score`."""
+    distances: Array
+    """Of the figure's voxels from there, (N,), metres."""
+
+
+def _places(figure: Voxels, template: Template) -> Iterator[_Place]:
+    """Yield the places that score enough, and their scores, from the highest down."""
     from scipy.signal import fftconvolve  # imported lazily: loading it takes 0.5 s
 
-    size = figure.grid.size_m
-    reach = int(np.ceil(SURROUNDING_M / size))
+    size, (inner_m, outer_m, surrounding_m, min_score) = figure.grid.size_m, template
+    reach = int(np.ceil(surrounding_m / size))
     distance = size * np.sqrt(np.sum(np.square(np.indices((2 * reach + 1,) * 3) - reach), axis=0))
-    crust = ((distance >= INNER_M) & (distance <= OUTER_M)).astype(np.float64)
-    around = ((distance > OUTER_M + size / 2) & (distance <= SURROUNDING_M)).astype(np.float64)
+    crust = ((distance >= inner_m) & (distance <= outer_m)).astype(np.float64)
+    around = ((distance > outer_m + size / 2) & (distance <= surrounding_m)).astype(np.float64)
     surface = np.zeros(figure.grid.shape)
     surface[tuple(figure.indices[figure.is_surface].T)] = 1.0
     counts = fftconvolve(surface, crust, mode="same")
     counts -= fftconvolve(figure.occupied.astype(np.float64), around, mode="same")
-    counts[~figure.occupied] = -np.inf
-    best = np.unravel_index(int(np.argmax(counts)), counts.shape)
-    expected = np.pi * (INNER_M + OUTER_M) ** 2 / size**2
-    return float(counts[best] / expected), figure.grid.centers(np.array(best))
+    expected = np.pi * (inner_m + outer_m) ** 2 / size**2
+    points = figure.points_world
+    scores = counts[tuple(figure.indices.T)] / expected
+    for _ in range(_TRIED):
+        best = int(np.argmax(scores))
+        if scores[best] < min_score:
+            return
+        distances = np.linalg.norm(points - points[best], axis=1)
+        yield _Place(float(scores[best]), distances)
+        scores[distances <= outer_m] = -np.inf
+
+
+def _is_end(figure: Voxels, is_head: NDArray[np.bool_]) -> bool:
+    """Return whether the rest of a figure is one piece without some voxels, (N,)."""
+    from scipy.ndimage import label
+
+    rest = np.zeros(figure.grid.shape, bool)
+    rest[tuple(figure.indices[~is_head].T)] = True
+    labels, _ = label(rest, np.ones((3, 3, 3)))
+    sizes = np.sort(np.bincount(labels.ravel())[1:])
+    return len(sizes) > 0 and float(sizes[:-1].sum()) <= _MAX_PIECE * len(is_head)
 
 
 def _neck(figure: Voxels, is_head: NDArray[np.bool_]) -> Array | None:

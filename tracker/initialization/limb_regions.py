@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array, IntArray
 from tracker.initialization.torso_template import Torso
+from tracker.voxels.paths import path_lengths
 from tracker.voxels.voxel_grid import Voxels
 
 _SKIN_M = 0.11
@@ -19,6 +20,8 @@ _MIN_REACH_M = 0.12
 """Smallest length of a branch beyond a fork, metres."""
 _LEG_M = 0.30
 """A limb whose tip is farther than this below the trunk is a leg, metres."""
+_LEG_ROOT = -0.75
+"""A limb that begins lower on the trunk, as a share of half its length from its middle, is a leg, raised or not."""
 _SLICE_M = 0.03
 """Half the thickness of the slice whose mean is a limb's centre, metres."""
 _SHARES = np.linspace(0.0, 1.0, 51)
@@ -30,7 +33,7 @@ _MIN_BEND = 1.5
 """Ratio of the errors of one and of two straight lines above which the place of the middle joint is known."""
 _USUAL_SPLIT = {"arm": 0.53, "leg": 0.52}
 """Place of the middle joint of a straight limb, as a share of its length to the wrist or ankle."""
-_END_M = {"arm": 0.10, "leg": 0.08}
+_END_M = {"arm": 0.10, "leg": 0.12}
 """Distance of the wrist and the ankle from the end of the limb, metres."""
 
 
@@ -52,6 +55,11 @@ class LimbRegion(NamedTuple):
     indices: IntArray
     """Its voxels, indices into those of the figure, (n,)."""
 
+    def scaled(self, factor: float) -> "LimbRegion":
+        """Return it in a figure that is larger by a factor about the world's origin."""
+        places = {n: getattr(self, n) * factor for n in ("proximal", "middle", "distal", "tip")}
+        return self._replace(**places)
+
 
 def find_limbs(figure: Voxels, torso: Torso, is_head: NDArray[np.bool_]) -> list[LimbRegion]:
     """Return the limbs that stand out, at most four, the largest first.
@@ -63,7 +71,7 @@ def find_limbs(figure: Voxels, torso: Torso, is_head: NDArray[np.bool_]) -> list
     """
 
     points, size_m = figure.points_world, figure.grid.size_m
-    distances = _geodesic(points, torso.is_torso | is_head, size_m)
+    distances = path_lengths(points, torso.is_torso | is_head, size_m)
     whole = np.flatnonzero(np.isfinite(distances) & (distances > _SKIN_M))
     found = [_limb(points, branch, distances, torso) for branch in _branches(figure, whole, distances, _SKIN_M)]
     return sorted(found, key=lambda limb: -len(limb.indices))
@@ -113,7 +121,7 @@ def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso) -> Lim
     tip = region[from_torso > from_torso.max() - 0.04].mean(axis=0)
     (begins_z, tip_z) = torso.local(np.stack([first, tip]))[:, 2]
     own_root = branch.begins_m < _SKIN_M + 0.05
-    kind = "leg" if tip_z < -half - _LEG_M or (own_root and begins_z < -0.4 * half) else "arm"
+    kind = "leg" if tip_z < -half - _LEG_M or (own_root and begins_z < _LEG_ROOT * half) else "arm"
     length = from_torso.max() - _END_M[kind]
     side = np.sign(torso.local(first[None])[0, 1]) or 1.0
     across, along = (0.35, -0.75) if kind == "leg" else (1.0, 0.85)
@@ -160,16 +168,3 @@ def _line_error(points: Array) -> float:
     """Return the sum of squared distances of points from their line, square metres."""
     deviations = points - points.mean(axis=0)
     return float(np.sum(np.linalg.svd(deviations, compute_uv=False)[1:] ** 2))
-
-
-def _geodesic(region: Array, sources: NDArray[np.bool_], size_m: float) -> Array:
-    """Return the distance of each voxel, (n,), from the sources through the voxels of a region, metres."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import dijkstra
-    from scipy.spatial import cKDTree
-
-    pairs = cKDTree(region).query_pairs(1.8 * size_m, output_type="ndarray")
-    lengths = np.linalg.norm(region[pairs[:, 0]] - region[pairs[:, 1]], axis=1)
-    graph = coo_matrix((lengths, (pairs[:, 0], pairs[:, 1])), shape=(len(region), len(region)))
-    found = dijkstra(graph.tocsr(), directed=False, indices=np.flatnonzero(sources), min_only=True)
-    return np.asarray(found)

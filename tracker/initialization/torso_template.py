@@ -41,6 +41,10 @@ class Torso(NamedTuple):
         """Centre of the cylinder, (3,), metres."""
         return np.asarray(self.neck - self.half_axes[2] * self.axes[:, 2])
 
+    def scaled(self, factor: float) -> "Torso":
+        """Return it in a figure that is larger by a factor about the world's origin."""
+        return self._replace(neck=self.neck * factor, half_axes=self.half_axes * factor)
+
     def local(self, points: Array) -> Array:
         """Return points, (N, 3), in its frame about its centre, (N, 3), metres."""
         return np.asarray((points - self.center) @ self.axes)

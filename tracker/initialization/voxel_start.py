@@ -25,10 +25,6 @@ SURE = 1.0
 """Sum of these cues from which on left and right are known."""
 _ONE_LEG = 0.25
 """Largest share of a figure's voxels in a single leg."""
-_MIN_STANDING = 0.85
-"""Smallest height of a figure, as a share of the body's, at which it counts as standing."""
-_UPRIGHT = 0.9
-"""Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
 
 
 class FigureParts(NamedTuple):
@@ -75,12 +71,16 @@ def locate_parts(figure: Voxels, motion: Array | None = None) -> FigureParts:
             "expected a head that stands out of the silhouettes, found none; choose another --frame, on which no "
             "arm or other person is beside the head"
         )
-    torso = find_torso(figure, head.neck, head.is_head)
-    limbs = find_limbs(figure, torso, head.is_head)
-    facing = facing_cues(figure, torso.axes[:, 0], torso.axes[:, 2], motion) + _bends(torso, limbs)
+    # Lengths below are those of an adult: a child is enlarged to one.
+    grown = figure.scaled(1 / head.scale)
+    torso = find_torso(grown, head.neck / head.scale, head.is_head)
+    limbs = find_limbs(grown, torso, head.is_head)
+    moved = None if motion is None else motion / head.scale
+    facing = facing_cues(grown, torso.axes[:, 0], torso.axes[:, 2], moved) + _bends(torso, limbs)
     if facing < 0:
         torso = torso._replace(axes=torso.axes * np.array([-1.0, -1.0, 1.0]))
-    return FigureParts(figure, head, torso, _by_side(torso, limbs, len(figure.indices)), abs(facing))
+    own = {n: limb.scaled(head.scale) for n, limb in _by_side(torso, limbs, len(figure.indices)).items()}
+    return FigureParts(figure, head, torso.scaled(head.scale), own, abs(facing))
 
 
 def turned_round(parts: FigureParts) -> FigureParts:
@@ -89,21 +89,6 @@ def turned_round(parts: FigureParts) -> FigureParts:
     other = {"left": "right", "right": "left"}
     limbs = {f"{other[n.split('_')[0]]}_{limb.kind}": limb for n, limb in parts.limbs.items()}
     return parts._replace(torso=torso, limbs=limbs)
-
-
-def measured_height(parts: FigureParts, up: Array) -> float | None:
-    """Return the height of a person who stands upright, metres; None if the person does not.
-
-    Args:
-        parts: of the figure.
-        up: vertical axis of the world, (3,).
-    """
-    if parts.torso.axes[:, 2] @ up < _UPRIGHT:
-        return None
-    along = parts.figure.points_world @ up
-    height = float(np.ptp(along)) + parts.figure.grid.size_m
-    trunk = float((parts.head.neck @ up) - along.min())
-    return height if trunk > _MIN_STANDING * 0.8 * height else None
 
 
 def start_pose(model: BodyModel, parts: FigureParts) -> Array:

@@ -53,6 +53,8 @@ class PosedFrames(NamedTuple):
     """By frame, joints of the person that somebody has placed."""
     seen: Mapping[int, PinBlock]
     """By frame, points of the person that somebody has seen in the images: pins, and the ends of drags."""
+    has_known_joints: bool = False
+    """Whether some joints were placed by known ones, whose definition may not be that of anatomy."""
 
 
 def acquire_body(
@@ -107,6 +109,8 @@ def _acquire(
 ) -> Acquisition:
     if isinstance(settings, TwoViewSettings):
         return acquire_from_two_views(observer, known.bodies, 0, settings, report)
+    if not known.has_known_joints:
+        settings = replace(settings, priors=settings.priors.anatomical())
     return acquire_from_contours(observer, known.bodies, 0, known.placed, settings, report, known.seen)
 
 
@@ -148,7 +152,8 @@ def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedF
     cameras = [c.camera for c in session.cameras]
     seen = {k: pin_block(model, cameras, o).widened(_HAND) for k, o in observed.items() if o}
     placed = {k: t for k, s in keyframes.items() if (t := _placed(s, observed[k])) is not None and len(t.points)}
-    return PosedFrames(bodies, placed, seen)
+    has_known_joints = any(s.record.settings.get("joints") for s in keyframes.values())
+    return PosedFrames(bodies, placed, seen, has_known_joints)
 
 
 def store_body(
@@ -275,4 +280,4 @@ def _with_tracked(
                 people = zip(subjects.models, found.poses, strict=True)
                 bodies.setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))
     assert all(b[0].model is session.people[person].model for b in bodies.values())
-    return PosedFrames(bodies, known.placed, known.seen)
+    return known._replace(bodies=bodies)

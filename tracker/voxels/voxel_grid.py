@@ -75,6 +75,11 @@ class Voxels:
         x, y, z = self.indices.T + 1
         return ~inner[x, y, z]
 
+    def scaled(self, factor: float) -> "Voxels":
+        """Return the figure larger by a factor about the world's origin."""
+        origin, size_m, shape = self.grid
+        return Voxels(VoxelGrid(origin * factor, size_m * factor, shape), self.occupied)
+
     @property
     def volume_m3(self) -> float:
         """Volume of the occupied voxels, cubic metres."""

@@ -15,14 +15,18 @@ def drawn(parameters, seed=0, share=0.7):
 
 
 @pytest.mark.parametrize("coupled", [True, False])
-def test_anatomy_tells_more_of_hips_and_soles_than_of_other_joints_and_ends(coupled):
+def test_anatomy_tells_more_of_limbs_and_soles_than_of_the_trunk_and_other_ends(coupled):
     parameters = SizeParameters(load_model("gavrila34", 1.7), coupled, SizePriors().anatomical())
     sigmas, side = dict(zip(parameters.names, parameters.sigmas, strict=True)), "" if coupled else "right_"
     priors = parameters.priors
-    assert sigmas[f"{side}hip.joint_y"] == priors.hip_side < sigmas[f"{side}hip.joint_z"] == priors.joint
+    for joint in ("hip", "knee", "shoulder", "elbow"):
+        assert sigmas[f"{side}{joint}.joint_x"] == priors.limb_joint < sigmas["waist.joint_x"] == priors.joint
+    for part in ("thigh", "calf", "upper_arm", "forearm"):
+        assert sigmas[f"{side}{part}.side_y"] == priors.limb_side < sigmas["torso.side_x"] == priors.side
     assert sigmas[f"{side}calf.free_end"] == priors.sole < sigmas[f"{side}forearm.free_end"] == priors.free_end
     # They are free in the same rounds as the others of their kind.
     assert parameters.of_kinds("joint")[parameters.names.index(f"{side}hip.joint_y")]
+    assert parameters.of_kinds("side")[parameters.names.index(f"{side}calf.side_y")]
 
 
 @each_model

@@ -8,6 +8,7 @@ from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.initialization.candidates import from_axis, from_search, from_voxels, silhouette_axes, standing_height
+from tracker.initialization.head_template import find_head
 
 CAMERAS = cameras_about_a_figure()
 MODEL = load_model("gavrila34")
@@ -70,7 +71,7 @@ def test_raised_arms_do_not_make_a_person_taller(arms_deg):
     voxels, joints = figure(arms_deg=arms_deg)
     top = joints["head"] + (0.0, 0.0, 0.125)
     soles_m = joints["left_ankle"][2] - 0.07
-    found = standing_height(scene(voxels), np.array([0.0, 0.0, 1.0]), top, joints["neck"] + (0.0, 0.0, 0.08))
+    found = standing_height(scene(voxels), np.array([0.0, 0.0, 1.0]), top, find_head(voxels))
     assert found == pytest.approx(top[2] - soles_m, abs=0.03)
 
 
@@ -78,7 +79,9 @@ def test_a_person_who_lies_or_crouches_has_no_standing_height():
     voxels, joints = figure()
     top, up = joints["head"] + (0.0, 0.0, 0.125), np.array([0.0, 0.0, 1.0])
     assert standing_height(scene(voxels), np.array([1.0, 0.0, 0.0]), top) is None
-    assert standing_height(scene(voxels), up, top, joints["neck"] - (0.0, 0.0, 0.10)) is None
+    head = find_head(voxels)
+    assert standing_height(scene(voxels), up, top, head._replace(path_m=1.3 * head.path_m)) is None
+    assert standing_height(scene(voxels), up, top, head._replace(neck=head.neck - (0.0, 0.0, 0.10))) is None
 
 
 def test_views_in_which_others_stand_before_the_person_are_left_out():

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
-from figures import UP, figure
+from figures import child, figure
 
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.initialization.head_template import find_head
-from tracker.initialization.voxel_start import locate_parts, measured_height, start_pose, turned_round
+from tracker.initialization.voxel_start import locate_parts, start_pose, turned_round
 from tracker.voxels.voxel_grid import Voxels
 
 POSES = [
@@ -32,11 +32,7 @@ def test_all_parts_are_found_left_and_right(pose):
     assert parts.is_facing_sure
     left = joints["left_shoulder"] - joints["right_shoulder"]
     assert parts.torso.axes[:, 1] @ left / np.linalg.norm(left) > 0.95
-    height_m = measured_height(parts, UP)
-    # Spread legs lower the head: the figure's own extent is what can be measured. Its soles lie 7 cm below the ankles.
-    extent_m = joints["head"][2] + 0.125 - (joints["left_ankle"][2] - 0.07)
-    assert height_m == pytest.approx(extent_m, abs=0.04)
-    model = load_model("gavrila34").with_height(height_m)
+    model = load_model("gavrila34").with_height(joints["head"][2] + 0.125 - (joints["left_ankle"][2] - 0.07))
     errors = errors_mm(model, start_pose(model, parts), joints)
     assert np.mean(list(errors.values())) < 80
 
@@ -63,6 +59,18 @@ def test_arms_on_the_body_and_closed_legs_are_not_guessed():
     assert {"left_leg", "right_leg"} <= set(parts.unresolved)
     model = load_model("gavrila34")
     assert np.all(np.isfinite(start_pose(model, parts)))
+
+
+def test_a_child_is_found():
+    """The head is nearly as large as an adult's, all else is not."""
+    voxels, joints = child(arms_deg=45)
+    parts = locate_parts(voxels)
+    assert np.linalg.norm(parts.head.center - joints["head"]) < 0.05
+    assert parts.head.scale == pytest.approx(0.6, rel=0.1)
+    assert parts.unresolved == ()
+    for name, limb in parts.limbs.items():
+        side, kind = name.split("_")
+        assert np.linalg.norm(limb.distal - joints[f"{side}_{'wrist' if kind == 'arm' else 'ankle'}"]) < 0.10
 
 
 def test_straight_limbs_are_named():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tracker.acquisition.from_contours import AcquisitionSettings
-from tracker.acquisition.size_parameters import SizeParameters
+from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
@@ -180,6 +180,16 @@ def test_each_round_tracks_with_the_body_of_the_one_before(session, store, monke
     assert tracked_with == pytest.approx([present.height_m, present.height_m + 0.1, present.height_m + 0.2])
     assert fitted_from == [present] * 3
     assert found.cost_after_px == 4.0
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_joints_are_those_of_anatomy_unless_known_ones_were_placed(known, session, store, monkeypatch):
+    settings = {"joints": {n: [0.1 * i, 0.0, 1.0] for i, n in enumerate(LIMB_JOINTS)}} if known else {}
+    put(session, store, f0=record(session, store, keyframe=True, settings=settings))
+    used = []
+    monkeypatch.setattr(body_acquisition, "acquire_from_contours", lambda *a: used.append(a[4].priors))
+    acquire_body(session, None, 0, range(1), AcquisitionSettings())
+    assert used == [SizePriors() if known else SizePriors().anatomical()]
 
 
 def test_a_round_in_which_most_frames_are_good_is_the_last(session, store, monkeypatch):
