@@ -1,42 +1,47 @@
-"""Search the twist and the limbs of a body on its axis, coarse to fine, by the chamfer measure (GD96 Sect. 4.1).
+"""Search the twist and the limbs of a body on its axis, coarse to fine, by the silhouettes (GD96 Sect. 4.1).
 
-The outlines of the silhouettes are the scene. At each of some twists the limbs are searched one after the other among
-poses spread over their joint limits. The best twists are searched on at ever smaller spreads, the trunk too at the end.
+At each of some twists the limbs are searched among poses spread over their joint limits, then again among the better
+ones given the others. The best twists are searched on around what was found, trunk and limbs in turn, at ever smaller
+spreads.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from tracker.body.limbs import Limb, limbs
-from tracker.body.model import BodyModel, PosedBody
-from tracker.evidence.view_evidence import ViewEvidence
+from tracker.body.kinematics import chain_poses
+from tracker.body.limbs import Limb
+from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.initialization.body_axis import SHOULDERS, BodyAxis
-from tracker.initialization.outline_evidence import REACH
-from tracker.search.best_first import SearchSettings, search
-from tracker.search.chamfer_cost import ChamferCost
+from tracker.initialization.limb_poses import changes_around, changes_within_limits, moving_limbs, trunk_parts
+from tracker.initialization.silhouette_overlap import SilhouetteOverlap
 
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _N_TWISTS = 12
-_PROPOSALS = 128
-"""Poses of a limb that are tried at each twist; a power of two, so that they fill the space evenly."""
-_USUAL_RAD = np.radians(60)
-"""Largest angle from hanging of half of these poses, rad: most limbs hang more or less."""
-_FINER_RAD = tuple(np.radians([30.0, 15.0, 8.0]).tolist())
+_N_AGAIN, _SWEEPS = 256, 2
+"""Poses of a limb that are tried again after the other limbs are known, and how often."""
+_FINER_RAD = tuple(np.radians([40.0, 30.0, 20.0, 15.0, 10.0, 8.0, 6.0, 4.0, 3.0]).tolist())
 """Spreads of the poses that are tried around the best one, rad, round by round."""
-_N_KEPT = 3
-"""Twists that are searched on."""
+_N_FINER = 64
+"""Poses that are tried around the best one of trunk and of each limb in each round, a power of two."""
+_TRUNK_SHARE, _TRUNK_M = 0.5, 0.10
+"""Spread of the trunk's directions as a share of that of the limbs, and of its place, metres per rad."""
+_N_SEARCHED, _N_KEPT = 12, 5
+"""Twists that are searched on, and starts that are returned of those that face any way."""
+_LIMB_JOINTS = (("knee", "ankle"), ("elbow", "wrist"))
+_N_EXCHANGED = 3
+"""Starts whose legs and whose arms are exchanged too: a leg before the other is easily taken for it."""
+_DOWNWARDS = 1.1
+"""Factor on the cost of a body with the head at the lower end of its axis."""
 _APART_RAD = np.radians(80)
-"""Twists of returned starts differ by more, so that both ways of facing are among them, rad."""
-_LAST = SearchSettings(
-    bound_rad=float(np.radians(30)), step_rad=float(np.radians(8)), step_m=0.04, passes=(1.0, 0.5), patience=2,
-    max_expansions=20, limbs_apart=True,
-)  # fmt: skip
+"""Angle between two ways of facing, rad: a body looks nearly the same from behind."""
+_DISTINCT_M = 0.08
+"""Smallest mean distance of the joints of two starts, metres."""
 
 
 class AxisStart(NamedTuple):
@@ -47,59 +52,153 @@ class AxisStart(NamedTuple):
     """(n_values,)."""
     forward: Array
     """Unit direction in which the trunk faces, (3,)."""
-    cost_px: float
-    """Chamfer distance between the outlines of the silhouettes and of the body, working px."""
+    cost: float
+    """Cost against the silhouettes, see `SilhouetteOverlap`."""
 
 
-def search_on_axes(model: BodyModel, views: Sequence[ViewEvidence], axes: Sequence[BodyAxis]) -> list[AxisStart]:
-    """Return start poses of a body on one of some axes, the cheapest first, at most one for each way of facing.
+def search_on_axes(
+    model: BodyModel, overlap: SilhouetteOverlap, axes: Sequence[BodyAxis], up: Array
+) -> list[AxisStart]:
+    """Return start poses of a body on one of some axes, the cheapest first, one that faces the other way among them.
 
     Args:
         model: the body.
-        views: outlines of the silhouettes.
+        overlap: with the silhouettes of the person.
         axes: places of the head that are tried; at least one.
+        up: vertical axis of the world, (3,). A body upside down must fit better than one that is upright.
     """
-    coarse = [_Coarse(axis, *start) for axis in axes for start in _coarse(model, views, axis)]
-    coarse.sort(key=lambda c: c.cost_px)
-    chosen = coarse[:_N_KEPT]
-    # A body looks nearly the same from behind: the best twist that faces the other way is searched on too.
-    chosen += [c for c in coarse[_N_KEPT:] if c.forward @ coarse[0].forward < np.cos(_APART_RAD)][:1]
-    cost, found = _cost(model, views, coarse[0].pose), []
-    for start in chosen:
-        pose, _ = _searched(cost, model, start.pose, _FINER_RAD)
-        *_, last = search(cost, [pose], _LAST)
-        found.append(AxisStart(start.axis, last.best[0], start.forward, last.best_px))
-    found.sort(key=lambda f: f.cost_px)
+    limb_search = _Search(model, overlap)
+
+    def weighed(start: AxisStart) -> float:
+        return start.cost * (_DOWNWARDS if start.axis.up @ up < 0 else 1.0)
+
+    coarse = sorted((start for axis in axes for start in _coarse(limb_search, axis)), key=weighed)
+    # A body looks nearly the same from behind: the best twists that face the other way are searched on too.
+    chosen = coarse[:_N_SEARCHED]
+    chosen += [s for s in coarse[_N_SEARCHED:] if _faces_elsewhere(s, coarse[0])][:2]
+    found = sorted((AxisStart(s.axis, *limb_search.refined(s.pose)) for s in chosen), key=weighed)
+    for start in found[:_N_EXCHANGED]:
+        exchanged = [_exchanged(model, start.pose, joints) for joints in _LIMB_JOINTS]
+        found += [AxisStart(start.axis, *limb_search.refined(pose)) for pose in exchanged]
     kept: list[AxisStart] = []
-    for own in found:
-        if all(own.forward @ other.forward < np.cos(_APART_RAD) for other in kept):
-            kept.append(own)
-    return kept
+    for start in sorted(found, key=weighed):
+        if all(_is_distinct(model, start, other) for other in kept):
+            kept.append(start)
+    others = [s for s in kept[_N_KEPT:] if _faces_elsewhere(s, kept[0])][:1]
+    return kept[:_N_KEPT] + (others if not any(_faces_elsewhere(s, kept[0]) for s in kept[:_N_KEPT]) else [])
 
 
-class _Coarse(NamedTuple):
-    axis: BodyAxis
-    pose: Array
-    forward: Array
-    cost_px: float
+def _exchanged(model: BodyModel, pose: Array, joints: Sequence[str]) -> Array:
+    """Return the pose in which the left and the right limb take each other's place, as far as joints allow."""
+    points = dict(zip(model.point_names, model.points_world(pose), strict=True))
+    pairs = [(f"left_{j}", f"right_{j}") for j in joints if f"left_{j}" in points]
+    for left, right in pairs:
+        points[left], points[right] = points[right], points[left]
+    return fit_to_points(model, points, pose).pose
 
 
-def _coarse(model: BodyModel, views: Sequence[ViewEvidence], axis: BodyAxis) -> list[tuple[Array, Array, float]]:
-    """Return for each twist on an axis the best pose among a few, its direction forwards and its cost, px."""
-    found, near, cost = [], None, None
+def _faces_elsewhere(start: AxisStart, other: AxisStart) -> bool:
+    return bool(start.forward @ other.forward < np.cos(_APART_RAD))
+
+
+def _is_distinct(model: BodyModel, start: AxisStart, other: AxisStart) -> bool:
+    off = model.points_world(start.pose) - model.points_world(other.pose)
+    return bool(np.linalg.norm(off, axis=1).mean() > _DISTINCT_M)
+
+
+def _coarse(limb_search: "_Search", axis: BodyAxis) -> list[AxisStart]:
+    """Return for each twist on an axis the best pose among a few."""
+    found, near = [], None
     for i in range(_N_TWISTS):
-        R = _frame(axis.up, 2 * np.pi * i / _N_TWISTS)
-        near = _trunk(model, axis, R, near)
-        cost = cost or _cost(model, views, near)
-        pose, px = _searched(cost, model, near, (None,))
-        found.append((pose, R[:, 0], px))
+        near = _trunk(limb_search.model, axis, _frame(axis.up, 2 * np.pi * i / _N_TWISTS), near)
+        found.append(AxisStart(axis, *limb_search.limbs_placed(near)))
     return found
 
 
-def _cost(model: BodyModel, views: Sequence[ViewEvidence], pose: Array) -> ChamferCost:
-    """Return the chamfer measure with all points of the outlines, however far from a pose they are."""
-    reach = max(REACH * max(v.camera.size) for v in views)
-    return ChamferCost(views, [PosedBody(model, pose)], reach)
+class _Search:
+    """Search of the poses of a body, limb by limb."""
+
+    def __init__(self, model: BodyModel, overlap: SilhouetteOverlap) -> None:
+        self.model, self._overlap = model, overlap
+        self._limbs, self._parts = moving_limbs(model), np.arange(len(model.parts))
+        self._root = np.flatnonzero(model.dof_joint == 0)
+
+    def limbs_placed(self, pose: Array) -> tuple[Array, Array, float]:
+        """Search the limbs all over their joint limits; return the pose, the direction it faces and its cost."""
+        model, trunk = self.model, trunk_parts(self.model)
+        covered = self._overlap.nothing()
+        Ts = model.kinematics(pose).Ts_world_part
+        costs = 1 + self._overlap.added(Ts[None, trunk], trunk, covered)
+        self._overlap.cover(Ts[trunk], trunk, covered)
+        tried = []
+        for limb, changes in zip(self._limbs, changes_within_limits(model), strict=True):
+            poses = self._with_limb(pose, limb, model.clip(model.retract(model.neutral(), changes)))
+            totals, view_costs = self._costs(pose, limb, poses, covered, costs)
+            order = np.argsort(totals)
+            pose, costs = poses[order[0]], view_costs[order[:1]]
+            self._overlap.cover(model.kinematics(pose).Ts_world_part[limb.parts], limb.parts, covered)
+            tried.append(poses[order[:_N_AGAIN]])
+        for _ in range(_SWEEPS):
+            for limb, poses in zip(self._limbs, tried, strict=True):
+                pose, _ = self._best_of_limb(pose, limb, self._with_limb(pose, limb, poses))
+        return self._found(pose)
+
+    def refined(self, pose: Array) -> tuple[Array, Array, float]:
+        """Search around a pose, trunk and limbs in turn; see `limbs_placed`."""
+        model, best = self.model, self._total(pose[None])[0]
+        for spread in _FINER_RAD:
+            steps = changes_around(model, self._root, _N_FINER, _TRUNK_SHARE * spread, _TRUNK_M * spread)
+            poses = model.clip(model.retract(pose, steps))
+            totals = self._total(poses)
+            if totals.min() < best:
+                pose, best = poses[int(np.argmin(totals))], totals.min()
+            for limb in self._limbs:
+                steps = changes_around(model, np.flatnonzero(limb.dofs), _N_FINER, spread)
+                near, cost = self._best_of_limb(pose, limb, model.clip(model.retract(pose, steps)))
+                if cost < best:
+                    pose, best = near, cost
+        return self._found(pose)
+
+    def _found(self, pose: Array) -> tuple[Array, Array, float]:
+        forward = self.model.kinematics(pose).Ts_world_part[0, :3, 0]
+        return pose, forward, float(self._total(pose[None])[0])
+
+    def _with_limb(self, pose: Array, limb: Limb, poses: Array) -> Array:
+        """Return the pose with one limb as in each of some poses, (n, n_values)."""
+        neutral = self.model.neutral()
+        own = self.model.retract(neutral, 0.1 * limb.dofs.astype(np.float64)) != neutral
+        return np.where(own, poses, pose)
+
+    def _best_of_limb(self, pose: Array, limb: Limb, poses: Array) -> tuple[Array, float]:
+        """Return the best of poses that differ from a pose in one limb only, and its cost."""
+        others = np.setdiff1d(self._parts, limb.parts)
+        Ts, covered = self.model.kinematics(pose).Ts_world_part, self._overlap.nothing()
+        costs = 1 + self._overlap.added(Ts[None, others], others, covered)
+        self._overlap.cover(Ts[others], others, covered)
+        totals, _ = self._costs(pose, limb, poses, covered, costs)
+        i = int(np.argmin(totals))
+        return poses[i], float(totals[i])
+
+    def _costs(
+        self, pose: Array, limb: Limb, poses: Array, covered: NDArray[np.bool_], costs: Array
+    ) -> tuple[Array, Array]:
+        """Return the costs of a limb in many poses, (n,), and those of each view, (n, V).
+
+        Args:
+            pose: that differs from the others in this limb only.
+            limb: the limb.
+            poses: (n, n_values).
+            covered: cells that the rest of the body covers.
+            costs: of each view without the limb, (1, V).
+        """
+        Ts = chain_poses(self.model.tree, self.model.kinematics(pose), limb.parts, poses)
+        view_costs = costs + self._overlap.added(Ts, limb.parts, covered)
+        return self._overlap.total(view_costs), view_costs
+
+    def _total(self, poses: Array) -> Array:
+        """Return the costs of whole bodies, (n,)."""
+        Ts = np.stack([self.model.kinematics(p).Ts_world_part for p in poses])
+        return self._overlap.total(1 + self._overlap.added(Ts, self._parts, self._overlap.nothing()))
 
 
 def _frame(up: Array, twist: float) -> Array:
@@ -126,59 +225,3 @@ def _trunk(model: BodyModel, axis: BodyAxis, R: Array, near: Array | None) -> Ar
     known = {n: rigid.apply(place, p - middle) for n, p in own.items()}
     start = near if near is not None else fit_to_points(model, {n: known[n] for n in _TRUNK if n in known}).pose
     return fit_to_points(model, known, start).pose
-
-
-def _searched(cost: ChamferCost, model: BodyModel, pose: Array, spreads: Sequence[float | None]) -> tuple[Array, float]:
-    """Search the limbs one after the other, round by round; return the best pose and its cost, px.
-
-    Args:
-        cost: to minimize.
-        model: the body.
-        pose: start, (n_values,).
-        spreads: of the poses that are tried in each round, rad; None for the whole joint limits.
-    """
-    best_px = cost([pose]).total_px
-    for spread in spreads:
-        for limb in _searched_limbs(model):
-            candidates = _proposals(model, limb, pose, spread)
-            costs, _ = cost.of_person(0, candidates, [pose])
-            i = int(np.argmin(costs))
-            if costs[i] < best_px:
-                pose, best_px = candidates[i], float(costs[i])
-    return pose, best_px
-
-
-def _searched_limbs(model: BodyModel) -> list[Limb]:
-    """Return the legs, then the arms: legs are larger, and what they explain no arm needs to."""
-    own = [limb for limb in limbs(model) if "head" not in limb.name]
-    return sorted(own, key=lambda limb: not any(n in limb.name for n in ("calf", "foot", "leg")))
-
-
-def _proposals(model: BodyModel, limb: Limb, pose: Array, spread: float | None) -> Array:
-    """Return poses with the limb elsewhere, (n, n_values): around the pose, or within the joint limits if None."""
-    dofs = np.flatnonzero(limb.dofs)
-    even, normal = _even(_PROPOSALS, len(dofs))
-    if spread is None:
-        low, high = model.limits[dofs].T
-        steps = np.maximum(low, -np.pi) + even * (np.minimum(high, np.pi) - np.maximum(low, -np.pi))
-        steps[::2] = np.clip(steps[::2], -_USUAL_RAD, _USUAL_RAD)
-        steps -= model.difference(pose, model.neutral())[dofs]
-    else:
-        steps = normal * spread
-    # Joints of little spread, such as collarbones, stay near their usual angles.
-    held = np.isfinite(model.spreads[dofs])
-    steps[:, held] = 0.25 * normal[:, held] * model.spreads[dofs][held]
-    changes = np.zeros((len(steps), model.n_dofs))
-    changes[:, dofs] = steps
-    return np.array([model.clip(model.retract(pose, change)) for change in changes])
-
-
-@lru_cache(maxsize=16)
-def _even(n: int, dims: int) -> tuple[Array, Array]:
-    """Return points that fill the unit cube evenly, (n, dims), and the same normally distributed (Sobol sequence)."""
-    # Imported lazily: these take 0.3 s to load.
-    from scipy.special import ndtri
-    from scipy.stats import qmc
-
-    even = np.asarray(qmc.Sobol(dims, seed=7).random(n))
-    return even, np.asarray(ndtri(0.002 + 0.996 * even))

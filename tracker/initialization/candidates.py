@@ -12,8 +12,8 @@ from tracker.geometry.arrays import Array
 from tracker.initialization.axis_start import AxisStart, search_on_axes
 from tracker.initialization.body_axis import BodyAxis, find_body_axes
 from tracker.initialization.head_template import Head
-from tracker.initialization.outline_evidence import outline_evidence
 from tracker.initialization.silhouette_axis import MajorAxis, major_axis
+from tracker.initialization.silhouette_overlap import SilhouetteOverlap
 from tracker.initialization.voxel_start import facing_cues, locate_parts, start_pose, turned_round
 from tracker.voxels.figure_masks import FigureMask
 from tracker.voxels.part_size import principal_axes
@@ -186,8 +186,9 @@ def _on_axes(
     pairs = list(zip(scene.masks, scene.silhouettes, strict=True))
     apart = sum(m.is_apart and bool(m.mask.any()) for m, _ in pairs) >= 2
     masks = [m.mask if m.is_apart or not apart else np.zeros_like(m.mask) for m, _ in pairs]
-    views = outline_evidence(masks, [s.camera for _, s in pairs])
-    starts: list[AxisStart] = search_on_axes(model, views, axes)
+    center = scene.figure.points_world.mean(axis=0)
+    overlap = SilhouetteOverlap(model, masks, [s.camera for _, s in pairs], center)
+    starts: list[AxisStart] = search_on_axes(model, overlap, axes, scene.up)
     return [
         StartCandidate(
             method, model, start.pose, start.forward,

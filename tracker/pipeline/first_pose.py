@@ -38,6 +38,8 @@ _ENOUGH_FRAMES, _AXIS_FRAMES = 5, 2
 """Number of frames with starts from voxels, and with starts on the axis, among which `auto` chooses."""
 _N_TRACKED = 4
 """Starts of a frame that are tracked."""
+_SAME_M = 0.03
+"""Mean distance of the joints up to which two fits are the same, metres."""
 _CUES_PX = 0.05
 """What a cue for the direction counts against the cost of a track, px."""
 _SURE_RATIO = 1.05
@@ -205,9 +207,10 @@ def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Ma
         return fit_start(observer, [candidate.model, *bodies], candidate.pose, frame, later, poses)
 
     tried = [(c, fitted(c, ())) for c in candidates]
-    kept = _kept(tried)
     steps = _track_frames(frame, session.n_frames)
-    tracked = _filling(sorted(((c, fitted(c, steps)) for c, _ in kept), key=_weighed), silhouettes, masks)
+    kept = [c for c, _ in _kept(_distinct(tried))]
+    runs = _distinct([(c, fitted(c, steps)) for c in candidates if any(c is k for k in kept)])
+    tracked = _filling(sorted(runs, key=_weighed), silhouettes, masks)
     best, fit = tracked[0]
     opposite = [_weighed(t) for t in tracked if t[0].forward @ best.forward < _OPPOSITE]
     opposite += [_weighed(t) for t in tried if t[0].forward @ best.forward < _OPPOSITE and not opposite]
@@ -217,6 +220,17 @@ def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Ma
     if note:
         notes, fit = (*notes, note), fit if fit.status == "lost" else fit._replace(status="doubtful")
     return FirstPose(frame, best, fit, is_sure, notes, _lines_px(session, scene))
+
+
+def _distinct(fits: Sequence[tuple[StartCandidate, FittedStart]]) -> list[tuple[StartCandidate, FittedStart]]:
+    """Return the fits without those that end where the fit of an earlier start does: methods give the best first."""
+    kept: list[tuple[StartCandidate, FittedStart]] = []
+    for candidate, fit in fits:
+        points = candidate.model.points_world(fit.pose)
+        others = [c.model.points_world(f.pose) for c, f in kept]
+        if all(np.linalg.norm(points - o, axis=1).mean() > _SAME_M for o in others):
+            kept.append((candidate, fit))
+    return kept
 
 
 def _filling(

@@ -187,3 +187,15 @@ def test_an_entry_of_one_person_is_read_as_before():
     assert sizes_changed({"5": ["ann", 1, 2]}, 5) == [("ann", 1, 2)]
     assert sizes_changed({"5": [["ann", 1, 2], ["bob", 3, 4]]}, 5) == [("ann", 1, 2), ("bob", 3, 4)]
     assert sizes_changed({"5": ["ann", 1, 2]}, 6) == []
+
+
+def test_starts_that_end_at_the_same_pose_are_one(session):
+    model = session.people[0].model
+    pose = model.neutral()
+
+    def ends_at(name, by_m):
+        candidate = StartCandidate(name, model, pose, np.array([1.0, 0.0, 0.0]), 0.0)
+        return candidate, FittedStart(pose + by_m * np.eye(len(pose))[0], "good", 1.0)
+
+    fits = [ends_at("first", 0.0), ends_at("again", 0.02), ends_at("other", 0.2)]
+    assert [c.method for c, _ in first_pose._distinct(fits)] == ["first", "other"]
