@@ -35,7 +35,7 @@ _TRACK_STEPS = (2, 4, 6)
 _MOTION_FRAMES = 6
 """Frames over which the motion of a figure is measured."""
 _ENOUGH_FRAMES, _AXIS_FRAMES = 5, 2
-"""Number of frames with starts from voxels, and with starts on the axis, among which `auto` chooses."""
+"""Number of frames with good starts from voxels, and with starts on the axis, among which `auto` chooses."""
 _N_TRACKED = 4
 """Starts of a frame that are tracked."""
 _SAME_M = 0.03
@@ -125,12 +125,12 @@ def find_first_poses_anywhere(
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever method and on whatever of some frames tracks best; see `find_first_poses`.
 
-    Voxels are tried until they succeed on enough frames. The axis is tried on the best of these, and a search along the
+    Voxels are tried until their starts are good on enough frames. The axis is tried on the best of these, and a search along the
     figure where neither finds a good start.
     """
     with _Trial(session, observer, people, size_m, say) as trial:
         for frame in frames:
-            if len(trial.found) < _ENOUGH_FRAMES:
+            if sum(f.is_good for f in trial.found) < _ENOUGH_FRAMES:
                 trial.add(frame, ("voxels",))
         by_cost = sorted(trial.found, key=lambda f: f.cost_px)
         chosen = [f.frame for f in by_cost[:_AXIS_FRAMES]] or list(frames)[:_ENOUGH_FRAMES]
