@@ -125,8 +125,8 @@ def find_first_poses_anywhere(
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever method and on whatever of some frames tracks best; see `find_first_poses`.
 
-    Voxels are tried until their starts are good on enough frames. The axis is tried on the best of these, and a search along the
-    figure where neither finds a good start.
+    Voxels are tried until their starts are good on enough frames. The axis is tried on the best of these, and a search
+    along the figure where neither finds a good start.
     """
     with _Trial(session, observer, people, size_m, say) as trial:
         for frame in frames:
