@@ -86,10 +86,14 @@ def parse_toml(text: str, source: str, kind: TextKind) -> dict[str, Any]:
     # tomllib's time grows with the square of the depth, and it recurses.
     plain = _OPAQUE.sub("_", text)
     depth = max(accumulate((1 if c in "[{" else -1 for c in re.findall(r"[\[\]{}]", plain)), initial=0))
+    too_deep = f"{where}: expected at most {MAX_NESTING} levels of nesting, found more; correct it"
     if depth > MAX_NESTING or _LONG_KEY.search(plain):
-        raise kind.error(f"{where}: expected at most {MAX_NESTING} levels of nesting, found more; correct it")
+        raise kind.error(too_deep)
     try:
         return tomllib.loads(text)
+    except RecursionError as error:
+        # Possessive quantifiers of Python 3.11.2 match too little, so that some strings hide brackets after them.
+        raise kind.error(too_deep) from error
     except ValueError as error:
         # The parser gives no line for a construct left open at the end: report the last line.
         place = str(error).replace("at end of document", f"at line {max(1, len(text.splitlines()))}, the last")
