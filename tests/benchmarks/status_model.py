@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import Status
+from tracker.tracking.confidence import Status, probabilities, worst
 from tracker.tracking.run_confidence import classify_limbs
 
 OFF_MM, LOST_MM = 100.0, 150.0
@@ -133,7 +133,7 @@ def fit_weights(features: Array, error_mm: Array, weights: Array) -> Array:
     def loss(b: Array) -> tuple[float, Array]:
         odds = (Z @ b[:n])[:, None] + b[n:]
         value = float(w @ (np.logaddexp(0, odds) - above * odds).sum(axis=1) + RIDGE * b[:n] @ b[:n])
-        residual = w[:, None] * (1 / (1 + np.exp(-odds)) - above)
+        residual = w[:, None] * (probabilities(odds) - above)
         return value, np.append(Z.T @ residual.sum(axis=1) + 2 * RIDGE * b[:n], residual.sum(axis=0))
 
     b = minimize(loss, np.zeros(n + 2), jac=True, method="L-BFGS-B", options={"maxiter": 2000}).x
@@ -188,8 +188,8 @@ def statuses(rows: LimbRows, odds: Array) -> Statuses:
 
 def _status(odds: Array, unseen: bool, alternatives: bool) -> Status:
     """Return the status from the odds of the limbs of a person, (n_limbs, 2), as a finished run does."""
-    status = "lost" if unseen else classify_limbs(odds)
-    return "doubtful" if status == "good" and alternatives else status
+    status: Status = "lost" if unseen else classify_limbs(odds)
+    return worst([status, "doubtful"]) if alternatives else status
 
 
 def least_fine(found: Sequence[Statuses]) -> tuple[float, float]:
@@ -248,5 +248,5 @@ def pooled(runs: Sequence[Run], odds: Sequence[Array], keep: Callable[[Run], boo
     """Return the probabilities of off and lost, (n, 2), and the errors, (n,), of the limbs of some runs."""
     chosen = [(r.rows, o) for r, o in zip(runs, odds, strict=True) if keep(r)]
     use = [np.isfinite(rows.error_mm) & ~rows.unseen for rows, _ in chosen]
-    probabilities = np.concatenate([1 / (1 + np.exp(-o[u])) for (_, o), u in zip(chosen, use, strict=True)])
+    probabilities = np.concatenate([probabilities(o[u]) for (_, o), u in zip(chosen, use, strict=True)])
     return probabilities, np.concatenate([rows.error_mm[u] for (rows, _), u in zip(chosen, use, strict=True)])

@@ -48,10 +48,8 @@ def figure(size_m=0.025, noise=0.0, head=1.0, **pose):
         inside |= _capsule(points, leg - (0, 0, 0.03), leg - (0, 0, 0.03) + 0.17 * R[:, 0], 0.04)
     voxels = Voxels(grid, inside.reshape(grid.shape))
     if noise:
-        lost = voxels.indices[voxels.is_surface & (np.random.default_rng(0).random(len(voxels.indices)) < noise)]
-        occupied = voxels.occupied.copy()
-        occupied[tuple(lost.T)] = False
-        voxels = Voxels(grid, occupied)
+        rng = np.random.default_rng(0)
+        voxels = voxels.without(voxels.is_surface & (rng.random(len(voxels.indices)) < noise))
     return voxels.cropped(), joints
 
 

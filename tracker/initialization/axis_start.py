@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import fit_to_points
+from tracker.fitting.gauss_newton import fit_to_points, value_mask
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.initialization.body_axis import SHOULDERS, BodyAxis
@@ -165,9 +165,7 @@ class _Search:
 
     def _with_limb(self, pose: Array, limb: Limb, poses: Array) -> Array:
         """Return the pose with one limb as in each of some poses, (n, n_values)."""
-        neutral = self.model.neutral()
-        own = self.model.retract(neutral, 0.1 * limb.dofs.astype(np.float64)) != neutral
-        return np.where(own, poses, pose)
+        return np.where(value_mask(self.model, limb.dofs), poses, pose)
 
     def _best_of_limb(self, pose: Array, limb: Limb, poses: Array) -> tuple[Array, float]:
         """Return the best of poses that differ from a pose in one limb only, and its cost."""

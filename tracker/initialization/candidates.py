@@ -24,8 +24,8 @@ StartMethod: TypeAlias = Literal["voxels", "axis", "search"]
 _UPRIGHT = 0.9
 """Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
 _NECK, _NECK_GROWTH, _NECK_SPREAD = 0.70, 0.18, 0.04
-"""Height of the base of the head of a person who stands, as a fraction of the body's height: of somebody without
-stature, what is added up to an adult, and the largest relative difference. Folded legs and hands on the head change it.
+"""Height of the base of the head of a person who stands, as a fraction of the body's height: a constant, the slope by
+the person's size as a share of an adult's, and the largest relative error. Folded legs or hands on the head change it.
 """
 _MAX_PATH = 1.25
 """Largest path from the top of the head to the soles, as a share of the height of a person who stands: folded legs make

@@ -40,10 +40,9 @@ _TRIED = 5
 """Number of places that are tried, from the highest score down."""
 _ADULT_M, _ADULT_M3 = 1.75, 0.10
 """Stature of a typical adult, metres, and the volume of the visual hull, cubic metres."""
-_GROWN_M = 0.135
-"""Distance from the centre within which voxels belong to the head of an adult, metres."""
-_CHILD_SHARE = 0.7
-"""Share of that in somebody without stature: a head grows by 0.3 of the share by which the body does."""
+_HEAD_M, _HEAD_GROWTH_M = 0.0945, 0.0405
+"""Distance from the centre within which voxels belong to the head, metres: a constant, and the slope by the person's
+size as a share of an adult's. Heads grow less than bodies."""
 
 
 class Head(NamedTuple):
@@ -79,7 +78,7 @@ def find_head(figure: Voxels) -> Head | None:
     path_m = radius_m + float(lengths[np.isfinite(lengths)].max())
     # A person whom an image cuts off has short paths, yet the volume of more than a child.
     scale = min(1.0, max(path_m / _ADULT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
-    is_head = distances <= _GROWN_M * (_CHILD_SHARE + (1 - _CHILD_SHARE) * scale)
+    is_head = distances <= _HEAD_M + _HEAD_GROWTH_M * scale
     neck = _neck(figure, is_head)
     if neck is None:
         return None
@@ -122,20 +121,15 @@ def _places(figure: Voxels, template: Template) -> Iterator[_Place]:
 
 def _is_end(figure: Voxels, is_head: NDArray[np.bool_]) -> bool:
     """Return whether the rest of a figure is one piece without some voxels, (N,)."""
-    from scipy.ndimage import label
-
-    rest = np.zeros(figure.grid.shape, bool)
-    rest[tuple(figure.indices[~is_head].T)] = True
-    labels, _ = label(rest, np.ones((3, 3, 3)))
-    sizes = np.sort(np.bincount(labels.ravel())[1:])
-    return len(sizes) > 0 and float(sizes[:-1].sum()) <= _MAX_PIECE * len(is_head)
+    rest = figure.without(is_head)
+    largest = rest.components(min_share=1.0)[:1]
+    cut_off = len(rest.indices) - sum(len(v.indices) for v in largest)
+    return bool(largest) and cut_off <= _MAX_PIECE * len(is_head)
 
 
 def _neck(figure: Voxels, is_head: NDArray[np.bool_]) -> Array | None:
     from scipy.ndimage import binary_dilation
 
-    rest = np.zeros(figure.grid.shape, bool)
-    rest[tuple(figure.indices[~is_head].T)] = True
-    beside = binary_dilation(rest, np.ones((3, 3, 3), dtype=bool))[tuple(figure.indices.T)]
+    beside = binary_dilation(figure.without(is_head).occupied, np.ones((3, 3, 3), dtype=bool))[tuple(figure.indices.T)]
     touching = is_head & beside
     return figure.points_world[touching].mean(axis=0) if touching.any() else None

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import chain_poses
-from tracker.body.limbs import Limb, limbs
+from tracker.body.limbs import Limb, limb_display_name, limbs
 from tracker.body.model import BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
@@ -72,7 +72,7 @@ def _within_limits(model: BodyModel, limb: Limb) -> Array:
 
 
 def _kind(limb: Limb) -> str:
-    return "leg" if any(n in limb.name for n in ("calf", "foot", "leg")) else "arm"
+    return "leg" if limb_display_name(limb.name).endswith("leg") else "arm"
 
 
 def _of_dofs(model: BodyModel, dofs: IntArray, steps: Array) -> Array:

@@ -85,7 +85,7 @@ class SilhouetteOverlap:
 
     @staticmethod
     def total(view_costs: Array) -> Array:
-        """Return the cost over all views, (..., V) to (...): a broken silhouette, which nobody fills, counts less."""
+        """Return the cost over all views, (..., V) to (...): a broken silhouette, which no body fills, counts less."""
         return np.asarray(np.mean(view_costs / (view_costs + _BROKEN), axis=-1))
 
     def cover(self, Ts: Array, parts: IntArray, covered: NDArray[np.bool_]) -> None:

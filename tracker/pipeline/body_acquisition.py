@@ -54,7 +54,7 @@ class PosedFrames(NamedTuple):
     seen: Mapping[int, PinBlock]
     """By frame, points of the person that somebody has seen in the images: pins, and the ends of drags."""
     has_known_joints: bool = False
-    """Whether some joints were placed by known ones, whose definition may not be that of anatomy."""
+    """Whether some joints come from a file, which may define them otherwise than anatomy does."""
 
 
 def acquire_body(

@@ -24,6 +24,7 @@ from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
 from tracker.session.session import Session
 from tracker.store.stored_poses import read_stored_poses
+from tracker.tracking.confidence import worst
 from tracker.voxels.figure_masks import FigureMask, figure_masks
 from tracker.voxels.visual_hull import VisualHull, carve_people
 from tracker.voxels.voxel_grid import Voxels
@@ -208,8 +209,8 @@ def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Ma
 
     tried = [(c, fitted(c, ())) for c in candidates]
     steps = _track_frames(frame, session.n_frames)
-    kept = [c for c, _ in _kept(_distinct(tried))]
-    runs = _distinct([(c, fitted(c, steps)) for c in candidates if any(c is k for k in kept)])
+    kept = {id(c) for c, _ in _kept(_distinct(tried))}
+    runs = _distinct([(c, fitted(c, steps)) for c in candidates if id(c) in kept])
     tracked = _filling(sorted(runs, key=_weighed), silhouettes, masks)
     best, fit = tracked[0]
     opposite = [_weighed(t) for t in tracked if t[0].forward @ best.forward < _OPPOSITE]
@@ -218,18 +219,18 @@ def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Ma
     notes = _notes(best, is_sure, hull, silhouettes)
     note = check_against_silhouettes(PosedBody(best.model, fit.pose), silhouettes, masks).note
     if note:
-        notes, fit = (*notes, note), fit if fit.status == "lost" else fit._replace(status="doubtful")
+        notes, fit = (*notes, note), fit._replace(status=worst([fit.status, "doubtful"]))
     return FirstPose(frame, best, fit, is_sure, notes, _lines_px(session, scene))
 
 
 def _distinct(fits: Sequence[tuple[StartCandidate, FittedStart]]) -> list[tuple[StartCandidate, FittedStart]]:
     """Return the fits without those that end where the fit of an earlier start does: methods give the best first."""
-    kept: list[tuple[StartCandidate, FittedStart]] = []
+    kept, others = list[tuple[StartCandidate, FittedStart]](), list[Array]()
     for candidate, fit in fits:
         points = candidate.model.points_world(fit.pose)
-        others = [c.model.points_world(f.pose) for c, f in kept]
         if all(np.linalg.norm(points - o, axis=1).mean() > _SAME_M for o in others):
             kept.append((candidate, fit))
+            others.append(points)
     return kept
 
 

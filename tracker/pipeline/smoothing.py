@@ -16,14 +16,13 @@ from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
 from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.confidence import PoseQuality, frame_features, is_uncertainty, uncertain
+from tracker.tracking.confidence import PoseQuality, frame_features, is_uncertainty, probabilities, uncertain, worst
 from tracker.tracking.run_confidence import LOST_FROM, classify_limbs, log_odds, run_features, smoothing_steps
 from tracker.tracking.subjects import Subjects
 
 
 class TrackedRows:
-    """The rows that a run has stored for one person, with the covariances of their poses and what tells how sure they
-    are."""
+    """The rows that a run has stored for one person, with the covariances and status features of their poses."""
 
     def __init__(self) -> None:
         """Hold no row yet."""
@@ -141,12 +140,12 @@ def _classified(model: BodyModel, change: PoseChange, features: Array) -> PoseCh
     assert change.pose is not None
     odds = log_odds(features)
     status = classify_limbs(odds)
-    if status == "good" and change.alternatives:
-        status = "doubtful"
+    if change.alternatives:
+        status = worst([status, "doubtful"])
     remarks = [r for r in change.pose.remark.split(", ") if r and not is_uncertainty(r)]
     if not remarks and status != "good":
         remarks = [uncertain(limbs(model)[int(odds[:, 1].argmax())].name)]
-    lost = tuple(map(float, 1 / (1 + np.exp(-odds[:, 1]))))
+    lost = tuple(map(float, probabilities(odds[:, 1])))
     return replace(change, pose=replace(change.pose, status=status, limbs_lost=lost, remark=", ".join(remarks)))
 
 

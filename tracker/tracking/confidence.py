@@ -125,7 +125,7 @@ class PoseQuality(NamedTuple):
     @property
     def lost_probabilities(self) -> Array:
         """Probability that a joint of each limb is off by more than 150 mm, (n_limbs,), 0 to 1."""
-        return np.asarray(1.0 / (1.0 + np.exp(-self.log_odds)))
+        return probabilities(self.log_odds)
 
     @property
     def is_unseen(self) -> bool:
@@ -183,6 +183,11 @@ def features(pose: PoseQuality, limb: LimbFeatures) -> Array:
         pose.trunk_forward,
         np.log(max(1, pose.views)),
     ])  # fmt: skip
+
+
+def probabilities(log_odds: Array) -> Array:
+    """Return the probabilities of log odds, of any shape."""
+    return np.asarray(1.0 / (1.0 + np.exp(-log_odds)))
 
 
 def frame_features(pose: PoseQuality) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS, Status
+from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS, Status, probabilities
 
 _WEIGHTS = np.array([1.623, 2.136, -1.529, -1.445, 4.644, -1.302, 1.014, 0.628])
 """Weights of `run_features`, in their order."""
@@ -28,9 +28,7 @@ _MAX_STEP, _LEAST_STEP = 0.5, 0.005
 _LEAST_TRUNK = 0.005
 """Smaller distances of the trunk hardly count, outlier distances."""
 
-DOUBTFUL_FROM, LOST_FROM = (
-    float(1.0 / (1.0 + np.exp(-odds))) for odds in (OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT, LOST_ODDS)
-)
+DOUBTFUL_FROM, LOST_FROM = probabilities(np.array([OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT, LOST_ODDS])).tolist()
 """Probabilities of a lost limb above which it is doubtful, and lost."""
 
 

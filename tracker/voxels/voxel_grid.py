@@ -75,6 +75,12 @@ class Voxels:
         x, y, z = self.indices.T + 1
         return ~inner[x, y, z]
 
+    def without(self, left_out: NDArray[np.bool_]) -> "Voxels":
+        """Return the voxels without some of them, (N,)."""
+        occupied = self.occupied.copy()
+        occupied[tuple(self.indices[left_out].T)] = False
+        return Voxels(self.grid, occupied)
+
     def scaled(self, factor: float) -> "Voxels":
         """Return the figure larger by a factor about the world's origin."""
         origin, size_m, shape = self.grid

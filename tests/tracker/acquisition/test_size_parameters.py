@@ -15,7 +15,7 @@ def drawn(parameters, seed=0, share=0.7):
 
 
 @pytest.mark.parametrize("coupled", [True, False])
-def test_anatomy_tells_more_of_limbs_and_soles_than_of_the_trunk_and_other_ends(coupled):
+def test_the_anatomical_prior_is_tighter_for_limbs_and_soles(coupled):
     parameters = SizeParameters(load_model("gavrila34", 1.7), coupled, SizePriors().anatomical())
     sigmas, side = dict(zip(parameters.names, parameters.sigmas, strict=True)), "" if coupled else "right_"
     priors = parameters.priors

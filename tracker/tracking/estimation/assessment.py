@@ -10,7 +10,7 @@ from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import covariance
 from tracker.geometry.arrays import Array
 from tracker.tracking import confidence
-from tracker.tracking.confidence import PoseQuality, Status
+from tracker.tracking.confidence import PoseQuality, Status, worst
 from tracker.tracking.estimate import NormalMatrix
 from tracker.tracking.estimation.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
 
@@ -40,9 +40,10 @@ class PersonEstimate(NamedTuple):
 
     def in_doubt(self, note: str, alternatives: Sequence[tuple[Array, ...]]) -> "PersonEstimate":
         """Return the estimate with more alternatives, at most doubtful."""
-        status: Status = "doubtful" if self.status == "good" else self.status
         notes = ", ".join(n for n in (self.note, note) if n)
-        return self._replace(status=status, note=notes, alternatives=(*self.alternatives, *alternatives))
+        return self._replace(
+            status=worst([self.status, "doubtful"]), note=notes, alternatives=(*self.alternatives, *alternatives)
+        )
 
 
 def estimate_fixed(problem: FrameProblem, person: int, bodies: Bodies) -> PersonEstimate:
