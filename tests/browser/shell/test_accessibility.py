@@ -133,7 +133,7 @@ async def test_a_change_of_the_systems_scheme_recolours_the_3d_view_without_load
     ground = "(body) => getComputedStyle(body).backgroundColor"
     around = "getComputedStyle(document.querySelector('#scene')).backgroundColor"
     inside = "getComputedStyle(document.querySelector('#scene').contentDocument.body).backgroundColor"
-    await shows(page, f"{inside} === {around}")
+    await shows(page, f"document.querySelector('#scene').contentDocument?.body && {inside} === {around}")
     dark = await frame.evaluate(ground)
     await frame.evaluate("() => (window.isLoadedOnce = true)")
     await page.emulate_media(color_scheme="light")
