@@ -74,11 +74,6 @@ class SilhouetteOverlap:
             np.array([(f, *c.size) for f, (_, c) in zip(firsts, views, strict=False)], np.int64),
         )
 
-    @property
-    def sizes(self) -> IntArray:
-        """First cell, width and height of each view that counts, (V, 3)."""
-        return self._views.layout
-
     def nothing(self) -> NDArray[np.bool_]:
         """Return the covered cells where nothing is, to which `cover` adds."""
         return np.zeros(self._n_cells, np.bool_)
