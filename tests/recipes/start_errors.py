@@ -22,6 +22,7 @@ from tracker.initialization.head_template import find_head
 from tracker.initialization.silhouette_axis import major_axis
 from tracker.pipeline.first_pose import VOXEL_M, find_first_poses
 from tracker.session.session import load_session
+from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.visual_hull import carve_people
 
 HEAD_CENTER, HEAD_M = 0.07, 0.10
@@ -85,7 +86,8 @@ def _print_heads(session, recording, reference, every):
     for frame in range(0, session.n_frames, every):
         silhouettes = finder.silhouettes(frame)
         truth = dict(zip(reference.names, reference.points[frame], strict=True))["head"]
-        head = find_head(carve_people(silhouettes, VOXEL_M).figures[0])
+        figure = carve_people(silhouettes, VOXEL_M).figures[0]
+        head = find_head(figure, neighbor_graph(figure))
         off["voxels"].append(np.inf if head is None else np.linalg.norm(head.center - truth))
         try:
             axes = [a for s in silhouettes if (a := major_axis(s.mask, s.camera)) is not None]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-from tracker.voxels.paths import path_lengths
+from tracker.voxels.paths import VoxelGraph, path_lengths
 from tracker.voxels.voxel_grid import Voxels
 
 
@@ -62,11 +62,12 @@ class Head(NamedTuple):
     """Size of the person, as a share of an adult's, at most 1."""
 
 
-def find_head(figure: Voxels) -> Head | None:
+def find_head(figure: Voxels, graph: VoxelGraph) -> Head | None:
     """Return the head of a figure; None if no place scores enough or nothing is beside it.
 
     Args:
         figure: voxels of one person, at most about 5 cm each.
+        graph: their `neighbor_graph`.
     """
     points = figure.points_world
     places = ((t.outer_m, place) for t in _TEMPLATES for place in _places(figure, t))
@@ -74,7 +75,7 @@ def find_head(figure: Voxels) -> Head | None:
     if best is None:
         return None
     radius_m, (score, distances) = best
-    lengths = path_lengths(points, distances <= radius_m, figure.grid.size_m)
+    lengths = path_lengths(graph, distances <= radius_m, figure.grid.size_m)
     path_m = radius_m + float(lengths[np.isfinite(lengths)].max())
     # A person whom an image cuts off has short paths, yet the volume of more than a child.
     scale = min(1.0, max(path_m / _ADULT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))

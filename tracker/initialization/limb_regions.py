@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array, IntArray
 from tracker.initialization.torso_template import Torso
-from tracker.voxels.paths import path_lengths
+from tracker.voxels.paths import VoxelGraph, path_lengths
 from tracker.voxels.voxel_grid import Voxels
 
 _SKIN_M = 0.11
@@ -61,17 +61,17 @@ class LimbRegion(NamedTuple):
         return self._replace(**places)
 
 
-def find_limbs(figure: Voxels, torso: Torso, is_head: NDArray[np.bool_]) -> list[LimbRegion]:
+def find_limbs(figure: Voxels, graph: VoxelGraph, torso: Torso, is_head: NDArray[np.bool_]) -> list[LimbRegion]:
     """Return the limbs that stand out, at most four, the largest first.
 
     Args:
         figure: voxels of one person.
+        graph: their `neighbor_graph`.
         torso: its torso.
         is_head: which voxels belong to the head, (N,).
     """
-
-    points, size_m = figure.points_world, figure.grid.size_m
-    distances = path_lengths(points, torso.is_torso | is_head, size_m)
+    points = figure.points_world
+    distances = path_lengths(graph, torso.is_torso | is_head, figure.grid.size_m)
     whole = np.flatnonzero(np.isfinite(distances) & (distances > _SKIN_M))
     found = [_limb(points, branch, distances, torso) for branch in _branches(figure, whole, distances, _SKIN_M)]
     return sorted(found, key=lambda limb: -len(limb.indices))

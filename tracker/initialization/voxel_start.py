@@ -13,6 +13,7 @@ from tracker.geometry.arrays import Array
 from tracker.initialization.head_template import Head, find_head
 from tracker.initialization.limb_regions import LimbRegion, find_limbs
 from tracker.initialization.torso_template import Torso, find_torso
+from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.voxel_grid import Voxels
 
 SIDES = ("left", "right")
@@ -65,7 +66,8 @@ def locate_parts(figure: Voxels, motion: Array | None = None) -> FigureParts:
     Raises:
         TrackerError: no head is found.
     """
-    head = find_head(figure)
+    graph = neighbor_graph(figure)
+    head = find_head(figure, graph)
     if head is None:
         raise TrackerError(
             "expected a head that stands out of the silhouettes, found none; choose another --frame, on which no "
@@ -74,7 +76,7 @@ def locate_parts(figure: Voxels, motion: Array | None = None) -> FigureParts:
     # Lengths below are those of an adult: a child is enlarged to one.
     grown = figure.scaled(1 / head.scale)
     torso = find_torso(grown, head.neck / head.scale, head.is_head)
-    limbs = find_limbs(grown, torso, head.is_head)
+    limbs = find_limbs(grown, graph, torso, head.is_head)
     moved = None if motion is None else motion / head.scale
     facing = facing_cues(grown, torso.axes[:, 0], torso.axes[:, 2], moved) + _bends(torso, limbs)
     if facing < 0:

@@ -1,28 +1,45 @@
 """Lengths of the shortest paths through the voxels of a figure: they hardly change with its pose."""
 
+import itertools
+from typing import TYPE_CHECKING, TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
+from tracker.voxels.voxel_grid import Voxels
 
-_NEIGHBOR = 1.8
-"""Largest distance of neighbors, in edges of a voxel: those that share a face, an edge or a corner."""
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+VoxelGraph: TypeAlias = "csr_matrix"
+"""Distances of neighbouring voxels, (N, N), each pair once, in edges of a voxel."""
+_STEPS = np.array([s for s in itertools.product((-1, 0, 1), repeat=3) if s > (0, 0, 0)])
+"""From a voxel to its neighbours across a face, an edge or a corner, one of each opposite pair, (13, 3)."""
 
 
-def path_lengths(points: Array, sources: NDArray[np.bool_], size_m: float) -> Array:
+def neighbor_graph(figure: Voxels) -> VoxelGraph:
+    """Return the graph of a figure's voxels. It does not depend on the scale of the figure."""
+    from scipy.sparse import coo_matrix  # imported lazily: loading scipy takes 0.2 s
+
+    at, n = figure.indices + 1, len(figure.indices)
+    numbers = np.full(np.add(figure.grid.shape, 2), -1)
+    numbers[tuple(at.T)] = np.arange(n)
+    neighbors = np.stack([numbers[tuple((at + step).T)] for step in _STEPS], axis=1)
+    voxels, steps = np.nonzero(neighbors >= 0)
+    lengths = np.linalg.norm(_STEPS, axis=1)[steps]
+    return coo_matrix((lengths, (voxels, neighbors[voxels, steps])), shape=(n, n)).tocsr()
+
+
+def path_lengths(graph: VoxelGraph, sources: NDArray[np.bool_], size_m: float) -> Array:
     """Return the length of the shortest path from the sources to each voxel, (N,), metres; infinite where none leads.
 
     Args:
-        points: centres of the voxels, (N, 3), metres.
+        graph: of the figure.
         sources: the voxels from which paths begin, (N,).
         size_m: edge of a voxel, metres.
     """
-    from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
-    from scipy.spatial import cKDTree
 
-    pairs = cKDTree(points).query_pairs(_NEIGHBOR * size_m, output_type="ndarray")
-    lengths = np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1)
-    graph = coo_matrix((lengths, (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
-    found = dijkstra(graph.tocsr(), directed=False, indices=np.flatnonzero(sources), min_only=True)
-    return np.asarray(found)
+    found = dijkstra(graph, directed=False, indices=np.flatnonzero(sources), min_only=True)
+    return np.asarray(size_m * found)

@@ -9,6 +9,7 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.initialization.candidates import from_axis, from_search, from_voxels, silhouette_axes, standing_height
 from tracker.initialization.head_template import find_head
+from tracker.voxels.paths import neighbor_graph
 
 CAMERAS = cameras_about_a_figure()
 MODEL = load_model("gavrila34")
@@ -72,7 +73,7 @@ def test_raised_arms_do_not_make_a_person_taller(arms_deg):
     voxels, joints = figure(arms_deg=arms_deg)
     top = joints["head"] + (0.0, 0.0, 0.125)
     soles_m = joints["left_ankle"][2] - 0.07
-    found = standing_height(scene(voxels), np.array([0.0, 0.0, 1.0]), top, find_head(voxels))
+    found = standing_height(scene(voxels), np.array([0.0, 0.0, 1.0]), top, find_head(voxels, neighbor_graph(voxels)))
     assert found == pytest.approx(top[2] - soles_m, abs=0.03)
 
 
@@ -80,7 +81,7 @@ def test_a_person_who_lies_or_crouches_has_no_standing_height():
     voxels, joints = figure()
     top, up = joints["head"] + (0.0, 0.0, 0.125), np.array([0.0, 0.0, 1.0])
     assert standing_height(scene(voxels), np.array([1.0, 0.0, 0.0]), top) is None
-    head = find_head(voxels)
+    head = find_head(voxels, neighbor_graph(voxels))
     assert standing_height(scene(voxels), up, top, head._replace(path_m=1.3 * head.path_m)) is None
     assert standing_height(scene(voxels), up, top, head._replace(neck=head.neck - (0.0, 0.0, 0.10))) is None
 

@@ -8,6 +8,7 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.initialization.head_template import find_head
 from tracker.initialization.voxel_start import locate_parts, start_pose, turned_round
+from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.voxel_grid import Voxels
 
 POSES = [
@@ -47,7 +48,7 @@ def test_any_body_takes_the_start(name):
 
 def test_the_head_and_the_neck():
     voxels, joints = figure()
-    head = find_head(voxels)
+    head = find_head(voxels, neighbor_graph(voxels))
     assert np.linalg.norm(head.center - joints["head"]) < 0.05
     # The neck is where the sphere around the head meets the body.
     assert np.linalg.norm(head.neck[:2] - joints["neck"][:2]) < 0.02
