@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import Status, probabilities, worst
-from tracker.tracking.run_confidence import classify_limbs
+from tracker.tracking.confidence import Status, classify_limbs, probabilities, worst
 
 OFF_MM, LOST_MM = 100.0, 150.0
 """A limb is off, and lost, where the error of a joint is larger."""

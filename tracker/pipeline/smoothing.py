@@ -16,8 +16,16 @@ from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
 from tracker.store.records import PoseChange, PoseRecord
-from tracker.tracking.confidence import PoseQuality, frame_features, is_uncertainty, probabilities, uncertain, worst
-from tracker.tracking.run_confidence import LOST_FROM, classify_limbs, log_odds, run_features, smoothing_steps
+from tracker.tracking.confidence import (
+    PoseQuality,
+    classify_limbs,
+    frame_features,
+    is_uncertainty,
+    probabilities,
+    uncertain,
+    worst,
+)
+from tracker.tracking.run_confidence import LOST_FROM, log_odds, run_features, smoothing_steps
 from tracker.tracking.subjects import Subjects
 
 

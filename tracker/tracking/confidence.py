@@ -57,8 +57,6 @@ def _odds(probability: float) -> float:
 OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.25)
 """A limb is doubtful above these log odds that a joint is off by more than 100 mm, and lost above these that one is by
 more than 150 mm. To call a wrong pose good is the worse error."""
-_DOUBTFUL_ODDS = OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT
-"""Log odds of a lost limb where the odds that it is off are `OFF_ODDS`."""
 
 _SEARCH_WEIGHTS = np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704])
 """Weights of `search_features`, in their order, and the constant."""
@@ -322,10 +320,14 @@ def _second_largest(shares: Array) -> float:
 
 def classify(found: PoseQuality) -> Status:
     """Return the status of a pose."""
-    most = found.log_odds.max(initial=-np.inf)
-    if found.is_unseen or most > LOST_ODDS:
-        return "lost"
-    return "doubtful" if most > _DOUBTFUL_ODDS else "good"
+    odds = found.log_odds[:, None] + (_OFF_CONSTANT - _LOST_CONSTANT, 0.0)
+    return "lost" if found.is_unseen else classify_limbs(odds)
+
+
+def classify_limbs(odds: Array) -> Status:
+    """Return the status of a pose from the log odds that its limbs are off and lost, (n_limbs, 2)."""
+    off, lost = odds.max(axis=0, initial=-np.inf)
+    return "lost" if lost > LOST_ODDS else "doubtful" if off > OFF_ODDS else "good"
 
 
 def reason(found: PoseQuality) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS, Status, probabilities
+from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS, probabilities
 
 _WEIGHTS = np.array([1.623, 2.136, -1.529, -1.445, 4.644, -1.302, 1.014, 0.628])
 """Weights of `run_features`, in their order."""
@@ -62,9 +62,3 @@ def run_features(frame_features: Array, steps: Array) -> Array:
 def log_odds(found: Array) -> Array:
     """Return the log odds of off and lost, (..., 2), of features, (..., 8)."""
     return np.asarray((found @ _WEIGHTS)[..., None] + (_OFF_CONSTANT, _LOST_CONSTANT))
-
-
-def classify_limbs(odds: Array) -> Status:
-    """Return the status of a pose from the log odds of its limbs, (n_limbs, 2)."""
-    off, lost = odds.max(axis=0)
-    return "lost" if lost > LOST_ODDS else "doubtful" if off > OFF_ODDS else "good"

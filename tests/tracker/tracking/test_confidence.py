@@ -14,10 +14,13 @@ from tracker.fitting.contour_residuals import ContourResiduals, PartCosts
 from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.tracking.confidence import (
+    _LOST_CONSTANT,
+    _OFF_CONSTANT,
     LimbFeatures,
     PoseQuality,
     _Contours,
     classify,
+    probabilities,
     quality,
     reason,
     worst,
@@ -108,6 +111,16 @@ def test_worse_figures_never_clear_a_limb(before, worse, body):
         assert set(better.search_candidates(alone)) <= set(worst_of.search_candidates(alone))
     order = ("good", "doubtful", "lost")
     assert order.index(classify(worst_of)) >= order.index(classify(better))
+
+
+def test_a_limb_is_doubtful_where_it_may_be_off_and_lost_where_it_may_be_lost():
+    seen = set()
+    for spread_px in np.geomspace(1.0, 80.0, 40):
+        found = PoseQuality(0.05, 3, 0.0, 0.05, (CLEAR, CLEAR._replace(free_spread_px=spread_px)))
+        off, lost = (probabilities(found.log_odds + c - _LOST_CONSTANT).max() for c in (_OFF_CONSTANT, _LOST_CONSTANT))
+        assert classify(found) == ("lost" if lost > 0.25 else "doubtful" if off > 0.05 else "good")
+        seen.add(classify(found))
+    assert seen == {"good", "doubtful", "lost"}
 
 
 def test_what_is_plain():

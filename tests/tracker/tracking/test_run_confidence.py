@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from staging import posed
 
 from tracker.body.limbs import limbs
+from tracker.tracking.confidence import classify_limbs
 from tracker.tracking.run_confidence import (
     DOUBTFUL_FROM,
     LOST_FROM,
     N_FEATURES,
-    classify_limbs,
     log_odds,
     run_features,
     smoothing_steps,
