@@ -11,6 +11,7 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 _FRAME = 25
 _FRAMES = 3
 """Number of tracked frames: motion and lost limbs exist from the second on."""
+_VOXEL_M = 0.05
 _WAIT_S = 0.5
 _GC_THRESHOLDS = 50_000, 20, 50
 """Thresholds of the garbage collector: numba makes so many objects that the usual ones cost a sixth of the time."""
@@ -92,6 +94,8 @@ def _call_kernels(background: bool) -> None:
         ChamferCost(Observer(session.cameras, recording).evidence(_FRAME), bodies).at_prediction()
     record_stage("cost")
     _call_tracking(session)
+    record_stage("tracking")
+    _call_others(session)
 
 
 def _compile_posing(session: Session) -> list[PosedBody]:
@@ -120,25 +124,47 @@ def _compile_evidence(session: Session, background: bool) -> None:
 
 
 def _call_tracking(session: Session) -> None:
-    """Search and track on a few frames: two people, one as in GD96, one without a background.
-
-    Kernels that tracking does not need follow: labels of the parts, the simulator.
-    """
+    """Search and track on a few frames: two people, one as in GD96, one without a background."""
     # Imported here: most of the program, which the page's first kernels do not wait for.
     from app.bench.sample_frames import read_crowd
-    from tracker.contours.label_image import part_labels
-    from tracker.simulate.people.model_figure import ModelFigure
-    from tracker.simulate.stage.camera_rig import make_cameras
-    from tracker.simulate.stage.film import film, freeze
-    from tracker.simulate.stage.room import see_room
     from tracker.tracking.chamfer.settings import TrackSettings
 
     crowd, cameras, settings = read_crowd(session.folder, _FRAME), session.cameras, TrackSettings()
     _track(cameras, settings, crowd.models, crowd.values)
     _track(cameras, replace(settings, estimate="search"), crowd.models[:1], crowd.values[:1])
     _track([replace(c, background=None) for c in cameras], settings, crowd.models[:1], crowd.values[:1])
-    part_labels([PosedBody(crowd.models[0], crowd.values[0])], cameras[0].camera.pinhole)
-    film(see_room(make_cameras(1, (32, 32), 0)[0], 0), freeze([ModelFigure(crowd.models[0])], crowd.values[:1]))
+
+
+def _call_others(session: Session) -> None:
+    """Call the kernels that the chamfer tracker does not need.
+
+    They label parts in an image, carve and label voxels, compare bodies with silhouettes, and film simulated people.
+    """
+    from tracker.contours.label_image import part_labels
+    from tracker.evidence.silhouettes import SilhouetteFinder
+    from tracker.geometry.cameras import viewed_point
+    from tracker.initialization.silhouette_overlap import SilhouetteOverlap
+    from tracker.simulate.people.model_figure import ModelFigure
+    from tracker.simulate.stage.camera_rig import make_cameras
+    from tracker.simulate.stage.film import film, freeze
+    from tracker.simulate.stage.room import see_room
+    from tracker.tracking.voxel.body_pose import state_of
+    from tracker.tracking.voxel.labels import label_voxels
+    from tracker.tracking.voxel.settings import VoxelSettings
+    from tracker.voxels.carving import Carver
+    from tracker.voxels.voxel_grid import VoxelGrid
+
+    model, cameras = session.people[0].model, [c.camera for c in session.cameras]
+    body, middle = PosedBody(model, default_pose(model, cameras)), viewed_point(cameras)
+    part_labels([body], cameras[0].pinhole)
+    film(see_room(make_cameras(1, (32, 32), 0)[0], 0), freeze([ModelFigure(model)], [body.values]))
+    with Recording(session.cameras) as recording, closing(SilhouetteFinder(session.cameras, recording)) as finder:
+        silhouettes = finder.silhouettes(_FRAME)
+    Carver(silhouettes).carve(VoxelGrid.over(middle - 1.0, middle + 1.0, _VOXEL_M))
+    settings = VoxelSettings()
+    label_voxels(middle[None], [state_of(model, [body.values], 0.04, settings)], _VOXEL_M, settings.label_rule)
+    overlap = SilhouetteOverlap(model, [s.mask for s in silhouettes], [s.camera for s in silhouettes], middle)
+    overlap.added(body.kinematics.Ts_world_part[None], np.arange(len(model.parts)), overlap.nothing())
 
 
 def _track(

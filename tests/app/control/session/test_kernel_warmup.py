@@ -14,10 +14,15 @@ from app.bench import compile_kernels
 from app.drawing import overlays
 from app.runtime import kernel_compiler
 from app.runtime.kernel_compiler import KernelCompiler
+from app.session.samples import bundled
 from app.state.page_view import View
 from tracker.compute import kernel_cache
 from tracker.compute.interpretation import is_interpreted
 from tracker.compute.kernel_cache import STAGES, compiled_mark, compiled_stages, record_compiled, record_stage
+from tracker.initialization import silhouette_overlap
+from tracker.session.session import load_session
+from tracker.tracking.voxel import labels
+from tracker.voxels import carving
 
 VIEW = View(frozenset({"contours"}), (1, 0, 0, 0))
 """The contours of one camera."""
@@ -148,7 +153,7 @@ def test_one_program_compiles_at_a_time(empty_cache, monkeypatch):
 
 def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monkeypatch):
     """All of them, by tracking: those that two people need, the paper's search, and a room without a background."""
-    tracked, priorities, stages, beside = [], [], [], []
+    tracked, priorities, stages, waited_for, beside = [], [], [], [], []
     monkeypatch.setattr("os.nice", priorities.append)
 
     class Beside:
@@ -169,13 +174,23 @@ def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monk
     monkeypatch.setattr(
         compile_kernels, "_track", lambda cameras, settings, models, start: tracked.append((cameras, settings, models))
     )
+    monkeypatch.setattr(compile_kernels, "_call_others", lambda _: waited_for.extend(stages))
     compile_kernels.main(background=True)
     assert priorities == [19, 19]  # of the program, and of the process beside it after the evidence
     assert beside == ["started", "joined"]
-    assert sorted(stages) == sorted(STAGES[:4])
+    assert sorted(stages) == sorted(waited_for) == sorted(STAGES)  # no stage waits for other kernels
     assert [(s.estimate, len(m), c[0].background is None) for c, s, m in tracked] == [
         ("refine", 2, False), ("search", 1, False), ("refine", 1, True)
     ]  # fmt: skip
     assert compiled_mark().exists()
     assert compiled_stages() == frozenset(STAGES)
     assert not list(empty_cache.glob("stage-*"))
+
+
+def test_kernels_that_find_people_and_track_voxels_are_called_too(monkeypatch):
+    called = []
+    for module, name in ((carving, "carve_blocks"), (labels, "label_and_sum"), (silhouette_overlap, "_add")):
+        kernel = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *args, kernel=kernel, name=name: called.append(name) or kernel(*args))
+    compile_kernels._call_others(load_session(bundled("tango")))
+    assert called == ["carve_blocks", "label_and_sum", "_add"]
