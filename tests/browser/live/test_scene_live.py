@@ -47,6 +47,12 @@ CAMERAS = (
 
 
 N_FRAMES = 6
+ALL_PIXELS = """
+if (location.pathname.endsWith("/viser/") && !location.search.includes("fixedDpr")) {
+  history.replaceState(null, "", `?fixedDpr=1&${location.search.slice(1)}`);
+}
+"""
+"""JavaScript: viser draws every pixel; on a slow machine it would draw fewer in some pictures and enlarge them."""
 
 
 def seen(view, model, values):
@@ -93,6 +99,7 @@ def folder(tmp_path_factory):
 async def live(browser, folder):
     async with started(folder) as program:
         context = await browser.new_context(viewport={"width": 1280, "height": 720}, color_scheme="dark")
+        await context.add_init_script(ALL_PIXELS)
         page = await context.new_page()
         await page.goto(program.address, timeout=120_000)
         await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 120)
@@ -149,6 +156,20 @@ def edge_distances(a, b):
     return cv2.distanceTransform(to_b, cv2.DIST_L2, 5)[tuple(outline_of(a).T)]
 
 
+def shift_px(a, b):
+    """Distance by which one silhouette is shifted against another, px; one may be wider than the other all round.
+
+    Their centroids would not do: the border of light limbs is found farther inside than that of the dark trunk. Thinner
+    legs alone move the centroid by most of a pixel.
+    """
+    outside, inside = (cv2.distanceTransform(m.astype(np.uint8), cv2.DIST_L2, 5) for m in (~a, a))
+    signed = outside - inside
+    at = tuple(outline_of(b).T)
+    normals = np.stack(np.gradient(cv2.GaussianBlur(signed, (0, 0), 1.0)), axis=-1)[at]
+    (rows, columns, _), *_ = np.linalg.lstsq(np.column_stack([normals, np.ones(len(normals))]), signed[at])
+    return np.hypot(rows, columns)
+
+
 def is_white(image):
     return image.min(axis=-1) > 200
 
@@ -168,11 +189,10 @@ async def test_bodies_lie_on_their_images_at_any_size_of_the_canvas(live, index,
         belongs = cv2.cvtColor(filmed, cv2.COLOR_BGR2GRAY) > 127
         is_drawn = np.abs(drawn.astype(int) - filmed).max(axis=-1) > 40
         distances = np.concatenate([edge_distances(belongs, is_drawn), edge_distances(is_drawn, belongs)])
-        a, b = (np.argwhere(m).mean(axis=0) for m in (belongs, is_drawn))
-        found.append((np.hypot(*(a - b)), np.mean(distances), np.percentile(distances, 95)))
+        found.append((shift_px(belongs, is_drawn), np.mean(distances), np.percentile(distances, 95)))
     print(*(f"off by {m:.2f} px, outlines {d:.2f} px apart, 95% within {p:.2f};" for m, d, p in found))
     offsets, means, nearly_all = zip(*found, strict=True)
-    assert max(offsets) < 1.0
+    assert max(offsets) < 0.5
     assert max(means) < 0.6  # outlines of whole pixels
     assert max(nearly_all) <= 1.5
     await live.set_viewport_size({"width": 1280, "height": 720})
