@@ -154,11 +154,12 @@ def _call_others(session: Session) -> None:
     from tracker.voxels.carving import Carver
     from tracker.voxels.voxel_grid import VoxelGrid
 
-    model, cameras = session.people[0].model, [c.camera for c in session.cameras]
+    model, sources = session.people[0].model, session.cameras[:2]  # each more view would take half a second
+    cameras = [c.camera for c in sources]
     body, middle = PosedBody(model, default_pose(model, cameras)), viewed_point(cameras)
     part_labels([body], cameras[0].pinhole)
     film(see_room(make_cameras(1, (32, 32), 0)[0], 0), freeze([ModelFigure(model)], [body.values]))
-    with Recording(session.cameras) as recording, closing(SilhouetteFinder(session.cameras, recording)) as finder:
+    with Recording(sources) as recording, closing(SilhouetteFinder(sources, recording)) as finder:
         silhouettes = finder.silhouettes(_FRAME)
     Carver(silhouettes).carve(VoxelGrid.over(middle - 1.0, middle + 1.0, _VOXEL_M))
     settings = VoxelSettings()
