@@ -16,13 +16,14 @@ from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.geometry.ground_plane import up_rotation
+from tracker.geometry.ground_plane import floor_plane
 from tracker.initialization.body_axis import find_body_axes
 from tracker.initialization.head_template import find_head
 from tracker.initialization.silhouette_axis import major_axis
 from tracker.pipeline.first_pose import VOXEL_M, find_first_poses
 from tracker.session.session import load_session
 from tracker.voxels.paths import neighbor_graph
+from tracker.voxels.shadows import recover_from_shadows
 from tracker.voxels.visual_hull import carve_people
 
 HEAD_CENTER, HEAD_M = 0.07, 0.10
@@ -81,17 +82,17 @@ def _row(found, references, frame):
 
 def _print_heads(session, recording, reference, every):
     """Print in how many frames each method locates the head within 10 cm of the reference."""
-    finder, up = SilhouetteFinder(session.cameras, recording), up_rotation(session.up, session.floor)[:, 2]
+    finder, floor = SilhouetteFinder(session.cameras, recording), floor_plane(session.up, session.floor)
     height_m, off = session.people[0].model.height_m, {"voxels": [], "axis": []}
     for frame in range(0, session.n_frames, every):
-        silhouettes = finder.silhouettes(frame)
+        silhouettes = recover_from_shadows(finder.silhouettes(frame), floor, VOXEL_M)
         truth = dict(zip(reference.names, reference.points[frame], strict=True))["head"]
         figure = carve_people(silhouettes, VOXEL_M).figures[0]
         head = find_head(figure, neighbor_graph(figure))
         off["voxels"].append(np.inf if head is None else np.linalg.norm(head.center - truth))
         try:
             axes = [a for s in silhouettes if (a := major_axis(s.mask, s.camera)) is not None]
-            found = find_body_axes(axes, up, height_m)[0]
+            found = find_body_axes(axes, floor.normal, height_m)[0]
             off["axis"].append(np.linalg.norm(found.top - HEAD_CENTER * height_m * found.up - truth))
         except TrackerError:
             off["axis"].append(np.inf)

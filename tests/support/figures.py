@@ -4,8 +4,11 @@ import numpy as np
 from staging import camera_at
 
 from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.geometry.ground_plane import GroundPlane
 from tracker.initialization.candidates import PersonScene
+from tracker.initialization.voxel_start import locate_parts, possible_heads
 from tracker.voxels.figure_masks import figure_masks, paint
+from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -84,4 +87,10 @@ def cameras_about_a_figure(n=4):
 
 def scene_of(voxels, silhouettes, motion=None):
     """What is known of a figure that is alone."""
-    return PersonScene(voxels, silhouettes, figure_masks(silhouettes, voxels), UP, motion)
+    return PersonScene(voxels, silhouettes, figure_masks(silhouettes, voxels), GroundPlane(UP, 0.0), motion)
+
+
+def parts_of(voxels, motion=None):
+    """The parts of a figure with its most likely head."""
+    graph = neighbor_graph(voxels)
+    return locate_parts(voxels, graph, possible_heads(voxels, graph, UP)[0], motion)

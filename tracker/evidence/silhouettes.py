@@ -19,6 +19,7 @@ from tracker.geometry.cameras import Camera
 from tracker.images.background_model import BackgroundModel, background_of_clip, background_of_recording
 from tracker.images.background_subtraction import (
     SHADOWS_AND_HIGHLIGHTS,
+    Changes,
     Mask,
     Shading,
     apply_gain,
@@ -53,6 +54,8 @@ class ViewSilhouette(NamedTuple):
     """How cleanly the silhouette was found, 0 to 1, see `CleanSilhouette`; 1 for a user's mask."""
     source: SilhouetteSource
     """Where it comes from."""
+    shadow: Mask | None = None
+    """What else has changed, (H, W): shadows, highlights, and clothes that look like them. None for a user's mask."""
 
     @property
     def is_empty(self) -> bool:
@@ -111,18 +114,19 @@ class SilhouetteFinder:
         if frame is None:
             return ViewSilhouette(np.zeros((camera.height, camera.width), bool), camera, 0.0, "none")
         model = self._models[i]
-        clean = clean_silhouette(self._changes(self._smooth(i, frame), model))
-        learnt = source.background is None
-        return ViewSilhouette(clean.mask, camera, clean.quality, "recording" if learnt else "background")
+        changes = self._changes(self._smooth(i, frame), model)
+        clean = clean_silhouette(changes.inside)
+        origin: SilhouetteSource = "recording" if source.background is None else "background"
+        return ViewSilhouette(clean.mask, camera, clean.quality, origin, changes.anything & ~clean.mask)
 
-    def _changes(self, smooth: Image, model: BackgroundModel) -> Mask:
+    def _changes(self, smooth: Image, model: BackgroundModel) -> Changes:
         samples, empty = (x[::_SPACING_PX, ::_SPACING_PX].reshape(-1, 3) for x in (smooth, model.image))
         colors, empty_colors = samples.astype(np.float32), empty.astype(np.float32)
         usable = has_usable_exposure(empty_colors)
         gain: FloatArray = exposure_gain(colors[usable], empty_colors[usable])
         threshold = change_threshold(np.abs(colors - gain * empty_colors).max(axis=-1))
         background = apply_gain(model.image, gain)
-        return subtract_background(smooth, background, threshold, self._shading, model.noise).inside
+        return subtract_background(smooth, background, threshold, self._shading, model.noise)
 
     def _smooth(self, i: int, frame: Image) -> Image:
         view = self._views[i]

@@ -85,3 +85,13 @@ def up_rotation(up: str, floor: GroundPlane | None) -> Array:
         floor: the plane set by a person; None for the plane through the world's origin.
     """
     return UP_ROTATIONS[up] if floor is None else floor.turned(UP_ROTATIONS[up])
+
+
+def floor_plane(up: str, floor: GroundPlane | None) -> GroundPlane:
+    """Return the floor of a session.
+
+    Args:
+        up: world axis that points up, or is nearest to it.
+        floor: the plane set by a person; None for the plane through the world's origin.
+    """
+    return GroundPlane(UP_ROTATIONS[up][:, 2], 0.0) if floor is None else floor

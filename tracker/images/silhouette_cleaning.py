@@ -17,6 +17,8 @@ MIN_COMPONENT = 0.1
 MIN_AREA = 0.0005
 """Smallest area of a silhouette, as a share of the image."""
 
+_RIM = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+
 
 class CleanSilhouette(NamedTuple):
     """A silhouette without noise and small holes."""
@@ -38,6 +40,14 @@ def clean_silhouette(changed: Mask) -> CleanSilhouette:
     mask = _without_small_holes(largest_components(np.asarray(closed) > 0))
     union = np.count_nonzero(changed | mask)
     return CleanSilhouette(mask, float(np.count_nonzero(changed & mask) / union) if union else 0.0)
+
+
+def without_rims(mask: Mask) -> Mask:
+    """Remove what is at most four pixels wide from a mask, (H, W), such as the rim of a silhouette.
+
+    Pixels there mix the person's colours with the background's.
+    """
+    return np.asarray(cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, _RIM)) > 0
 
 
 def largest_components(mask: Mask, min_share: float = MIN_COMPONENT) -> Mask:

@@ -9,14 +9,23 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
+from tracker.geometry.ground_plane import GroundPlane
 from tracker.initialization.axis_start import AxisStart, search_on_axes
 from tracker.initialization.body_axis import BodyAxis, find_body_axes
 from tracker.initialization.head_template import Head
 from tracker.initialization.silhouette_axis import MajorAxis, major_axis
 from tracker.initialization.silhouette_overlap import SilhouetteOverlap
-from tracker.initialization.voxel_start import facing_cues, locate_parts, start_pose, turned_round
+from tracker.initialization.voxel_start import (
+    facing_cues,
+    locate_parts,
+    possible_heads,
+    start_pose,
+    turned_round,
+)
 from tracker.voxels.figure_masks import FigureMask
 from tracker.voxels.part_size import principal_axes
+from tracker.voxels.paths import neighbor_graph
+from tracker.voxels.shadows import is_changed_at
 from tracker.voxels.voxel_grid import Voxels
 
 StartMethod: TypeAlias = Literal["voxels", "axis", "search"]
@@ -30,6 +39,8 @@ the person's size as a share of an adult's, and the largest relative error. Fold
 _MAX_PATH = 1.25
 """Largest path from the top of the head to the soles, as a share of the height of a person who stands: folded legs make
 it longer. The grid lengthens paths by up to a tenth."""
+_MAX_HIDDEN_M = 0.15
+"""Largest height of shoes that shadows hide, metres."""
 _AXES_TRIED = 3
 _RAISED = (0.0, 0.10, 0.20)
 """Tops of the head that a search tries, below the end of the figure, as fractions of the height: hands may be above."""
@@ -44,10 +55,15 @@ class PersonScene(NamedTuple):
     """Of all views."""
     masks: Sequence[FigureMask]
     """Those of the person alone."""
-    up: Array
-    """Vertical axis of the world, (3,)."""
+    floor: GroundPlane
+    """The floor."""
     motion: Array | None
     """The way of the person to later frames, (3,), metres; None if it is not known."""
+
+    @property
+    def up(self) -> Array:
+        """Vertical axis of the world, (3,)."""
+        return self.floor.normal
 
 
 class StartCandidate(NamedTuple):
@@ -73,7 +89,7 @@ class StartCandidate(NamedTuple):
 
 
 def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
-    """Return starts from the parts that voxels show (MTHC01 Sect. 3), one for each way of facing.
+    """Return starts from the parts that voxels show (MTHC01 Sect. 3), one for each head and way of facing.
 
     Args:
         scene: the person on a frame.
@@ -83,18 +99,22 @@ def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[St
     Raises:
         TrackerError: no head is found.
     """
-    parts = locate_parts(scene.figure, scene.motion)
-    head = scene.figure.points_world[parts.head.is_head]
-    top = head[int(np.argmax(head @ scene.up))] + scene.figure.grid.size_m / 2 * scene.up
-    height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], top, parts.head)
-    own = model if height_m is None else model.with_height(height_m)
-    return [
-        StartCandidate(
-            "voxels", own, start_pose(own, p), p.torso.axes[:, 0], sign * p.facing, p.unresolved, p.straight,
-            None, is_known or height_m is not None,
-        )
-        for sign, p in ((1.0, parts), (-1.0, turned_round(parts)))
-    ]  # fmt: skip
+    starts: list[StartCandidate] = []
+    graph = neighbor_graph(scene.figure)
+    for head in possible_heads(scene.figure, graph, scene.up):
+        parts = locate_parts(scene.figure, graph, head, scene.motion)
+        points = scene.figure.points_world[head.is_head]
+        top = points[int(np.argmax(points @ scene.up))] + scene.figure.grid.size_m / 2 * scene.up
+        height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], top, head)
+        own = model if height_m is None else model.with_height(height_m)
+        starts += [
+            StartCandidate(
+                "voxels", own, start_pose(own, p), p.torso.axes[:, 0], sign * p.facing, p.unresolved, p.straight,
+                None, is_known or height_m is not None,
+            )
+            for sign, p in ((1.0, parts), (-1.0, turned_round(parts)))
+        ]  # fmt: skip
+    return starts
 
 
 def from_axis(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
@@ -165,7 +185,7 @@ def standing_height(scene: PersonScene, trunk_up: Array, top: Array, head: Head 
     """
     if trunk_up @ scene.up < _UPRIGHT:
         return None
-    low = float((scene.figure.points_world @ scene.up).min()) - scene.figure.grid.size_m / 2
+    low = _soles(scene)
     height_m = float(top @ scene.up) - low
     if head is None:
         return height_m
@@ -173,6 +193,23 @@ def standing_height(scene: PersonScene, trunk_up: Array, top: Array, head: Head 
     usual = _NECK + _NECK_GROWTH * head.scale
     stands = abs(neck / usual - 1) < _NECK_SPREAD and head.path_m <= _MAX_PATH * height_m
     return height_m if stands else None
+
+
+def _soles(scene: PersonScene) -> float:
+    """Return the height of the soles along the vertical axis, metres: that of the lowest voxels, or the floor's.
+
+    Shoes are lost in the shadow around them. The person stands on the floor if all views show a change all the way down
+    from a lowest voxel.
+    """
+    points, size_m = scene.figure.points_world, scene.figure.grid.size_m
+    heights = points @ scene.up
+    low = float(heights.min()) - size_m / 2
+    depths = np.arange(size_m, low - scene.floor.offset_m + size_m / 2, size_m)
+    if not len(depths) or depths[-1] > _MAX_HIDDEN_M:
+        return low
+    below = points[heights < low + size_m, None] - depths[:, None] * scene.up
+    is_changed = np.all([is_changed_at(s, below.reshape(-1, 3)) for s in scene.silhouettes], axis=0)
+    return scene.floor.offset_m if is_changed.reshape(below.shape[:2]).all(axis=1).any() else low
 
 
 def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:

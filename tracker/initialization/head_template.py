@@ -38,6 +38,8 @@ _MAX_PIECE = 0.02
 """Largest share of a figure's voxels that may be cut off from the rest without the head: hair and stray voxels."""
 _TRIED = 5
 """Number of places that are tried, from the highest score down."""
+_UPPER_M, _MIN_UPPER_SCORE = 0.35, 0.4
+"""Depth of the upper end of a figure below its highest voxel, metres, and the smallest score of a head there."""
 _ADULT_M, _ADULT_M3 = 1.75, 0.10
 """Stature of a typical adult, metres, and the volume of the visual hull, cubic metres."""
 _HEAD_M, _HEAD_GROWTH_M = 0.0945, 0.0405
@@ -63,27 +65,30 @@ class Head(NamedTuple):
 
 
 def find_head(figure: Voxels, graph: VoxelGraph) -> Head | None:
-    """Return the head of a figure; None if no place scores enough or nothing is beside it.
+    """Return the most likely head of a figure, however it lies; None if no place scores enough or nothing is beside it.
 
     Args:
         figure: voxels of one person, at most about 5 cm each.
         graph: their `neighbor_graph`.
     """
-    points = figure.points_world
-    places = ((t.outer_m, place) for t in _TEMPLATES for place in _places(figure, t))
-    best = next(((r, place) for r, place in places if _is_end(figure, place.distances <= r)), None)
-    if best is None:
-        return None
-    radius_m, (score, distances) = best
-    lengths = path_lengths(graph, distances <= radius_m, figure.grid.size_m)
-    path_m = radius_m + float(lengths[np.isfinite(lengths)].max())
-    # A person whom an image cuts off has short paths, yet the volume of more than a child.
-    scale = min(1.0, max(path_m / _ADULT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
-    is_head = distances <= _HEAD_M + _HEAD_GROWTH_M * scale
-    neck = _neck(figure, is_head)
-    if neck is None:
-        return None
-    return Head(points[is_head].mean(axis=0), neck, is_head, score, path_m, scale)
+    place = next((p for t in _TEMPLATES for p in _ends(figure, t, _scores(figure, t), t.min_score)), None)
+    return None if place is None else _head(figure, graph, place)
+
+
+def find_upper_head(figure: Voxels, graph: VoxelGraph, up: Array) -> Head | None:
+    """Return the head at the upper end of a figure; None if no place there scores enough.
+
+    Beside broad shoulders a head scores less than a hand or a foot may do. People seldom stand on their heads.
+
+    Args:
+        figure: voxels of one person, at most about 5 cm each.
+        graph: their `neighbor_graph`.
+        up: vertical axis of the world, (3,).
+    """
+    heights, template = figure.points_world @ up, _TEMPLATES[-1]
+    scores = np.where(heights > heights.max() - _UPPER_M, _scores(figure, template), -np.inf)
+    place = next(_ends(figure, template, scores, _MIN_UPPER_SCORE), None)
+    return None if place is None else _head(figure, graph, place)
 
 
 class _Place(NamedTuple):
@@ -93,13 +98,15 @@ class _Place(NamedTuple):
     """See `Template.min_score`."""
     distances: Array
     """Of the figure's voxels from there, (N,), metres."""
+    radius_m: float
+    """Radius of the head there, metres."""
 
 
-def _places(figure: Voxels, template: Template) -> Iterator[_Place]:
-    """Yield the places that score enough, and their scores, from the highest down."""
+def _scores(figure: Voxels, template: Template) -> Array:
+    """Return the score of a template at each voxel of a figure, (N,)."""
     from scipy.signal import fftconvolve  # imported lazily: loading it takes 0.5 s
 
-    size, (inner_m, outer_m, surrounding_m, min_score) = figure.grid.size_m, template
+    size, (inner_m, outer_m, surrounding_m, _) = figure.grid.size_m, template
     reach = int(np.ceil(surrounding_m / size))
     distance = size * np.sqrt(np.sum(np.square(np.indices((2 * reach + 1,) * 3) - reach), axis=0))
     crust = ((distance >= inner_m) & (distance <= outer_m)).astype(np.float64)
@@ -109,15 +116,35 @@ def _places(figure: Voxels, template: Template) -> Iterator[_Place]:
     counts = fftconvolve(surface, crust, mode="same")
     counts -= fftconvolve(figure.occupied.astype(np.float64), around, mode="same")
     expected = np.pi * (inner_m + outer_m) ** 2 / size**2
-    points = figure.points_world
-    scores = counts[tuple(figure.indices.T)] / expected
+    return np.asarray(counts[tuple(figure.indices.T)] / expected)
+
+
+def _ends(figure: Voxels, template: Template, scores: Array, min_score: float) -> Iterator[_Place]:
+    """Yield the places that are ends of a figure and score enough, from the highest score down."""
+    points, left = figure.points_world, scores.copy()
     for _ in range(_TRIED):
-        best = int(np.argmax(scores))
-        if scores[best] < min_score:
+        best = int(np.argmax(left))
+        if left[best] < min_score:
             return
         distances = np.linalg.norm(points - points[best], axis=1)
-        yield _Place(float(scores[best]), distances)
-        scores[distances <= outer_m] = -np.inf
+        is_near = distances <= template.outer_m
+        if _is_end(figure, is_near):
+            yield _Place(float(left[best]), distances, template.outer_m)
+        left[is_near] = -np.inf
+
+
+def _head(figure: Voxels, graph: VoxelGraph, place: _Place) -> Head | None:
+    """Return the head at a place; None if nothing is beside it."""
+    points = figure.points_world
+    lengths = path_lengths(graph, place.distances <= place.radius_m, figure.grid.size_m)
+    path_m = place.radius_m + float(lengths[np.isfinite(lengths)].max())
+    # A person whom an image cuts off has short paths, yet the volume of more than a child.
+    scale = min(1.0, max(path_m / _ADULT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
+    is_head = place.distances <= _HEAD_M + _HEAD_GROWTH_M * scale
+    neck = _neck(figure, is_head)
+    if neck is None:
+        return None
+    return Head(points[is_head].mean(axis=0), neck, is_head, place.score, path_m, scale)
 
 
 def _is_end(figure: Voxels, is_head: NDArray[np.bool_]) -> bool:

@@ -10,10 +10,10 @@ from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.initialization.head_template import Head, find_head
+from tracker.initialization.head_template import Head, find_head, find_upper_head
 from tracker.initialization.limb_regions import LimbRegion, find_limbs
 from tracker.initialization.torso_template import Torso, find_torso
-from tracker.voxels.paths import neighbor_graph
+from tracker.voxels.paths import VoxelGraph
 from tracker.voxels.voxel_grid import Voxels
 
 SIDES = ("left", "right")
@@ -24,6 +24,8 @@ _FOOT_M, _BEND_M, _MOTION_M = 0.06, 0.06, 0.12
 through its limb, and the way to the next frames, metres."""
 SURE = 1.0
 """Sum of these cues from which on left and right are known."""
+_SAME_HEAD_M = 0.11
+"""Distance up to which two heads are the same, metres."""
 _ONE_LEG = 0.25
 """Largest share of a figure's voxels in a single leg."""
 
@@ -56,23 +58,36 @@ class FigureParts(NamedTuple):
         return tuple(name for name, limb in self.limbs.items() if not limb.is_bent)
 
 
-def locate_parts(figure: Voxels, motion: Array | None = None) -> FigureParts:
-    """Locate head, neck, torso and limbs of a figure.
+def possible_heads(figure: Voxels, graph: VoxelGraph, up: Array) -> list[Head]:
+    """Return the heads that a figure may have, the most likely first: at most two.
 
     Args:
         figure: voxels of one person.
-        motion: the way of the figure to later frames, (3,), metres; None if it is not known.
+        graph: their `neighbor_graph`.
+        up: vertical axis of the world, (3,).
 
     Raises:
         TrackerError: no head is found.
     """
-    graph = neighbor_graph(figure)
-    head = find_head(figure, graph)
-    if head is None:
+    heads = [head for head in (find_head(figure, graph), find_upper_head(figure, graph, up)) if head is not None]
+    if not heads:
         raise TrackerError(
             "expected a head that stands out of the silhouettes, found none; choose another --frame, on which no "
             "arm or other person is beside the head"
         )
+    is_same = np.linalg.norm(heads[0].center - heads[-1].center) < _SAME_HEAD_M
+    return heads[:1] if is_same else heads
+
+
+def locate_parts(figure: Voxels, graph: VoxelGraph, head: Head, motion: Array | None = None) -> FigureParts:
+    """Locate neck, torso and limbs of a figure.
+
+    Args:
+        figure: voxels of one person.
+        graph: their `neighbor_graph`.
+        head: the head.
+        motion: the way of the figure to later frames, (3,), metres; None if it is not known.
+    """
     # Lengths below are those of an adult: a child is enlarged to one.
     grown = figure.scaled(1 / head.scale)
     torso = find_torso(grown, head.neck / head.scale, head.is_head)

@@ -16,7 +16,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.geometry.arrays import Array
-from tracker.geometry.ground_plane import up_rotation
+from tracker.geometry.ground_plane import floor_plane
 from tracker.initialization.candidates import METHODS, PersonScene, StartCandidate, StartMethod, silhouette_axes
 from tracker.initialization.silhouette_check import check_against_silhouettes
 from tracker.initialization.start_fit import FittedStart, fit_start
@@ -26,6 +26,7 @@ from tracker.session.session import Session
 from tracker.store.stored_poses import read_stored_poses
 from tracker.tracking.confidence import worst
 from tracker.voxels.figure_masks import FigureMask, figure_masks
+from tracker.voxels.shadows import recover_from_shadows
 from tracker.voxels.visual_hull import VisualHull, carve_people
 from tracker.voxels.voxel_grid import Voxels
 
@@ -194,13 +195,13 @@ class _Task(NamedTuple):
 
 def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Mapping[int, FirstPose]) -> FirstPose:
     session, observer, finder, person, size_m = task
-    silhouettes = finder.silhouettes(frame, person)
+    floor = floor_plane(session.up, session.floor)
+    silhouettes = recover_from_shadows(finder.silhouettes(frame, person), floor, size_m)
     hull = carve_people(silhouettes, size_m)
     others = _others(session, person, frame, found)
     figure = _own_figure(session, person, hull, others)
     masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
-    up = up_rotation(session.up, session.floor)[:, 2]
-    scene = PersonScene(figure, silhouettes, masks, up, _motion(task, figure, frame))
+    scene = PersonScene(figure, silhouettes, masks, floor, _motion(task, figure, frame))
     candidates = _candidates(scene, session.people[person].model, methods)
     poses, bodies = [b.values for b in others], [b.model for b in others]
 

@@ -5,21 +5,21 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from figures import cameras_about_a_figure, figure, silhouettes_of_figure
+from figures import cameras_about_a_figure, figure, parts_of, silhouettes_of_figure
 from gestures import wait_for
 
 from app.drawing.overlay_colors import rgb
 from app.scene3d import voxel_layer
 from app.scene3d.voxel_layer import VoxelLayer, part_colors
 from tracker.formats.model_toml import load_model
-from tracker.initialization.voxel_start import locate_parts, start_pose
+from tracker.initialization.voxel_start import start_pose
 from tracker.tracking.voxel.body_pose import state_of
 from tracker.tracking.voxel.figure import figure_of
 from tracker.tracking.voxel.settings import VoxelSettings
 
 MODEL = load_model("gavrila34", 1.72)
 VOXELS, _ = figure(noise=0.1)
-POSE = start_pose(MODEL, locate_parts(VOXELS))
+POSE = start_pose(MODEL, parts_of(VOXELS))
 GREY = [150, 150, 150]
 
 

@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
-from figures import cameras_about_a_figure, figure, scene_of, silhouettes_of_figure
+from figures import UP, cameras_about_a_figure, figure, scene_of, silhouettes_of_figure
 
 from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
+from tracker.geometry.ground_plane import GroundPlane
 from tracker.initialization.candidates import from_axis, from_search, from_voxels, silhouette_axes, standing_height
 from tracker.initialization.head_template import find_head
 from tracker.voxels.paths import neighbor_graph
+from tracker.voxels.voxel_grid import Voxels
 
 CAMERAS = cameras_about_a_figure()
 MODEL = load_model("gavrila34")
@@ -73,17 +75,44 @@ def test_raised_arms_do_not_make_a_person_taller(arms_deg):
     voxels, joints = figure(arms_deg=arms_deg)
     top = joints["head"] + (0.0, 0.0, 0.125)
     soles_m = joints["left_ankle"][2] - 0.07
-    found = standing_height(scene(voxels), np.array([0.0, 0.0, 1.0]), top, find_head(voxels, neighbor_graph(voxels)))
+    found = standing_height(scene(voxels), UP, top, find_head(voxels, neighbor_graph(voxels)))
     assert found == pytest.approx(top[2] - soles_m, abs=0.03)
+
+
+def test_shoes_that_a_shadow_hides_do_not_make_a_person_smaller():
+    voxels, joints = figure()
+    floor_m = joints["left_ankle"][2] - 0.07
+    heights = voxels.points_world[:, 2]
+    barefoot = scene(voxels.without(heights < floor_m + 0.10))._replace(floor=GroundPlane(UP, floor_m))
+    top = joints["head"] + (0.0, 0.0, 0.125)
+    hidden = [b.mask & ~a.mask for a, b in zip(barefoot.silhouettes, scene(voxels).silhouettes, strict=True)]
+    shaded = [s._replace(shadow=h) for s, h in zip(barefoot.silhouettes, hidden, strict=True)]
+    assert standing_height(barefoot._replace(silhouettes=shaded), UP, top) == pytest.approx(top[2] - floor_m, abs=0.01)
+    # Where one view shows the floor below the feet, the person stands on something or jumps.
+    shaded[0] = barefoot.silhouettes[0]
+    found = standing_height(barefoot._replace(silhouettes=shaded), UP, top)
+    assert found == pytest.approx(top[2] - floor_m - 0.10, abs=0.03)
+
+
+def test_a_figure_with_a_large_hand_has_two_possible_heads():
+    voxels, joints = figure(arms_deg=45)
+    points = voxels.grid.centers(np.argwhere(np.ones(voxels.grid.shape, dtype=bool)))
+    hand = joints["left_wrist"] + 0.25 * (joints["left_wrist"] - joints["left_shoulder"])
+    ball = (np.linalg.norm(points - hand, axis=1) < 0.105).reshape(voxels.grid.shape)
+    own = scene(Voxels(voxels.grid, voxels.occupied | ball))
+    assert np.linalg.norm(find_head(own.figure, neighbor_graph(own.figure)).center - hand) < 0.08
+    found = from_voxels(own, MODEL, True)
+    assert len(found) == 4
+    assert min(error_mm(c, joints) for c in found) < 80
 
 
 def test_a_person_who_lies_or_crouches_has_no_standing_height():
     voxels, joints = figure()
-    top, up = joints["head"] + (0.0, 0.0, 0.125), np.array([0.0, 0.0, 1.0])
+    top = joints["head"] + (0.0, 0.0, 0.125)
     assert standing_height(scene(voxels), np.array([1.0, 0.0, 0.0]), top) is None
     head = find_head(voxels, neighbor_graph(voxels))
-    assert standing_height(scene(voxels), up, top, head._replace(path_m=1.3 * head.path_m)) is None
-    assert standing_height(scene(voxels), up, top, head._replace(neck=head.neck - (0.0, 0.0, 0.10))) is None
+    assert standing_height(scene(voxels), UP, top, head._replace(path_m=1.3 * head.path_m)) is None
+    assert standing_height(scene(voxels), UP, top, head._replace(neck=head.neck - (0.0, 0.0, 0.10))) is None
 
 
 def test_views_in_which_others_stand_before_the_person_are_left_out():

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from figures import cameras_about_a_figure, figure, silhouettes_of_figure
+from figures import cameras_about_a_figure, figure, parts_of, silhouettes_of_figure
 
 from tracker.body.model import PosedBody
 from tracker.formats.model_toml import load_model
 from tracker.initialization.silhouette_check import check_against_silhouettes
-from tracker.initialization.voxel_start import locate_parts, start_pose
+from tracker.initialization.voxel_start import start_pose
 from tracker.voxels.figure_masks import figure_masks
 
 
@@ -17,7 +17,7 @@ def scene():
     voxels, _ = figure(noise=0.1)
     model = load_model("gavrila34", 1.72)
     silhouettes = silhouettes_of_figure(voxels, cameras_about_a_figure())
-    return PosedBody(model, start_pose(model, locate_parts(voxels))), silhouettes, figure_masks(silhouettes, voxels)
+    return PosedBody(model, start_pose(model, parts_of(voxels))), silhouettes, figure_masks(silhouettes, voxels)
 
 
 def changed(body, **dofs):

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
-from figures import child, figure
+from figures import child, figure, parts_of
 
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.initialization.head_template import find_head
-from tracker.initialization.voxel_start import locate_parts, start_pose, turned_round
+from tracker.initialization.voxel_start import start_pose, turned_round
 from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.voxel_grid import Voxels
 
@@ -28,7 +28,7 @@ def errors_mm(model: BodyModel, pose, joints):
 @pytest.mark.parametrize("pose", [*POSES[:2], *(pytest.param(pose, marks=pytest.mark.slow) for pose in POSES[2:])])
 def test_all_parts_are_found_left_and_right(pose):
     voxels, joints = figure(**pose)
-    parts = locate_parts(voxels)
+    parts = parts_of(voxels)
     assert parts.unresolved == ()
     assert parts.is_facing_sure
     left = joints["left_shoulder"] - joints["right_shoulder"]
@@ -43,7 +43,7 @@ def test_all_parts_are_found_left_and_right(pose):
 def test_any_body_takes_the_start(name):
     voxels, joints = figure(turn_deg=40)
     model = load_model(name)
-    assert np.mean(list(errors_mm(model, start_pose(model, locate_parts(voxels)), joints).values())) < 80
+    assert np.mean(list(errors_mm(model, start_pose(model, parts_of(voxels)), joints).values())) < 80
 
 
 def test_the_head_and_the_neck():
@@ -56,7 +56,7 @@ def test_the_head_and_the_neck():
 
 
 def test_arms_on_the_body_and_closed_legs_are_not_guessed():
-    parts = locate_parts(figure(arms_deg=2, legs_deg=-6)[0])
+    parts = parts_of(figure(arms_deg=2, legs_deg=-6)[0])
     assert {"left_leg", "right_leg"} <= set(parts.unresolved)
     model = load_model("gavrila34")
     assert np.all(np.isfinite(start_pose(model, parts)))
@@ -65,7 +65,7 @@ def test_arms_on_the_body_and_closed_legs_are_not_guessed():
 def test_a_child_is_found():
     """The head is nearly as large as an adult's, all else is not."""
     voxels, joints = child(arms_deg=45)
-    parts = locate_parts(voxels)
+    parts = parts_of(voxels)
     assert np.linalg.norm(parts.head.center - joints["head"]) < 0.05
     assert parts.head.scale == pytest.approx(0.6, rel=0.1)
     assert parts.unresolved == ()
@@ -75,18 +75,18 @@ def test_a_child_is_found():
 
 
 def test_straight_limbs_are_named():
-    assert {"left_leg", "right_leg"} <= set(locate_parts(figure()[0]).straight)
+    assert {"left_leg", "right_leg"} <= set(parts_of(figure()[0]).straight)
 
 
 def test_motion_tells_the_direction():
     voxels, _ = figure(turn_deg=90)
-    ahead, back = (locate_parts(voxels, sign * np.array([0.0, 1.0, 0.0])) for sign in (1, -1))
+    ahead, back = (parts_of(voxels, sign * np.array([0.0, 1.0, 0.0])) for sign in (1, -1))
     assert ahead.torso.axes[1, 0] > 0.9
     assert ahead.facing > back.facing
 
 
 def test_turning_round_exchanges_left_and_right():
-    parts = locate_parts(figure()[0])
+    parts = parts_of(figure()[0])
     other = turned_round(parts)
     assert other.limbs["left_arm"] is parts.limbs["right_arm"]
     np.testing.assert_allclose(other.torso.axes[:, 1], -parts.torso.axes[:, 1])
@@ -98,4 +98,4 @@ def test_a_figure_without_a_head():
     occupied = voxels.occupied.copy()
     occupied[:, :, voxels.grid.centers(np.array([[0, 0, k] for k in range(occupied.shape[2])]))[:, 2] > 1.40] = False
     with pytest.raises(TrackerError, match="expected a head that stands out"):
-        locate_parts(Voxels(voxels.grid, occupied).cropped())
+        parts_of(Voxels(voxels.grid, occupied).cropped())
