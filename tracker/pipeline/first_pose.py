@@ -5,7 +5,7 @@ facing. Each is fitted to the contours. The best are tracked over a few frames i
 track is kept.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -50,6 +50,8 @@ _OPPOSITE = 0.0
 """Largest cosine of the angle between two directions that count as opposite."""
 _OWN_M = 0.4
 """A figure that is closer to the trunk of another person with a pose is that person, metres."""
+_LARGER = 0.02
+"""Share by which some silhouette grows with what looks like shadows, above which it is worth another start."""
 _MAX_HULL_M3 = 0.25
 """Largest volume of the visual hull of one person, cubic metres: three times that of a large man."""
 
@@ -164,7 +166,7 @@ class _Trial:
         try:
             for person in self._people:
                 task = _Task(self._session, self._observer, self._finder, person, self._size_m)
-                own[person] = _on_frame(task, frame, methods, own)
+                own[person] = _best_on_frame(task, frame, methods, own)
         except TrackerError as error:
             self._errors.append(error)
             self._say(f"frame {frame}, {' and '.join(methods)}: {error}")
@@ -193,15 +195,46 @@ class _Task(NamedTuple):
     size_m: float
 
 
-def _on_frame(task: _Task, frame: int, methods: Sequence[StartMethod], found: Mapping[int, FirstPose]) -> FirstPose:
-    session, observer, finder, person, size_m = task
-    floor = floor_plane(session.up, session.floor)
-    silhouettes = recover_from_shadows(finder.silhouettes(frame, person), floor, size_m)
+def _best_on_frame(
+    task: _Task, frame: int, methods: Sequence[StartMethod], found: Mapping[int, FirstPose]
+) -> FirstPose:  # fmt: skip
+    """Return the pose on a frame; where it is not good, that with what looks like shadows if it is better."""
+    poses, errors = list[FirstPose](), list[TrackerError]()
+    for silhouettes in _silhouettes(task, frame):
+        try:
+            poses.append(_on_frame(task, frame, silhouettes, methods, found))
+        except TrackerError as error:
+            errors.append(error)
+        if poses and poses[-1].fitted.status == "good":
+            break
+    if not poses:
+        raise errors[0]
+    return min(poses, key=lambda p: (p.fitted.status != "good", p.fitted.cost_px))
+
+
+def _silhouettes(task: _Task, frame: int) -> Iterator[Sequence[ViewSilhouette]]:
+    """Yield the silhouettes of a frame; then, where they are larger, those with what looks like shadows."""
+    found = task.finder.silhouettes(frame, task.person)
+    yield found
+    floor = floor_plane(task.session.up, task.session.floor)
+    recovered = recover_from_shadows(found, floor, task.size_m)
+    before, after = (np.array([np.count_nonzero(s.mask) for s in own]) for own in (found, recovered))
+    if np.any(after > (1 + _LARGER) * before):
+        yield recovered
+
+
+def _on_frame(
+    task: _Task, frame: int, silhouettes: Sequence[ViewSilhouette], methods: Sequence[StartMethod],
+    found: Mapping[int, FirstPose],
+) -> FirstPose:  # fmt: skip
+    session, observer, _, person, size_m = task
     hull = carve_people(silhouettes, size_m)
     others = _others(session, person, frame, found)
     figure = _own_figure(session, person, hull, others)
     masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
-    scene = PersonScene(figure, silhouettes, masks, floor, _motion(task, figure, frame))
+    scene = PersonScene(
+        figure, silhouettes, masks, floor_plane(session.up, session.floor), _motion(task, figure, frame)
+    )
     candidates = _candidates(scene, session.people[person].model, methods)
     poses, bodies = [b.values for b in others], [b.model for b in others]
 
