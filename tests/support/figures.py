@@ -94,3 +94,19 @@ def parts_of(voxels, motion=None):
     """The parts of a figure with its most likely head."""
     graph = neighbor_graph(voxels)
     return locate_parts(voxels, graph, possible_heads(voxels, graph, UP)[0], motion)
+
+
+def legs(silhouette):
+    """The lower third of a silhouette."""
+    rows = np.flatnonzero(silhouette.mask.any(axis=1))
+    own = silhouette.mask.copy()
+    own[: rows[0] + 2 * len(rows) // 3] = False
+    return own
+
+
+def hide_legs(silhouettes, views, shadows):
+    """Take the legs for shadow in some views, beside the shadows of all views."""
+    return [
+        s._replace(mask=s.mask & ~legs(s), shadow=shadow | legs(s)) if i in views else s._replace(shadow=shadow)
+        for i, (s, shadow) in enumerate(zip(silhouettes, shadows, strict=True))
+    ]

@@ -7,10 +7,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from figures import cameras_about_a_figure, figure, silhouettes_of_figure
+from figures import cameras_about_a_figure, figure, hide_legs, silhouettes_of_figure
 from solids import ellipsoid, silhouettes_of
 
 from tracker.errors import TrackerError
+from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.initialization.candidates import StartCandidate
 from tracker.initialization.start_fit import FittedStart
@@ -131,6 +132,31 @@ def test_another_start_takes_its_place(session, silhouettes, monkeypatch):
     found = find(session).poses[0]
     assert found.fitted.status == "good"
     assert not any("share little" in note for note in found.notes)
+
+
+def test_legs_that_look_like_shadows_are_found(session, silhouettes, monkeypatch):
+    voxels, joints = figure(noise=0.1)
+    legs = ("left_knee", "right_knee", "left_ankle", "right_ankle")
+
+    def errors(model, pose):
+        points = dict(zip(model.point_names, model.points_world(pose), strict=True))
+        return [np.linalg.norm(points[n] - joints[n]) for n in legs]
+
+    def fit(observer, models, start, frame, later, others):
+        if max(errors(models[0], start)) > 0.3:
+            return FittedStart(start, "doubtful", 2.0)
+        known = {n: p for n, p in joints.items() if n in models[0].point_names}
+        return FittedStart(fit_to_points(models[0], known).pose, "good", 1.0)
+
+    monkeypatch.setattr(first_pose, "fit_start", fit)
+    whole = silhouettes_of_figure(voxels, CAMERAS)
+    silhouettes += hide_legs(whole, {0, 2}, [np.zeros_like(s.mask) for s in whole])
+    found = find(session).poses[0]
+    assert max(errors(found.model, found.fitted.pose)) < 0.3
+    # Shadows are asked only where a start is not good without them.
+    monkeypatch.setattr(first_pose, "recover_from_shadows", None)
+    silhouettes[:] = whole
+    assert find(session).is_good
 
 
 def test_a_start_that_one_view_contradicts_is_doubtful(session, silhouettes, fits, monkeypatch):

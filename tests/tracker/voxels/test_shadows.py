@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from figures import UP, cameras_about_a_figure, figure, silhouettes_of_figure
+from figures import UP, cameras_about_a_figure, figure, hide_legs, legs, silhouettes_of_figure
 
 from tracker.geometry.arrays import intersection_over_union
 from tracker.geometry.ground_plane import GroundPlane
@@ -21,22 +21,6 @@ def on_floor(silhouette, x_m, y_m):
     spans = [np.arange(*span, 0.02) for span in (x_m, y_m)]
     points = np.array([(x, y, 0.0) for x in spans[0] for y in spans[1]])
     return paint(points, SIZE_M, silhouette) & ~silhouette.mask
-
-
-def legs(silhouette):
-    """The lower third of a silhouette."""
-    rows = np.flatnonzero(silhouette.mask.any(axis=1))
-    own = silhouette.mask.copy()
-    own[: rows[0] + 2 * len(rows) // 3] = False
-    return own
-
-
-def hide_legs(silhouettes, views, shadows):
-    """Take the legs for shadow in some views, beside the shadows of all views."""
-    return [
-        s._replace(mask=s.mask & ~legs(s), shadow=shadow | legs(s)) if i in views else s._replace(shadow=shadow)
-        for i, (s, shadow) in enumerate(zip(silhouettes, shadows, strict=True))
-    ]
 
 
 def test_legs_before_a_floor_that_others_see_unchanged_come_back(whole):
