@@ -165,28 +165,36 @@ def section(outcomes: Sequence[Outcome]) -> str:
     return "\n".join([*lines, table(HEADS, {o.name.replace("_", " "): o.cells for o in outcomes})])
 
 
-def main() -> None:
-    """Measure and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def arguments(description: str | None) -> argparse.Namespace:
+    """Read the options of a benchmark on these people and recordings."""
+    parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
     parser.add_argument("--scenes", type=Path, help="folder that keeps the simulated recordings")
     parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
     parser.add_argument("--out", type=Path, default=OUT)
-    words = parser.parse_args()
+    return parser.parse_args()
+
+
+def chosen(words: argparse.Namespace, folder: Path) -> list[Recording]:
+    """Return the people and recordings that are asked for; scenes that are not kept are made in a folder."""
+    scenes = words.scenes or folder / "scenes"
+    scenes.mkdir(exist_ok=True)
+    wanted = words.only or [*PLAYED, *RECORDED]
+    made = simulated(scenes, [n for n in PLAYED if n in wanted])
+    return [*made, *(recorded(words.data, [n for n in RECORDED if n in wanted]) if words.data else [])]
+
+
+def main() -> None:
+    """Measure and write the table."""
+    words, outcomes = arguments(__doc__), []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        scenes = words.scenes or folder / "scenes"
-        scenes.mkdir(exist_ok=True)
-        wanted = words.only or [*PLAYED, *RECORDED]
-        recordings = [*simulated(scenes, [n for n in PLAYED if n in wanted])]
-        recordings += recorded(words.data, [n for n in RECORDED if n in wanted]) if words.data else []
-        outcomes = []
-        for recording in recordings:
+        for recording in chosen(words, folder):
             for outcome in measure(recording, folder):
                 print(f"{outcome.name}: {', '.join(map(' '.join, zip(HEADS, outcome.cells, strict=True)))}", flush=True)
                 outcomes.append(outcome)
-        if not words.only:
-            put_section(words.out, section(outcomes))
+    if not words.only:
+        put_section(words.out, section(outcomes))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,87 @@
+"""Measure starts with nobody's help (docs/accuracy.md): `python tests/benchmarks/from_nothing.py --data DIR`.
+
+The people and recordings of `acquisition.py`. No height, joint or pose is given: `track --init auto --acquire` finds
+the people, acquires their bodies and tracks them. Accuracy is the mean error of the 12 limb joints; a frame is lost
+when one of them is off by more than 150 mm.
+"""
+
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from acquisition import Recording, arguments, chosen, quadrille
+from sections import put_section, table
+
+from tracker.session.session import load_session
+
+HEADS = ("error, mm", "lost frames", "frames called good", "good, yet a joint over 100 mm", "height off")
+OFF_MM = 100.0
+
+
+class Found(NamedTuple):
+    """A person that was found and tracked."""
+
+    name: str
+    error_mm: float
+    lost: int
+    n_good: int
+    n_good_off: int
+    """Frames that are called good and have a limb joint that is off by more than 100 mm."""
+    height_share: float | None
+    """Error of the height, as a share; None where the height is not known."""
+
+    @property
+    def cells(self) -> list[str]:
+        """Cells of the table, in the order of `HEADS`."""
+        height = "" if self.height_share is None else f"{100 * self.height_share:+.1f}%"
+        return [f"{self.error_mm:.1f}", f"{self.lost}", f"{self.n_good}", f"{self.n_good_off}", height]
+
+
+def found_people(recording: Recording, folder: Path) -> Iterator[Found]:
+    """Find and track the people of a recording."""
+    at, names = folder / recording.name, list(recording.references)
+    quadrille(
+        "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
+        recording.background, "--people", *names,
+    )  # fmt: skip
+    quadrille("track", at, "--init", "auto", "--acquire")
+    heights = {p.name: p.model.height_m for p in load_session(at).people}
+    for person, joints in recording.references.items():
+        result = quadrille("evaluate", at, "--reference", joints, "--person", person)
+        good = [f for f in result["per_frame"] if f["status"] == "good"]
+        yield Found(
+            recording.name if len(names) == 1 else f"{recording.name}, {person}",
+            result["mpjpe_mm"], result["lost_frames"], len(good),
+            sum((f["worst_mm"] or 0.0) > OFF_MM for f in good),
+            None if recording.height_m is None else heights[person] / recording.height_m - 1,
+        )  # fmt: skip
+
+
+def section(found: Sequence[Found]) -> str:
+    """The results as Markdown."""
+    lines = [
+        "## People found with nobody's help",
+        "",
+        "Made by `python tests/benchmarks/from_nothing.py --data DIR`: the people and recordings of the table above by "
+        "`quadrille track --init auto --acquire`. No height, joint or pose is given.",
+        "",
+    ]
+    return "\n".join([*lines, table(HEADS, {f.name.replace("_", " "): f.cells for f in found})])
+
+
+def main() -> None:
+    """Measure and write the table."""
+    words, people = arguments(__doc__), []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for recording in chosen(words, folder):
+            for found in found_people(recording, folder):
+                print(f"{found.name}: {', '.join(map(' '.join, zip(HEADS, found.cells, strict=True)))}", flush=True)
+                people.append(found)
+    if not words.only:
+        put_section(words.out, section(people))
+
+
+if __name__ == "__main__":
+    main()
