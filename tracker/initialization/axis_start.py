@@ -128,14 +128,13 @@ class _Search:
         model, trunk = self.model, trunk_parts(self.model)
         covered = self._overlap.nothing()
         Ts = model.kinematics(pose).Ts_world_part
-        costs = 1 + self._overlap.added(Ts[None, trunk], trunk, covered)
-        self._overlap.cover(Ts[trunk], trunk, covered)
+        costs = 1 + self._overlap.cover(Ts[trunk], trunk, covered)
         tried = []
         for limb, changes in zip(self._limbs, changes_within_limits(model), strict=True):
             poses = self._with_limb(pose, limb, model.clip(model.retract(model.neutral(), changes)))
             totals, view_costs = self._costs(pose, limb, poses, covered, costs)
             order = np.argsort(totals)
-            pose, costs = poses[order[0]], view_costs[order[:1]]
+            pose, costs = poses[order[0]], view_costs[order[0]]
             self._overlap.cover(model.kinematics(pose).Ts_world_part[limb.parts], limb.parts, covered)
             tried.append(poses[order[:_N_AGAIN]])
         for _ in range(_SWEEPS):
@@ -171,8 +170,7 @@ class _Search:
         """Return the best of poses that differ from a pose in one limb only, and its cost."""
         others = np.setdiff1d(self._parts, limb.parts)
         Ts, covered = self.model.kinematics(pose).Ts_world_part, self._overlap.nothing()
-        costs = 1 + self._overlap.added(Ts[None, others], others, covered)
-        self._overlap.cover(Ts[others], others, covered)
+        costs = 1 + self._overlap.cover(Ts[others], others, covered)
         totals, _ = self._costs(pose, limb, poses, covered, costs)
         i = int(np.argmin(totals))
         return poses[i], float(totals[i])
@@ -187,7 +185,7 @@ class _Search:
             limb: the limb.
             poses: (n, n_values).
             covered: cells that the rest of the body covers.
-            costs: of each view without the limb, (1, V).
+            costs: of each view without the limb, (V,).
         """
         Ts = chain_poses(self.model.tree, self.model.kinematics(pose), limb.parts, poses)
         view_costs = costs + self._overlap.added(Ts, limb.parts, covered)

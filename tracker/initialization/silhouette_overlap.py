@@ -83,8 +83,8 @@ class SilhouetteOverlap:
         """Return the cost over all views, (..., V) to (...): a broken silhouette, which no body fills, counts less."""
         return np.asarray(np.mean(view_costs / (view_costs + _BROKEN), axis=-1))
 
-    def cover(self, Ts: Array, parts: IntArray, covered: NDArray[np.bool_]) -> None:
-        """Mark the cells that some parts of one body cover.
+    def cover(self, Ts: Array, parts: IntArray, covered: NDArray[np.bool_]) -> Array:
+        """Mark the cells that some parts of one body cover; return what they add to the cost of each view, (V,).
 
         Args:
             Ts: poses of the parts, (n, 4, 4).
@@ -92,8 +92,9 @@ class SilhouetteOverlap:
             covered: is added to.
         """
         marks = np.zeros(self._n_cells, np.int32)
-        self._measure(Ts[None], parts, covered, marks)
+        added = self._measure(Ts[None], parts, covered, marks)[0]
         covered |= marks > 0
+        return added
 
     def added(self, Ts: Array, parts: IntArray, covered: NDArray[np.bool_]) -> Array:
         """Return what parts in many poses add to the cost of each view, (C, V), where some cells are covered already.
