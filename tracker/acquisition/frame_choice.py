@@ -53,7 +53,7 @@ def choose_frames(
 def _information(
     parameters: SizeParameters, cameras: Sequence[Camera], bodies: Sequence[PosedBody], person: int
 ) -> Array:
-    """Return what the visible contours of a frame say about the sizes, (n_sizes, n_sizes)."""
+    """Return the information matrix of the sizes by the visible contours of a frame, (n_sizes, n_sizes)."""
     body, (model, kinematics) = bodies[person], (bodies[person].model, bodies[person].kinematics)
     first = sum(len(other.model.parts) for other in bodies[:person])
     pieces = [(c, _visible_pieces(occluding_contours.trace(bodies, c), first, body, c)) for c in cameras]

@@ -98,10 +98,10 @@ def acquire_from_contours(
         observer: of the recording.
         bodies: all people on each frame that may be used, in their present bodies.
         person: index of the person among them.
-        placed: by frame, points of the person that somebody has placed.
+        placed: by frame, points of the person that were placed by hand or are known.
         settings: of the acquisition.
         report: shows progress.
-        seen: by frame, points of the person that somebody has seen in the images.
+        seen: by frame, points of the person that a user has marked in the images.
 
     Raises:
         TrackerError: there is no frame, or the views show nothing of the person.

@@ -54,9 +54,9 @@ class SightedPerson(NamedTuple):
     person: int
     """Index of the person among them."""
     placed: PointTargets | None = None
-    """Where somebody has placed points of the body; None in a frame that was only tracked."""
+    """Positions of points of the body that were placed by hand or are known; None in a frame that was only tracked."""
     seen: PinBlock | None = None
-    """Where somebody has seen points of the body in the images; None where nobody has."""
+    """Positions of points of the body that a user has marked in the images; None without any."""
 
     def moved(self, model: BodyModel, pose: Array) -> "SightedPerson":
         """Return the person with another body and pose."""

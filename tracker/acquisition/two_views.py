@@ -1,8 +1,8 @@
 """Acquire a person's body from two near-orthogonal views of one frame, as GD96 Sect. 3 does: `acquire --paper`.
 
-The person faces one view, or turns the back to it, and is seen from the side in the other. The paper leaves open what
-happens where the views are not quite orthogonal, how parts are segmented, and what is searched in which steps; see
-docs/acquisition.md for what was chosen.
+The person faces one view, or turns the back to it, and is seen from the side in the other. The paper leaves open how
+parts are segmented, and in which steps they are searched. It assumes orthogonal views. The choices made here are in
+docs/acquisition.md.
 """
 
 from collections.abc import Mapping, Sequence

@@ -24,12 +24,12 @@ StartMethod: TypeAlias = Literal["voxels", "axis", "search"]
 _UPRIGHT = 0.9
 """Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
 _NECK, _NECK_GROWTH, _NECK_SPREAD = 0.70, 0.18, 0.04
-"""Height of the base of the head of a person who stands, as a fraction of the body's height: a constant, the slope by
-the person's size as a share of an adult's, and the largest relative error. Folded legs or hands on the head change it.
-"""
+"""Height of the base of a standing person's head, as a fraction of the body's height. It is a constant plus a slope by
+the person's size as a share of an adult's; the last number is its largest relative error. Folded legs and hands on the
+head change it."""
 _MAX_PATH = 1.25
-"""Largest path from the top of the head to the soles, as a share of the height of a person who stands: folded legs make
-it longer. The grid lengthens paths by up to a tenth."""
+"""Largest path from the top of the head to the soles, as a share of a standing person's height. Folded legs make it
+longer. The grid lengthens paths by up to a tenth."""
 _AXES_TRIED = 3
 _RAISED = (0.0, 0.10, 0.20)
 """Tops of the head that a search tries, below the end of the figure, as fractions of the height: hands may be above."""
@@ -61,9 +61,9 @@ class StartCandidate(NamedTuple):
     forward: Array
     """Unit direction in which the trunk faces, (3,)."""
     cues: float
-    """What feet, bends and motion say for that direction; below 0 they speak for the opposite one."""
+    """Sum of the cues of feet, bends and motion for that direction; below 0 they favour the opposite one."""
     unresolved: tuple[str, ...] = ()
-    """Limbs that the method does not tell from the rest of the body."""
+    """Limbs that the method does not separate from the rest of the body."""
     straight: tuple[str, ...] = ()
     """Limbs whose middle joint follows from proportions."""
     axis: BodyAxis | None = None

@@ -13,7 +13,7 @@ from tracker.voxels.figure_masks import FigureMask
 
 _MIN_OVERLAP = 0.55
 """Smallest overlap with the silhouettes in half of the views. A body of other proportions in about the right pose has
-two thirds or more, one that stands beside the person or upside down a half or less."""
+two thirds or more. One that stands beside the person or upside down has a half or less."""
 
 
 class SilhouetteCheck(NamedTuple):
@@ -49,7 +49,7 @@ def check_against_silhouettes(
 
     Args:
         body: the body.
-        silhouettes: of everybody in all views.
+        silhouettes: of all people, in all views.
         masks: that of the person in each of them.
     """
     found = [

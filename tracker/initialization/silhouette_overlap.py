@@ -37,8 +37,8 @@ class _Views(NamedTuple):
     P: FloatArray
     """Projection matrices, (V, 3, 4)."""
     weights: FloatArray
-    """What covering each cell costs, of all views one after the other, row by row: above 0 beside the silhouette,
-    below 0 within; 1 is a whole silhouette."""
+    """Cost of covering each cell, of all views one after the other, row by row. It is positive beside the silhouette
+    and negative within; 1 is a whole silhouette."""
     layout: IntArray
     """First cell, width and height of each view, (V, 3)."""
 

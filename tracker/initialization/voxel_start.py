@@ -20,8 +20,8 @@ SIDES = ("left", "right")
 _JOINTS = {"arm": ("elbow", "wrist"), "leg": ("knee", "ankle")}
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _FOOT_M, _BEND_M, _MOTION_M = 0.06, 0.06, 0.12
-"""Lengths that say with some certainty where a person faces: a foot before its ankle, a knee or elbow beside the line
-through its limb, and the way to the next frames, metres."""
+"""Units of the cues for where a person faces, metres. The cues are a foot before its ankle, a knee or elbow beside the
+line through its limb, and the way to the next frames."""
 SURE = 1.0
 """Sum of these cues from which on left and right are known."""
 _ONE_LEG = 0.25
@@ -34,7 +34,7 @@ class FigureParts(NamedTuple):
     figure: Voxels
     head: Head
     torso: Torso
-    """Its narrow axis points forwards and its wide one to the left, as far as the cues say."""
+    """Its narrow axis points forwards and its wide one to the left, as far as the cues show."""
     limbs: dict[str, LimbRegion]
     """Limbs that stand out, by name: `left_arm` and so on."""
     facing: float
@@ -42,7 +42,7 @@ class FigureParts(NamedTuple):
 
     @property
     def is_facing_sure(self) -> bool:
-        """Whether the cues tell left from right."""
+        """Whether left and right are known by the cues."""
         return self.facing >= SURE
 
     @property
@@ -120,7 +120,7 @@ def joint_positions(model: BodyModel, parts: FigureParts) -> dict[str, Array]:
 
 
 def _by_side(torso: Torso, limbs: Sequence[LimbRegion], n_voxels: int) -> dict[str, LimbRegion]:
-    """Name limbs by the side of the torso that they leave; two of a kind are told apart by their order."""
+    """Name limbs by the side of the torso that they leave, and two of a kind by their order."""
     found: dict[str, LimbRegion] = {}
     for kind in _JOINTS:
         own = sorted((limb for limb in limbs if limb.kind == kind), key=lambda limb: -len(limb.indices))[:2]
@@ -135,7 +135,7 @@ def _by_side(torso: Torso, limbs: Sequence[LimbRegion], n_voxels: int) -> dict[s
 
 
 def _bends(torso: Torso, limbs: Sequence[LimbRegion]) -> float:
-    """Return what the bends of limbs say for the torso's narrow axis as the direction in which a person faces."""
+    """Return the cue of the limbs' bends that a person faces along the torso's narrow axis."""
     forward, total = torso.axes[:, 0], 0.0
     for limb in limbs:
         bend = float((limb.middle - (limb.proximal + limb.distal) / 2) @ forward)
@@ -145,7 +145,7 @@ def _bends(torso: Torso, limbs: Sequence[LimbRegion]) -> float:
 
 
 def facing_cues(figure: Voxels, forward: Array, up: Array, motion: Array | None) -> float:
-    """Return what feet and motion say for a direction as that in which a person faces; from `SURE` on they tell.
+    """Return the sum of the cues of feet and motion that a person faces in a direction; from `SURE` on it is known.
 
     Args:
         figure: voxels of the person.

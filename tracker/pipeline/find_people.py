@@ -1,4 +1,4 @@
-"""Find people with nobody's help: first poses, then their sizes. Tracking goes on from there in both directions."""
+"""Find people automatically: first poses, then their sizes. Tracking goes on from there in both directions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,8 +26,8 @@ _STARTING = 0.5
 """Share of the work up to the end of the first poses, where sizes are acquired too."""
 
 AXES = "silhouette_axes"
-"""Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera,
-for each person the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
+"""Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera.
+For each person these are the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
 
 Report = Callable[[str, float, str], None]
 """Is given a stage, the share of all work that is done, 0 to 1, and a sentence, which may be empty. What it raises ends

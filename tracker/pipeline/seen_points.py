@@ -12,7 +12,7 @@ from tracker.geometry.triangulation import PointObservation
 from tracker.store.records import SEEN, Pin, PoseRecord
 
 _MOVED_M = 0.01
-"""An edit other than a drag that moves a point by more says that it was not where it was seen."""
+"""An edit other than a drag that moves a point by more withdraws its place in the images, metres."""
 _Seen = dict[str, dict[str, Any]]
 """Position in each camera, original px, by point."""
 
@@ -20,7 +20,7 @@ _Seen = dict[str, dict[str, Any]]
 def seen_points(
     cameras: Sequence[CameraSource], model: BodyModel, record: PoseRecord, pins: Sequence[Pin] = ()
 ) -> list[PointObservation]:
-    """Return where somebody has seen points of a person on a frame, ascending by point and name of the camera.
+    """Return the points of a person that users have marked on a frame, ascending by point and name of the camera.
 
     Args:
         cameras: the session's views. What was seen in other views is left out.

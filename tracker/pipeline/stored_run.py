@@ -174,7 +174,7 @@ def _start_poses(store: AnnotationStore, person: Person, frames: Sequence[int], 
         store: annotations of the session.
         person: whose poses.
         frames: to track, in order.
-        needed: whether the person is tracked; anybody else may have the neutral pose.
+        needed: whether the person is tracked; others may have the neutral pose.
 
     Raises:
         SessionError: a pose is needed and there is none.

@@ -115,7 +115,7 @@ class TrackSession:
         self.costs_px: dict[int, float] = {}
         """Cost of each frame that this run has tracked, px."""
         self.normal_matrices: dict[int, tuple[NormalMatrix | None, ...]] = {}
-        """How well the contours determine the pose of each person, by frame; empty where the method does not say."""
+        """How well contours determine the pose of each person, by frame; empty where the method does not compute it."""
         self.n_improved = 0
         """Number of poses that the backward pass has replaced."""
         self.visited: int | None = None

@@ -40,7 +40,7 @@ def bounding_volume(silhouettes: Sequence[ViewSilhouette], missing: int = 0) -> 
         missing: number of views that may be broken. The box holds what all but any so many views allow.
 
     Raises:
-        TrackerError: fewer than two views show anybody, or the views show nothing in common.
+        TrackerError: fewer than two views show people, or the views show nothing in common.
     """
     seen = [s for s in silhouettes if not s.is_empty]
     if len(seen) < 2:
