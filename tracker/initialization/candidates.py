@@ -9,6 +9,8 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera
+from tracker.images.background_subtraction import Mask
 from tracker.initialization.axis_start import AxisStart, search_on_axes
 from tracker.initialization.body_axis import BodyAxis, find_body_axes
 from tracker.initialization.head_template import Head
@@ -48,6 +50,13 @@ class PersonScene(NamedTuple):
     """Vertical axis of the world, (3,)."""
     motion: Array | None
     """The way of the person to later frames, (3,), metres; None if it is not known."""
+
+    @property
+    def clear_views(self) -> list[tuple[Mask, Camera]]:
+        """Masks and cameras of the views that show the person alone; of all views if fewer than two do."""
+        pairs = list(zip(self.masks, self.silhouettes, strict=True))
+        alone = [(m.mask, s.camera) for m, s in pairs if m.shows_figure_alone]
+        return alone if len(alone) >= 2 else [(m.mask, s.camera) for m, s in pairs]
 
 
 class StartCandidate(NamedTuple):
@@ -142,10 +151,7 @@ def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
     Raises:
         TrackerError: fewer than two views show the person.
     """
-    pairs = list(zip(scene.masks, scene.silhouettes, strict=True))
-    apart = [(m, s) for m, s in pairs if m.is_apart and m.mask.any()]
-    chosen = apart if len(apart) >= 2 else pairs
-    axes = [a for m, s in chosen if (a := major_axis(m.mask, s.camera)) is not None]
+    axes = [a for mask, camera in scene.clear_views if (a := major_axis(mask, camera)) is not None]
     if len(axes) < 2:
         raise TrackerError(
             f"expected the person in at least 2 views, found {len(axes)}; choose another --frame, or check the "
@@ -183,11 +189,8 @@ def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:
 def _on_axes(
     method: StartMethod, scene: PersonScene, model: BodyModel, axes: Sequence[BodyAxis], is_measured: bool
 ) -> list[StartCandidate]:
-    pairs = list(zip(scene.masks, scene.silhouettes, strict=True))
-    apart = sum(m.is_apart and bool(m.mask.any()) for m, _ in pairs) >= 2
-    masks = [m.mask if m.is_apart or not apart else np.zeros_like(m.mask) for m, _ in pairs]
-    center = scene.figure.points_world.mean(axis=0)
-    overlap = SilhouetteOverlap(model, masks, [s.camera for _, s in pairs], center)
+    masks, cameras = zip(*scene.clear_views, strict=True)
+    overlap = SilhouetteOverlap(model, masks, cameras, scene.figure.points_world.mean(axis=0))
     starts: list[AxisStart] = search_on_axes(model, overlap, axes, scene.up)
     return [
         StartCandidate(

@@ -55,6 +55,6 @@ def check_against_silhouettes(
     found = [
         (s.camera.name, intersection_over_union(body_silhouette([body], s.camera), m.mask))
         for s, m in zip(silhouettes, masks, strict=True)
-        if m.is_apart and m.mask.any()
+        if m.shows_figure_alone
     ]
     return SilhouetteCheck(tuple(name for name, _ in found), np.array([share for _, share in found]))
