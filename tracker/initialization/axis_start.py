@@ -90,7 +90,7 @@ def search_on_axes(
 
 def _exchanged(model: BodyModel, pose: Array, joints: Sequence[str]) -> Array:
     """Return the pose in which the left and the right limb take each other's place, as far as joints allow."""
-    points = dict(zip(model.point_names, model.points_world(pose), strict=True))
+    points = model.named_points_world(pose)
     pairs = [(f"left_{j}", f"right_{j}") for j in joints if f"left_{j}" in points]
     for left, right in pairs:
         points[left], points[right] = points[right], points[left]
@@ -215,7 +215,7 @@ def _trunk(model: BodyModel, axis: BodyAxis, R: Array, near: Array | None) -> Ar
         R: the frame, (3, 3).
         near: pose at a twist nearby, (n_values,), if there is one.
     """
-    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    own = model.named_points_world(model.neutral())
     middle = (own["left_shoulder"] + own["right_shoulder"]) / 2
     place = rigid.transform(R, axis.top - SHOULDERS * model.height_m * axis.up)
     known = {n: rigid.apply(place, p - middle) for n, p in own.items()}

@@ -99,7 +99,7 @@ def start_pose(model: BodyModel, parts: FigureParts) -> Array:
     Shoulders and hips lie in the torso's frame as in the body. Limbs that are not resolved hang.
     """
     known = joint_positions(model, parts)
-    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    own = model.named_points_world(model.neutral())
     place = rigid.transform(parts.torso.axes, parts.head.neck)
     for name in parts.unresolved:
         side, kind = name.split("_")
@@ -109,7 +109,7 @@ def start_pose(model: BodyModel, parts: FigureParts) -> Array:
 
 def joint_positions(model: BodyModel, parts: FigureParts) -> dict[str, Array]:
     """Return the joints that the parts of a figure show, by name, (3,) each, metres."""
-    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    own = model.named_points_world(model.neutral())
     place = rigid.transform(parts.torso.axes, parts.head.neck)
     found = {n: rigid.apply(place, own[n] - own["neck"]) for n in _TRUNK if n in own}
     for name, limb in parts.limbs.items():

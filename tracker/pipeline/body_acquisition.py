@@ -232,7 +232,7 @@ def _placed(stored: StoredPose, observed: Sequence[PointObservation]) -> PointTa
         return None  # a tracked pose that was confirmed shows where the flesh is, not the joints
     if observed:
         return None
-    return place_joints(model, dict(zip(model.point_names, stored.body.points_world, strict=True)), PLACED_M)
+    return place_joints(model, stored.body.named_points_world, PLACED_M)
 
 
 def _tracked_with(

@@ -28,7 +28,7 @@ def scene(voxels, **changes):
 
 def error_mm(candidate, joints):
     model = candidate.model
-    own = dict(zip(model.point_names, model.points_world(candidate.pose), strict=True))
+    own = model.named_points_world(candidate.pose)
     return 1000 * float(np.mean([np.linalg.norm(own[n] - joints[n]) for n in LIMB_JOINTS]))
 
 
