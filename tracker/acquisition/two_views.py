@@ -16,7 +16,7 @@ from tracker.acquisition.chamfer_search import ChamferSearchSettings, search_sha
 from tracker.acquisition.from_contours import Acquisition, Report, cost_px, learn_static_edges, own_views, read_views
 from tracker.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
-from tracker.body.model import PosedBody
+from tracker.body.model import PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
@@ -161,8 +161,8 @@ def _off_rad(front_rad: float, side_rad: float) -> float:
 def _occluded(bodies: Sequence[PosedBody], person: int, camera: Camera) -> float:
     """Return which share of a person's contour is occluded or outside the image."""
     contour = occluding_contours.trace(bodies, camera)
-    first = sum(len(b.model.parts) for b in bodies[:person])
-    own = (contour.parts >= first) & (contour.parts < first + len(bodies[person].model.parts))
+    parts = parts_of([b.model for b in bodies], person)
+    own = (contour.parts >= parts.start) & (contour.parts < parts.stop)
     middles = (contour.pieces_px[own, :2] + contour.pieces_px[own, 2:]) / 2
     hidden = contour.occluded[own] | np.any((middles < 0) | (middles >= camera.size), axis=1)
     return float(hidden.mean()) if len(hidden) else 1.0
