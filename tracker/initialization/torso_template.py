@@ -45,6 +45,10 @@ class Torso(NamedTuple):
         """Return it in a figure that is larger by a factor about the world's origin."""
         return self._replace(neck=self.neck * factor, half_axes=self.half_axes * factor)
 
+    def turned_round(self) -> "Torso":
+        """Return it facing the other way: forwards and left are exchanged with backwards and right."""
+        return self._replace(axes=self.axes * np.array([-1.0, -1.0, 1.0]))
+
     def local(self, points: Array) -> Array:
         """Return points, (N, 3), in its frame about its centre, (N, 3), metres."""
         return np.asarray((points - self.center) @ self.axes)

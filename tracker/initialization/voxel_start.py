@@ -80,17 +80,16 @@ def locate_parts(figure: Voxels, motion: Array | None = None) -> FigureParts:
     moved = None if motion is None else motion / head.scale
     facing = facing_cues(grown, torso.axes[:, 0], torso.axes[:, 2], moved) + _bends(torso, limbs)
     if facing < 0:
-        torso = torso._replace(axes=torso.axes * np.array([-1.0, -1.0, 1.0]))
+        torso = torso.turned_round()
     own = {n: limb.scaled(head.scale) for n, limb in _by_side(torso, limbs, len(figure.indices)).items()}
     return FigureParts(figure, head, torso.scaled(head.scale), own, abs(facing))
 
 
 def turned_round(parts: FigureParts) -> FigureParts:
     """Return the same parts of a person who faces the other way: left and right are exchanged."""
-    torso = parts.torso._replace(axes=parts.torso.axes * np.array([-1.0, -1.0, 1.0]))
     other = {"left": "right", "right": "left"}
     limbs = {f"{other[n.split('_')[0]]}_{limb.kind}": limb for n, limb in parts.limbs.items()}
-    return parts._replace(torso=torso, limbs=limbs)
+    return parts._replace(torso=parts.torso.turned_round(), limbs=limbs)
 
 
 def start_pose(model: BodyModel, parts: FigureParts) -> Array:
