@@ -219,10 +219,7 @@ class _Frame:
         settings, body = self._settings, self._bodies[0]
         sigma = np.where(body.model.dof_is_length, settings.trust_m, settings.trust_rad)
         first, H, g = len(found.gradient) - body.model.n_dofs, found.hessian.copy(), found.gradient.copy()
-        for prior in (
-            PosePrior(self._frame.bodies[0].values, 1 / sigma),
-            PosePrior(body.model.neutral(), 1 / body.model.spreads),
-        ):
+        for prior in (PosePrior(self._frame.bodies[0].values, 1 / sigma), PosePrior.of_spreads(body.model)):
             own = prior.linearize(body.model, body.values, body.kinematics)
             H[first:, first:] += own.hessian
             g[first:] += own.gradient

@@ -207,7 +207,7 @@ class _Problem:
         self._with_shapes = bool({"taper", "exponent"} & set(step.kinds))
         model = parameters.base
         sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
-        usual = PosePrior(model.neutral(), 1 / model.spreads)
+        usual = PosePrior.of_spreads(model)
         self._priors = [[PosePrior(f.pose, 1 / sigma), usual] for f in frames]
         self.sizes, self.poses, self._damping = sizes, [f.pose for f in frames], INITIAL_DAMPING
         self.n_evaluations = 0
