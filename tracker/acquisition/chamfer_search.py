@@ -48,7 +48,7 @@ class ChamferSearchSettings:
 
 
 class ShapeFound(NamedTuple):
-    """What the search found."""
+    """The result of the search."""
 
     sizes: Array
     """Parameters, (n_sizes,), see `SizeParameters`."""

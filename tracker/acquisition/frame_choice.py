@@ -1,4 +1,4 @@
-"""Choose the frames from which the sizes of a body are acquired: those whose poses show what is unknown.
+"""Choose the frames from which the sizes of a body are acquired: those whose poses show the unknown sizes best.
 
 The contours of a frame carry information about the sizes, whatever the pose is: the Schur complement of their normal
 matrix. Frames are added one at a time, each the one that shrinks the uncertainty of all sizes most (the determinant of

@@ -234,7 +234,7 @@ class SizeParameters:
         return tuple(index), C
 
     def _effects(self, i: int) -> list[tuple[str, int, float]]:
-        """Return what each parameter of a part's flesh changes: its name, a column and a factor."""
+        """Return the effects of the parameters of a part's flesh: name, column and factor."""
         part, main = self.base.parts[i], main_axis(self.base, i)
         outward = -1.0 if part.center[main] < 0 else 1.0  # from the joint to the far end
         is_leaf = i not in self.base.parents
@@ -259,7 +259,7 @@ def kind_of(name: str) -> str:
 
 
 def _limited(values: Array, by: Array, low: float, high: float) -> tuple[Array, Array]:
-    """Clip values; what is clipped has no derivative."""
+    """Clip values; clipped ones have no derivative."""
     inside = (values >= low) & (values <= high)
     return np.clip(values, low, high), np.where(inside[..., None], by, 0.0)
 

@@ -25,7 +25,7 @@ from tracker.geometry.cameras import Camera
 MAX_OFF_RAD = np.radians(35.0)
 """Largest angle between a view and the person's front or side, and of two views from a right angle."""
 _ALIKE_RAD = np.radians(2.0)
-"""Views whose angles differ by less are chosen by what is occluded."""
+"""Views whose angles differ by less are chosen by the occluded share of the contour."""
 _CHOOSING, _OBSERVING = 0.05, 0.15
 """Shares of the work up to the ends of the stages before the search."""
 

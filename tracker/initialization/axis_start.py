@@ -1,8 +1,7 @@
 """Search the twist and the limbs of a body on its axis, coarse to fine, by the silhouettes (GD96 Sect. 4.1).
 
 At each of some twists the limbs are searched among poses spread over their joint limits, then again among the better
-ones given the others. The best twists are searched on around what was found, trunk and limbs in turn, at ever smaller
-spreads.
+ones given the others. The best twists are refined, trunk and limbs in turn, at ever smaller spreads.
 """
 
 from collections.abc import Sequence

@@ -32,7 +32,7 @@ Biomech. 29:1223)."""
 _MAX_MISFIT = 0.035
 """Largest mean difference of the widths from those of a head, as a fraction of the height."""
 _DOWNWARDS = 0.010
-"""What a head at the lower end must fit better, as a fraction of the height."""
+"""Advantage that a head at the lower end needs in its fit, as a fraction of the height."""
 
 
 class BodyAxis(NamedTuple):

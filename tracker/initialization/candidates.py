@@ -38,14 +38,14 @@ _RAISED = (0.0, 0.10, 0.20)
 
 
 class PersonScene(NamedTuple):
-    """What is known of one person on a frame before any pose is."""
+    """One person on a frame before any pose is known."""
 
     figure: Voxels
     """Voxels of the person."""
     silhouettes: Sequence[ViewSilhouette]
     """Of all views."""
     masks: Sequence[FigureMask]
-    """Those of the person alone."""
+    """Silhouettes of the person, of all views."""
     up: Array
     """Vertical axis of the world, (3,)."""
     motion: Array | None
@@ -182,7 +182,7 @@ def standing_height(scene: PersonScene, trunk_up: Array, top: Array, head: Head 
 
 
 def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:
-    """Return the direction from the feet upwards, (3,): the soles of who stands are on the ground, bent or not."""
+    """Return the direction from the feet upwards, (3,): a standing person's soles are on the ground, bent or not."""
     return scene.up if axis.up @ scene.up > _UPRIGHT else axis.up
 
 

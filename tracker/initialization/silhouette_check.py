@@ -31,7 +31,7 @@ class SilhouetteCheck(NamedTuple):
 
     @property
     def note(self) -> str:
-        """A sentence on what is wrong, as seen by the views; empty if nothing is."""
+        """A sentence on the views that contradict the body; empty if none does."""
         if not self.cameras:
             return "no view shows the person alone, so that the silhouettes do not check the pose"
         poor = [

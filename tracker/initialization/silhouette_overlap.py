@@ -84,7 +84,7 @@ class SilhouetteOverlap:
         return np.asarray(np.mean(view_costs / (view_costs + _BROKEN), axis=-1))
 
     def cover(self, Ts: Array, parts: IntArray, covered: NDArray[np.bool_]) -> Array:
-        """Mark the cells that some parts of one body cover; return what they add to the cost of each view, (V,).
+        """Mark the cells that some parts of one body cover; return the costs that they add, (V,).
 
         Args:
             Ts: poses of the parts, (n, 4, 4).
@@ -97,7 +97,7 @@ class SilhouetteOverlap:
         return added
 
     def added(self, Ts: Array, parts: IntArray, covered: NDArray[np.bool_]) -> Array:
-        """Return what parts in many poses add to the cost of each view, (C, V), where some cells are covered already.
+        """Return the costs that parts in many poses add to each view, (C, V), where some cells are covered already.
 
         Args:
             Ts: poses of the parts, (C, n, 4, 4).
@@ -122,7 +122,7 @@ class SilhouetteOverlap:
 
 
 def _reduced(mask: Mask, camera: Camera, center: Array) -> tuple[FloatArray, Camera]:
-    """Return what covering each cell costs as shares of the silhouette, (H, W), and the camera of the cells."""
+    """Return the cost of covering each cell, (H, W), as shares of the silhouette, and the camera of the cells."""
     depth = max(float(camera.depths(center)), NEAR_PLANE_M)
     whole = camera.pinhole
     cells = whole.scaled(min(1.0, depth / (camera.K[0, 0] * _CELL_M)))

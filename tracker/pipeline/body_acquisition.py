@@ -1,4 +1,4 @@
-"""Acquire a person's body from what a session stores, and make it the person's present body."""
+"""Acquire a person's body from the stored poses of a session, and make it the person's present body."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing

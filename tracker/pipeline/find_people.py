@@ -36,7 +36,7 @@ the work."""
 
 @dataclass(frozen=True)
 class FindSettings:
-    """What is to be found."""
+    """Settings of the search for people."""
 
     frame: int | None = None
     """First frame to try; None for the middle of the recording first, where people are seen from all sides."""
@@ -91,7 +91,7 @@ def find_people(
         observer: of its recording.
         people: indices of the people to find.
         frames: the frames that may be used.
-        settings: what is to be found.
+        settings: of the search.
         report: shows progress.
 
     Raises:
@@ -196,7 +196,7 @@ def store_found(session: Session, store: AnnotationStore, found: FoundPeople, la
 
 
 def sentences(session: Session, found: FoundPeople) -> list[str]:
-    """Return a sentence on each first pose, on what is not sure about it, and on each acquired body."""
+    """Return a sentence on each first pose, on its doubts, and on each acquired body."""
     out = []
     for person, first in found.first.poses.items():
         name = session.people[person].name

@@ -1,4 +1,4 @@
-"""Where users have seen points of people in the images: the ends of drags, which are stored with the pose."""
+"""Points of people that users have marked in the images: the ends of drags, which are stored with the pose."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -23,7 +23,7 @@ def seen_points(
     """Return the points of a person that users have marked on a frame, ascending by point and name of the camera.
 
     Args:
-        cameras: the session's views. What was seen in other views is left out.
+        cameras: the session's views. Points in other views are left out.
         model: the person's body. Points that it does not have are left out.
         record: the stored pose, with the ends of drags.
         pins: pins of the person on the frame, which go before the ends of drags.
@@ -40,7 +40,7 @@ def seen_points(
 
 
 def with_drag_ends(cameras: Sequence[CameraSource], seen: _Seen, ends: Sequence[PointObservation]) -> _Seen:
-    """Return what is stored of seen points with the ends of drags, which replace former ones in their views."""
+    """Return stored points with the ends of drags, which replace former ones in their views."""
     seen = dict(seen)
     for at in ends:
         camera = cameras[at.camera].camera
@@ -50,7 +50,7 @@ def with_drag_ends(cameras: Sequence[CameraSource], seen: _Seen, ends: Sequence[
 
 
 def without_moved(model: BodyModel, seen: _Seen, before: Array, after: Array) -> _Seen:
-    """Return what is stored of seen points without those that an edit of the pose, (n_values,) each, moves.
+    """Return stored points without those that an edit of the pose, (n_values,) each, moves.
 
     Nothing stays where the body has other values.
     """

@@ -1,4 +1,4 @@
-"""Prepare a tracking run from what a session stores, and go on with one that was interrupted."""
+"""Prepare a tracking run from the stored poses of a session, and resume one that was interrupted."""
 
 import json
 from collections.abc import Iterator, Sequence

@@ -34,7 +34,7 @@ class Sink(Protocol):
         Args:
             label: of the entry of the history.
             changes: at least one.
-            edit: what the last call returned; None at the first.
+            edit: the result of the last call; None at the first.
 
         Returns:
             The entry of the history that further poses of the run are added to.
@@ -188,7 +188,7 @@ class TrackSession:
         return self.run.frames[done] if done < len(self.run.frames) else None
 
     def rows_record(self) -> dict[str, Any]:
-        """Return what a resumed run needs to smooth the frames of this one."""
+        """Return the covariances and features with which a resumed run smooths the frames of this one."""
         return {str(person): rows.record() for person, rows in self._rows.items()}
 
     def status_counts(self) -> list[Counter[Status]]:

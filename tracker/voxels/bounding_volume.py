@@ -12,7 +12,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, viewed_point
 
 _REACH = 1.5
-"""Half the edge of the largest volume, in the mean distance of the cameras from what they look at."""
+"""Half the edge of the largest volume, in the mean distance of the cameras from the point that they look at."""
 _PIXEL = 1.0
 """Margin around the box of a silhouette, px: a body may reach nearly to the next pixel's centre."""
 
