@@ -1,6 +1,7 @@
 """Imports run one way: a room imports only rooms below it (tests/support/architecture.py lists them)."""
 
 import ast
+import re
 
 import pytest
 from architecture import (
@@ -53,6 +54,16 @@ def test_the_page_imports_run_downwards(script):
     wrong = [s for s in page_imports(script) if PAGE_FLOOR[page_room(s)] > PAGE_FLOOR[page_room(script)]]
     assert wrong == [], f"{script} must not import these"
     assert page_imports(script) <= SCRIPTS.keys()
+
+
+@pytest.mark.parametrize("room", sorted(m for m, path in FILES.items() if path.name == "__init__.py"))
+def test_what_a_room_offers_exists(room):
+    """Its docstring names `file.function`, or a room as `room.part`."""
+    docstring = ast.get_docstring(ast.parse(FILES[room].read_text("utf-8"))) or ""
+    for file, name in re.findall(r"`([a-z_0-9]+)\.([A-Za-z_0-9]+)`", docstring):
+        if not {f"{file}.{name}", f"{room.split('.')[0]}.{file}.{name}"} & FILES.keys():
+            text = FILES[f"{room}.{file}"].read_text("utf-8")
+            assert re.search(rf"^(def |class )?{name}\b", text, re.MULTILINE), f"{file}.{name}"
 
 
 def test_no_folder_is_crowded():

@@ -71,6 +71,6 @@ def _off(frame: BenchFrame, pose: Array) -> Array:
 
 def _off_m(frame: BenchFrame, body: PosedBody, k: int) -> float:
     """Return the mean distance of a body's limb joints from the true ones on a frame, metres."""
-    places = dict(zip(body.model.point_names, body.points_world, strict=True))
+    places = body.named_points_world
     true = dict(zip(frame.joints.names, frame.joints.points[k], strict=True))
     return float(np.mean([np.linalg.norm(places[n] - true[n]) for n in LIMB_JOINTS]))

@@ -1,4 +1,4 @@
-"""`quadrille init --method voxels`, `axis` and `auto`: first poses with nobody's help."""
+"""`quadrille init --method voxels`, `axis` and `auto`: automatic first poses."""
 
 from collections.abc import Sequence
 from contextlib import closing

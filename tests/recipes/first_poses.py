@@ -57,7 +57,7 @@ def true_body(stem):
 def views_of(cameras, truths, person):
     """The two views in which a person would drag each joint: those that show it, and as much as possible across."""
     model, values = truths[person].model, truths[person].values
-    points = dict(zip(model.point_names, model.points_world(values), strict=True))
+    points = model.named_points_world(values)
     views = {}
     for name in LIMBS:
         hidden = points_occluded(truths, cameras, points[name][None])[:, 0]

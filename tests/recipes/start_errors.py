@@ -67,7 +67,7 @@ def _row(found, references, frame):
         points = dict(zip(reference.names, reference.points[row], strict=True))
         before, after = (_errors(found.model, pose, points) for pose in (found.candidate.pose, found.fitted.pose))
         left = points["left_shoulder"] - points["right_shoulder"] + points["left_hip"] - points["right_hip"]
-        own = dict(zip(found.model.point_names, found.model.points_world(found.fitted.pose), strict=True))
+        own = found.model.named_points_world(found.fitted.pose)
         mine = own["left_shoulder"] - own["right_shoulder"] + own["left_hip"] - own["right_hip"]
         errors.append((np.mean(before), np.mean(after), float(mine @ left > 0)))
     best = min(errors)

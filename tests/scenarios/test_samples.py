@@ -93,7 +93,7 @@ def test_the_first_poses_of_the_tango_are_of_a_careful_hand():
         (values,) = table.values_for(person.model)
         assert np.allclose(values, person.model.clip(values), atol=1e-3)
         truth = read_trc(session.folder / f"truth_{person.name}.trc")
-        at = dict(zip(person.model.point_names, person.model.points_world(values), strict=True))
+        at = person.model.named_points_world(values)
         errors = [np.linalg.norm(at[n] - truth.points[0, truth.names.index(n)]) for n in LIMB_JOINTS]
         # Near, but not fitted to the truth: bones of the preset fitted to it are 15 mm off.
         assert 0.03 < np.mean(errors) < 0.07

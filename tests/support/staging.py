@@ -203,7 +203,7 @@ class Shown:
 def seen(model, values, names, cameras, noise_px=0.0, seed=0):
     """Pins of points in all views, with the noise of a user's hand."""
     rng = np.random.default_rng(seed)
-    places = dict(zip(model.point_names, model.points_world(values), strict=True))
+    places = model.named_points_world(values)
     return [
         PointObservation(name, i, tuple(camera.pinhole.project(places[name]) + rng.normal(0, noise_px, 2)))
         for name in names

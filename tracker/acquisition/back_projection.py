@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.size_fit import SightedPerson
-from tracker.body.model import PosedBody
+from tracker.body.model import PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.cameras import Camera
 
@@ -61,7 +62,7 @@ class OccludingContour(NamedTuple):
 
 def back_project_contours(person: SightedPerson) -> list[OccludingContour]:
     """Return the occluding contours of all parts in all views that have at least `MIN_POINTS` points."""
-    body, first = person.bodies[person.person], sum(len(b.model.parts) for b in person.bodies[: person.person])
+    body, first = person.bodies[person.person], parts_of([b.model for b in person.bodies], person.person).start
     out = []
     for i, view in enumerate(person.views):
         points_px, parts = explained_points(view, person.bodies)
@@ -71,8 +72,7 @@ def back_project_contours(person: SightedPerson) -> list[OccludingContour]:
                 continue
             plane = polar_plane(view.camera, body, part)
             points = plane.cut(view.camera.center_world + view.camera.rays(own))
-            middle = body.kinematics.Ts_world_part[part, :3, 3]
-            middle = middle + body.kinematics.Ts_world_part[part, :3, :3] @ body.model.centers_part[part]
+            middle = rigid.apply(body.kinematics.Ts_world_part[part], body.model.centers_part[part])
             reach = _MAX_REACH * np.linalg.norm(body.model.shapes[part].half_axes)
             points = points[np.linalg.norm(points - middle, axis=1) <= reach]
             if len(points) >= MIN_POINTS:
@@ -126,7 +126,7 @@ def _all_points(view: ViewEvidence) -> tuple[FloatArray, FloatArray]:
 def polar_plane(camera: Camera, body: PosedBody, part: int) -> PolarPlane:
     """Return the polar plane of the eye in a part: `e . x = 1` of the eye e in the part's unit coordinates."""
     T, half_axes = body.kinematics.Ts_world_part[part], np.array(body.model.shapes[part].half_axes)
-    eye, middle = camera.center_world, T[:3, 3] + T[:3, :3] @ body.model.centers_part[part]
+    eye, middle = camera.center_world, rigid.apply(T, body.model.centers_part[part])
     unit_eye = (eye - middle) @ T[:3, :3] / half_axes
     normal = T[:3, :3] @ (unit_eye / half_axes)
     return PolarPlane(eye, normal, float(1 + normal @ middle))

@@ -15,6 +15,7 @@ import numpy as np
 from tracker.acquisition.back_projection import MIN_POINTS, back_project_contours
 from tracker.acquisition.size_fit import SightedPerson
 from tracker.acquisition.size_parameters import SizeParameters
+from tracker.body.model import parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.surfaces import Surfaces, resized_surfaces, surfaces_of
 from tracker.geometry.arrays import Array
@@ -47,7 +48,7 @@ class ChamferSearchSettings:
 
 
 class ShapeFound(NamedTuple):
-    """What the search found."""
+    """The result of the search."""
 
     sizes: Array
     """Parameters, (n_sizes,), see `SizeParameters`."""
@@ -106,7 +107,7 @@ class _Space:
         self._parameters, self._person, self._settings = parameters, person, settings
         self._sizes = sizes
         self._contours = back_project_contours(person)
-        self._first = sum(len(b.model.parts) for b in person.bodies[: person.person])
+        self._first = parts_of([b.model for b in person.bodies], person.person).start
         self._surfaces = surfaces_of(tuple(b.model for b in person.bodies))
         self._Ts = occluding_contours.part_poses(person.bodies)
         sigmas = parameters.sigmas

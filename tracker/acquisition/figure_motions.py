@@ -78,7 +78,7 @@ def parts_by_unknowns(body: PosedBody, state: FilterState, by_sizes: FigureSizes
 
 def _torso_turn(body: PosedBody, moved: dict[str, Array], R: Array) -> Array:
     """Differentiate the torso's turn, whose axes lead from point to point, (3, n), by the derivatives of the points."""
-    at = dict(zip(body.model.point_names, body.points_world, strict=True))
+    at = body.named_points_world
 
     def up_of(p: dict[str, Array]) -> Array:
         return np.asarray(p["neck"] - (p["left_hip"] + p["right_hip"]) / 2)

@@ -1,4 +1,4 @@
-"""Choose the frames from which the sizes of a body are acquired: those whose poses show what is unknown.
+"""Choose the frames from which the sizes of a body are acquired: those whose poses show the unknown sizes best.
 
 The contours of a frame carry information about the sizes, whatever the pose is: the Schur complement of their normal
 matrix. Frames are added one at a time, each the one that shrinks the uncertainty of all sizes most (the determinant of
@@ -11,7 +11,7 @@ import numpy as np
 
 from tracker.acquisition.part_motions import motions_by_unknowns, sum_motions, to_unknowns
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.fitting.contour_residuals import MatchSettings, PieceSums
 from tracker.geometry.arrays import Array
@@ -53,9 +53,9 @@ def choose_frames(
 def _information(
     parameters: SizeParameters, cameras: Sequence[Camera], bodies: Sequence[PosedBody], person: int
 ) -> Array:
-    """Return what the visible contours of a frame say about the sizes, (n_sizes, n_sizes)."""
+    """Return the information matrix of the sizes by the visible contours of a frame, (n_sizes, n_sizes)."""
     body, (model, kinematics) = bodies[person], (bodies[person].model, bodies[person].kinematics)
-    first = sum(len(other.model.parts) for other in bodies[:person])
+    first = parts_of([b.model for b in bodies], person).start
     pieces = [(c, _visible_pieces(occluding_contours.trace(bodies, c), first, body, c)) for c in cameras]
     b, M = sum_motions(pieces, model, kinematics)
     by_sizes = parameters.derivatives(np.zeros(len(parameters.names)))

@@ -75,7 +75,7 @@ class Acquisition(NamedTuple):
     cost_after_px: float
     """The same with the acquired body and its poses, px."""
     parameters: SizeParameters
-    """What was fitted, from the body before."""
+    """The sizes that were fitted, relative to the body before."""
     fit: SizeFit
     views: tuple[str, ...] = ()
     """Names of the views that it was fitted to; all of them if empty."""
@@ -98,10 +98,10 @@ def acquire_from_contours(
         observer: of the recording.
         bodies: all people on each frame that may be used, in their present bodies.
         person: index of the person among them.
-        placed: by frame, points of the person that somebody has placed.
+        placed: by frame, points of the person that were placed by hand or are known.
         settings: of the acquisition.
         report: shows progress.
-        seen: by frame, points of the person that somebody has seen in the images.
+        seen: by frame, points of the person that a user has marked in the images.
 
     Raises:
         TrackerError: there is no frame, or the views show nothing of the person.
@@ -192,7 +192,7 @@ def read_views(
 
 
 def own_views(views: Sequence[ViewEvidence], bodies: tuple[PosedBody, ...], person: int) -> Sequence[ViewEvidence]:
-    """Return the evidence of a frame without what other people explain."""
+    """Return the evidence of a frame without the edges that other people explain."""
     people = [PersonPrior(b.model, b.values) for b in bodies]
     return FrameProblem(views, people, TrackSettings()).own_evidence([person], bodies)[0]
 

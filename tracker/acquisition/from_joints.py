@@ -63,7 +63,7 @@ def height_from_joints(model: BodyModel, joints: MarkerTable) -> float:
     Raises:
         TrackerError: the joints lack a segment, or give one a length that no body of this kind has.
     """
-    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    own = model.named_points_world(model.neutral())
     measured = {n: joints.points[:, i] for i, n in enumerate(joints.names)}
     logs = {n: np.log(_length(measured, n, pairs) / _length(own, n, pairs)) for n, pairs in _LENGTHS.items()}
     middle = float(np.median(list(logs.values())))

@@ -45,7 +45,7 @@ class VoxelSizeSettings:
     """Settings of the fit."""
 
     voxels: VoxelSettings = field(default_factory=lambda: VoxelSettings(voxel_m=0.025))
-    """Size of the voxels, how they are labelled, and the noise of what they measure."""
+    """Size of the voxels, how they are labelled, and the noise of their measurements."""
     rounds: int = 3
     """Number of times that voxels are labelled and sizes are updated."""
     trust_rad: float = 0.05
@@ -68,7 +68,7 @@ class VoxelSizes(NamedTuple):
     """Sizes and poses that fit the voxels of some frames."""
 
     parameters: SizeParameters
-    """What was fitted, from the body before."""
+    """The sizes that were fitted, relative to the body before."""
     sizes: Array
     """(n_sizes,)."""
     body: BodyModel
@@ -192,7 +192,7 @@ class _Frame:
     def _measurements(
         self, seen: _Measured, own: _Measured, by_sizes: SizeArrays, by_figure: FigureSizes
     ) -> NormalEquations:
-        """Return the normal equations of what is measured, relative to what the body's own hull measures."""
+        """Return the normal equations of the measurements, relative to those of the body's own hull."""
         (body, *_), (state, *_), noise = self._bodies, self._states, self._settings.voxels.measurement
         n = by_figure.half_sizes.shape[-1] + body.model.n_dofs
         found = _relative(state, seen.parts, own.parts)
@@ -215,14 +215,11 @@ class _Frame:
         return NormalEquations(0.0, gradient, np.einsum("pij,pik->jk", J, WJ, optimize=True))
 
     def _with_priors(self, found: NormalEquations) -> NormalEquations:
-        """Add what is known of the pose without voxels."""
+        """Add the priors of the pose."""
         settings, body = self._settings, self._bodies[0]
         sigma = np.where(body.model.dof_is_length, settings.trust_m, settings.trust_rad)
         first, H, g = len(found.gradient) - body.model.n_dofs, found.hessian.copy(), found.gradient.copy()
-        for prior in (
-            PosePrior(self._frame.bodies[0].values, 1 / sigma),
-            PosePrior(body.model.neutral(), 1 / body.model.spreads),
-        ):
+        for prior in (PosePrior(self._frame.bodies[0].values, 1 / sigma), PosePrior.of_spreads(body.model)):
             own = prior.linearize(body.model, body.values, body.kinematics)
             H[first:, first:] += own.hessian
             g[first:] += own.gradient
@@ -236,7 +233,7 @@ class _Frame:
         ]
 
     def _measured(self, frame: FrameVoxels) -> _Measured:
-        """Return what the voxels of a frame measure of the person."""
+        """Return the measurements of the person by the voxels of a frame."""
         settings, state = self._settings.voxels, self._states[0]
         points = frame.voxels.points_world
         labels = label_voxels(points, self._states, settings.voxel_m, settings.label_rule)
@@ -252,7 +249,7 @@ class _Frame:
 
 
 def _relative(state: FilterState, seen: PartAxes, own: PartAxes) -> PartAxes:
-    """Return what was measured, as if the body's own hull had measured the body itself."""
+    """Return the measurements as if the body's own hull had measured the body itself."""
     sizes = state.sizes * seen.sizes / own.sizes
     volumes = 2 * np.pi * state.sizes.prod(axis=1) * np.where(state.figure.is_ellipsoid, 2 / 3, 1.0)
     return seen._replace(

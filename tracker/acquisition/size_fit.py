@@ -1,7 +1,7 @@
 """Fit the sizes of a body and its poses on several frames to contours, all at once, by Gauss-Newton.
 
 The unknowns are the sizes, which all frames share, and the pose of each frame. The residuals are those of the tracker
-(`contour_residuals`), with the sizes as further columns of the Jacobian. Priors keep what the frames do not show.
+(`contour_residuals`), with the sizes as further columns of the Jacobian. Priors hold sizes that no frame shows.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -44,7 +44,7 @@ _TOLERANCE = 1e-4
 
 
 class SightedPerson(NamedTuple):
-    """A person on one frame, with what the views show."""
+    """A person on one frame, with the evidence of the views."""
 
     frame: int
     views: Sequence[ViewEvidence]
@@ -54,9 +54,9 @@ class SightedPerson(NamedTuple):
     person: int
     """Index of the person among them."""
     placed: PointTargets | None = None
-    """Where somebody has placed points of the body; None in a frame that was only tracked."""
+    """Positions of points of the body that were placed by hand or are known; None in a frame that was only tracked."""
     seen: PinBlock | None = None
-    """Where somebody has seen points of the body in the images; None where nobody has."""
+    """Positions of points of the body that a user has marked in the images; None without any."""
 
     def moved(self, model: BodyModel, pose: Array) -> "SightedPerson":
         """Return the person with another body and pose."""
@@ -103,7 +103,7 @@ class SizeFitSettings:
 
 
 class SizeStart(NamedTuple):
-    """Where a fit starts, other than at the body before."""
+    """The start of a fit that does not begin at the body before."""
 
     sizes: Array
     """Parameters, (n_sizes,), see `SizeParameters`."""
@@ -127,7 +127,7 @@ class SizeFit(NamedTuple):
     covariance: Array
     """Of the sizes, (n_sizes, n_sizes), whatever the poses are."""
     n_evaluations: int = 0
-    """How many times the residuals of all frames were evaluated."""
+    """Number of evaluations of the residuals of all frames."""
 
 
 class _Bundle(NamedTuple):
@@ -207,7 +207,7 @@ class _Problem:
         self._with_shapes = bool({"taper", "exponent"} & set(step.kinds))
         model = parameters.base
         sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
-        usual = PosePrior(model.neutral(), 1 / model.spreads)
+        usual = PosePrior.of_spreads(model)
         self._priors = [[PosePrior(f.pose, 1 / sigma), usual] for f in frames]
         self.sizes, self.poses, self._damping = sizes, [f.pose for f in frames], INITIAL_DAMPING
         self.n_evaluations = 0

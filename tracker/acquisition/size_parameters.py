@@ -2,10 +2,10 @@
 
 All parameters are 0 for the body that they belong to. Scales are logarithms, so that no size can become negative.
 
-The prior says how people differ from a body of their height. Lengths: the segments of the ANSUR II survey (Gordon et
-al. 2014) differ from those of people of equal stature by 3 to 5%. Girths: its breadths and depths differ by 7 to 15%,
-mostly together (`build`). Places: the centre of a joint is known to 1 to 2 cm from the skin around it (Leardini et al.
-1999 for the hip). Shapes: GD96 Sect. 3 lists no ranges; ours are those of the built-in bodies' parts.
+The prior describes how people differ from a body of their height. Lengths: the segments of the ANSUR II survey (Gordon
+et al. 2014) differ from those of people of equal stature by 3 to 5%. Girths: its breadths and depths differ by 7 to
+15%, mostly together (`build`). Places: the centre of a joint is known to 1 to 2 cm from the skin around it (Leardini et
+al. 1999 for the hip). Shapes: GD96 Sect. 3 lists no ranges; ours are those of the built-in bodies' parts.
 """
 
 from dataclasses import dataclass, replace
@@ -22,9 +22,9 @@ from tracker.geometry.arrays import Array
 _LENGTH, _GIRTHS, _CENTER, _HALF, _TAPER, _EXPONENTS, _JOINT = (
     0, slice(1, 3), slice(3, 6), slice(6, 9), slice(9, 11), slice(11, 13), slice(13, 16)
 )  # fmt: skip
-"""Columns of what differs on a part: the logarithm of its length, which stretches flesh and joints along its main axis,
-and of its girths across; shifts of the flesh's centre and half-axes, fractions of height; changes of its shape; and the
-shift of its own joint on the parent, fraction of height."""
+"""Columns of the changes of a part. The logarithm of its length stretches flesh and joints along its main axis, and
+those of its girths stretch it across. Shifts of the flesh's centre, of its half-axes and of its own joint on the parent
+are fractions of the height."""
 _N_COLUMNS = 16
 _EXPONENT_LIMITS, _TAPER_LIMIT = (0.15, 1.0), 0.8
 """Limits of shapes: convex, with finite derivatives."""
@@ -69,13 +69,13 @@ class SizePriors:
     """Of an exponent."""
 
     def anatomical(self) -> "SizePriors":
-        """Return the priors of joints as anatomy defines them, for a person of whom no joints were placed.
+        """Return the priors of joints as anatomy defines them, for a person without placed joints.
 
         Contours hardly show these sizes. Placed joints may have other definitions, so that their offsets are fitted.
         Elbows and knees are the midpoints between the epicondyles (Wu et al. 2002 and 2005), so that flesh lies evenly
-        around them. Regressions predict a hip to 6 mm from the pelvic width (Seidel et al. 1995), and a shoulder to 3
-        mm from the scapula (Meskers et al. 1998). The height of the lateral malleolus varies by 6 mm (ANSUR II). Shoes
-        and plantar flexion add 2 cm.
+        around them. Regressions predict a hip to 6 mm from the pelvic width (Seidel et al. 1995). They predict a
+        shoulder to 3 mm from the scapula (Meskers et al. 1998). The height of the lateral malleolus varies by 6 mm
+        (ANSUR II). Shoes and plantar flexion add 2 cm.
         """
         return replace(
             self,
@@ -234,7 +234,7 @@ class SizeParameters:
         return tuple(index), C
 
     def _effects(self, i: int) -> list[tuple[str, int, float]]:
-        """Return what each parameter of a part's flesh changes: its name, a column and a factor."""
+        """Return the effects of the parameters of a part's flesh: name, column and factor."""
         part, main = self.base.parts[i], main_axis(self.base, i)
         outward = -1.0 if part.center[main] < 0 else 1.0  # from the joint to the far end
         is_leaf = i not in self.base.parents
@@ -259,7 +259,7 @@ def kind_of(name: str) -> str:
 
 
 def _limited(values: Array, by: Array, low: float, high: float) -> tuple[Array, Array]:
-    """Clip values; what is clipped has no derivative."""
+    """Clip values; clipped ones have no derivative."""
     inside = (values >= low) & (values <= high)
     return np.clip(values, low, high), np.where(inside[..., None], by, 0.0)
 

@@ -25,7 +25,7 @@ class SizeChange(NamedTuple):
 
     @property
     def change_m(self) -> float:
-        """How much the size has grown, metres."""
+        """Growth of the size, metres."""
         return self.after_m - self.before_m
 
 

@@ -1,8 +1,8 @@
 """Acquire a person's body from two near-orthogonal views of one frame, as GD96 Sect. 3 does: `acquire --paper`.
 
-The person faces one view, or turns the back to it, and is seen from the side in the other. The paper leaves open what
-happens where the views are not quite orthogonal, how parts are segmented, and what is searched in which steps; see
-docs/acquisition.md for what was chosen.
+The person faces one view, or turns the back to it, and is seen from the side in the other. The paper leaves open how
+parts are segmented, and in which steps they are searched. It assumes orthogonal views. The choices made here are in
+docs/acquisition.md.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ from tracker.acquisition.chamfer_search import ChamferSearchSettings, search_sha
 from tracker.acquisition.from_contours import Acquisition, Report, cost_px, learn_static_edges, own_views, read_views
 from tracker.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
-from tracker.body.model import PosedBody
+from tracker.body.model import PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
@@ -25,7 +25,7 @@ from tracker.geometry.cameras import Camera
 MAX_OFF_RAD = np.radians(35.0)
 """Largest angle between a view and the person's front or side, and of two views from a right angle."""
 _ALIKE_RAD = np.radians(2.0)
-"""Views whose angles differ by less are chosen by what is occluded."""
+"""Views whose angles differ by less are chosen by the occluded share of the contour."""
 _CHOOSING, _OBSERVING = 0.05, 0.15
 """Shares of the work up to the ends of the stages before the search."""
 
@@ -161,8 +161,8 @@ def _off_rad(front_rad: float, side_rad: float) -> float:
 def _occluded(bodies: Sequence[PosedBody], person: int, camera: Camera) -> float:
     """Return which share of a person's contour is occluded or outside the image."""
     contour = occluding_contours.trace(bodies, camera)
-    first = sum(len(b.model.parts) for b in bodies[:person])
-    own = (contour.parts >= first) & (contour.parts < first + len(bodies[person].model.parts))
+    parts = parts_of([b.model for b in bodies], person)
+    own = (contour.parts >= parts.start) & (contour.parts < parts.stop)
     middles = (contour.pieces_px[own, :2] + contour.pieces_px[own, 2:]) / 2
     hidden = contour.occluded[own] | np.any((middles < 0) | (middles >= camera.size), axis=1)
     return float(hidden.mean()) if len(hidden) else 1.0

@@ -231,6 +231,10 @@ class BodyModel:
         """Return the positions of the body's points (see `point_names`), (n_points, 3), metres."""
         return PosedBody(self, values).points_world
 
+    def named_points_world(self, values: Array) -> dict[str, Array]:
+        """Return the positions of the body's points by name, (3,) each, metres."""
+        return PosedBody(self, values).named_points_world
+
     def points_at(self, kinematics: Kinematics, points: IntArray) -> Array:
         """Return the positions of some points, given by index (N,), from known kinematics, (N, 3), metres."""
         T = kinematics.Ts_world_part[self.point_parts[points]]
@@ -347,6 +351,11 @@ class PosedBody:
     def points_world(self) -> Array:
         """Positions of its points, (n_points, 3), metres."""
         return self.model.points_at(self.kinematics, np.arange(len(self.model.point_parts)))
+
+    @property
+    def named_points_world(self) -> dict[str, Array]:
+        """Positions of its points by name, (3,) each, metres."""
+        return dict(zip(self.model.point_names, self.points_world, strict=True))
 
     @cached_property
     def joint_centers_world(self) -> Array:

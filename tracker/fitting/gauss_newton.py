@@ -91,6 +91,11 @@ class PosePrior:
     weights: Array
     """Weight of each degree of freedom, (n_dofs,), per radian or metre."""
 
+    @classmethod
+    def of_spreads(cls, model: BodyModel) -> "PosePrior":
+        """Return the prior by the joint spreads of a body, around its neutral pose."""
+        return cls(model.neutral(), 1 / model.spreads)
+
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         # d(difference)/d(step) is the identity to first order; for ball joints up to the curvature of the rotation.
@@ -289,7 +294,7 @@ def fit_to_points(
             step[turns[0]], step[turns[-1]] = tilt * np.pi / 2, turn * np.pi / 4
             starts.append(model.retract(base, step))
     # Without this prior a body of other sizes would bend unnaturally to come closer to the positions.
-    usual = PosePrior(model.neutral(), 1 / model.spreads)
+    usual = PosePrior.of_spreads(model)
     # A weak pull to the start determines what the points do not, such as the twist of a straight arm.
     rest = np.full(model.n_dofs, 1e-3 / _PLACE_M)
 

@@ -1,8 +1,7 @@
 """Search the twist and the limbs of a body on its axis, coarse to fine, by the silhouettes (GD96 Sect. 4.1).
 
 At each of some twists the limbs are searched among poses spread over their joint limits, then again among the better
-ones given the others. The best twists are searched on around what was found, trunk and limbs in turn, at ever smaller
-spreads.
+ones given the others. The best twists are refined, trunk and limbs in turn, at ever smaller spreads.
 """
 
 from collections.abc import Sequence
@@ -90,7 +89,7 @@ def search_on_axes(
 
 def _exchanged(model: BodyModel, pose: Array, joints: Sequence[str]) -> Array:
     """Return the pose in which the left and the right limb take each other's place, as far as joints allow."""
-    points = dict(zip(model.point_names, model.points_world(pose), strict=True))
+    points = model.named_points_world(pose)
     pairs = [(f"left_{j}", f"right_{j}") for j in joints if f"left_{j}" in points]
     for left, right in pairs:
         points[left], points[right] = points[right], points[left]
@@ -128,14 +127,13 @@ class _Search:
         model, trunk = self.model, trunk_parts(self.model)
         covered = self._overlap.nothing()
         Ts = model.kinematics(pose).Ts_world_part
-        costs = 1 + self._overlap.added(Ts[None, trunk], trunk, covered)
-        self._overlap.cover(Ts[trunk], trunk, covered)
+        costs = 1 + self._overlap.cover(Ts[trunk], trunk, covered)
         tried = []
         for limb, changes in zip(self._limbs, changes_within_limits(model), strict=True):
             poses = self._with_limb(pose, limb, model.clip(model.retract(model.neutral(), changes)))
             totals, view_costs = self._costs(pose, limb, poses, covered, costs)
             order = np.argsort(totals)
-            pose, costs = poses[order[0]], view_costs[order[:1]]
+            pose, costs = poses[order[0]], view_costs[order[0]]
             self._overlap.cover(model.kinematics(pose).Ts_world_part[limb.parts], limb.parts, covered)
             tried.append(poses[order[:_N_AGAIN]])
         for _ in range(_SWEEPS):
@@ -171,8 +169,7 @@ class _Search:
         """Return the best of poses that differ from a pose in one limb only, and its cost."""
         others = np.setdiff1d(self._parts, limb.parts)
         Ts, covered = self.model.kinematics(pose).Ts_world_part, self._overlap.nothing()
-        costs = 1 + self._overlap.added(Ts[None, others], others, covered)
-        self._overlap.cover(Ts[others], others, covered)
+        costs = 1 + self._overlap.cover(Ts[others], others, covered)
         totals, _ = self._costs(pose, limb, poses, covered, costs)
         i = int(np.argmin(totals))
         return poses[i], float(totals[i])
@@ -187,7 +184,7 @@ class _Search:
             limb: the limb.
             poses: (n, n_values).
             covered: cells that the rest of the body covers.
-            costs: of each view without the limb, (1, V).
+            costs: of each view without the limb, (V,).
         """
         Ts = chain_poses(self.model.tree, self.model.kinematics(pose), limb.parts, poses)
         view_costs = costs + self._overlap.added(Ts, limb.parts, covered)
@@ -217,7 +214,7 @@ def _trunk(model: BodyModel, axis: BodyAxis, R: Array, near: Array | None) -> Ar
         R: the frame, (3, 3).
         near: pose at a twist nearby, (n_values,), if there is one.
     """
-    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    own = model.named_points_world(model.neutral())
     middle = (own["left_shoulder"] + own["right_shoulder"]) / 2
     place = rigid.transform(R, axis.top - SHOULDERS * model.height_m * axis.up)
     known = {n: rigid.apply(place, p - middle) for n, p in own.items()}

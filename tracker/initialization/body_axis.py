@@ -14,7 +14,7 @@ _MAX_OFF_RAD = np.radians(20)
 _MIN_APART = 0.2
 """Smallest spread of the planes, as a sine: views from opposite sides have the same plane."""
 _CENTER_WEIGHT = 0.1
-"""Weight of the rays through the silhouettes' centres against the planes: they only say where along the axis."""
+"""Weight of the rays through the silhouettes' centres against the planes. They only give the place along the axis."""
 _BIN_M = 0.02
 _LATERAL_M = 0.40
 """Points of a silhouette farther aside of the axis are not counted, metres."""
@@ -32,7 +32,7 @@ Biomech. 29:1223)."""
 _MAX_MISFIT = 0.035
 """Largest mean difference of the widths from those of a head, as a fraction of the height."""
 _DOWNWARDS = 0.010
-"""What a head at the lower end must fit better, as a fraction of the height."""
+"""Advantage that a head at the lower end needs in its fit, as a fraction of the height."""
 
 
 class BodyAxis(NamedTuple):
@@ -126,8 +126,10 @@ def _center(axes: Sequence[MajorAxis], direction: Array) -> Array:
 
 
 def _along(axis: MajorAxis, center: Array, direction: Array) -> tuple[Array, Array, Array]:
-    """Return for points of a silhouette where along the axis they lie, how far aside, (n,) each, metres, and the area
-    of a point, (n,), square metres."""
+    """Return the places of a silhouette's points along the axis, their distances from it, and their areas.
+
+    All are (n,), in metres, the areas in square metres.
+    """
     eye = axis.camera.center_world
     rays = axis.camera.rays(axis.points_px)
     d = rays @ direction

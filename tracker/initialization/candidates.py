@@ -9,7 +9,9 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import GroundPlane
+from tracker.images.background_subtraction import Mask
 from tracker.initialization.axis_start import AxisStart, search_on_axes
 from tracker.initialization.body_axis import BodyAxis, find_body_axes
 from tracker.initialization.head_template import Head
@@ -33,12 +35,12 @@ StartMethod: TypeAlias = Literal["voxels", "axis", "search"]
 _UPRIGHT = 0.9
 """Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
 _NECK, _NECK_GROWTH, _NECK_SPREAD = 0.70, 0.18, 0.04
-"""Height of the base of the head of a person who stands, as a fraction of the body's height: a constant, the slope by
-the person's size as a share of an adult's, and the largest relative error. Folded legs or hands on the head change it.
-"""
+"""Height of the base of a standing person's head, as a fraction of the body's height. It is a constant plus a slope by
+the person's size as a share of an adult's; the last number is its largest relative error. Folded legs and hands on the
+head change it."""
 _MAX_PATH = 1.25
-"""Largest path from the top of the head to the soles, as a share of the height of a person who stands: folded legs make
-it longer. The grid lengthens paths by up to a tenth."""
+"""Largest path from the top of the head to the soles, as a share of a standing person's height. Folded legs make it
+longer. The grid lengthens paths by up to a tenth."""
 _MAX_HIDDEN_M = 0.15
 """Largest height of shoes that shadows hide, metres."""
 _AXES_TRIED = 3
@@ -47,14 +49,14 @@ _RAISED = (0.0, 0.10, 0.20)
 
 
 class PersonScene(NamedTuple):
-    """What is known of one person on a frame before any pose is."""
+    """One person on a frame before any pose is known."""
 
     figure: Voxels
     """Voxels of the person."""
     silhouettes: Sequence[ViewSilhouette]
     """Of all views."""
     masks: Sequence[FigureMask]
-    """Those of the person alone."""
+    """Silhouettes of the person, of all views."""
     floor: GroundPlane
     """The floor."""
     motion: Array | None
@@ -64,6 +66,13 @@ class PersonScene(NamedTuple):
     def up(self) -> Array:
         """Vertical axis of the world, (3,)."""
         return self.floor.normal
+
+    @property
+    def clear_views(self) -> list[tuple[Mask, Camera]]:
+        """Masks and cameras of the views that show the person alone; of all views if fewer than two do."""
+        pairs = list(zip(self.masks, self.silhouettes, strict=True))
+        alone = [(m.mask, s.camera) for m, s in pairs if m.shows_figure_alone]
+        return alone if len(alone) >= 2 else [(m.mask, s.camera) for m, s in pairs]
 
 
 class StartCandidate(NamedTuple):
@@ -77,9 +86,9 @@ class StartCandidate(NamedTuple):
     forward: Array
     """Unit direction in which the trunk faces, (3,)."""
     cues: float
-    """What feet, bends and motion say for that direction; below 0 they speak for the opposite one."""
+    """Sum of the cues of feet, bends and motion for that direction; below 0 they favour the opposite one."""
     unresolved: tuple[str, ...] = ()
-    """Limbs that the method does not tell from the rest of the body."""
+    """Limbs that the method does not separate from the rest of the body."""
     straight: tuple[str, ...] = ()
     """Limbs whose middle joint follows from proportions."""
     axis: BodyAxis | None = None
@@ -162,10 +171,7 @@ def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
     Raises:
         TrackerError: fewer than two views show the person.
     """
-    pairs = list(zip(scene.masks, scene.silhouettes, strict=True))
-    apart = [(m, s) for m, s in pairs if m.is_apart and m.mask.any()]
-    chosen = apart if len(apart) >= 2 else pairs
-    axes = [a for m, s in chosen if (a := major_axis(m.mask, s.camera)) is not None]
+    axes = [a for mask, camera in scene.clear_views if (a := major_axis(mask, camera)) is not None]
     if len(axes) < 2:
         raise TrackerError(
             f"expected the person in at least 2 views, found {len(axes)}; choose another --frame, or check the "
@@ -213,18 +219,15 @@ def _soles(scene: PersonScene) -> float:
 
 
 def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:
-    """Return the direction from the feet upwards, (3,): the soles of who stands are on the ground, bent or not."""
+    """Return the direction from the feet upwards, (3,): a standing person's soles are on the ground, bent or not."""
     return scene.up if axis.up @ scene.up > _UPRIGHT else axis.up
 
 
 def _on_axes(
     method: StartMethod, scene: PersonScene, model: BodyModel, axes: Sequence[BodyAxis], is_measured: bool
 ) -> list[StartCandidate]:
-    pairs = list(zip(scene.masks, scene.silhouettes, strict=True))
-    apart = sum(m.is_apart and bool(m.mask.any()) for m, _ in pairs) >= 2
-    masks = [m.mask if m.is_apart or not apart else np.zeros_like(m.mask) for m, _ in pairs]
-    center = scene.figure.points_world.mean(axis=0)
-    overlap = SilhouetteOverlap(model, masks, [s.camera for _, s in pairs], center)
+    masks, cameras = zip(*scene.clear_views, strict=True)
+    overlap = SilhouetteOverlap(model, masks, cameras, scene.figure.points_world.mean(axis=0))
     starts: list[AxisStart] = search_on_axes(model, overlap, axes, scene.up)
     return [
         StartCandidate(

@@ -26,14 +26,14 @@ class Template(NamedTuple):
     surrounding_m: float
     """Outer radius of the shell in which a head has only its neck, metres."""
     min_score: float
-    """Smallest score of a head: the surface voxels in the crust less the voxels around it, as a share of the surface
-    voxels of a sphere of the crust's mean radius."""
+    """Smallest score of a head: the surface voxels in the crust less the voxels around it. The unit is the number of
+    surface voxels of a sphere of the crust's mean radius."""
 
 
 _TEMPLATES = (Template(0.07, 0.135, 0.20, 0.25), Template(0.055, 0.11, 0.13, 0.5))
 """In the order in which they are tried. The first has half the smallest and half the largest dimension of an adult's
-head, with a wide shell, which hands and feet in the hull of few views do not pass. The second also fits heads beside an
-arm, and heads of children, whose shoulders are near."""
+head. Hands and feet in the hull of few views do not pass its wide shell. The second also fits heads beside an arm, and
+heads of children, whose shoulders are near."""
 _MAX_PIECE = 0.02
 """Largest share of a figure's voxels that may be cut off from the rest without the head: hair and stray voxels."""
 _TRIED = 5
@@ -43,8 +43,8 @@ _UPPER_M, _MIN_UPPER_SCORE = 0.35, 0.4
 _ADULT_M, _ADULT_M3 = 1.75, 0.10
 """Stature of a typical adult, metres, and the volume of the visual hull, cubic metres."""
 _HEAD_M, _HEAD_GROWTH_M = 0.0945, 0.0405
-"""Distance from the centre within which voxels belong to the head, metres: a constant, and the slope by the person's
-size as a share of an adult's. Heads grow less than bodies."""
+"""Distance from the centre within which voxels belong to the head, metres. It is a constant plus a slope by the size of
+the person as a share of an adult's, because heads grow less than bodies."""
 
 
 class Head(NamedTuple):
@@ -138,7 +138,7 @@ def _head(figure: Voxels, graph: VoxelGraph, place: _Place) -> Head | None:
     points = figure.points_world
     lengths = path_lengths(graph, place.distances <= place.radius_m, figure.grid.size_m)
     path_m = place.radius_m + float(lengths[np.isfinite(lengths)].max())
-    # A person whom an image cuts off has short paths, yet the volume of more than a child.
+    # A person cut off by an image has short paths, yet the volume of more than a child.
     scale = min(1.0, max(path_m / _ADULT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
     is_head = place.distances <= _HEAD_M + _HEAD_GROWTH_M * scale
     neck = _neck(figure, is_head)

@@ -22,7 +22,7 @@ _INSIDE = 0.8
 
 
 def moving_limbs(model: BodyModel) -> tuple[Limb, ...]:
-    """Return the legs, then the arms: legs are larger, and what they explain no arm needs to."""
+    """Return the legs, then the arms: legs are larger, and no arm needs to explain their part of the silhouettes."""
     own = [limb for limb in limbs(model) if "head" not in limb.name]
     return tuple(sorted(own, key=lambda limb: _kind(limb) == "arm"))
 

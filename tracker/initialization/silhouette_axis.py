@@ -1,6 +1,6 @@
 """Find the major axis of a silhouette by iterative principal component analysis (GD96 Sect. 4.1, Fig. 5).
 
-Arms beside the trunk turn the first axis. Each round removes what lies far aside of the axis, and finds it again.
+Arms beside the trunk turn the first axis. Each round removes the points far aside of the axis, and finds it again.
 """
 
 from typing import NamedTuple

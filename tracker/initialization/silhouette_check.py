@@ -13,7 +13,7 @@ from tracker.voxels.figure_masks import FigureMask
 
 _MIN_OVERLAP = 0.55
 """Smallest overlap with the silhouettes in half of the views. A body of other proportions in about the right pose has
-two thirds or more, one that stands beside the person or upside down a half or less."""
+two thirds or more. One that stands beside the person or upside down has a half or less."""
 
 
 class SilhouetteCheck(NamedTuple):
@@ -31,7 +31,7 @@ class SilhouetteCheck(NamedTuple):
 
     @property
     def note(self) -> str:
-        """A sentence on what is wrong, as seen by the views; empty if nothing is."""
+        """A sentence on the views that contradict the body; empty if none does."""
         if not self.cameras:
             return "no view shows the person alone, so that the silhouettes do not check the pose"
         poor = [
@@ -49,12 +49,12 @@ def check_against_silhouettes(
 
     Args:
         body: the body.
-        silhouettes: of everybody in all views.
+        silhouettes: of all people, in all views.
         masks: that of the person in each of them.
     """
     found = [
         (s.camera.name, intersection_over_union(body_silhouette([body], s.camera), m.mask))
         for s, m in zip(silhouettes, masks, strict=True)
-        if m.is_apart and m.mask.any()
+        if m.shows_figure_alone
     ]
     return SilhouetteCheck(tuple(name for name, _ in found), np.array([share for _, share in found]))

@@ -37,8 +37,8 @@ class _Views(NamedTuple):
     P: FloatArray
     """Projection matrices, (V, 3, 4)."""
     weights: FloatArray
-    """What covering each cell costs, of all views one after the other, row by row: above 0 beside the silhouette,
-    below 0 within; 1 is a whole silhouette."""
+    """Cost of covering each cell, of all views one after the other, row by row. It is positive beside the silhouette
+    and negative within; 1 is a whole silhouette."""
     layout: IntArray
     """First cell, width and height of each view, (V, 3)."""
 
@@ -83,8 +83,8 @@ class SilhouetteOverlap:
         """Return the cost over all views, (..., V) to (...): a broken silhouette, which no body fills, counts less."""
         return np.asarray(np.mean(view_costs / (view_costs + _BROKEN), axis=-1))
 
-    def cover(self, Ts: Array, parts: IntArray, covered: NDArray[np.bool_]) -> None:
-        """Mark the cells that some parts of one body cover.
+    def cover(self, Ts: Array, parts: IntArray, covered: NDArray[np.bool_]) -> Array:
+        """Mark the cells that some parts of one body cover; return the costs that they add, (V,).
 
         Args:
             Ts: poses of the parts, (n, 4, 4).
@@ -92,11 +92,12 @@ class SilhouetteOverlap:
             covered: is added to.
         """
         marks = np.zeros(self._n_cells, np.int32)
-        self._measure(Ts[None], parts, covered, marks)
+        added = self._measure(Ts[None], parts, covered, marks)[0]
         covered |= marks > 0
+        return added
 
     def added(self, Ts: Array, parts: IntArray, covered: NDArray[np.bool_]) -> Array:
-        """Return what parts in many poses add to the cost of each view, (C, V), where some cells are covered already.
+        """Return the costs that parts in many poses add to each view, (C, V), where some cells are covered already.
 
         Args:
             Ts: poses of the parts, (C, n, 4, 4).
@@ -121,7 +122,7 @@ class SilhouetteOverlap:
 
 
 def _reduced(mask: Mask, camera: Camera, center: Array) -> tuple[FloatArray, Camera]:
-    """Return what covering each cell costs as shares of the silhouette, (H, W), and the camera of the cells."""
+    """Return the cost of covering each cell, (H, W), as shares of the silhouette, and the camera of the cells."""
     depth = max(float(camera.depths(center)), NEAR_PLANE_M)
     whole = camera.pinhole
     cells = whole.scaled(min(1.0, depth / (camera.K[0, 0] * _CELL_M)))

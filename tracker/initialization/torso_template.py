@@ -45,6 +45,10 @@ class Torso(NamedTuple):
         """Return it in a figure that is larger by a factor about the world's origin."""
         return self._replace(neck=self.neck * factor, half_axes=self.half_axes * factor)
 
+    def turned_round(self) -> "Torso":
+        """Return it facing the other way: forwards and left are exchanged with backwards and right."""
+        return self._replace(axes=self.axes * np.array([-1.0, -1.0, 1.0]))
+
     def local(self, points: Array) -> Array:
         """Return points, (N, 3), in its frame about its centre, (N, 3), metres."""
         return np.asarray((points - self.center) @ self.axes)
@@ -70,7 +74,7 @@ def find_torso(figure: Voxels, neck: Array, is_head: NDArray[np.bool_]) -> Torso
 
 
 def _axis(points: Array, neck: Array) -> Array:
-    """Return the direction from the torso to the neck, (3,): the template turns to the centroid of what it holds."""
+    """Return the direction from the torso to the neck, (3,): the template turns to the centroid of its voxels."""
     length, radius = _AVERAGE_M
     down = points.mean(axis=0) - neck
     down /= np.linalg.norm(down)
@@ -123,7 +127,7 @@ def _grown(figure: Voxels, neck: Array, axes: Array) -> Array:
 
 
 def _filled(figure: Voxels, neck: Array, axes: Array, half: Array, larger: Array) -> float:
-    """Return the share of occupied voxels in what a larger template adds."""
+    """Return the share of occupied voxels in the growth of a template."""
     step = figure.grid.size_m / 2
     x, y = (np.arange(-h, h + step / 2, step) for h in larger[:2])
     z = np.arange(-2 * larger[2], step / 2, step)

@@ -20,8 +20,8 @@ SIDES = ("left", "right")
 _JOINTS = {"arm": ("elbow", "wrist"), "leg": ("knee", "ankle")}
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _FOOT_M, _BEND_M, _MOTION_M = 0.06, 0.06, 0.12
-"""Lengths that say with some certainty where a person faces: a foot before its ankle, a knee or elbow beside the line
-through its limb, and the way to the next frames, metres."""
+"""Units of the cues for where a person faces, metres. The cues are a foot before its ankle, a knee or elbow beside the
+line through its limb, and the way to the next frames."""
 SURE = 1.0
 """Sum of these cues from which on left and right are known."""
 _SAME_HEAD_M = 0.11
@@ -36,7 +36,7 @@ class FigureParts(NamedTuple):
     figure: Voxels
     head: Head
     torso: Torso
-    """Its narrow axis points forwards and its wide one to the left, as far as the cues say."""
+    """Its narrow axis points forwards and its wide one to the left, as far as the cues show."""
     limbs: dict[str, LimbRegion]
     """Limbs that stand out, by name: `left_arm` and so on."""
     facing: float
@@ -44,7 +44,7 @@ class FigureParts(NamedTuple):
 
     @property
     def is_facing_sure(self) -> bool:
-        """Whether the cues tell left from right."""
+        """Whether left and right are known by the cues."""
         return self.facing >= SURE
 
     @property
@@ -95,17 +95,16 @@ def locate_parts(figure: Voxels, graph: VoxelGraph, head: Head, motion: Array | 
     moved = None if motion is None else motion / head.scale
     facing = facing_cues(grown, torso.axes[:, 0], torso.axes[:, 2], moved) + _bends(torso, limbs)
     if facing < 0:
-        torso = torso._replace(axes=torso.axes * np.array([-1.0, -1.0, 1.0]))
+        torso = torso.turned_round()
     own = {n: limb.scaled(head.scale) for n, limb in _by_side(torso, limbs, len(figure.indices)).items()}
     return FigureParts(figure, head, torso.scaled(head.scale), own, abs(facing))
 
 
 def turned_round(parts: FigureParts) -> FigureParts:
     """Return the same parts of a person who faces the other way: left and right are exchanged."""
-    torso = parts.torso._replace(axes=parts.torso.axes * np.array([-1.0, -1.0, 1.0]))
     other = {"left": "right", "right": "left"}
     limbs = {f"{other[n.split('_')[0]]}_{limb.kind}": limb for n, limb in parts.limbs.items()}
-    return parts._replace(torso=torso, limbs=limbs)
+    return parts._replace(torso=parts.torso.turned_round(), limbs=limbs)
 
 
 def start_pose(model: BodyModel, parts: FigureParts) -> Array:
@@ -114,7 +113,7 @@ def start_pose(model: BodyModel, parts: FigureParts) -> Array:
     Shoulders and hips lie in the torso's frame as in the body. Limbs that are not resolved hang.
     """
     known = joint_positions(model, parts)
-    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    own = model.named_points_world(model.neutral())
     place = rigid.transform(parts.torso.axes, parts.head.neck)
     for name in parts.unresolved:
         side, kind = name.split("_")
@@ -124,7 +123,7 @@ def start_pose(model: BodyModel, parts: FigureParts) -> Array:
 
 def joint_positions(model: BodyModel, parts: FigureParts) -> dict[str, Array]:
     """Return the joints that the parts of a figure show, by name, (3,) each, metres."""
-    own = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    own = model.named_points_world(model.neutral())
     place = rigid.transform(parts.torso.axes, parts.head.neck)
     found = {n: rigid.apply(place, own[n] - own["neck"]) for n in _TRUNK if n in own}
     for name, limb in parts.limbs.items():
@@ -135,7 +134,7 @@ def joint_positions(model: BodyModel, parts: FigureParts) -> dict[str, Array]:
 
 
 def _by_side(torso: Torso, limbs: Sequence[LimbRegion], n_voxels: int) -> dict[str, LimbRegion]:
-    """Name limbs by the side of the torso that they leave; two of a kind are told apart by their order."""
+    """Name limbs by the side of the torso that they leave, and two of a kind by their order."""
     found: dict[str, LimbRegion] = {}
     for kind in _JOINTS:
         own = sorted((limb for limb in limbs if limb.kind == kind), key=lambda limb: -len(limb.indices))[:2]
@@ -150,7 +149,7 @@ def _by_side(torso: Torso, limbs: Sequence[LimbRegion], n_voxels: int) -> dict[s
 
 
 def _bends(torso: Torso, limbs: Sequence[LimbRegion]) -> float:
-    """Return what the bends of limbs say for the torso's narrow axis as the direction in which a person faces."""
+    """Return the cue of the limbs' bends that a person faces along the torso's narrow axis."""
     forward, total = torso.axes[:, 0], 0.0
     for limb in limbs:
         bend = float((limb.middle - (limb.proximal + limb.distal) / 2) @ forward)
@@ -160,7 +159,7 @@ def _bends(torso: Torso, limbs: Sequence[LimbRegion]) -> float:
 
 
 def facing_cues(figure: Voxels, forward: Array, up: Array, motion: Array | None) -> float:
-    """Return what feet and motion say for a direction as that in which a person faces; from `SURE` on they tell.
+    """Return the sum of the cues of feet and motion that a person faces in a direction; from `SURE` on it is known.
 
     Args:
         figure: voxels of the person.

@@ -1,4 +1,4 @@
-"""Acquire a person's body from what a session stores, and make it the person's present body."""
+"""Acquire a person's body from the stored poses of a session, and make it the person's present body."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
@@ -30,8 +30,8 @@ from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
 SIZES_EDITS = "sizes_edits"
-"""Setting of the session: for each entry of the history that changed sizes, the name of the person and the revisions
-before and after it; a list of such triples for several people."""
+"""Setting of the session. For each entry of the history that changed sizes it has the name of the person and the
+revisions before and after. For several people it has a list of such triples."""
 PLACED_M = 0.02
 """Standard deviation of a joint that a user has placed in the images, metres."""
 _HAND = 3.0
@@ -50,9 +50,9 @@ class PosedFrames(NamedTuple):
     bodies: Mapping[int, tuple[PosedBody, ...]]
     """On each frame the person in the present body, then the other people who have a pose there."""
     placed: Mapping[int, PointTargets]
-    """By frame, joints of the person that somebody has placed."""
+    """By frame, joints of the person that were placed by hand or are known."""
     seen: Mapping[int, PinBlock]
-    """By frame, points of the person that somebody has seen in the images: pins, and the ends of drags."""
+    """By frame, points of the person that a user has marked in the images: pins, and the ends of drags."""
     has_known_joints: bool = False
     """Whether some joints come from a file, which may define them otherwise than anatomy does."""
 
@@ -115,12 +115,12 @@ def _acquire(
 
 
 def has_preset_sizes(model: BodyModel) -> bool:
-    """Return whether a body still has all sizes of its preset, so that nobody has said how tall the person is."""
+    """Return whether a body still has all sizes of its preset, so that the height of the person is not known."""
     return model.name in PRESETS and format_model(model) == format_model(load_model(model.name))
 
 
 def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedFrames:
-    """Return the frames on which a person has a credible pose, with the joints that somebody has placed.
+    """Return the frames on which a person has a credible pose, with the placed joints.
 
     Keyframes and good frames are used. If there are none, doubtful ones are.
 
@@ -220,9 +220,9 @@ def _pose_in(body: BodyModel, stored: StoredPose, known: Array | None) -> Array:
 
 
 def _placed(stored: StoredPose, observed: Sequence[PointObservation]) -> PointTargets | None:
-    """Return the joints that somebody has placed on a frame: known joints, or those of a keyframe set by hand.
+    """Return the placed joints of a frame: known joints, or those of a keyframe set by hand.
 
-    Where it is known in which places a user saw points, these say more than a pose that a body of other sizes reached.
+    Points that a user has marked in the images replace those of a keyframe: a body of other sizes may have missed them.
     """
     record, model = stored.record, stored.body.model
     joints = record.settings.get("joints")
@@ -232,7 +232,7 @@ def _placed(stored: StoredPose, observed: Sequence[PointObservation]) -> PointTa
         return None  # a tracked pose that was confirmed shows where the flesh is, not the joints
     if observed:
         return None
-    return place_joints(model, dict(zip(model.point_names, stored.body.points_world, strict=True)), PLACED_M)
+    return place_joints(model, stored.body.named_points_world, PLACED_M)
 
 
 def _tracked_with(

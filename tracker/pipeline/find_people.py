@@ -1,4 +1,4 @@
-"""Find people with nobody's help: first poses, then their sizes. Tracking goes on from there in both directions."""
+"""Find people automatically: first poses, then their sizes. Tracking goes on from there in both directions."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,8 +26,8 @@ _STARTING = 0.5
 """Share of the work up to the end of the first poses, where sizes are acquired too."""
 
 AXES = "silhouette_axes"
-"""Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera,
-for each person the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
+"""Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera.
+For each person these are the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
 
 Report = Callable[[str, float, str], None]
 """Is given a stage, the share of all work that is done, 0 to 1, and a sentence, which may be empty. What it raises ends
@@ -36,7 +36,7 @@ the work."""
 
 @dataclass(frozen=True)
 class FindSettings:
-    """What is to be found."""
+    """Settings of the search for people."""
 
     frame: int | None = None
     """First frame to try; None for the middle of the recording first, where people are seen from all sides."""
@@ -91,7 +91,7 @@ def find_people(
         observer: of its recording.
         people: indices of the people to find.
         frames: the frames that may be used.
-        settings: what is to be found.
+        settings: of the search.
         report: shows progress.
 
     Raises:
@@ -196,7 +196,7 @@ def store_found(session: Session, store: AnnotationStore, found: FoundPeople, la
 
 
 def sentences(session: Session, found: FoundPeople) -> list[str]:
-    """Return a sentence on each first pose, on what is not sure about it, and on each acquired body."""
+    """Return a sentence on each first pose, on its doubts, and on each acquired body."""
     out = []
     for person, first in found.first.poses.items():
         name = session.people[person].name

@@ -1,4 +1,4 @@
-"""Where users have seen points of people in the images: the ends of drags, which are stored with the pose."""
+"""Points of people that users have marked in the images: the ends of drags, which are stored with the pose."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,7 +12,7 @@ from tracker.geometry.triangulation import PointObservation
 from tracker.store.records import SEEN, Pin, PoseRecord
 
 _MOVED_M = 0.01
-"""An edit other than a drag that moves a point by more says that it was not where it was seen."""
+"""An edit other than a drag that moves a point by more withdraws its place in the images, metres."""
 _Seen = dict[str, dict[str, Any]]
 """Position in each camera, original px, by point."""
 
@@ -20,10 +20,10 @@ _Seen = dict[str, dict[str, Any]]
 def seen_points(
     cameras: Sequence[CameraSource], model: BodyModel, record: PoseRecord, pins: Sequence[Pin] = ()
 ) -> list[PointObservation]:
-    """Return where somebody has seen points of a person on a frame, ascending by point and name of the camera.
+    """Return the points of a person that users have marked on a frame, ascending by point and name of the camera.
 
     Args:
-        cameras: the session's views. What was seen in other views is left out.
+        cameras: the session's views. Points in other views are left out.
         model: the person's body. Points that it does not have are left out.
         record: the stored pose, with the ends of drags.
         pins: pins of the person on the frame, which go before the ends of drags.
@@ -40,7 +40,7 @@ def seen_points(
 
 
 def with_drag_ends(cameras: Sequence[CameraSource], seen: _Seen, ends: Sequence[PointObservation]) -> _Seen:
-    """Return what is stored of seen points with the ends of drags, which replace former ones in their views."""
+    """Return stored points with the ends of drags, which replace former ones in their views."""
     seen = dict(seen)
     for at in ends:
         camera = cameras[at.camera].camera
@@ -50,7 +50,7 @@ def with_drag_ends(cameras: Sequence[CameraSource], seen: _Seen, ends: Sequence[
 
 
 def without_moved(model: BodyModel, seen: _Seen, before: Array, after: Array) -> _Seen:
-    """Return what is stored of seen points without those that an edit of the pose, (n_values,) each, moves.
+    """Return stored points without those that an edit of the pose, (n_values,) each, moves.
 
     Nothing stays where the body has other values.
     """

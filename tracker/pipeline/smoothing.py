@@ -1,6 +1,6 @@
 """Finish a run: smooth its poses, and classify them again.
 
-A run keeps of its frames what that needs, and gets rows that take the place of those of the tracked poses.
+A run keeps covariances and features of its frames. It gets rows that replace those of the tracked poses.
 """
 
 import base64
@@ -59,7 +59,7 @@ class TrackedRows:
         return {str(f): [base64.b64encode(a.tobytes()).decode() for a in some] for f, some in arrays.items()}
 
     def restore(self, change: PoseChange, texts: Sequence[str] | str) -> None:
-        """Add a row of an interrupted run with what `record` returned of its frame; older versions knew no features."""
+        """Add a row of an interrupted run with its texts from `record`; older versions stored no features."""
         known = [texts] if isinstance(texts, str) else texts
         covariance, *features = [np.frombuffer(base64.b64decode(text), np.float32) for text in known]
         self._changes[change.frame], self._covariances[change.frame] = change, covariance
@@ -86,7 +86,7 @@ class TrackedRows:
 
         Args:
             model: the body.
-            smoothed: what `smoothed` returned.
+            smoothed: rows from `smoothed`.
         """
         after = {c.frame: c.pose.values for c in smoothed if c.pose is not None and c.frame in self._features}
         before = {f: pose.values for f in after if (pose := self._changes[f].pose) is not None}
@@ -132,7 +132,7 @@ def resumed_rows(
 
     Args:
         rows: stored rows by index of the person.
-        records: what `TrackedRows.record` returned, by index of the person as text.
+        records: texts from `TrackedRows.record`, by index of the person as text.
     """
     out = {}
     for person, changes in rows.items():

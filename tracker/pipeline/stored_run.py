@@ -1,4 +1,4 @@
-"""Prepare a tracking run from what a session stores, and go on with one that was interrupted."""
+"""Prepare a tracking run from the stored poses of a session, and resume one that was interrupted."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -174,7 +174,7 @@ def _start_poses(store: AnnotationStore, person: Person, frames: Sequence[int], 
         store: annotations of the session.
         person: whose poses.
         frames: to track, in order.
-        needed: whether the person is tracked; anybody else may have the neutral pose.
+        needed: whether the person is tracked; others may have the neutral pose.
 
     Raises:
         SessionError: a pose is needed and there is none.

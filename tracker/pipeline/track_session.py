@@ -34,7 +34,7 @@ class Sink(Protocol):
         Args:
             label: of the entry of the history.
             changes: at least one.
-            edit: what the last call returned; None at the first.
+            edit: the result of the last call; None at the first.
 
         Returns:
             The entry of the history that further poses of the run are added to.
@@ -115,7 +115,7 @@ class TrackSession:
         self.costs_px: dict[int, float] = {}
         """Cost of each frame that this run has tracked, px."""
         self.normal_matrices: dict[int, tuple[NormalMatrix | None, ...]] = {}
-        """How well the contours determine the pose of each person, by frame; empty where the method does not say."""
+        """How well contours determine the pose of each person, by frame; empty where the method does not compute it."""
         self.n_improved = 0
         """Number of poses that the backward pass has replaced."""
         self.visited: int | None = None
@@ -188,7 +188,7 @@ class TrackSession:
         return self.run.frames[done] if done < len(self.run.frames) else None
 
     def rows_record(self) -> dict[str, Any]:
-        """Return what a resumed run needs to smooth the frames of this one."""
+        """Return the covariances and features with which a resumed run smooths the frames of this one."""
         return {str(person): rows.record() for person, rows in self._rows.items()}
 
     def status_counts(self) -> list[Counter[Status]]:

@@ -29,7 +29,7 @@ def drive_character(pose: Array, source: BodyModel, character: BodyModel, floor:
     """
     names, places = list(source.point_names), source.points_world(pose)
     known = dict(zip(names, places, strict=True))
-    rest = dict(zip(character.point_names, character.points_world(character.neutral()), strict=True))
+    rest = character.named_points_world(character.neutral())
     first = character.joints[0].name
     wanted = {first: known.get(first, places[0])}
     for parent, child in character.bones:

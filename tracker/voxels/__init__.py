@@ -1,5 +1,5 @@
-"""Carve voxels from the silhouettes of a frame (MTHC01 Sect. 2), and measure what they show.
+"""Carve voxels from the silhouettes of a frame (MTHC01 Sect. 2), and measure their figures.
 
-The room imports `compute`, `geometry` and `evidence`, and knows no body. Callers use `visual_hull.carve_people`,
-`carving.carve` and `part_size`.
+The room imports `compute`, `geometry`, `images` and `evidence`, and knows no body. Callers use
+`visual_hull.carve_people`, `carving.Carver`, `paths.path_lengths` and `part_size.principal_axes`.
 """

@@ -12,7 +12,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, viewed_point
 
 _REACH = 1.5
-"""Half the edge of the largest volume, in the mean distance of the cameras from what they look at."""
+"""Half the edge of the largest volume, in the mean distance of the cameras from the point that they look at."""
 _PIXEL = 1.0
 """Margin around the box of a silhouette, px: a body may reach nearly to the next pixel's centre."""
 
@@ -40,7 +40,7 @@ def bounding_volume(silhouettes: Sequence[ViewSilhouette], missing: int = 0) -> 
         missing: number of views that may be broken. The box holds what all but any so many views allow.
 
     Raises:
-        TrackerError: fewer than two views show anybody, or the views show nothing in common.
+        TrackerError: fewer than two views show people, or the views show nothing in common.
     """
     seen = [s for s in silhouettes if not s.is_empty]
     if len(seen) < 2:

@@ -25,6 +25,11 @@ class FigureMask(NamedTuple):
     is_apart: bool
     """Whether no other figure covers it. Where one does, its outline is not that of the figure alone."""
 
+    @property
+    def shows_figure_alone(self) -> bool:
+        """Whether the view shows the figure, and no other one in front of it."""
+        return self.is_apart and bool(self.mask.any())
+
 
 def paint(points: Array, size_m: float, silhouette: ViewSilhouette, margin: float = 0.0) -> Mask:
     """Return the pixels of a view, (H, W), within squares of the size of a voxel around projected surface voxels.

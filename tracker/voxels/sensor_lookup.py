@@ -19,7 +19,7 @@ _STEPS_PER_PX = 2
 _MAX_ENTRIES = 4096
 """Largest number of entries along each axis. Wide lenses have long borders."""
 BEYOND_LENS = -32000
-"""Column and row of what lies beyond the lens, where nothing is seen."""
+"""Column and row of points beyond the lens, which it does not show."""
 _BORDER_SAMPLES = 64
 
 
@@ -56,7 +56,7 @@ def sensor_lookup(camera: Camera) -> SensorLookup:
 
 
 def lens_of(camera: Camera) -> Lens:
-    """Return what the table of a camera follows from."""
+    """Return the lens of a camera, from which its table follows."""
     return Lens(camera.size, camera.K.tobytes(), camera.distortion.tobytes())
 
 

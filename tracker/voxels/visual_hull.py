@@ -19,7 +19,7 @@ _MIN_SHARE = 0.25
 """Smallest volume of a figure, as a share of the largest one."""
 _MIN_NEEDED = 0.15
 """Share of a figure's silhouette that no other figure explains, in some view. Lines of sight to two people also meet
-where nobody is: such a figure explains nothing by itself."""
+where there is no person: such a figure explains nothing by itself."""
 _MIN_COVERAGE = 0.6
 """Share of its silhouette that the hull explains in a view that agrees with the others."""
 _MIN_GAIN = 0.15
@@ -52,7 +52,7 @@ def carve_people(
         settings: which voxels agree with the silhouettes.
 
     Raises:
-        TrackerError: fewer than two views show anybody, the views contradict each other, or nothing of the size of a
+        TrackerError: fewer than two views show people, the views contradict each other, or nothing of the size of a
             person is found.
     """
     seen = [s for s in silhouettes if not s.is_empty]

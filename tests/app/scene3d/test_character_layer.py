@@ -14,7 +14,7 @@ CAMERAS = cameras_around(3)
 
 
 def bone(model, values, parent, child):
-    points = dict(zip(model.point_names, model.points_world(values), strict=True))
+    points = model.named_points_world(values)
     along = points[child] - points[parent]
     return along / np.linalg.norm(along)
 

@@ -65,7 +65,7 @@ def frames_of(person, model, n):
     found = []
     for seed in range(n):
         rng, pose = np.random.default_rng(seed), posed(person, seed)
-        at = dict(zip(person.point_names, person.points_world(pose), strict=True))
+        at = person.named_points_world(pose)
         start = fit_to_points(model, {j: at[j] + rng.normal(0, 0.01, 3) for j in LIMB_JOINTS}).pose
         found.append(SilhouettedPerson(seed, silhouettes(person, pose, rng), (PosedBody(model, start),)))
     return found

@@ -66,7 +66,7 @@ def test_arrays_are_those_of_the_body(name):
 def test_coupled_sides_are_mirror_images(name):
     parameters = SizeParameters(load_model(name, 1.7))
     body = parameters.body(drawn(parameters))
-    points = dict(zip(body.point_names, body.points_world(body.neutral()), strict=True))
+    points = body.named_points_world(body.neutral())
     for point, position in points.items():
         if point.startswith("left_"):
             mirrored = points[point.replace("left_", "right_")]

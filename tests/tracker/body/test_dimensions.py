@@ -10,7 +10,7 @@ from tracker.formats.model_toml import PRESETS, format_model, load_model, parse_
 
 
 def points(model):
-    return dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    return model.named_points_world(model.neutral())
 
 
 def distance(model, a, b):

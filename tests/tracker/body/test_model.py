@@ -188,7 +188,7 @@ def test_gavrila34_has_a_trunk_that_bends():
     assert model.n_dofs == len(model.value_names) == 34
     assert sorted(d for g in model.search_groups for d in g.dofs) == sorted(model.dof_names)
     # Standing straight it is the same person: the points that both have are in the same places.
-    places = dict(zip(plain.point_names, plain.points_world(plain.neutral()), strict=True))
+    places = plain.named_points_world(plain.neutral())
     shared = [n for n in model.point_names if n in places]
     assert len(shared) >= 14
     for name in shared:

@@ -20,7 +20,7 @@ def placed(model, values):
     Ts = model.kinematics(values).Ts_world_part
     centers = np.einsum("nij,nj->ni", Ts[:, :3, :3], model.centers_part) + Ts[:, :3, 3]
     shapes = {p.name: (c, T[:3, :3]) for p, c, T in zip(model.parts, centers, Ts, strict=True)}
-    return shapes, dict(zip(model.point_names, model.points_world(values), strict=True))
+    return shapes, model.named_points_world(values)
 
 
 @pytest.mark.parametrize(("name", "part"), CASES)

@@ -65,7 +65,7 @@ def test_part_edges_never_enter_the_cost():
 
 def test_points_hidden(gavrila):
     body = PosedBody(gavrila, gavrila.neutral())
-    place = dict(zip(gavrila.point_names, gavrila.points_world(body.values), strict=True))
+    place = gavrila.named_points_world(body.values)
     side = camera_at("side", (0.0, 4.0, 0.0))  # at the body's left
     occluded = dict(zip(place, points_occluded([body], [side], np.stack(list(place.values())))[0], strict=True))
     # The left side hides the right: the trunk its arm, the legs one another. The forearm hangs before the hip.

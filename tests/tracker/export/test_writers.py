@@ -128,7 +128,7 @@ def test_bvh_puts_the_joints_where_they_are(tmp_path, name, axes, units, up):
     T = file_from_world(session, axes)
     for frame in truth[0]:
         root.loadPose(frame)
-        expected = dict(zip(truth[0][frame].model.point_names, truth[0][frame].points_world, strict=True))
+        expected = truth[0][frame].named_points_world
         seen = {joint.Name: np.array(joint.PositionWorld) for joint, _, _ in root.layout()}
         assert {j.name for j in truth[0][frame].model.joints} <= seen.keys()
         for joint, place in seen.items():
@@ -288,7 +288,7 @@ def test_poses_of_another_body_are_tabled_but_give_no_skeleton(tmp_path):
     writers.write_person_trc(motion, ExportOptions(), [tmp_path / "a.trc"], no_tick)
     table = read_trc(tmp_path / "a.trc")
     found = {name: table.points[:, i] for i, name in enumerate(table.names)}
-    places = dict(zip(other.point_names, other.points_world(values), strict=True))
+    places = other.named_points_world(values)
     np.testing.assert_allclose(found["left_wrist"][1], places["left_wrist"], atol=1e-6)
     assert np.isnan(found["waist"][:, 0]).tolist() == [False, True]
     writers.write_keypoints(motion, ExportOptions(), [tmp_path / "k.json"], no_tick)

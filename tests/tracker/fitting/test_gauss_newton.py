@@ -16,7 +16,7 @@ ROTATIONS = ~ARM.dof_is_length
 
 
 def points_of(model, values, names=LIMB_JOINTS):
-    places = dict(zip(model.point_names, model.points_world(values), strict=True))
+    places = model.named_points_world(values)
     return {n: places[n] for n in names}
 
 

@@ -38,7 +38,7 @@ class Staged:
 
     def blocks(self):
         model, n = self.model, self.model.n_dofs
-        priors = [PosePrior(self.expected, np.full(n, 5.0)), PosePrior(model.neutral(), 1 / model.spreads)]
+        priors = [PosePrior(self.expected, np.full(n, 5.0)), PosePrior.of_spreads(model)]
         return [
             ContourResiduals(self.views, self.bodies),
             *priors,

@@ -30,7 +30,7 @@ def scene(voxels, **changes):
 
 def error_mm(candidate, joints):
     model = candidate.model
-    own = dict(zip(model.point_names, model.points_world(candidate.pose), strict=True))
+    own = model.named_points_world(candidate.pose)
     return 1000 * float(np.mean([np.linalg.norm(own[n] - joints[n]) for n in LIMB_JOINTS]))
 
 
@@ -119,6 +119,8 @@ def test_views_in_which_others_stand_before_the_person_are_left_out():
     own = scene(figure()[0])
     masks = [m._replace(is_apart=i > 0) for i, m in enumerate(own.masks)]
     assert [a.camera.name for a in silhouette_axes(own._replace(masks=masks))] == ["c1", "c2", "c3"]
+    once = [m._replace(is_apart=i == 0) for i, m in enumerate(own.masks)]
+    assert [c.name for _, c in own._replace(masks=once).clear_views] == ["c0", "c1", "c2", "c3"]
     nothing = [m._replace(mask=np.zeros_like(m.mask)) for m in own.masks]
     with pytest.raises(TrackerError, match="the person in at least 2 views"):
         silhouette_axes(own._replace(masks=nothing))

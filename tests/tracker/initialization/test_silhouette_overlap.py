@@ -65,7 +65,7 @@ def test_covered_cells_cost_nothing_again(overlap):
     covered, arm = overlap.nothing(), MODEL.part_index["left_forearm"]
     Ts, rest = poses_of(POSE), np.setdiff1d(PARTS, [arm])
     alone = 1 + overlap.added(Ts[None, rest], rest, covered)[0]
-    overlap.cover(Ts[rest], rest, covered)
+    np.testing.assert_array_equal(1 + overlap.cover(Ts[rest], rest, covered), alone)
     arms = overlap.added(np.stack([Ts[[arm]]] * 5), np.array([arm]), covered)
     np.testing.assert_allclose(alone + arms, np.stack([view_costs(overlap, POSE)] * 5), atol=1e-6)
     overlap.cover(Ts[[arm]], np.array([arm]), covered)

@@ -21,7 +21,7 @@ POSES = [
 
 
 def errors_mm(model: BodyModel, pose, joints):
-    own = dict(zip(model.point_names, model.points_world(pose), strict=True))
+    own = model.named_points_world(pose)
     return {n: 1000 * float(np.linalg.norm(own[n] - joints[n])) for n in LIMB_JOINTS}
 
 

@@ -14,7 +14,7 @@ LIMBS = ("elbow", "wrist", "knee", "ankle")
 
 
 def directions(model, pose):
-    places = dict(zip(model.point_names, model.points_world(pose), strict=True))
+    places = model.named_points_world(pose)
     return {
         b: (places[b] - places[a]) / np.linalg.norm(places[b] - places[a]) for a, b in model.bones if b.endswith(LIMBS)
     }

@@ -24,7 +24,7 @@ SETTINGS = TrackSettings()
 
 
 def off_px(model, values, pins, cameras=CAMERAS):
-    places = dict(zip(model.point_names, model.points_world(values), strict=True))
+    places = model.named_points_world(values)
     return [np.linalg.norm(cameras[p.camera].pinhole.project(places[p.point]) - p.position_px) for p in pins]
 
 
@@ -100,7 +100,7 @@ def test_edges_leave_points_that_were_placed_near_their_places(two_people):
     def moved_m(held, pins=()):
         constraints = [Constraints(held=held), Constraints()]
         found = fit_frame(bodies, [list(pins), []], CAMERAS, views, SETTINGS, [0], constraints).poses[0]
-        points = dict(zip(tall.point_names, tall.points_world(found), strict=True))
+        points = tall.named_points_world(found)
         return [float(np.linalg.norm(points[n] - places[n])) for n in names]
 
     free, held = moved_m({}), moved_m(dict.fromkeys(names, CAMERAS))
@@ -205,7 +205,7 @@ def test_pins_and_edges_of_real_footage_come_below_45_mm(sample_folder):
         ]
         found = fit_frame([PosedBody(model, start)], [pins], cameras, evidence, SETTINGS, [0])
         for values in (start, found.poses[0]):
-            places = dict(zip(model.point_names, model.points_world(values), strict=True))
+            places = model.named_points_world(values)
             errors.append(np.mean([np.linalg.norm(places[n] - true[n]) for n in LIMB_JOINTS]))
     assert np.mean(errors[::2]) > 0.07
     assert max(errors[1::2]) < 0.045

@@ -57,7 +57,7 @@ def test_poses_and_skeleton_give_the_joints_and_bones_keep_their_length(folder):
         assert np.allclose(model.points_world(values)[index], points, atol=1e-5)
     at = {name: truth.points[:, i] for i, name in enumerate(truth.names)}
     preset = load_model("gavrila22", model.height_m)
-    generic = dict(zip(preset.point_names, preset.points_world(preset.neutral()), strict=True))
+    generic = preset.named_points_world(preset.neutral())
     for a, b in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")):
         for side in ("left", "right"):
             lengths = np.linalg.norm(at[f"{side}_{a}"] - at[f"{side}_{b}"], axis=1)

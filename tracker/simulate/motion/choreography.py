@@ -140,7 +140,7 @@ def _turned(yaw: float) -> Array:
 
 def _within_reach(model: BodyModel, trunk: Array, lean: Array, feet: Mapping[str, tuple[float, float, float]]) -> float:
     """Return the height of the trunk, metres, at which both feet are within reach; smooth as a leg becomes straight."""
-    points = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    points = model.named_points_world(model.neutral())
     heights = [float(trunk[2])]
     for side in SIDES:
         hip, knee, ankle = (points[f"{side}_{name}"] for name in ("hip", "knee", "ankle"))

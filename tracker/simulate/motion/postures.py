@@ -105,7 +105,7 @@ def _upright(model: BodyModel) -> Array:
 
 def standing_height(model: BodyModel) -> float:
     """Return the height of the torso centre over the floor with straight legs, metres."""
-    points = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+    points = model.named_points_world(model.neutral())
     return float(ANKLE_HEIGHT * model.height_m - points["left_ankle"][2])
 
 

@@ -49,7 +49,7 @@ def bone_poses(model: BodyModel, values: Array) -> Array:
         `Ts_world_bone`, (n_bones, 4, 4), metres, in the order of `bone_names`.
     """
     Ts = model.kinematics(values).Ts_world_part
-    points = dict(zip(model.point_names, model.points_world(values), strict=True))
+    points = model.named_points_world(values)
     feet = []
     for side in ("left", "right"):
         R_calf = Ts[model.part_index[f"{side}_calf"], :3, :3]

@@ -135,4 +135,4 @@ def prior_blocks(model: BodyModel, predicted: Array, sigmas: Array) -> list[Resi
         predicted: the predicted pose, (n_values,).
         sigmas: its standard deviations, (n_dofs,), rad or metres.
     """
-    return [PosePrior(predicted, 1 / sigmas), PosePrior(model.neutral(), 1 / model.spreads), SelfPenetration()]
+    return [PosePrior(predicted, 1 / sigmas), PosePrior.of_spreads(model), SelfPenetration()]

@@ -101,7 +101,7 @@ def pose_of(
     rest = np.where(model.dof_is_length, 1 / _NEAR_M, 1 / _NEAR_RAD)
     blocks: list[ResidualBlock] = [
         PointTargets(np.array([names[n] for n in points.names]), targets, 1 / np.sqrt(variances + _PLACE_M**2)),
-        PosePrior(model.neutral(), 1 / model.spreads),
+        PosePrior.of_spreads(model),
         PosePrior(near, rest),
     ]
     fit = solve(model, near if start is None else start, blocks, active_dofs, _MAX_ITERATIONS, _TOLERANCE)

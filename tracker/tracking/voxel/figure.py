@@ -82,7 +82,7 @@ def figure_of(model: BodyModel) -> FigureOfBody:
             "or another tracking method"
         )
     body = PosedBody(model, np.where([n.endswith(".qw") for n in model.value_names], 1.0, 0.0))
-    points = dict(zip(model.point_names, body.points_world, strict=True))
+    points = body.named_points_world
     members = _members(model)
     boxes = np.array([_box(body, m) for m in members])
     joints = np.array([points[ROOTS[n]] if n in ROOTS else np.zeros(3) for n in PARTS])
@@ -107,7 +107,7 @@ def part_rotations(body: PosedBody, of: FigureOfBody) -> Array:
 
     The torso's z axis points from between the hips to the neck, whatever joints its trunk has.
     """
-    points = dict(zip(body.model.point_names, body.points_world, strict=True))
+    points = body.named_points_world
     R = body.kinematics.Ts_world_part[[int(m[0]) for m in of.members], :3, :3].copy()
     up = points["neck"] - (points["left_hip"] + points["right_hip"]) / 2
     up /= np.linalg.norm(up)
@@ -120,7 +120,7 @@ def part_rotations(body: PosedBody, of: FigureOfBody) -> Array:
 
 def torso_center(body: PosedBody, of: FigureOfBody, rotation: Array) -> Array:
     """Return the centre of the figure's torso, (3,), metres, that brings its neck and hips closest to the body's."""
-    points = dict(zip(body.model.point_names, body.points_world, strict=True))
+    points = body.named_points_world
     found = []
     for part, weight in ((1, 2.0), (4, 1.0), (5, 1.0)):
         at = rotation @ (of.figure.parent_shares[part] * of.sizes[TORSO])

@@ -21,6 +21,6 @@ def test_the_body_keeps_its_height_and_its_degrees_of_freedom(true_model):
     assert true_model.dof_names == preset.dof_names
     extents = []
     for model in (preset, true_model):
-        points = dict(zip(model.point_names, model.points_world(model.neutral()), strict=True))
+        points = model.named_points_world(model.neutral())
         extents.append(points["head"][2] - points["left_ankle"][2])
     assert np.isclose(*extents, rtol=0.01)

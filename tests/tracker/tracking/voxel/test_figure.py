@@ -20,7 +20,7 @@ def test_joints_of_the_figure_are_those_of_the_body(name):
     of, body = figure_of(model), PosedBody(model, model.neutral())
     R = part_rotations(body, of)
     centers = chain_centers(of.figure, of.sizes, R, torso_center(body, of, R[0]))
-    own = dict(zip(model.point_names, body.points_world, strict=True))
+    own = body.named_points_world
     for point, position in joint_points(of.figure, of.sizes, R, centers).items():
         np.testing.assert_allclose(position, own[point], atol=2e-3, err_msg=point)
     assert sorted(np.concatenate(of.members)) == list(range(len(model.parts)))

@@ -50,7 +50,7 @@ def tracked(gap_m, n, seen=lambda k, offsets: offsets):
     found = [estimator.estimate(k, views_of(k / FPS, seen(k, offsets))) for k in range(n)]
     errors = []
     for pose, offset in zip(found[-1].poses, offsets, strict=True):
-        own, truth = dict(zip(BODY.point_names, BODY.points_world(pose), strict=True)), joints_of((n - 1) / FPS, offset)
+        own, truth = BODY.named_points_world(pose), joints_of((n - 1) / FPS, offset)
         errors.append(np.mean([np.linalg.norm(own[j] - truth[j]) for j in LIMB_JOINTS]))
     return found, errors
 

@@ -32,7 +32,7 @@ def tracked(
     estimates, errors, seen = [], [], cameras()
     for k in frames:
         found = estimator.estimate(k, change(k, views_at(k / FPS, sizes, seen)))
-        own = dict(zip(body.point_names, body.points_world(found.poses[0]), strict=True))
+        own = body.named_points_world(found.poses[0])
         truth = joints_at(k / FPS, sizes)
         estimates.append(found)
         errors.append([np.linalg.norm(own[j] - truth[j]) for j in LIMB_JOINTS])
