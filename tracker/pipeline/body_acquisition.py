@@ -30,8 +30,7 @@ from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
 SIZES_EDITS = "sizes_edits"
-"""Setting of the session. For each entry of the history that changed sizes it has the name of the person and the
-revisions before and after. For several people it has a list of such triples."""
+"""Setting of the session: the entries of the history that changed sizes, see `sizes_changed`."""
 PLACED_M = 0.02
 """Standard deviation of a joint that a user has placed in the images, metres."""
 _HAND = 3.0
@@ -182,18 +181,29 @@ def store_body(
         if s.record.keyframe and len(s.record.values) == len(body.value_names)
     ]
     edit = store.commit(label, changes).edit
-    store.set_setting(SIZES_EDITS, {**store.setting(SIZES_EDITS, {}), str(edit): [name, before, revision]})
+    store.set_setting(SIZES_EDITS, with_sizes_changed(store.setting(SIZES_EDITS, {}), edit, [(name, before, revision)]))
     return changed
 
 
-def sizes_changed(edits: Mapping[str, Any], edit: int) -> list[tuple[str, int, int]]:
-    """Return whose sizes an entry of the history changed, with the revisions before and after it.
+def with_sizes_changed(edits: Mapping[str, Any], edit: int, changed: Sequence[tuple[str, int, int]]) -> dict[str, Any]:
+    """Return the setting `SIZES_EDITS` with another entry of the history; `sizes_changed` reads it.
 
     Args:
-        edits: the setting `SIZES_EDITS`.
+        edits: the setting before.
+        edit: number of the entry.
+        changed: name of each person whose sizes it changed, with the revisions before and after it.
+    """
+    return {**edits, str(edit): [list(row) for row in changed]}
+
+
+def sizes_changed(edits: Mapping[str, Any], edit: int) -> list[tuple[str, int, int]]:
+    """Return the names of the people whose sizes an entry of the history changed, with the revisions before and after.
+
+    Args:
+        edits: the setting `SIZES_EDITS`, see `with_sizes_changed`.
         edit: number of the entry.
     """
-    found = edits.get(str(edit), [])
+    found = edits.get(str(edit), [])  # a single row where an older version stored it
     rows = found if found and isinstance(found[0], list) else [found] if found else []
     return [(str(name), int(before), int(after)) for name, before, after in rows]
 

@@ -11,7 +11,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
-from tracker.pipeline.body_acquisition import SIZES_EDITS, PosedFrames, acquire_body
+from tracker.pipeline.body_acquisition import SIZES_EDITS, PosedFrames, acquire_body, with_sizes_changed
 from tracker.pipeline.first_pose import FirstPose, FirstPoses, find_first_poses_anywhere
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session, save_model
@@ -187,11 +187,11 @@ def store_found(session: Session, store: AnnotationStore, found: FoundPeople, la
         revision = store.add_model_revision(who.name, format_model(body))
         changes.append(PoseChange(who.name, found.frame, first_record(found, person, revision)))
         if revision != before:
-            sizes.append([who.name, before, revision])
+            sizes.append((who.name, before, revision))
     edit = store.commit(f"{label}, frame {found.frame}", changes).edit
     store.set_setting(AXES, axes_record(found))
     if sizes:
-        store.set_setting(SIZES_EDITS, {**store.setting(SIZES_EDITS, {}), str(edit): sizes})
+        store.set_setting(SIZES_EDITS, with_sizes_changed(store.setting(SIZES_EDITS, {}), edit, sizes))
     return session
 
 

@@ -13,7 +13,12 @@ from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_o
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
-from tracker.pipeline.body_acquisition import SIZES_EDITS, refitted_record, sizes_changed
+from tracker.pipeline.body_acquisition import (
+    SIZES_EDITS,
+    refitted_record,
+    sizes_changed,
+    with_sizes_changed,
+)
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
@@ -140,8 +145,8 @@ class BodySizeEditing:
             )
             if edit is not None and session_state.saver.error is None:
                 saver = session_state.saver
-                change = {str(edit): [name, before, saver.revisions.current(person)]}
-                saver.store_setting(SIZES_EDITS, {**saver.setting(SIZES_EDITS, {}), **change})
+                changed = [(name, before, saver.revisions.current(person))]
+                saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, changed))
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
             message = f"Applied{outcome}{off}." + ("" if same or not refit else self._rest(person))
             self._runs.clear()

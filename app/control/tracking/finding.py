@@ -13,7 +13,7 @@ from app.control.tracking.tracking import Tracking
 from app.state.progress import FindState, Line
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
-from tracker.pipeline.body_acquisition import SIZES_EDITS
+from tracker.pipeline.body_acquisition import SIZES_EDITS, with_sizes_changed
 from tracker.pipeline.find_people import (
     AXES,
     FindSettings,
@@ -149,12 +149,12 @@ class FindingPeople:
                 revision = saver.revisions.current(person)
                 changes.append(PoseChange(who.name, found.frame, first_record(found, person, revision)))
                 if revision != before:
-                    sizes.append([who.name, before, revision])
+                    sizes.append((who.name, before, revision))
             edit = saver.write("find people", changes, None, by_program=False)
             axes = axes_record(found)
             saver.store_setting(AXES, axes)
             if edit is not None and sizes:
-                saver.store_setting(SIZES_EDITS, {**saver.setting(SIZES_EDITS, {}), str(edit): sizes})
+                saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, sizes))
                 self._runs.clear()
             frame, lines = _axes(axes)
             session_state.show_frame(found.frame, finding=replace(session_state.state.finding, frame=frame, axes=lines))

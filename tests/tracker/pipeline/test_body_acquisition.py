@@ -126,7 +126,7 @@ def test_keyframes_are_fitted_to_the_new_body_and_undone_with_it(session, store)
     revision = store.pose(name, 0).model_revision
     assert revision == store.pose(name, 5).model_revision != first.model_revision
     assert store.pose(name, 6).model_revision == first.model_revision  # not a keyframe: it keeps its body
-    ((edit, (who, before, after)),) = store.setting(SIZES_EDITS).items()
+    ((edit, ((who, before, after),)),) = store.setting(SIZES_EDITS).items()
     assert (who, before, after) == (name, first.model_revision, revision)
     assert int(edit) == store.history(1)[0].edit
     store.undo()

@@ -16,7 +16,7 @@ from tracker.formats.model_toml import format_model
 from tracker.initialization.candidates import StartCandidate
 from tracker.initialization.start_fit import FittedStart
 from tracker.pipeline import first_pose
-from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
+from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_sizes_changed
 from tracker.pipeline.find_people import AXES, FoundPeople, frames_to_try, store_found
 from tracker.pipeline.first_pose import FirstPose, FirstPoses, find_first_poses
 from tracker.session.session import load_session
@@ -210,8 +210,10 @@ def test_poses_and_bodies_are_one_entry_of_the_history(session, scale):
 
 
 def test_an_entry_of_one_person_is_read_as_before():
-    assert sizes_changed({"5": ["ann", 1, 2]}, 5) == [("ann", 1, 2)]
-    assert sizes_changed({"5": [["ann", 1, 2], ["bob", 3, 4]]}, 5) == [("ann", 1, 2), ("bob", 3, 4)]
+    assert sizes_changed({"5": ["ann", 1, 2]}, 5) == [("ann", 1, 2)]  # as an older version stored it
+    changed = [("ann", 1, 2), ("bob", 3, 4)]
+    edits = with_sizes_changed(with_sizes_changed({}, 4, changed[:1]), 5, changed)
+    assert [sizes_changed(edits, edit) for edit in (4, 5)] == [changed[:1], changed]
     assert sizes_changed({"5": ["ann", 1, 2]}, 6) == []
 
 
