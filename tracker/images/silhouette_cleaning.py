@@ -16,8 +16,8 @@ MIN_COMPONENT = 0.1
 """Smallest area of a component that is kept, as a share of the largest one."""
 MIN_AREA = 0.0005
 """Smallest area of a silhouette, as a share of the image."""
-
-_RIM = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+_RIM = 0.0025
+"""Half the width of a silhouette's rim, as a fraction of the longer side of the image: 2 px of 640."""
 
 
 class CleanSilhouette(NamedTuple):
@@ -34,20 +34,18 @@ def clean_silhouette(changed: Mask) -> CleanSilhouette:
 
     The result is empty if nothing changed but specks.
     """
-    radius = max(1, round(_CLOSING * max(changed.shape)))
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
-    closed = cv2.morphologyEx(changed.view(np.uint8), cv2.MORPH_CLOSE, disc)
+    closed = cv2.morphologyEx(changed.view(np.uint8), cv2.MORPH_CLOSE, _disc(_CLOSING, changed))
     mask = _without_small_holes(largest_components(np.asarray(closed) > 0))
     union = np.count_nonzero(changed | mask)
     return CleanSilhouette(mask, float(np.count_nonzero(changed & mask) / union) if union else 0.0)
 
 
 def without_rims(mask: Mask) -> Mask:
-    """Remove what is at most four pixels wide from a mask, (H, W), such as the rim of a silhouette.
+    """Remove what is no wider than the rim of a silhouette from a mask, (H, W).
 
     Pixels there mix the person's colours with the background's.
     """
-    return np.asarray(cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, _RIM)) > 0
+    return np.asarray(cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, _disc(_RIM, mask))) > 0
 
 
 def largest_components(mask: Mask, min_share: float = MIN_COMPONENT) -> Mask:
@@ -64,6 +62,12 @@ def largest_components(mask: Mask, min_share: float = MIN_COMPONENT) -> Mask:
     areas[0] = 0
     kept = areas >= max(min_share * areas.max(), MIN_AREA * mask.size)
     return np.asarray(kept[labels])
+
+
+def _disc(share: float, mask: Mask) -> NDArray[np.uint8]:
+    """Return a disc whose radius is a share of the longer side of an image."""
+    radius = max(1, round(share * max(mask.shape)))
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1)), np.uint8)
 
 
 def _without_small_holes(mask: Mask) -> Mask:

@@ -10,6 +10,7 @@ from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
+from tracker.geometry.ground_plane import floor_plane
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.smoothing import TrackedRows, resumed_rows
 from tracker.pipeline.track_session import StoreSink, TrackSession
@@ -83,7 +84,7 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, tas
     before = frames[: len(frames) - len(left)]
     run = TrackSession(
         make_tracker(task.settings),
-        TrackingRun(observer, subjects, start, left, session.fps),
+        TrackingRun(observer, subjects, start, left, session.fps, floor_plane(session.up, session.floor)),
         [StoredPerson(p.name, store.add_model_revision(p.name, format_model(p.model))) for p in people],
         StoreSink(store, _views(session, task)),
         f"track frames {min(frames)}:{max(frames) + 1}",

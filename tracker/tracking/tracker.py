@@ -9,6 +9,7 @@ import numpy as np
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
+from tracker.geometry.ground_plane import GroundPlane
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
 from tracker.tracking.subjects import Subjects
 
@@ -44,6 +45,8 @@ class TrackingRun:
     """The frames in the order of tracking."""
     fps: float = 30.0
     """Frame rate of the recording, 1/s."""
+    floor: GroundPlane | None = None
+    """The floor, by which trackers that use silhouettes tell clothes from shadows; None where it is not known."""
 
     def __post_init__(self) -> None:
         """Check the poses: from one that is no number, none of the frames after it would be."""

@@ -16,6 +16,7 @@ from app.state.run_choices import RunChoices
 from app.state.state import StateChanges, finite_or_none
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
+from tracker.geometry.ground_plane import floor_plane
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.track_session import SmoothedRows, Step, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson
@@ -127,6 +128,7 @@ class Tracking:
                     session_state.present_poses(),
                     frames,
                     session_state.session.fps,
+                    floor_plane(session_state.session.up, session_state.session.floor),
                 ),
                 [StoredPerson(p.name, saver.revisions.current(i)) for i, p in enumerate(session_state.session.people)],
                 _SaverSink(session_state, edit),

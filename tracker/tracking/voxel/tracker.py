@@ -4,11 +4,12 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
-from tracker.evidence.silhouettes import SilhouetteFinder
+from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.voxel.frame_estimator import VoxelEstimator
 from tracker.tracking.voxel.settings import VoxelSettings
+from tracker.voxels.shadows import recover_from_shadows
 
 
 @dataclass(frozen=True)
@@ -20,14 +21,19 @@ class VoxelTracker:
     def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
         """See `Tracker.estimates`."""
         finder = SilhouetteFinder(run.observer.cameras, run.observer.recording)
+
+        def silhouettes_of(frame: int) -> Sequence[ViewSilhouette]:
+            found = finder.silhouettes(frame)
+            return found if run.floor is None else recover_from_shadows(found, run.floor, self.settings.voxel_m)
+
         estimator = VoxelEstimator(run, self.settings)
         try:
             with ThreadPoolExecutor(1, "silhouettes ahead") as ahead:
-                following = ahead.submit(finder.silhouettes, run.frames[0])
+                following = ahead.submit(silhouettes_of, run.frames[0])
                 for i, frame in enumerate(run.frames):
                     silhouettes = following.result()
                     if i + 1 < len(run.frames):
-                        following = ahead.submit(finder.silhouettes, run.frames[i + 1])
+                        following = ahead.submit(silhouettes_of, run.frames[i + 1])
                     yield estimator.estimate(frame, silhouettes)
         finally:
             finder.close()

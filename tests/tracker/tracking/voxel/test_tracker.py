@@ -5,16 +5,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from figures import hide_legs
 from moving_figure import ADULT, CHILD, cameras, joints_at, views_at
 
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
+from tracker.geometry.ground_plane import GroundPlane
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
+from tracker.tracking.voxel import tracker
 from tracker.tracking.voxel.frame_estimator import VoxelEstimator
 from tracker.tracking.voxel.paper import paper_settings
 from tracker.tracking.voxel.settings import VoxelSettings
+from tracker.tracking.voxel.tracker import VoxelTracker
 
 FPS = 30.0
 
@@ -45,6 +49,30 @@ def test_a_person_of_another_shape_is_followed(model):
     assert errors.mean() < 0.05
     assert all(e.statuses[0] != "lost" for e in estimates)
     assert np.all(np.linalg.eigvalsh(estimates[-1].covariances[0]) > 0)
+
+
+def test_legs_that_look_like_shadows_are_followed(monkeypatch):
+    """One view takes the legs for a shadow, the others show them."""
+    body, frames = load_model("gavrila34", 1.72), range(3)
+    start, seen = fit_to_points(body, joints_at(0.0)).pose, cameras()
+
+    def silhouettes(frame):
+        whole = views_at(frame / FPS, ADULT, seen)
+        return hide_legs(whole, {0}, [np.zeros_like(s.mask) for s in whole])
+
+    finder = SimpleNamespace(silhouettes=silhouettes, close=lambda: None)
+    monkeypatch.setattr(tracker, "SilhouetteFinder", lambda cameras, recording: finder)
+
+    def leg_errors(floor):
+        observer = SimpleNamespace(cameras=seen, recording=None)
+        run = TrackingRun(observer, Subjects.of([body]), [start], frames, FPS, floor)
+        *_, last = VoxelTracker().estimates(run)
+        own, truth = body.named_points_world(last.poses[0]), joints_at(frames[-1] / FPS)
+        return [np.linalg.norm(own[j] - truth[j]) for j in LIMB_JOINTS if "knee" in j or "ankle" in j]
+
+    soles_m = float(joints_at(0.0)["left_ankle"][2]) - 0.10
+    assert np.mean(leg_errors(GroundPlane(np.array([0.0, 0.0, 1.0]), soles_m))) < 0.06
+    assert np.mean(leg_errors(None)) > 0.15
 
 
 @pytest.mark.slow
