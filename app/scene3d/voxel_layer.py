@@ -15,10 +15,12 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.geometry.arrays import Array
+from tracker.geometry.ground_plane import floor_plane
 from tracker.tracking.voxel.body_pose import state_of
 from tracker.tracking.voxel.figure import N_PARTS, figure_of
 from tracker.tracking.voxel.labels import LabelRule, label_voxels
 from tracker.tracking.voxel.settings import VoxelSettings
+from tracker.voxels.shadows import recover_from_shadows
 from tracker.voxels.visual_hull import carve_people
 
 _VOXEL_M = 0.03
@@ -60,10 +62,11 @@ class VoxelLayer:
 
     def _carved(self, frame: int) -> Array:
         """Return the surface voxels of all people on a frame, (N, 3), metres."""
+        session = self._controller.session
         if self._finder is None:
-            session = self._controller.session
             self._finder = SilhouetteFinder(session.cameras, self._controller.frames.observer.recording)
-        hull = carve_people(self._finder.silhouettes(frame), _VOXEL_M)
+        silhouettes, floor = self._finder.silhouettes(frame), floor_plane(session.up, session.floor)
+        hull = carve_people(recover_from_shadows(silhouettes, floor, _VOXEL_M), _VOXEL_M)
         return np.concatenate([f.points_world[f.is_surface] for f in hull.figures])
 
     def _draw(self, points: Array, colors: NDArray[np.uint8], note: str) -> None:

@@ -57,7 +57,7 @@ class Controller:
     """Stands for the controller: a state that its one subscriber follows."""
 
     def __init__(self):
-        self.session = SimpleNamespace(cameras=())
+        self.session = SimpleNamespace(cameras=(), up="z", floor=None)
         self.frames = SimpleNamespace(observer=SimpleNamespace(recording=None))
         self.state = self.of(voxels=False)
 
