@@ -1,8 +1,8 @@
 """Print precision and recall of silhouettes against masks: `python tests/recipes/silhouettes.py SESSION MASKS`.
 
 The session has backgrounds and no masks; MASKS is a folder with CAMERA/%06d.png. Rows: background subtraction with
-shadow and highlight removal, without, with the background learnt from the recording, and OpenCV's MOG2 after one pass
-over the recording.
+shadow and highlight removal, without, with the background learnt from the recording, with the shadows that other views
+contradict, and OpenCV's MOG2 after one pass over the recording.
 """
 
 import sys
@@ -14,8 +14,11 @@ import numpy as np
 
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.recording import Recording, background_frames
+from tracker.geometry.ground_plane import floor_plane
 from tracker.images.background_subtraction import SHADOWS, SHADOWS_AND_HIGHLIGHTS, Shading
+from tracker.pipeline.first_pose import VOXEL_M
 from tracker.session.session import load_session
+from tracker.voxels.shadows import recover_from_shadows
 
 EVERY = 5
 """Every which frame is scored."""
@@ -37,12 +40,21 @@ def main(folder, masks):
             "the same, background from the recording": SilhouetteFinder(without, recording),
         }
         for name, finder in rows.items():
-            scores = [
-                (*_score(s.mask, truth[k, s.camera.name]), s.quality) for k in frames for s in finder.silhouettes(k)
-            ]
-            _show(name, scores)
+            _show(name, _scores(map(finder.silhouettes, frames), frames, truth))
+        floor, finder = floor_plane(session.up, session.floor), rows["shadows and highlights removed"]
+        recovered = (recover_from_shadows(finder.silhouettes(k), floor, VOXEL_M) for k in frames)
+        _show("the same, with what others contradict", _scores(recovered, frames, truth))
         for name, value in (("MOG2, shadows removed", _MOG2_FOREGROUND), ("MOG2 with shadows", _MOG2_SHADOW)):
             _show(name, [s for c, _ in enumerate(cameras) for s in _mog2(recording, cameras[c], c, truth, value)])
+
+
+def _scores(silhouettes, frames, truth):
+    """Precision, recall and quality of each view of some frames."""
+    return [
+        (*_score(s.mask, truth[k, s.camera.name]), s.quality)
+        for k, views in zip(frames, silhouettes, strict=True)
+        for s in views
+    ]
 
 
 def _mask(folder, camera, k):

@@ -72,8 +72,8 @@ def recover_standing(silhouettes: Sequence[ViewSilhouette], floor: GroundPlane) 
                 votes[is_seen] += np.where(near[y, x], -1.0 * shadow[y, x], 1.0)
         standing = np.zeros_like(own.mask)
         standing[rows, columns] = is_floor & (votes > 0)
-        clean = clean_silhouette(own.mask | without_rims(standing))
-        found.append(own._replace(mask=clean.mask, quality=clean.quality, shadow=own.shadow & ~clean.mask))
+        mask = clean_silhouette(own.mask | without_rims(standing)).mask
+        found.append(own._replace(mask=mask, shadow=own.shadow & ~mask))
     return tuple(found)
 
 
