@@ -1,6 +1,5 @@
 /** Find people: one button from a new recording to a tracked one, its progress, and what was found. */
 
-import { button } from "../widgets/elements.js";
 import { textButton } from "./rows.js";
 
 /** Number of the latest sentences that are shown. */
@@ -29,7 +28,6 @@ export function findSection({ store, send }) {
   const body = document.createElement("div");
   body.className = "acquisition";
   body.append(start, work, status, notes);
-  button("first-find", () => find("start"));
 
   const show = () => {
     const { finding } = store.facts;

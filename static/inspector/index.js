@@ -4,6 +4,7 @@
  * The room imports `widgets`, types of `model`, `panes` and `scene`, and `posing`.
  */
 
+import { button } from "../widgets/elements.js";
 import { alt, inArea } from "../widgets/key_matching.js";
 import { findSection } from "./find_section.js";
 import { BodySection } from "./body_section.js";
@@ -39,6 +40,11 @@ export function mount(context, { panes, posing, scene }) {
     viewSection(context, scene, panes),
   ];
   const inspector = new Inspector(context.store, sections);
+  const findPeople = () => {
+    inspector.reveal("find");
+    context.send({ type: "find_people", action: "start" });
+  };
+  button("first-find", findPeople);
   const bindings = inArea("Inspector", [
     { keys: ["Alt I"], label: "Inspector: body sizes and settings (toggle)", matches: alt("KeyI", false), run: () => inspector.toggle() },
     {
@@ -46,10 +52,7 @@ export function mount(context, { panes, posing, scene }) {
       label: "Find people",
       words: "start automatically initialize bootstrap first pose acquire track nobody placed",
       matches: () => false,
-      run: () => {
-        inspector.reveal("find");
-        context.send({ type: "find_people", action: "start" });
-      },
+      run: findPeople,
     },
     ...sections.filter(({ id }) => id !== "find").map(({ id, title, hint }) => ({
       keys: [],

@@ -265,6 +265,13 @@ async def test_the_palette_finds_people(page, endpoint):
     await page.locator("[data-section=find]").wait_for()
 
 
+async def test_the_first_steps_find_people_and_show_the_progress(page, endpoint):
+    await page.evaluate("document.getElementById('first-steps').hidden = false")
+    await page.locator("#first-find").click()
+    await until(lambda: endpoint.heard("find_people") == [{"type": "find_people", "action": "start"}])
+    await page.locator("[data-section=find]").wait_for()
+
+
 async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page, endpoint):
     await opened(page, "body")
     await page.get_by_role("button", name="Acquire from footage").click()
