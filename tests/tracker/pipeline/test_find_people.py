@@ -47,11 +47,20 @@ def silhouettes(monkeypatch):
 def fits(monkeypatch):
     """Every start fits as it is; the second way of facing costs more."""
     costs = iter(np.arange(1.0, 100.0))
+    monkeypatch.setattr(first_pose, "StartFitter", fitter(track=lambda start: (start.values, next(costs))))
 
-    def fit(observer, models, start, frame, later, others):
-        return FittedStart(start, "good", float(next(costs)))
 
-    monkeypatch.setattr(first_pose, "fit_start", fit)
+def fitter(track, status="good"):
+    """Stands for the class that fits starts: they fit as they are, and tracks give a pose and a cost."""
+
+    def fitted(start):
+        return FittedStart(start.values, status, 1.0)
+
+    def tracked(start, fit):
+        pose, cost_px = track(start)
+        return FittedStart(pose, status, float(cost_px))
+
+    return lambda *_: SimpleNamespace(fit=fitted, search=fitted, track=tracked)
 
 
 OBSERVER = SimpleNamespace(recording=None)
@@ -111,12 +120,12 @@ def off_by(places, monkeypatch):
     """Fits that are called good and have moved by metres along x, each by the next of some places."""
     places = iter(places)
 
-    def fit(observer, models, start, frame, later, others):
-        moved = start.copy()
-        moved[0] += next(places) if later else 0.0
-        return FittedStart(moved, "good", 1.0)
+    def track(start):
+        moved = start.values.copy()
+        moved[0] += next(places)
+        return moved, 1.0
 
-    monkeypatch.setattr(first_pose, "fit_start", fit)
+    monkeypatch.setattr(first_pose, "StartFitter", fitter(track))
 
 
 def test_a_body_in_empty_space_is_refused(session, silhouettes, monkeypatch):
@@ -215,15 +224,3 @@ def test_an_entry_of_one_person_is_read_as_before():
     edits = with_sizes_changed(with_sizes_changed({}, 4, changed[:1]), 5, changed)
     assert [sizes_changed(edits, edit) for edit in (4, 5)] == [changed[:1], changed]
     assert sizes_changed({"5": ["ann", 1, 2]}, 6) == []
-
-
-def test_starts_that_end_at_the_same_pose_are_one(session):
-    model = session.people[0].model
-    pose = model.neutral()
-
-    def ends_at(name, by_m):
-        candidate = StartCandidate(name, model, pose, np.array([1.0, 0.0, 0.0]), 0.0)
-        return candidate, FittedStart(pose + by_m * np.eye(len(pose))[0], "good", 1.0)
-
-    fits = [ends_at("first", 0.0), ends_at("again", 0.02), ends_at("other", 0.2)]
-    assert [c.method for c, _ in first_pose._distinct(fits)] == ["first", "other"]
