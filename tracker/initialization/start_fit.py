@@ -25,10 +25,6 @@ from tracker.tracking.tracker import TrackingRun
 
 _LOST_PX, _DOUBTFUL_PX = 2.0, 0.5
 """What a lost and a doubtful frame of a short track add to its cost, px."""
-_MAX_FITS = 3
-"""Largest number of fits to the frame after the search, each from the one before."""
-_MIN_GAIN = 0.01
-"""Smallest decrease of the cost, as a share, for another fit."""
 _RETURNED_M = 0.05
 """A track comes back to another pose if a joint of a limb is farther from the start, metres."""
 _TRACK_STEPS = (2, 4, 6)
@@ -79,15 +75,11 @@ class StartFitter:
         return FittedStart(found.poses[0], found.statuses[0], _cost_px(found))
 
     def search(self, start: PosedBody) -> FittedStart:
-        """Search around a start, and fit the result again while that pays."""
+        """Search around a start, and fit the result twice."""
         fitted = self.fit(search_around(self.observer, (start, *self.others), self.frame, _SETTINGS))
         # A fit reaches only as far as its prior and the edges around its start.
-        for _ in range(_MAX_FITS - 1):
-            again, cost_px = self.fit(PosedBody(start.model, fitted.pose)), fitted.cost_px
-            fitted = again if again.cost_px < cost_px else fitted
-            if not cost_px - again.cost_px > _MIN_GAIN * cost_px:
-                break
-        return fitted
+        again = self.fit(PosedBody(start.model, fitted.pose))
+        return again if again.cost_px < fitted.cost_px else fitted
 
     def track(self, start: PosedBody, fitted: FittedStart) -> FittedStart:
         """Track from a fitted start in all directions, and return it with the cost of all these frames.

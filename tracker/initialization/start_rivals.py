@@ -10,9 +10,9 @@ from tracker.geometry.arrays import Array
 
 _ELSEWHERE_M = 0.10
 """A limb is elsewhere if one of its joints is farther away, metres: then it counts as off."""
-ABOUT_EQUAL = 1.05
-"""Ratio of the costs of two starts below which they are about equally good. A short track from the same pose costs up
-to 4% more or less after another refinement."""
+ABOUT_EQUAL = 1.03
+"""Ratio of the costs of two starts below which they are about equally good. A short track from the same pose costs some
+percent more or less after another refinement."""
 
 
 def rivals_note(starts: Sequence[tuple[PosedBody, float]]) -> str:

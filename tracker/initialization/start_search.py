@@ -14,7 +14,7 @@ from tracker.tracking.estimation.start_pose import roughly_known, search_start
 from tracker.tracking.person_memory import PersonMemory
 from tracker.tracking.view_regions import read_views
 
-_MAX_ROUNDS, _N_DRAWS = 3, 3
+_MAX_ROUNDS, _N_DRAWS = 2, 3
 """Largest number of rounds, each with the evidence around the pose of the one before, and draws of samples in each."""
 _SETTLED_M = 0.01
 """The search ends where nothing moves farther in a round, metres."""

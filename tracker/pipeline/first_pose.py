@@ -20,9 +20,10 @@ from tracker.geometry.ground_plane import floor_plane
 from tracker.initialization.candidates import METHODS, PersonScene, StartCandidate, StartMethod, silhouette_axes
 from tracker.initialization.silhouette_check import check_against_silhouettes
 from tracker.initialization.start_fit import FittedStart, StartFitter, short_tracks
-from tracker.initialization.start_rivals import ABOUT_EQUAL, rivals_note
+from tracker.initialization.start_rivals import rivals_note
 from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
+from tracker.pipeline.standing_heights import StandingHeights
 from tracker.pipeline.start_choice import Start, compare_starts, face_opposite, weighed_px
 from tracker.session.session import Session
 from tracker.store.stored_poses import read_stored_poses
@@ -38,6 +39,8 @@ _MOTION_FRAMES = 6
 """Frames over which the motion of a figure is measured."""
 _ENOUGH_FRAMES, _AXIS_FRAMES = 5, 2
 """Number of frames with good starts from voxels, and with starts on the axis, among which `auto` chooses."""
+_SURE_RATIO = 1.05
+"""Ratio of the cost of the cheapest track that faces the other way above which left and right are known."""
 _OWN_M = 0.4
 """A figure that is closer to the trunk of another person with a pose is that person, metres."""
 _LARGER = 0.02
@@ -142,6 +145,13 @@ class _Trial:
     def __init__(self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say) -> None:
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
         self._finder = SilhouetteFinder(session.cameras, observer.recording)
+
+        def scenes(frame: int, person: int) -> list[PersonScene]:
+            silhouettes = self._finder.silhouettes(frame, person)
+            return [PersonScene(f, silhouettes, (), floor, None) for f in carve_people(silhouettes, size_m).figures]
+
+        floor = floor_plane(session.up, session.floor)
+        self._heights = StandingHeights(scenes, session.n_frames, len(session.people))
         self.found, self._errors = list[FirstPoses](), list[TrackerError]()
 
     def __enter__(self) -> "_Trial":
@@ -155,7 +165,7 @@ class _Trial:
         own: dict[int, FirstPose] = {}
         try:
             for person in self._people:
-                task = _Task(self._session, self._observer, self._finder, person, self._size_m)
+                task = _Task(self._session, self._observer, self._finder, self._heights, person, self._size_m)
                 own[person] = _best_on_frame(task, frame, methods, own)
         except TrackerError as error:
             self._errors.append(error)
@@ -181,6 +191,7 @@ class _Task(NamedTuple):
     session: Session
     observer: Observer
     finder: SilhouetteFinder
+    heights: StandingHeights
     person: int
     size_m: float
 
@@ -217,7 +228,7 @@ def _on_frame(
     task: _Task, frame: int, silhouettes: Sequence[ViewSilhouette], methods: Sequence[StartMethod],
     found: Mapping[int, FirstPose],
 ) -> FirstPose:  # fmt: skip
-    session, observer, _, person, size_m = task
+    session, observer, _, heights, person, size_m = task
     hull = carve_people(silhouettes, size_m)
     others = _others(session, person, frame, found)
     figure = _own_figure(session, person, hull, others)
@@ -225,14 +236,16 @@ def _on_frame(
     scene = PersonScene(
         figure, silhouettes, masks, floor_plane(session.up, session.floor), _motion(task, figure, frame)
     )
-    candidates = _candidates(scene, session.people[person].model, methods)
+    model = session.people[person].model
+    height_m = heights.around(scene, frame, person) if has_preset_sizes(model) else None
+    candidates = _candidates(scene, model if height_m is None else model.with_height(height_m), methods)
     fitter = StartFitter(observer, frame, short_tracks(frame, session.n_frames), tuple(others))
     searched, tracked, is_lost = compare_starts(fitter, candidates, lambda runs: _filling(runs, silhouettes, masks))
     best, fit = tracked[0]
     # Starts whose tracks were not worth it cost much more on the frame alone.
     opposite, untracked = ([weighed_px(s) for s in own if face_opposite(s[0], best)] for own in (tracked, searched))
     opposite = opposite or untracked
-    is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > ABOUT_EQUAL * weighed_px(tracked[0]))
+    is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > _SURE_RATIO * weighed_px(tracked[0]))
     notes = _notes(best, is_sure, hull, silhouettes)
     doubts = [
         check_against_silhouettes(PosedBody(best.model, fit.pose), silhouettes, masks).note,

@@ -50,15 +50,15 @@ def fits(monkeypatch):
     monkeypatch.setattr(first_pose, "StartFitter", fitter(track=lambda start: (start.values, next(costs))))
 
 
-def fitter(track, status="good"):
+def fitter(track, status=lambda start: "good"):
     """Stands for the class that fits starts: they fit as they are, and tracks give a pose and a cost."""
 
     def fitted(start):
-        return FittedStart(start.values, status, 1.0)
+        return FittedStart(start.values, status(start), 1.0)
 
     def tracked(start, fit):
         pose, cost_px = track(start)
-        return FittedStart(pose, status, float(cost_px))
+        return FittedStart(pose, status(start), float(cost_px))
 
     return lambda *_: SimpleNamespace(fit=fitted, search=fitted, track=tracked)
 
@@ -151,13 +151,17 @@ def test_legs_that_look_like_shadows_are_found(session, silhouettes, monkeypatch
         points = dict(zip(model.point_names, model.points_world(pose), strict=True))
         return [np.linalg.norm(points[n] - joints[n]) for n in legs]
 
-    def fit(observer, models, start, frame, later, others):
-        if max(errors(models[0], start)) > 0.3:
-            return FittedStart(start, "doubtful", 2.0)
-        known = {n: p for n, p in joints.items() if n in models[0].point_names}
-        return FittedStart(fit_to_points(models[0], known).pose, "good", 1.0)
+    def is_near(start):
+        return max(errors(start.model, start.values)) < 0.3
 
-    monkeypatch.setattr(first_pose, "fit_start", fit)
+    def track(start):
+        if not is_near(start):
+            return start.values, 2.0
+        known = {n: p for n, p in joints.items() if n in start.model.point_names}
+        return fit_to_points(start.model, known).pose, 1.0
+
+    fits = fitter(track, lambda start: "good" if is_near(start) else "doubtful")
+    monkeypatch.setattr(first_pose, "StartFitter", fits)
     whole = silhouettes_of_figure(voxels, CAMERAS)
     silhouettes += hide_legs(whole, {0, 2}, [np.zeros_like(s.mask) for s in whole])
     found = find(session).poses[0]
