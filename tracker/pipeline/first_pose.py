@@ -179,12 +179,15 @@ class _Trial:
     def best(self) -> FirstPoses:
         """Return the first poses that cost least; those whose fits are good go before.
 
+        At an end of the recording only one short track speaks for a start, so that other frames go before, too.
+
         Raises:
             TrackerError: there are none.
         """
         if not self.found:
             raise self._errors[0]
-        return min(self.found, key=lambda f: (not f.is_good, f.cost_px))
+        n_frames = self._session.n_frames
+        return min(self.found, key=lambda f: (not f.is_good, len(short_tracks(f.frame, n_frames)) < 2, f.cost_px))
 
 
 class _Task(NamedTuple):
