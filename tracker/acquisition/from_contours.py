@@ -33,7 +33,7 @@ from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.forward_pass import update_static_edges
 from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior
 from tracker.tracking.estimation.settings import chamfer_cost
-from tracker.tracking.view_regions import regions, visible_pieces_px
+from tracker.tracking.view_regions import read_views, visible_pieces_px
 
 SizeMethod = Literal["contours", "voxels"]
 """Whether the fit to contours starts at the body before, or at a fit to voxels."""
@@ -180,15 +180,6 @@ def _spread(frames: Sequence[int], n: int, keep: Sequence[int]) -> list[int]:
     """Return frames evenly spread over all, with those to keep."""
     at = np.unique(np.linspace(0, len(frames) - 1, min(n, len(frames))).round().astype(int))
     return sorted({frames[i] for i in at} | (set(keep) & set(frames)))
-
-
-def read_views(
-    observer: Observer, frame: int, bodies: Sequence[PosedBody], static_edges: Sequence[StaticEdgeModel] | None
-) -> tuple[ViewEvidence, ...]:
-    """Return the evidence of a frame around all people."""
-    cameras = observer.working_cameras
-    visible = [visible_pieces_px(occluding_contours.trace(bodies, c)) for c in cameras]
-    return observer.evidence(frame, regions(cameras, bodies), visible, static_edges)
 
 
 def own_views(views: Sequence[ViewEvidence], bodies: tuple[PosedBody, ...], person: int) -> Sequence[ViewEvidence]:

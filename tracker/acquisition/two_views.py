@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.chamfer_search import ChamferSearchSettings, search_shapes
-from tracker.acquisition.from_contours import Acquisition, Report, cost_px, learn_static_edges, own_views, read_views
+from tracker.acquisition.from_contours import Acquisition, Report, cost_px, learn_static_edges, own_views
 from tracker.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.body.model import PosedBody, parts_of
@@ -21,6 +21,7 @@ from tracker.contours import occluding_contours
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.cameras import Camera
+from tracker.tracking.view_regions import read_views
 
 MAX_OFF_RAD = np.radians(35.0)
 """Largest angle between a view and the person's front or side, and of two views from a right angle."""

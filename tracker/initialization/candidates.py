@@ -18,6 +18,7 @@ from tracker.initialization.head_template import Head
 from tracker.initialization.silhouette_axis import MajorAxis, major_axis
 from tracker.initialization.silhouette_overlap import SilhouetteOverlap
 from tracker.initialization.voxel_start import (
+    FigureParts,
     facing_cues,
     locate_parts,
     possible_heads,
@@ -112,9 +113,7 @@ def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[St
     graph = neighbor_graph(scene.figure)
     for head in possible_heads(scene.figure, graph, scene.up):
         parts = locate_parts(scene.figure, graph, head, scene.motion)
-        points = scene.figure.points_world[head.is_head]
-        top = points[int(np.argmax(points @ scene.up))] + scene.figure.grid.size_m / 2 * scene.up
-        height_m = None if is_known else standing_height(scene, parts.torso.axes[:, 2], top, head)
+        height_m = None if is_known else _height_of_parts(scene, parts)
         own = model if height_m is None else model.with_height(height_m)
         starts += [
             StartCandidate(
@@ -178,6 +177,22 @@ def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
             "background"
         )
     return axes
+
+
+def upright_height(scene: PersonScene) -> float | None:
+    """Return the height of a person by the most likely head, metres; None if the person does not stand upright."""
+    graph = neighbor_graph(scene.figure)
+    try:
+        head = possible_heads(scene.figure, graph, scene.up)[0]
+        return _height_of_parts(scene, locate_parts(scene.figure, graph, head))
+    except TrackerError:
+        return None
+
+
+def _height_of_parts(scene: PersonScene, parts: FigureParts) -> float | None:
+    points = scene.figure.points_world[parts.head.is_head]
+    top = points[int(np.argmax(points @ scene.up))] + scene.figure.grid.size_m / 2 * scene.up
+    return standing_height(scene, parts.torso.axes[:, 2], top, parts.head)
 
 
 def standing_height(scene: PersonScene, trunk_up: Array, top: Array, head: Head | None = None) -> float | None:

@@ -1,13 +1,21 @@
-"""Fit start poses to the contours of a frame, and compare them by short tracks in both directions."""
+"""Fit start poses to the contours of a frame, and compare them by short tracks in both directions.
+
+In a wrong local minimum a limb keeps its place only until it moves. A short track that comes back may then end in the
+right pose, which is another start.
+"""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.model import BodyModel
+from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
+from tracker.initialization.start_rivals import limbs_elsewhere
+from tracker.initialization.start_search import search_around
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.confidence import Status
@@ -17,10 +25,11 @@ from tracker.tracking.tracker import TrackingRun
 
 _LOST_PX, _DOUBTFUL_PX = 2.0, 0.5
 """What a lost and a doubtful frame of a short track add to its cost, px."""
-_MAX_FITS = 4
-"""Largest number of fits to the frame of the start, each from the one before."""
-_MIN_GAIN = 0.01
-"""Smallest decrease of the cost, as a share, for another fit."""
+_RETURNED_M = 0.05
+"""A track comes back to another pose if a joint of a limb is farther from the start, metres."""
+_TRACK_STEPS = (2, 4, 6)
+"""Frames after and before a start over which starts are compared."""
+_SETTINGS = TrackSettings(backward_pass=False)
 
 
 class FittedStart(NamedTuple):
@@ -31,47 +40,95 @@ class FittedStart(NamedTuple):
     status: Status
     """As the tracker gives it."""
     cost_px: float
-    """Mean cost over the frames of the track, px of the footage; lost frames cost more."""
+    """Mean cost over the frames that were fitted, px of the footage; lost frames cost more."""
+    is_lost: bool = False
+    """Whether the person was lost on a short track."""
+    returning: tuple[Iterator[PoseEstimate], ...] = ()
+    """The ways back of short tracks, which have not been tracked yet."""
 
 
-def fit_start(
-    observer: Observer,
-    models: Sequence[BodyModel],
-    start: Array,
-    frame: int,
-    later: Sequence[Sequence[int]],
-    others: Sequence[Array],
-) -> FittedStart:
-    """Fit the start pose of the first person to a frame, and track from it in several directions.
+class Returned(NamedTuple):
+    """The ends of short tracks that came back to the frame of a start."""
+
+    poses: list[Array]
+    """Those that are not the start, (n_values,) each."""
+    is_lost: bool
+    """Whether the person was lost on a short track, there or back."""
+
+
+@dataclass(frozen=True)
+class StartFitter:
+    """Fits starts of one person on a frame."""
+
+    observer: Observer
+    """Of the recording."""
+    frame: int
+    """Of the starts."""
+    later: Sequence[Sequence[int]]
+    """For each direction the frames of a short track, without the first."""
+    others: tuple[PosedBody, ...]
+    """The other people on that frame."""
+
+    def fit(self, start: PosedBody) -> FittedStart:
+        """Fit a start to the frame."""
+        (found,) = self._estimates(start, [self.frame])
+        return FittedStart(found.poses[0], found.statuses[0], _cost_px(found))
+
+    def search(self, start: PosedBody) -> FittedStart:
+        """Search around a start, and fit the result twice."""
+        fitted = self.fit(search_around(self.observer, (start, *self.others), self.frame, _SETTINGS))
+        # A fit reaches only as far as its prior and the edges around its start.
+        again = self.fit(PosedBody(start.model, fitted.pose))
+        return again if again.cost_px < fitted.cost_px else fitted
+
+    def track(self, start: PosedBody, fitted: FittedStart) -> FittedStart:
+        """Track from a fitted start in all directions, and return it with the cost of all these frames.
+
+        Args:
+            start: the body in the fitted pose.
+            fitted: the fit.
+        """
+        tracked, returning = list[PoseEstimate](), list[Iterator[PoseEstimate]]()
+        for frames in self.later:
+            way = self._estimates(start, [self.frame, *frames, *frames[-2::-1], self.frame])
+            _, *found = islice(way, 1 + len(frames))
+            tracked += found
+            returning.append(way)
+        cost = float(np.mean([fitted.cost_px, *map(_cost_px, tracked)]))
+        is_lost = any(_is_lost(e) for e in tracked)
+        return FittedStart(fitted.pose, fitted.status, cost if np.isfinite(cost) else np.inf, is_lost, tuple(returning))
+
+    def _estimates(self, start: PosedBody, frames: Sequence[int]) -> Iterator[PoseEstimate]:
+        people = (start, *self.others)
+        subjects = Subjects.of([b.model for b in people], [0])
+        run = TrackingRun(self.observer, subjects, [b.values for b in people], frames)
+        return ChamferTracker(_SETTINGS).estimates(run)
+
+
+def short_tracks(frame: int, n_frames: int) -> list[list[int]]:
+    """Return the frames of the short tracks from a frame of a recording, forward and backward."""
+    both = [[frame + sign * d for d in _TRACK_STEPS] for sign in (1, -1)]
+    return [own for frames in both if (own := [k for k in frames if 0 <= k < n_frames])]
+
+
+def track_back(start: PosedBody, fitted: FittedStart) -> Returned:
+    """Track back to the frame of a start.
 
     Args:
-        observer: of the recording.
-        models: the body of each person.
-        start: of the first person, (n_values,).
-        frame: of the start.
-        later: for each direction the frames of a short track, without the first.
-        others: pose of each other person on that frame, (n_values,) each.
+        start: the body in the fitted pose.
+        fitted: the fit, whose short tracks have not come back yet.
     """
-    subjects = Subjects.of(models, [0])
+    poses, is_lost = list[Array](), fitted.is_lost
+    for way in fitted.returning:
+        *_, last = found = list(way)
+        is_lost = is_lost or any(_is_lost(e) for e in found)
+        if limbs_elsewhere(start.model, start.points_world, start.model.points_world(last.poses[0]), _RETURNED_M):
+            poses.append(last.poses[0])
+    return Returned(poses, is_lost)
 
-    def estimates(pose: Array, frames: Sequence[int]) -> Iterator[PoseEstimate]:
-        run = TrackingRun(observer, subjects, [pose, *others], frames)
-        return ChamferTracker(TrackSettings(backward_pass=False)).estimates(run)
 
-    (fitted,) = estimates(start, [frame])
-    # A fit reaches only as far as its prior and the edges around its start. Starts that short tracks compare are few
-    # enough to be fitted again.
-    for _ in range(_MAX_FITS - 1 if later else 0):
-        (again,) = estimates(fitted.poses[0], [frame])
-        gained = fitted.cost_px - again.cost_px
-        fitted = again if gained > 0 else fitted
-        if not gained > _MIN_GAIN * fitted.cost_px:
-            break
-    pose, costs = fitted.poses[0], [_cost_px(fitted)]
-    for frames in later:
-        costs += [_cost_px(e) for e in estimates(pose, [frame, *frames]) if e.frame != frame]
-    cost = float(np.mean(costs))
-    return FittedStart(pose, fitted.statuses[0], cost if np.isfinite(cost) else np.inf)
+def _is_lost(estimate: PoseEstimate) -> bool:
+    return estimate.statuses[0] == "lost"
 
 
 def _cost_px(estimate: PoseEstimate) -> float:

@@ -1,8 +1,8 @@
 """Find the first pose of a person in a session with nobody's help, and store it.
 
 On each frame that is tried every method gives start poses (`tracker.initialization.candidates`), one for each way of
-facing. Each is fitted to the contours. The best are tracked over a few frames in both directions, and the cheapest
-track is kept.
+facing. Each is fitted to the contours. The best are searched around and tracked over a few frames in both directions.
+The cheapest track is kept. It is doubtful where another start costs as much, or where it loses the person.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,9 +19,12 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
 from tracker.initialization.candidates import METHODS, PersonScene, StartCandidate, StartMethod, silhouette_axes
 from tracker.initialization.silhouette_check import check_against_silhouettes
-from tracker.initialization.start_fit import FittedStart, fit_start
+from tracker.initialization.start_fit import FittedStart, StartFitter, short_tracks
+from tracker.initialization.start_rivals import rivals_note
 from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
+from tracker.pipeline.standing_heights import StandingHeights
+from tracker.pipeline.start_choice import Start, compare_starts, face_opposite, weighed_px
 from tracker.session.session import Session
 from tracker.store.stored_poses import read_stored_poses
 from tracker.tracking.confidence import worst
@@ -32,22 +35,12 @@ from tracker.voxels.voxel_grid import Voxels
 
 VOXEL_M = 0.025
 """Edge of a voxel, metres."""
-_TRACK_STEPS = (2, 4, 6)
-"""Frames after and before the first pose over which starts are compared."""
 _MOTION_FRAMES = 6
 """Frames over which the motion of a figure is measured."""
 _ENOUGH_FRAMES, _AXIS_FRAMES = 5, 2
 """Number of frames with good starts from voxels, and with starts on the axis, among which `auto` chooses."""
-_N_TRACKED = 4
-"""Starts of a frame that are tracked."""
-_SAME_M = 0.03
-"""Mean distance of the joints up to which two fits are the same, metres."""
-_CUES_PX = 0.05
-"""What a cue for the direction counts against the cost of a track, px."""
 _SURE_RATIO = 1.05
 """Ratio of the cost of the cheapest track that faces the other way above which left and right are known."""
-_OPPOSITE = 0.0
-"""Largest cosine of the angle between two directions that count as opposite."""
 _OWN_M = 0.4
 """A figure that is closer to the trunk of another person with a pose is that person, metres."""
 _LARGER = 0.02
@@ -152,6 +145,13 @@ class _Trial:
     def __init__(self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say) -> None:
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
         self._finder = SilhouetteFinder(session.cameras, observer.recording)
+
+        def scenes(frame: int, person: int) -> list[PersonScene]:
+            silhouettes = self._finder.silhouettes(frame, person)
+            return [PersonScene(f, silhouettes, (), floor, None) for f in carve_people(silhouettes, size_m).figures]
+
+        floor = floor_plane(session.up, session.floor)
+        self._heights = StandingHeights(scenes, session.n_frames, len(session.people))
         self.found, self._errors = list[FirstPoses](), list[TrackerError]()
 
     def __enter__(self) -> "_Trial":
@@ -165,7 +165,7 @@ class _Trial:
         own: dict[int, FirstPose] = {}
         try:
             for person in self._people:
-                task = _Task(self._session, self._observer, self._finder, person, self._size_m)
+                task = _Task(self._session, self._observer, self._finder, self._heights, person, self._size_m)
                 own[person] = _best_on_frame(task, frame, methods, own)
         except TrackerError as error:
             self._errors.append(error)
@@ -179,18 +179,22 @@ class _Trial:
     def best(self) -> FirstPoses:
         """Return the first poses that cost least; those whose fits are good go before.
 
+        At an end of the recording only one short track speaks for a start, so that other frames go before, too.
+
         Raises:
             TrackerError: there are none.
         """
         if not self.found:
             raise self._errors[0]
-        return min(self.found, key=lambda f: (not f.is_good, f.cost_px))
+        n_frames = self._session.n_frames
+        return min(self.found, key=lambda f: (not f.is_good, len(short_tracks(f.frame, n_frames)) < 2, f.cost_px))
 
 
 class _Task(NamedTuple):
     session: Session
     observer: Observer
     finder: SilhouetteFinder
+    heights: StandingHeights
     person: int
     size_m: float
 
@@ -227,7 +231,7 @@ def _on_frame(
     task: _Task, frame: int, silhouettes: Sequence[ViewSilhouette], methods: Sequence[StartMethod],
     found: Mapping[int, FirstPose],
 ) -> FirstPose:  # fmt: skip
-    session, observer, _, person, size_m = task
+    session, observer, _, heights, person, size_m = task
     hull = carve_people(silhouettes, size_m)
     others = _others(session, person, frame, found)
     figure = _own_figure(session, person, hull, others)
@@ -235,43 +239,31 @@ def _on_frame(
     scene = PersonScene(
         figure, silhouettes, masks, floor_plane(session.up, session.floor), _motion(task, figure, frame)
     )
-    candidates = _candidates(scene, session.people[person].model, methods)
-    poses, bodies = [b.values for b in others], [b.model for b in others]
-
-    def fitted(candidate: StartCandidate, later: Sequence[Sequence[int]]) -> FittedStart:
-        return fit_start(observer, [candidate.model, *bodies], candidate.pose, frame, later, poses)
-
-    tried = [(c, fitted(c, ())) for c in candidates]
-    steps = _track_frames(frame, session.n_frames)
-    kept = {id(c) for c, _ in _kept(_distinct(tried))}
-    runs = _distinct([(c, fitted(c, steps)) for c in candidates if id(c) in kept])
-    tracked = _filling(sorted(runs, key=_weighed), silhouettes, masks)
+    model = session.people[person].model
+    height_m = heights.around(scene, frame, person) if has_preset_sizes(model) else None
+    candidates = _candidates(scene, model if height_m is None else model.with_height(height_m), methods)
+    fitter = StartFitter(observer, frame, short_tracks(frame, session.n_frames), tuple(others))
+    searched, tracked, is_lost = compare_starts(fitter, candidates, lambda runs: _filling(runs, silhouettes, masks))
     best, fit = tracked[0]
-    opposite = [_weighed(t) for t in tracked if t[0].forward @ best.forward < _OPPOSITE]
-    opposite += [_weighed(t) for t in tried if t[0].forward @ best.forward < _OPPOSITE and not opposite]
-    is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > _SURE_RATIO * _weighed(tracked[0]))
+    # Starts whose tracks were not worth it cost much more on the frame alone.
+    opposite, untracked = ([weighed_px(s) for s in own if face_opposite(s[0], best)] for own in (tracked, searched))
+    opposite = opposite or untracked
+    is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > _SURE_RATIO * weighed_px(tracked[0]))
     notes = _notes(best, is_sure, hull, silhouettes)
-    note = check_against_silhouettes(PosedBody(best.model, fit.pose), silhouettes, masks).note
-    if note:
-        notes, fit = (*notes, note), fit._replace(status=worst([fit.status, "doubtful"]))
-    return FirstPose(frame, best, fit, is_sure, notes, _lines_px(session, scene))
-
-
-def _distinct(fits: Sequence[tuple[StartCandidate, FittedStart]]) -> list[tuple[StartCandidate, FittedStart]]:
-    """Return the fits without those that end where the fit of an earlier start does: methods give the best first."""
-    kept, others = list[tuple[StartCandidate, FittedStart]](), list[Array]()
-    for candidate, fit in fits:
-        points = candidate.model.points_world(fit.pose)
-        if all(np.linalg.norm(points - o, axis=1).mean() > _SAME_M for o in others):
-            kept.append((candidate, fit))
-            others.append(points)
-    return kept
+    doubts = [
+        check_against_silhouettes(PosedBody(best.model, fit.pose), silhouettes, masks).note,
+        rivals_note([(PosedBody(c.model, f.pose), weighed_px((c, f))) for c, f in tracked]),
+        "the person is lost on a short track from here" if is_lost else "",
+    ]
+    status = worst([fit.status, "doubtful"]) if any(doubts) else fit.status
+    fitted = FittedStart(fit.pose, status, fit.cost_px)
+    return FirstPose(frame, best, fitted, is_sure, (*notes, *filter(None, doubts)), _lines_px(session, scene))
 
 
 def _filling(
-    tracked: Sequence[tuple[StartCandidate, FittedStart]], silhouettes: Sequence[ViewSilhouette],
+    tracked: Sequence[Start], silhouettes: Sequence[ViewSilhouette],
     masks: Sequence[FigureMask],
-) -> list[tuple[StartCandidate, FittedStart]]:  # fmt: skip
+) -> list[Start]:  # fmt: skip
     """Return the starts whose bodies fill the silhouettes.
 
     Raises:
@@ -301,11 +293,6 @@ def _candidates(scene: PersonScene, model: BodyModel, methods: Sequence[StartMet
     return found
 
 
-def _weighed(start: tuple[StartCandidate, FittedStart]) -> float:
-    """Return the cost of a start, px, less what the cues say for its direction."""
-    return start[1].cost_px - _CUES_PX * start[0].cues
-
-
 def _lines_px(session: Session, scene: PersonScene) -> dict[str, Array]:
     """Return the axes of the silhouettes by view, undistorted px of the footage; empty if fewer than two have one."""
     try:
@@ -314,21 +301,6 @@ def _lines_px(session: Session, scene: PersonScene) -> dict[str, Array]:
         return {}
     widths = {c.camera.name: c.camera.width for c in session.cameras}
     return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in axes}
-
-
-def _kept(tried: Sequence[tuple[StartCandidate, FittedStart]]) -> list[tuple[StartCandidate, FittedStart]]:
-    """Return the starts to track: the cheapest ones, and the cheapest that faces the other way than the first."""
-    order = sorted(tried, key=_weighed)
-    kept, rest = order[:_N_TRACKED], order[_N_TRACKED:]
-    if all(c.forward @ kept[0][0].forward >= _OPPOSITE for c, _ in kept):
-        kept += [t for t in rest if t[0].forward @ kept[0][0].forward < _OPPOSITE][:1]
-    return kept
-
-
-def _track_frames(frame: int, n_frames: int) -> list[list[int]]:
-    """Return the frames of the short tracks, forward and backward."""
-    both = [[frame + sign * d for d in _TRACK_STEPS] for sign in (1, -1)]
-    return [own for frames in both if (own := [k for k in frames if 0 <= k < n_frames])]
 
 
 def _others(session: Session, person: int, frame: int, found: Mapping[int, FirstPose]) -> list[PosedBody]:

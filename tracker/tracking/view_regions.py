@@ -1,13 +1,17 @@
-"""Regions of the views around posed bodies, their visible contours, and the image scale at a body."""
+"""Regions of the views around posed bodies, the evidence there, visible contours, and the image scale at a body."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from tracker.body.model import PosedBody
+from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import Contour
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
 from tracker.geometry.cameras import Camera, Region
+from tracker.images.static_edges import StaticEdgeModel
 from tracker.images.working_view import region_around
 
 _MIN_DEPTH_M = 0.3
@@ -64,6 +68,15 @@ def _contains(outer: Region | None, inner: Region | None) -> bool:
 def visible_pieces_px(contour: Contour) -> FloatArray:
     """Return the visible pieces of a contour, x0, y0, x1, y1, (M, 4), px."""
     return contour.pieces_px[~contour.occluded]
+
+
+def read_views(
+    observer: Observer, frame: int, bodies: Sequence[PosedBody], static_edges: Sequence[StaticEdgeModel] | None = None
+) -> tuple[ViewEvidence, ...]:
+    """Return the evidence of a frame around all people."""
+    cameras = observer.working_cameras
+    visible = [visible_pieces_px(occluding_contours.trace(bodies, c)) for c in cameras]
+    return observer.evidence(frame, regions(cameras, bodies), visible, static_edges)
 
 
 def px_per_m(cameras: Sequence[Camera], body: PosedBody) -> float:

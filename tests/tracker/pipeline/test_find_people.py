@@ -47,11 +47,20 @@ def silhouettes(monkeypatch):
 def fits(monkeypatch):
     """Every start fits as it is; the second way of facing costs more."""
     costs = iter(np.arange(1.0, 100.0))
+    monkeypatch.setattr(first_pose, "StartFitter", fitter(track=lambda start: (start.values, next(costs))))
 
-    def fit(observer, models, start, frame, later, others):
-        return FittedStart(start, "good", float(next(costs)))
 
-    monkeypatch.setattr(first_pose, "fit_start", fit)
+def fitter(track, status=lambda start: "good"):
+    """Stands for the class that fits starts: they fit as they are, and tracks give a pose and a cost."""
+
+    def fitted(start):
+        return FittedStart(start.values, status(start), 1.0)
+
+    def tracked(start, fit):
+        pose, cost_px = track(start)
+        return FittedStart(pose, status(start), float(cost_px))
+
+    return lambda *_: SimpleNamespace(fit=fitted, search=fitted, track=tracked)
 
 
 OBSERVER = SimpleNamespace(recording=None)
@@ -111,12 +120,12 @@ def off_by(places, monkeypatch):
     """Fits that are called good and have moved by metres along x, each by the next of some places."""
     places = iter(places)
 
-    def fit(observer, models, start, frame, later, others):
-        moved = start.copy()
-        moved[0] += next(places) if later else 0.0
-        return FittedStart(moved, "good", 1.0)
+    def track(start):
+        moved = start.values.copy()
+        moved[0] += next(places)
+        return moved, 1.0
 
-    monkeypatch.setattr(first_pose, "fit_start", fit)
+    monkeypatch.setattr(first_pose, "StartFitter", fitter(track))
 
 
 def test_a_body_in_empty_space_is_refused(session, silhouettes, monkeypatch):
@@ -142,13 +151,17 @@ def test_legs_that_look_like_shadows_are_found(session, silhouettes, monkeypatch
         points = dict(zip(model.point_names, model.points_world(pose), strict=True))
         return [np.linalg.norm(points[n] - joints[n]) for n in legs]
 
-    def fit(observer, models, start, frame, later, others):
-        if max(errors(models[0], start)) > 0.3:
-            return FittedStart(start, "doubtful", 2.0)
-        known = {n: p for n, p in joints.items() if n in models[0].point_names}
-        return FittedStart(fit_to_points(models[0], known).pose, "good", 1.0)
+    def is_near(start):
+        return max(errors(start.model, start.values)) < 0.3
 
-    monkeypatch.setattr(first_pose, "fit_start", fit)
+    def track(start):
+        if not is_near(start):
+            return start.values, 2.0
+        known = {n: p for n, p in joints.items() if n in start.model.point_names}
+        return fit_to_points(start.model, known).pose, 1.0
+
+    fits = fitter(track, lambda start: "good" if is_near(start) else "doubtful")
+    monkeypatch.setattr(first_pose, "StartFitter", fits)
     whole = silhouettes_of_figure(voxels, CAMERAS)
     silhouettes += hide_legs(whole, {0, 2}, [np.zeros_like(s.mask) for s in whole])
     found = find(session).poses[0]
@@ -215,15 +228,3 @@ def test_an_entry_of_one_person_is_read_as_before():
     edits = with_sizes_changed(with_sizes_changed({}, 4, changed[:1]), 5, changed)
     assert [sizes_changed(edits, edit) for edit in (4, 5)] == [changed[:1], changed]
     assert sizes_changed({"5": ["ann", 1, 2]}, 6) == []
-
-
-def test_starts_that_end_at_the_same_pose_are_one(session):
-    model = session.people[0].model
-    pose = model.neutral()
-
-    def ends_at(name, by_m):
-        candidate = StartCandidate(name, model, pose, np.array([1.0, 0.0, 0.0]), 0.0)
-        return candidate, FittedStart(pose + by_m * np.eye(len(pose))[0], "good", 1.0)
-
-    fits = [ends_at("first", 0.0), ends_at("again", 0.02), ends_at("other", 0.2)]
-    assert [c.method for c, _ in first_pose._distinct(fits)] == ["first", "other"]

@@ -28,7 +28,7 @@ _MAX_STEP = 1.2
 """Largest change of a degree of freedom, rad or metres. What no contour determines would turn freely otherwise."""
 
 
-def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array) -> Fit:
+def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array, draw: int = 0) -> Fit:
     """Refine poses sampled around a fit, and return the fit of the cheapest.
 
     Poses are compared without the prediction, since what it says has led to a doubtful pose.
@@ -38,6 +38,7 @@ def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigm
         fit: the refined pose.
         scorer: compares poses; the first of its priors is the prediction.
         sigma: standard deviations of a prediction, (n_dofs,), rad or metres.
+        draw: number of the samples; another number gives others.
 
     Returns:
         The given pose refined again, unless another is cheaper by `MIN_COST_GAIN`. Its normal matrix is that of all
@@ -53,7 +54,7 @@ def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigm
         )
         return ScoredFit(found, scorer.cost(found) - held.cost(model, found.pose))
 
-    here, *others = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, own)])
+    here, *others = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, own, draw)])
     cheapest = min(others, key=lambda x: x.cost)
     best = cheapest if cheapest.cost < here.cost - MIN_COST_GAIN else here
     return solve_compiled(model, best.fit.pose, scorer.blocks, scorer.active_dofs, 0)
@@ -64,7 +65,7 @@ def _blocks(scorer: PoseScorer, held: PosePrior) -> list[ResidualBlock]:
     return [scorer.residuals, held, *scorer.priors[1:]]
 
 
-def _samples(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array) -> Sequence[Array]:
+def _samples(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array, draw: int = 0) -> Sequence[Array]:
     """Return poses drawn around a fit, (n_values,) each."""
     free = np.flatnonzero(np.ones(model.n_dofs, dtype=bool) if scorer.active_dofs is None else scorer.active_dofs)
     blocks = _blocks(scorer, PosePrior(fit.pose, 1 / (_FREE * sigma)))
@@ -72,14 +73,14 @@ def _samples(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array) -> Se
     # Steps with the inverse Hessian as covariance. Its eigenvalues would take a hundred times as long.
     factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])
     steps = np.zeros((_N_SAMPLES, model.n_dofs))
-    drawn = _SCALE * np.linalg.solve(factor.T, _normal(_N_SAMPLES, len(free)).T).T
+    drawn = _SCALE * np.linalg.solve(factor.T, _normal(_N_SAMPLES, len(free), draw).T).T
     steps[:, free] = np.clip(drawn, -_MAX_STEP, _MAX_STEP)
     return [model.clip(model.retract(fit.pose, step)) for step in steps]
 
 
 @lru_cache(maxsize=8)
-def _normal(n: int, dims: int) -> Array:
-    """Return the same standard normal samples, (n, dims), in each call: runs are repeatable."""
-    out = np.random.default_rng(0).normal(size=(n, dims))
+def _normal(n: int, dims: int, draw: int) -> Array:
+    """Return the same standard normal samples, (n, dims), in each call of a draw: runs are repeatable."""
+    out = np.random.default_rng(draw).normal(size=(n, dims))
     out.flags.writeable = False
     return out

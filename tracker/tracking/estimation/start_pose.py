@@ -2,7 +2,8 @@
 
 A person places a start by hand, to within several degrees of each joint and centimetres. Limbs may then lie on other
 edges, and the colours under the parts are not theirs. The search keeps to the neighbourhood of the start, so that left
-and right stay what the person said. It scores contours alone: colours are learnt from its result.
+and right stay what the person said. It scores contours alone: colours are learnt from its result. Starts that a program
+found are searched in the same way (`tracker.initialization.start_search`).
 """
 
 from collections.abc import Callable, Sequence
@@ -20,6 +21,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, solve
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.assessment import PersonEstimate, estimate_at
+from tracker.tracking.estimation.covariance_search import search_along_covariance
 from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior, moved_m, with_body
 from tracker.tracking.estimation.incremental_fit import fit_by_chains
 from tracker.tracking.estimation.limb_recovery import PoseScorer, search_limbs
@@ -76,11 +78,11 @@ def settle_starts(
     doubted = [p for p, e in before.items() if _contradiction(e) >= least]
     if not doubted or not any(len(v.points_px) for v in first.views):
         return {}
-    wide, bodies = replace(settings, trust_rad=_START_RAD, trust_m=_START_M), start
+    wide, bodies = roughly_known(settings), start
     for _ in range(_MAX_ROUNDS):
         problem, last = FrameProblem(observe(bodies), known, wide), bodies
         for person in doubted:
-            bodies = with_body(bodies, person, _searched(problem, person, bodies, memories[person]))
+            bodies = with_body(bodies, person, search_start(problem, person, bodies, memories[person]))
         if all(moved_m(a, b) < _SETTLED_M for a, b in zip(last, bodies, strict=True)):
             break
     found = FrameProblem(observe(bodies), known, wide)
@@ -96,8 +98,23 @@ def _contradiction(estimate: PersonEstimate) -> int:
     return 1 if quality.search_candidates(alone=True) else 0
 
 
-def _searched(problem: FrameProblem, person: int, bodies: Bodies, memory: PersonMemory) -> PosedBody:
-    """Refine the pose of one person, search all limbs that have a counterpart, and return the person there."""
+def roughly_known(settings: EstimationSettings) -> EstimationSettings:
+    """Return the settings with which a start is searched: its prior is wide."""
+    return replace(settings, trust_rad=_START_RAD, trust_m=_START_M)
+
+
+def search_start(
+    problem: FrameProblem, person: int, bodies: Bodies, memory: PersonMemory, n_draws: int = 0
+) -> PosedBody:
+    """Refine the pose of one person, search around it, and return the person in the cheapest pose.
+
+    Args:
+        problem: of the frame, see `roughly_known`.
+        person: whom to search. All limbs that have a counterpart are searched, and exchanged with it.
+        bodies: all people.
+        memory: of the person, before the frame.
+        n_draws: number of searches along the directions that contours hardly determine, each with other samples.
+    """
     model, recover, start = memory.model, problem.settings.recover, problem.people[person].predicted
     assert recover is not None
     (own,) = problem.own_evidence([person], bodies, everywhere=True)
@@ -114,6 +131,8 @@ def _searched(problem: FrameProblem, person: int, bodies: Bodies, memory: Person
         fit = search_limbs(model, pair, fit, (start,), scorer).best
         exchanged = problem.solve(person, _exchanged(model, fit.pose, pair), scorer.blocks, MAX_ITERATIONS)
         fit = min(fit, exchanged, key=scorer.cost)
+    for draw in range(n_draws):
+        fit = search_along_covariance(model, fit, scorer, problem.sigma(person), draw)
     return PosedBody(model, fit.pose)
 
 

@@ -77,6 +77,8 @@ def test_samples_keep_locked_angles_and_are_the_same_each_time(model):
     np.testing.assert_array_equal(samples[:, ~active], np.repeat(staged.here.pose[None, ~active], len(samples), axis=0))
     _normal.cache_clear()
     np.testing.assert_array_equal(_samples(model, staged.here, staged.scorer, OWN_TRUST * staged.sigma), samples)
+    another = np.array(_samples(model, staged.here, staged.scorer, OWN_TRUST * staged.sigma, draw=1))
+    assert np.abs(another - samples).max() > 0.01
 
 
 def test_a_fit_is_drawn_on_from_a_wrong_prediction(model):

@@ -108,7 +108,7 @@ NOTHING, SUSPECT, MISSING = (
 def test_whose_start_is_searched(gavrila, truth, views, monkeypatch, n_people, quality, searched):
     bodies, asked = (PosedBody(gavrila, truth),) * n_people, []
     monkeypatch.setattr(start_pose, "estimate_at", lambda *_: SimpleNamespace(quality=quality))
-    monkeypatch.setattr(start_pose, "_searched", lambda _, person, at, __: asked.append(person) or at[person])
+    monkeypatch.setattr(start_pose, "search_start", lambda _, person, at, __: asked.append(person) or at[person])
     contours = [occluding_contours.trace(bodies, v.camera) for v in views]
     memories = [PersonMemory(gavrila, truth) for _ in bodies]
     settle_starts(StartFrame(bodies, contours, views, lambda _: views), memories, range(n_people), TrackSettings())

@@ -1,0 +1,44 @@
+"""Search around a fitted start: its limbs, exchanged limbs, and the directions that contours hardly determine.
+
+A start from voxels or silhouettes is several degrees off in each joint, and often a limb is elsewhere. A fit then ends
+in the local minimum next to it. Its cost and status look as good as those of the right pose.
+"""
+
+from collections.abc import Sequence
+
+from tracker.body.model import PosedBody
+from tracker.evidence.observer import Observer
+from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior, moved_m
+from tracker.tracking.estimation.settings import EstimationSettings
+from tracker.tracking.estimation.start_pose import roughly_known, search_start
+from tracker.tracking.person_memory import PersonMemory
+from tracker.tracking.view_regions import read_views
+
+_MAX_ROUNDS, _N_DRAWS = 2, 3
+"""Largest number of rounds, each with the evidence around the pose of the one before, and draws of samples in each."""
+_SETTLED_M = 0.01
+"""The search ends where nothing moves farther in a round, metres."""
+
+
+def search_around(
+    observer: Observer, bodies: Sequence[PosedBody], frame: int, settings: EstimationSettings
+) -> PosedBody:
+    """Search around the start of the first person on a frame, and return the person in the cheapest pose.
+
+    Args:
+        observer: of the recording.
+        bodies: all people; the others stay.
+        frame: of the start.
+        settings: of the tracker.
+    """
+    body, *others = bodies
+    alone, wide = not others, roughly_known(settings)
+    for _ in range(_MAX_ROUNDS):
+        everybody = (body, *others)
+        priors = [PersonPrior(b.model, b.values) for b in everybody]
+        problem = FrameProblem(read_views(observer, frame, everybody), priors, wide)
+        memory = PersonMemory(body.model, body.values, alone=alone)
+        before, body = body, search_start(problem, 0, everybody, memory, _N_DRAWS)
+        if moved_m(before, body) < _SETTLED_M:
+            break
+    return body
