@@ -107,12 +107,10 @@ def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[St
         is_known: whether its height is known; else it is measured, if the person stands.
 
     Raises:
-        TrackerError: no head is found.
+        TrackerError: no head with a trunk is found.
     """
     starts: list[StartCandidate] = []
-    graph = neighbor_graph(scene.figure)
-    for head in possible_heads(scene.figure, graph, scene.up):
-        parts = locate_parts(scene.figure, graph, head, scene.motion)
+    for parts in _possible_parts(scene):
         height_m = None if is_known else _height_of_parts(scene, parts)
         own = model if height_m is None else model.with_height(height_m)
         starts += [
@@ -123,6 +121,23 @@ def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[St
             for sign, p in ((1.0, parts), (-1.0, turned_round(parts)))
         ]  # fmt: skip
     return starts
+
+
+def _possible_parts(scene: PersonScene) -> list[FigureParts]:
+    """Return the parts of a figure with each head that it may have, the most likely first.
+
+    Raises:
+        TrackerError: there is no head, or none with a trunk.
+    """
+    found, errors, graph = list[FigureParts](), list[TrackerError](), neighbor_graph(scene.figure)
+    for head in possible_heads(scene.figure, graph, scene.up):
+        try:
+            found.append(locate_parts(scene.figure, graph, head, scene.motion))
+        except TrackerError as error:
+            errors.append(error)
+    if not found:
+        raise errors[0]
+    return found
 
 
 def from_axis(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
@@ -181,10 +196,8 @@ def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
 
 def upright_height(scene: PersonScene) -> float | None:
     """Return the height of a person by the most likely head, metres; None if the person does not stand upright."""
-    graph = neighbor_graph(scene.figure)
     try:
-        head = possible_heads(scene.figure, graph, scene.up)[0]
-        return _height_of_parts(scene, locate_parts(scene.figure, graph, head))
+        return _height_of_parts(scene, _possible_parts(scene)[0])
     except TrackerError:
         return None
 

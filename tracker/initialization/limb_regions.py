@@ -117,7 +117,8 @@ def _connected(figure: Voxels, own: IntArray) -> list[IntArray]:
 def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso) -> LimbRegion:
     """Return the limb of a branch. Where it does not stand out yet it runs straight from the torso."""
     region, from_torso, half = points[branch.own], distances[branch.own], torso.half_axes[2]
-    first = region[from_torso < branch.begins_m + 0.05].mean(axis=0)
+    # Voxels of a child who is enlarged to an adult are wide: there may be none this near.
+    first = region[from_torso <= max(branch.begins_m + 0.05, from_torso.min())].mean(axis=0)
     tip = region[from_torso > from_torso.max() - 0.04].mean(axis=0)
     (begins_z, tip_z) = torso.local(np.stack([first, tip]))[:, 2]
     own_root = branch.begins_m < _SKIN_M + 0.05

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.voxels.part_size import principal_axes
 from tracker.voxels.voxel_grid import Voxels
@@ -61,10 +62,18 @@ def find_torso(figure: Voxels, neck: Array, is_head: NDArray[np.bool_]) -> Torso
         figure: voxels of one person.
         neck: base of the head, (3,), metres.
         is_head: which voxels belong to the head, (N,).
+
+    Raises:
+        TrackerError: nothing is below the head.
     """
     points, others = figure.points_world, ~is_head
     up = _axis(points[others], neck)
     girdle = others & _in_cylinder(points, neck, up, *_GIRDLE_M)
+    if not girdle.any():
+        raise TrackerError(
+            "expected a trunk below the head in the silhouettes, found none; choose another --frame, or place the "
+            "person in the page"
+        )
     axes = _across(points[girdle], figure.grid.size_m, up)
     half = _grown(figure, neck, axes)
     local = (points - neck) @ axes

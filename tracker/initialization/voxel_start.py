@@ -87,6 +87,9 @@ def locate_parts(figure: Voxels, graph: VoxelGraph, head: Head, motion: Array | 
         graph: their `neighbor_graph`.
         head: the head.
         motion: the way of the figure to later frames, (3,), metres; None if it is not known.
+
+    Raises:
+        TrackerError: nothing is below the head.
     """
     # Lengths below are those of an adult: a child is enlarged to one.
     grown = figure.scaled(1 / head.scale)

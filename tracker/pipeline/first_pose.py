@@ -5,9 +5,9 @@ facing. Each is fitted to the contours. The best are searched around and tracked
 The cheapest track is kept. It is doubtful where another start costs as much, or where it loses the person.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -16,17 +16,17 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.geometry.arrays import Array
-from tracker.geometry.ground_plane import floor_plane
+from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.initialization.candidates import METHODS, PersonScene, StartCandidate, StartMethod, silhouette_axes
 from tracker.initialization.silhouette_check import check_against_silhouettes
 from tracker.initialization.start_fit import FittedStart, StartFitter, short_tracks
 from tracker.initialization.start_rivals import rivals_note
 from tracker.initialization.voxel_start import SURE
 from tracker.pipeline.body_acquisition import has_preset_sizes
+from tracker.pipeline.own_figure import figure_motion, others_on_frame, own_figure
 from tracker.pipeline.standing_heights import StandingHeights
 from tracker.pipeline.start_choice import Start, compare_starts, face_opposite, weighed_px
 from tracker.session.session import Session
-from tracker.store.stored_poses import read_stored_poses
 from tracker.tracking.confidence import worst
 from tracker.voxels.figure_masks import FigureMask, figure_masks
 from tracker.voxels.shadows import recover_from_shadows
@@ -41,14 +41,12 @@ _ENOUGH_FRAMES, _AXIS_FRAMES = 5, 2
 """Number of frames with good starts from voxels, and with starts on the axis, among which `auto` chooses."""
 _SURE_RATIO = 1.05
 """Ratio of the cost of the cheapest track that faces the other way above which left and right are known."""
-_OWN_M = 0.4
-"""A figure that is closer to the trunk of another person with a pose is that person, metres."""
 _LARGER = 0.02
 """Share by which some silhouette grows with what looks like shadows, above which it is worth another start."""
-_MAX_HULL_M3 = 0.25
-"""Largest volume of the visual hull of one person, cubic metres: three times that of a large man."""
 
 Say = Callable[[str], None]
+Silhouettes: TypeAlias = Callable[[int, int], Sequence[ViewSilhouette]]
+"""Returns the silhouettes of all views by frame and by index of the person whose masks are used."""
 
 
 class FirstPose(NamedTuple):
@@ -144,14 +142,15 @@ class _Trial:
 
     def __init__(self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say) -> None:
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
-        self._finder = SilhouetteFinder(session.cameras, observer.recording)
+        self._finder, floor = (
+            SilhouetteFinder(session.cameras, observer.recording),
+            floor_plane(session.up, session.floor),
+        )
 
-        def scenes(frame: int, person: int) -> list[PersonScene]:
-            silhouettes = self._finder.silhouettes(frame, person)
-            return [PersonScene(f, silhouettes, (), floor, None) for f in carve_people(silhouettes, size_m).figures]
+        def recovered(frame: int, person: int) -> Sequence[ViewSilhouette]:
+            return recover_from_shadows(self._finder.silhouettes(frame, person), floor, size_m)
 
-        floor = floor_plane(session.up, session.floor)
-        self._heights = StandingHeights(scenes, session.n_frames, len(session.people))
+        self._sources = [self._source(silhouettes, floor) for silhouettes in (self._finder.silhouettes, recovered)]
         self.found, self._errors = list[FirstPoses](), list[TrackerError]()
 
     def __enter__(self) -> "_Trial":
@@ -160,12 +159,19 @@ class _Trial:
     def __exit__(self, *_: object) -> None:
         self._finder.close()
 
+    def _source(self, silhouettes: Silhouettes, floor: GroundPlane) -> "_Source":
+        def scenes(frame: int, person: int) -> list[PersonScene]:
+            views = silhouettes(frame, person)
+            return [PersonScene(f, views, (), floor, None) for f in carve_people(views, self._size_m).figures]
+
+        return _Source(silhouettes, StandingHeights(scenes, self._session.n_frames, len(self._session.people)))
+
     def add(self, frame: int, methods: Sequence[StartMethod]) -> None:
         """Try a frame."""
         own: dict[int, FirstPose] = {}
         try:
             for person in self._people:
-                task = _Task(self._session, self._observer, self._finder, self._heights, person, self._size_m)
+                task = _Task(self._session, self._observer, self._sources, person, self._size_m)
                 own[person] = _best_on_frame(task, frame, methods, own)
         except TrackerError as error:
             self._errors.append(error)
@@ -190,11 +196,18 @@ class _Trial:
         return min(self.found, key=lambda f: (not f.is_good, len(short_tracks(f.frame, n_frames)) < 2, f.cost_px))
 
 
+class _Source(NamedTuple):
+    """Silhouettes of a recording, and the heights of the people whom they show."""
+
+    silhouettes: Silhouettes
+    heights: StandingHeights
+
+
 class _Task(NamedTuple):
     session: Session
     observer: Observer
-    finder: SilhouetteFinder
-    heights: StandingHeights
+    sources: Sequence[_Source]
+    """The silhouettes as each view finds them, then those with what looks like shadows."""
     person: int
     size_m: float
 
@@ -203,10 +216,14 @@ def _best_on_frame(
     task: _Task, frame: int, methods: Sequence[StartMethod], found: Mapping[int, FirstPose]
 ) -> FirstPose:  # fmt: skip
     """Return the pose on a frame; where it is not good, that with what looks like shadows if it is better."""
-    poses, errors = list[FirstPose](), list[TrackerError]()
-    for silhouettes in _silhouettes(task, frame):
+    poses, errors, before = list[FirstPose](), list[TrackerError](), None
+    for source in task.sources:
+        silhouettes = source.silhouettes(frame, task.person)
+        if before is not None and not _are_larger(silhouettes, before):
+            break
+        before = silhouettes
         try:
-            poses.append(_on_frame(task, frame, silhouettes, methods, found))
+            poses.append(_on_frame(task, frame, source, silhouettes, methods, found))
         except TrackerError as error:
             errors.append(error)
         if poses and poses[-1].fitted.status == "good":
@@ -216,31 +233,25 @@ def _best_on_frame(
     return min(poses, key=lambda p: (p.fitted.status != "good", p.fitted.cost_px))
 
 
-def _silhouettes(task: _Task, frame: int) -> Iterator[Sequence[ViewSilhouette]]:
-    """Yield the silhouettes of a frame; then, where they are larger, those with what looks like shadows."""
-    found = task.finder.silhouettes(frame, task.person)
-    yield found
-    floor = floor_plane(task.session.up, task.session.floor)
-    recovered = recover_from_shadows(found, floor, task.size_m)
-    before, after = (np.array([np.count_nonzero(s.mask) for s in own]) for own in (found, recovered))
-    if np.any(after > (1 + _LARGER) * before):
-        yield recovered
+def _are_larger(silhouettes: Sequence[ViewSilhouette], before: Sequence[ViewSilhouette]) -> bool:
+    areas, areas_before = (np.array([np.count_nonzero(s.mask) for s in own]) for own in (silhouettes, before))
+    return bool(np.any(areas > (1 + _LARGER) * areas_before))
 
 
 def _on_frame(
-    task: _Task, frame: int, silhouettes: Sequence[ViewSilhouette], methods: Sequence[StartMethod],
-    found: Mapping[int, FirstPose],
+    task: _Task, frame: int, source: _Source, silhouettes: Sequence[ViewSilhouette],
+    methods: Sequence[StartMethod], found: Mapping[int, FirstPose],
 ) -> FirstPose:  # fmt: skip
-    session, observer, _, heights, person, size_m = task
+    session, observer, _, person, size_m = task
     hull = carve_people(silhouettes, size_m)
-    others = _others(session, person, frame, found)
-    figure = _own_figure(session, person, hull, others)
+    known = {i: PosedBody(pose.model, pose.fitted.pose) for i, pose in found.items()}
+    others = others_on_frame(session, person, frame, known)
+    figure = own_figure(session, person, hull, others)
     masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
-    scene = PersonScene(
-        figure, silhouettes, masks, floor_plane(session.up, session.floor), _motion(task, figure, frame)
-    )
+    motion = _motion(task, source, figure, frame)
+    scene = PersonScene(figure, silhouettes, masks, floor_plane(session.up, session.floor), motion)
     model = session.people[person].model
-    height_m = heights.around(scene, frame, person) if has_preset_sizes(model) else None
+    height_m = source.heights.around(scene, frame, person) if has_preset_sizes(model) else None
     candidates = _candidates(scene, model if height_m is None else model.with_height(height_m), methods)
     fitter = StartFitter(observer, frame, short_tracks(frame, session.n_frames), tuple(others))
     searched, tracked, is_lost = compare_starts(fitter, candidates, lambda runs: _filling(runs, silhouettes, masks))
@@ -303,70 +314,14 @@ def _lines_px(session: Session, scene: PersonScene) -> dict[str, Array]:
     return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in axes}
 
 
-def _others(session: Session, person: int, frame: int, found: Mapping[int, FirstPose]) -> list[PosedBody]:
-    """Return the other people who have a pose on a frame, found just now or stored."""
-    bodies = []
-    for i, other in enumerate(session.people):
-        if i == person:
-            continue
-        if i in found:
-            bodies.append(PosedBody(found[i].model, found[i].fitted.pose))
-            continue
-        stored = read_stored_poses(session.annotations_path, other.name, other.model, range(frame, frame + 1))
-        if frame in stored:
-            bodies.append(stored[frame].body)
-    return bodies
-
-
-def _own_figure(session: Session, person: int, hull: VisualHull, others: Sequence[PosedBody]) -> Voxels:
-    """Return the largest figure that nobody else has a pose in.
-
-    Raises:
-        TrackerError: there are more figures than people, or none is left.
-    """
-    figures, n_people = hull.figures, len(session.people)
-    if len(figures) > n_people:
-        raise TrackerError(
-            f"expected {n_people} person{'s' * (n_people > 1)} as the session has, found {len(figures)} figures that "
-            "stand apart; make the session with all --people, or give masks of the person"
-        )
-    free = [f for f in figures if not any(_is_in(f, body) for body in others)]
-    if not free:
-        raise TrackerError(
-            f"expected a figure of '{session.people[person].name}', found only those of people who have a pose on this "
-            "frame; choose another --frame, on which all stand apart"
-        )
-    if (len(figures) < n_people and free[0].volume_m3 > _MAX_HULL_M3) or len(free) + len(others) < n_people:
-        raise TrackerError(
-            f"expected {n_people} figures that stand apart, found {len(figures)}; choose another --frame, on which "
-            "people do not touch"
-        )
-    if free[0].volume_m3 > _MAX_HULL_M3:
-        raise TrackerError(
-            f"expected one person of at most {1000 * _MAX_HULL_M3:.0f} litres, found a figure of "
-            f"{1000 * free[0].volume_m3:.0f}; several people may touch, or views may be too few; choose another --frame"
-        )
-    return free[0]
-
-
-def _is_in(figure: Voxels, body: PosedBody) -> bool:
-    trunk = body.points_world.mean(axis=0)
-    return bool(np.linalg.norm(figure.points_world.mean(axis=0) - trunk) < _OWN_M)
-
-
-def _motion(task: _Task, figure: Voxels, frame: int) -> Array | None:
-    """Return the way of a figure to a later frame, (3,); None if it cannot be found."""
+def _motion(task: _Task, source: _Source, figure: Voxels, frame: int) -> Array | None:
+    """Return the way of a figure to a later frame, (3,), metres; None if it cannot be found."""
     ahead = frame + _MOTION_FRAMES < task.session.n_frames
-    later = frame + (_MOTION_FRAMES if ahead else -_MOTION_FRAMES)
-    if later < 0:
+    other = frame + (_MOTION_FRAMES if ahead else -_MOTION_FRAMES)
+    if other < 0:
         return None
-    try:
-        found = carve_people(task.finder.silhouettes(later, task.person), 2 * task.size_m).figures
-    except TrackerError:
-        return None
-    begin = figure.points_world.mean(axis=0)
-    ways = [f.points_world.mean(axis=0) - begin for f in found]
-    return min(ways, key=lambda way: float(np.linalg.norm(way))) * (1.0 if ahead else -1.0)
+    way = figure_motion(figure, source.silhouettes(other, task.person), 2 * task.size_m)
+    return None if way is None else way * (1.0 if ahead else -1.0)
 
 
 def _notes(

@@ -74,6 +74,18 @@ def test_a_child_is_found():
         assert np.linalg.norm(limb.distal - joints[f"{side}_{'wrist' if kind == 'arm' else 'ankle'}"]) < 0.10
 
 
+def test_coarse_voxels_of_a_small_child_give_a_start():
+    """Enlarged to an adult, a voxel is wider than the slices in which limbs are measured."""
+    parts = parts_of(child(share=0.4, size_m=0.03, arms_deg=25, legs_deg=4)[0])
+    assert np.all(np.isfinite(start_pose(load_model("gavrila34", 0.7), parts)))
+
+
+def test_a_figure_without_a_trunk():
+    """A figure of 0.7 m, whose belly is taken for a head."""
+    with pytest.raises(TrackerError, match="expected a trunk below the head"):
+        parts_of(child(share=0.4, arms_deg=10)[0])
+
+
 def test_straight_limbs_are_named():
     assert {"left_leg", "right_leg"} <= set(parts_of(figure()[0]).straight)
 

@@ -15,7 +15,7 @@ from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.model_toml import format_model
 from tracker.initialization.candidates import StartCandidate
 from tracker.initialization.start_fit import FittedStart
-from tracker.pipeline import first_pose
+from tracker.pipeline import first_pose, own_figure
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_sizes_changed
 from tracker.pipeline.find_people import AXES, FoundPeople, frames_to_try, store_found
 from tracker.pipeline.first_pose import FirstPose, FirstPoses, find_first_poses
@@ -92,7 +92,7 @@ def test_two_people_where_one_was_announced(session, silhouettes):
 
 
 def test_a_camera_that_moved_is_named(session, silhouettes, fits, monkeypatch):
-    monkeypatch.setattr(first_pose, "_MAX_HULL_M3", 0.5)  # three views leave a wide hull
+    monkeypatch.setattr(own_figure, "_MAX_HULL_M3", 0.5)  # three views leave a wide hull
     views = silhouettes_of_figure(figure()[0], CAMERAS)
     silhouettes += [views[0], views[1]._replace(mask=np.roll(views[1].mask, 130, axis=1)), *views[2:]]
     notes = " ".join(find(session, 0.03).poses[0].notes)

@@ -1,0 +1,87 @@
+"""The figure of one person among those of a visual hull, and where it goes."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tracker.body.model import PosedBody
+from tracker.errors import TrackerError
+from tracker.evidence.silhouettes import ViewSilhouette
+from tracker.geometry.arrays import Array
+from tracker.session.session import Session
+from tracker.store.stored_poses import read_stored_poses
+from tracker.voxels.visual_hull import VisualHull, carve_people
+from tracker.voxels.voxel_grid import Voxels
+
+_OWN_M = 0.4
+"""A figure that is closer to the trunk of another person with a pose is that person, metres."""
+_MAX_HULL_M3 = 0.25
+"""Largest volume of the visual hull of one person, cubic metres: three times that of a large man."""
+
+
+def others_on_frame(session: Session, person: int, frame: int, found: Mapping[int, PosedBody]) -> list[PosedBody]:
+    """Return the other people who have a pose on a frame, found just now or stored."""
+    bodies = []
+    for i, other in enumerate(session.people):
+        if i == person:
+            continue
+        if i in found:
+            bodies.append(found[i])
+            continue
+        stored = read_stored_poses(session.annotations_path, other.name, other.model, range(frame, frame + 1))
+        if frame in stored:
+            bodies.append(stored[frame].body)
+    return bodies
+
+
+def own_figure(session: Session, person: int, hull: VisualHull, others: Sequence[PosedBody]) -> Voxels:
+    """Return the largest figure that nobody else has a pose in.
+
+    Raises:
+        TrackerError: there are more figures than people, or none is left.
+    """
+    figures, n_people = hull.figures, len(session.people)
+    if len(figures) > n_people:
+        raise TrackerError(
+            f"expected {n_people} person{'s' * (n_people > 1)} as the session has, found {len(figures)} figures that "
+            "stand apart; make the session with all --people, or give masks of the person"
+        )
+    free = [f for f in figures if not any(_is_in(f, body) for body in others)]
+    if not free:
+        raise TrackerError(
+            f"expected a figure of '{session.people[person].name}', found only those of people who have a pose on this "
+            "frame; choose another --frame, on which all stand apart"
+        )
+    if (len(figures) < n_people and free[0].volume_m3 > _MAX_HULL_M3) or len(free) + len(others) < n_people:
+        raise TrackerError(
+            f"expected {n_people} figures that stand apart, found {len(figures)}; choose another --frame, on which "
+            "people do not touch"
+        )
+    if free[0].volume_m3 > _MAX_HULL_M3:
+        raise TrackerError(
+            f"expected one person of at most {1000 * _MAX_HULL_M3:.0f} litres, found a figure of "
+            f"{1000 * free[0].volume_m3:.0f}; several people may touch, or views may be too few; choose another --frame"
+        )
+    return free[0]
+
+
+def _is_in(figure: Voxels, body: PosedBody) -> bool:
+    trunk = body.points_world.mean(axis=0)
+    return bool(np.linalg.norm(figure.points_world.mean(axis=0) - trunk) < _OWN_M)
+
+
+def figure_motion(figure: Voxels, later: Sequence[ViewSilhouette], size_m: float) -> Array | None:
+    """Return the way of a figure to another frame, (3,), metres; None if it cannot be found.
+
+    Args:
+        figure: voxels of the person.
+        later: silhouettes of the other frame.
+        size_m: edge of a voxel for that frame, metres.
+    """
+    try:
+        found = carve_people(later, size_m).figures
+    except TrackerError:
+        return None
+    begin = figure.points_world.mean(axis=0)
+    ways = [f.points_world.mean(axis=0) - begin for f in found]
+    return min(ways, key=lambda way: float(np.linalg.norm(way)))
