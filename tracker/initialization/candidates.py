@@ -195,9 +195,10 @@ def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
 
 
 def upright_height(scene: PersonScene) -> float | None:
-    """Return the height of a person by the most likely head, metres; None if the person does not stand upright."""
+    """Return the height of a person by the most likely head that stands upright, metres; None if none does."""
     try:
-        return _height_of_parts(scene, _possible_parts(scene)[0])
+        heights = (_height_of_parts(scene, parts) for parts in _possible_parts(scene))
+        return next((h for h in heights if h is not None), None)
     except TrackerError:
         return None
 

@@ -8,7 +8,14 @@ from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.geometry.ground_plane import GroundPlane
-from tracker.initialization.candidates import from_axis, from_search, from_voxels, silhouette_axes, standing_height
+from tracker.initialization.candidates import (
+    from_axis,
+    from_search,
+    from_voxels,
+    silhouette_axes,
+    standing_height,
+    upright_height,
+)
 from tracker.initialization.head_template import find_head
 from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.voxel_grid import Voxels
@@ -104,6 +111,7 @@ def test_a_figure_with_a_large_hand_has_two_possible_heads():
     found = from_voxels(own, MODEL, True)
     assert len(found) == 4
     assert min(error_mm(c, joints) for c in found) < 80
+    assert upright_height(own) == pytest.approx(1.74, abs=0.05)
 
 
 def test_a_person_who_lies_or_crouches_has_no_standing_height():
