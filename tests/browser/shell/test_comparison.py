@@ -71,7 +71,7 @@ async def test_a_result_that_disagrees_with_the_placement_is_reported_once(page,
     for _ in range(2):
         endpoint.state["compared"] = COMPARED | {"number": 5, "warning": WARNING}
         await endpoint.broadcast(endpoint.state)
-        await shows(page, "quadrille.state.state.compared.number === 5")
+        await shows(page, "quadrille.state.state.compared?.number === 5")
     notices = page.locator("#notices .notice", has_text="left wrist 8 cm")
     await notices.wait_for()
     assert await notices.count() == 1
