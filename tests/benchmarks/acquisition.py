@@ -12,10 +12,10 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from sections import put_section, table
@@ -59,6 +59,29 @@ class Recording:
     height_m: float | None = None
     """True stature, metres, if known."""
 
+    def label(self, person: str) -> str:
+        """Name of a person's row."""
+        return self.name if len(self.references) == 1 else f"{self.name}, {person}"
+
+    def height_share(self, height_m: float) -> float | None:
+        """Error of a height, as a share; None where the true one is not known."""
+        return None if self.height_m is None else height_m / self.height_m - 1
+
+
+class Row(Protocol):
+    """What is measured of one person."""
+
+    @property
+    def name(self) -> str:
+        """Name of the row."""
+
+    @property
+    def cells(self) -> list[str]:
+        """Cells of the row."""
+
+
+RowT = TypeVar("RowT", bound=Row)
+
 
 class Result(NamedTuple):
     """What a body reaches on a recording."""
@@ -80,9 +103,13 @@ class Outcome(NamedTuple):
     @property
     def cells(self) -> list[str]:
         """Cells of the table, in the order of `HEADS`."""
-        height = "" if self.height_share is None else f"{100 * self.height_share:+.1f}%"
         (mm, lost, px), (mm_after, lost_after, px_after) = self.before, self.after
-        return [height, f"{mm:.1f} → {mm_after:.1f}", f"{lost} → {lost_after}", f"{px:.2f} → {px_after:.2f}"]
+        return [
+            percent(self.height_share),
+            f"{mm:.1f} → {mm_after:.1f}",
+            f"{lost} → {lost_after}",
+            f"{px:.2f} → {px_after:.2f}",
+        ]
 
 
 def simulated(folder: Path, names: Sequence[str]) -> Iterator[Recording]:
@@ -108,23 +135,33 @@ def recorded(data: Path, names: Sequence[str]) -> Iterator[Recording]:
 
 def measure(recording: Recording, folder: Path) -> list[Outcome]:
     """Track, acquire and track again; return the outcome of each person."""
-    session, people = folder / recording.name, list(recording.references)
-    quadrille(
-        "new", session, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
-        recording.background, "--people", *people,
-    )  # fmt: skip
+    session = new_session(recording, folder)
     for person, joints in recording.references.items():
         quadrille("init", session, "--joints", joints, "--person", person)
     before = _tracked(recording, session)
-    for person in people:
+    for person in recording.references:
         quadrille("acquire", session, "--person", person)
     after = _tracked(recording, session)
     out = []
     for person, model in ((p.name, p.model) for p in load_session(session).people):
-        share = None if recording.height_m is None else model.height_m / recording.height_m - 1
-        name = recording.name if len(people) == 1 else f"{recording.name}, {person}"
-        out.append(Outcome(name, share, before[person], after[person]))
+        share = recording.height_share(model.height_m)
+        out.append(Outcome(recording.label(person), share, before[person], after[person]))
     return out
+
+
+def new_session(recording: Recording, folder: Path) -> Path:
+    """Make a session of a recording in a folder."""
+    at = folder / recording.name
+    quadrille(
+        "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
+        recording.background, "--people", *recording.references,
+    )  # fmt: skip
+    return at
+
+
+def percent(share: float | None) -> str:
+    """Return a share as a cell; empty where it is not known."""
+    return "" if share is None else f"{100 * share:+.1f}%"
 
 
 def _tracked(recording: Recording, session: Path) -> dict[str, Result]:
@@ -165,16 +202,6 @@ def section(outcomes: Sequence[Outcome]) -> str:
     return "\n".join([*lines, table(HEADS, {o.name.replace("_", " "): o.cells for o in outcomes})])
 
 
-def arguments(description: str | None) -> argparse.Namespace:
-    """Read the options of a benchmark on these people and recordings."""
-    parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
-    parser.add_argument("--scenes", type=Path, help="folder that keeps the simulated recordings")
-    parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
-    parser.add_argument("--out", type=Path, default=OUT)
-    return parser.parse_args()
-
-
 def chosen(words: argparse.Namespace, folder: Path) -> list[Recording]:
     """Return the people and recordings that are asked for; scenes that are not kept are made in a folder."""
     scenes = words.scenes or folder / "scenes"
@@ -184,18 +211,33 @@ def chosen(words: argparse.Namespace, folder: Path) -> list[Recording]:
     return [*made, *(recorded(words.data, [n for n in RECORDED if n in wanted]) if words.data else [])]
 
 
-def main() -> None:
-    """Measure and write the table."""
-    words, outcomes = arguments(__doc__), []
+def run(
+    description: str | None, heads: Sequence[str], measure_one: Callable[[Recording, Path], Iterable[RowT]],
+    write: Callable[[Sequence[RowT]], str],
+) -> None:  # fmt: skip
+    """Read the options, measure the people and recordings that are asked for, and write the section of a document.
+
+    Args:
+        description: of the benchmark.
+        heads: of the columns.
+        measure_one: measures a recording in a folder, and returns a row for each person.
+        write: returns the section as Markdown.
+    """
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
+    parser.add_argument("--scenes", type=Path, help="folder that keeps the simulated recordings")
+    parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
+    parser.add_argument("--out", type=Path, default=OUT)
+    words, rows = parser.parse_args(), list[RowT]()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for recording in chosen(words, folder):
-            for outcome in measure(recording, folder):
-                print(f"{outcome.name}: {', '.join(map(' '.join, zip(HEADS, outcome.cells, strict=True)))}", flush=True)
-                outcomes.append(outcome)
+            for row in measure_one(recording, folder):
+                print(f"{row.name}: {', '.join(map(' '.join, zip(heads, row.cells, strict=True)))}", flush=True)
+                rows.append(row)
     if not words.only:
-        put_section(words.out, section(outcomes))
+        put_section(words.out, write(rows))
 
 
 if __name__ == "__main__":
-    main()
+    run(__doc__, HEADS, measure, section)

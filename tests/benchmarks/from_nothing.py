@@ -5,13 +5,12 @@ the people, acquires their bodies and tracks them. Accuracy is the mean error of
 when one of them is off by more than 150 mm.
 """
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from acquisition import Recording, arguments, chosen, quadrille
-from sections import put_section, table
+from acquisition import Recording, new_session, percent, quadrille, run
+from sections import table
 
 from tracker.session.session import load_session
 
@@ -34,27 +33,22 @@ class Found(NamedTuple):
     @property
     def cells(self) -> list[str]:
         """Cells of the table, in the order of `HEADS`."""
-        height = "" if self.height_share is None else f"{100 * self.height_share:+.1f}%"
-        return [f"{self.error_mm:.1f}", f"{self.lost}", f"{self.n_good}", f"{self.n_good_off}", height]
+        counts = (f"{n}" for n in (self.lost, self.n_good, self.n_good_off))
+        return [f"{self.error_mm:.1f}", *counts, percent(self.height_share)]
 
 
 def found_people(recording: Recording, folder: Path) -> Iterator[Found]:
     """Find and track the people of a recording."""
-    at, names = folder / recording.name, list(recording.references)
-    quadrille(
-        "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
-        recording.background, "--people", *names,
-    )  # fmt: skip
+    at = new_session(recording, folder)
     quadrille("track", at, "--init", "auto", "--acquire")
     heights = {p.name: p.model.height_m for p in load_session(at).people}
     for person, joints in recording.references.items():
         result = quadrille("evaluate", at, "--reference", joints, "--person", person)
         good = [f for f in result["per_frame"] if f["status"] == "good"]
         yield Found(
-            recording.name if len(names) == 1 else f"{recording.name}, {person}",
-            result["mpjpe_mm"], result["lost_frames"], len(good),
+            recording.label(person), result["mpjpe_mm"], result["lost_frames"], len(good),
             sum((f["worst_mm"] or 0.0) > OFF_MM for f in good),
-            None if recording.height_m is None else heights[person] / recording.height_m - 1,
+            recording.height_share(heights[person]),
         )  # fmt: skip
 
 
@@ -70,18 +64,5 @@ def section(found: Sequence[Found]) -> str:
     return "\n".join([*lines, table(HEADS, {f.name.replace("_", " "): f.cells for f in found})])
 
 
-def main() -> None:
-    """Measure and write the table."""
-    words, people = arguments(__doc__), []
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for recording in chosen(words, folder):
-            for found in found_people(recording, folder):
-                print(f"{found.name}: {', '.join(map(' '.join, zip(HEADS, found.cells, strict=True)))}", flush=True)
-                people.append(found)
-    if not words.only:
-        put_section(words.out, section(people))
-
-
 if __name__ == "__main__":
-    main()
+    run(__doc__, HEADS, found_people, section)

@@ -1,4 +1,4 @@
-"""Tell where starts differ, and which limbs are elsewhere in starts that cost as much as the best one."""
+"""Compare starts limb by limb, and name the limbs that are elsewhere in starts that cost as much as the best one."""
 
 from collections.abc import Sequence
 

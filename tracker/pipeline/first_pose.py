@@ -142,10 +142,8 @@ class _Trial:
 
     def __init__(self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say) -> None:
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
-        self._finder, floor = (
-            SilhouetteFinder(session.cameras, observer.recording),
-            floor_plane(session.up, session.floor),
-        )
+        self._finder = SilhouetteFinder(session.cameras, observer.recording)
+        floor = floor_plane(session.up, session.floor)
 
         def recovered(frame: int, person: int) -> Sequence[ViewSilhouette]:
             return recover_from_shadows(self._finder.silhouettes(frame, person), floor, size_m)
@@ -185,7 +183,7 @@ class _Trial:
     def best(self) -> FirstPoses:
         """Return the first poses that cost least; those whose fits are good go before.
 
-        At an end of the recording only one short track speaks for a start, so that other frames go before, too.
+        A start at an end of the recording is compared by one short track alone, so that other frames go before it, too.
 
         Raises:
             TrackerError: there are none.

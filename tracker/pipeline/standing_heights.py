@@ -58,7 +58,7 @@ class StandingHeights:
         return float(np.median(heights)) if heights else None
 
     def _along(self, center: Array, frames: Sequence[int], person: int) -> Iterator[float | None]:
-        """Yield the height of a figure on some frames, or None, until it cannot be told from other people."""
+        """Yield the height of a figure on some frames, or None, up to the first on which its identity is ambiguous."""
         for frame in frames:
             found = self._on_frame(frame, person)
             away = [float(np.linalg.norm(m.center - center)) for m in found]

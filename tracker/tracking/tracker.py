@@ -46,7 +46,7 @@ class TrackingRun:
     fps: float = 30.0
     """Frame rate of the recording, 1/s."""
     floor: GroundPlane | None = None
-    """The floor, by which trackers that use silhouettes tell clothes from shadows; None where it is not known."""
+    """The floor, by which trackers that use silhouettes recover clothes classified as shadows; None if unknown."""
 
     def __post_init__(self) -> None:
         """Check the poses: from one that is no number, none of the frames after it would be."""

@@ -1,4 +1,4 @@
-"""Recover the parts of people that a view takes for shadows, by what the other views show.
+"""Recover the parts of people that background subtraction classifies as shadows, by comparing views.
 
 Clothes that are a darker shade of what is behind them look like its shadow (Horprasert, Harwood & Davis 1999). A shadow
 on the floor is one in every view. Behind clothes, other views see the floor as it was, or the person.
