@@ -13,6 +13,7 @@ import msgspec
 from aiohttp import web
 from msgspec import Meta
 
+from app.remedies import page_text
 from app.server import connections
 from app.session.camera_check import exchange_note
 from app.session.new_session import NewSessionForm, make_session
@@ -88,7 +89,7 @@ class SessionRoutes:
         try:
             folder = await asyncio.to_thread(self._checked, body.folder)
         except TrackerError as error:
-            raise web.HTTPBadRequest(text=str(error)) from error
+            raise web.HTTPBadRequest(text=page_text(error)) from error
         self.chosen = folder
         self.is_chosen.set()
         return web.json_response({"name": folder.name})
@@ -155,7 +156,7 @@ class SessionRoutes:
         except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
             raise web.HTTPBadRequest(text=f"Expected a request in JSON, found other data ({error}).") from error
         except SessionError as error:
-            raise web.HTTPBadRequest(text=str(error)) from error
+            raise web.HTTPBadRequest(text=page_text(error)) from error
 
 
 def _made(form: NewSessionForm, report: Callable[[str, str], None]) -> None:
@@ -163,7 +164,7 @@ def _made(form: NewSessionForm, report: Callable[[str, str], None]) -> None:
     try:
         session = make_session(form, lambda text: report("passed", text))
     except TrackerError as error:
-        report("failed", str(error))
+        report("failed", page_text(error))
         return
     if note := exchange_note(session):
         report("warning", note)
@@ -181,7 +182,7 @@ def refusal(host_is_private: bool, has_token: bool) -> str | None:
     """
     if host_is_private and has_token:
         return None
-    found = "--no-token" if host_is_private else "one that other machines can reach"
+    found = "one without a token" if host_is_private else "one that other machines can reach"
     return (
         f"expected a page that only its user can open, found {found}; open other sessions on the command line, "
         "with 'quadrille SESSION'"

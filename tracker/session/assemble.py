@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from tracker.errors import RecordingError, SessionError
+from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
@@ -78,16 +78,16 @@ def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None
     """
     request = replace(request, videos=tuple(request.videos))
     calibrated = {c.name: c for c in read_cameras(request.calibration, request.units)}
-    check_names(request.cameras, list(calibrated), "camera", "--cameras")
+    check_names(request.cameras, list(calibrated), "camera", "the cameras to use")
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
-        raise SessionError(f"expected each camera once as --cameras, found '{twice[0]}' twice; leave one out")
+        raise SessionError(f"expected each camera to use once, found '{twice[0]}' twice; leave one out")
     without = [] if request.cameras else unfilmed_cameras(request, list(calibrated))
     names = list(request.cameras) or [n for n in calibrated if n not in without]
     report(f"The calibration has {len(calibrated)} cameras: {', '.join(calibrated)}.")
     if without:
         report(f"Cameras without footage are left out: {', '.join(without)}.")
     unused = calibrated.keys() - set(names)
-    check_names(request.offsets, names, "camera", "--offset")
+    check_names(request.offsets, names, "camera", "the offsets")
     paths = match_footage(names, request.videos, request.camera_paths, unused)
     report("Each camera has footage: " + ", ".join(f"{name} ({paths[name].name})" for name in names) + ".")
     footage = {name: open_footage(paths[name], name) for name in names}
@@ -174,8 +174,8 @@ def find_background(folder: Path, camera: str) -> Path:
         if path.is_file():
             return path
     raise RecordingError(
-        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4; "
-        "add it or leave out --background"
+        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4",
+        Remedy("give_camera_background"),
     )
 
 
@@ -188,8 +188,8 @@ def find_masks(folder: Path, camera: str) -> Path:
     path = folder / camera
     if not any(path.glob("[0-9]" * 6 + ".png")):
         raise RecordingError(
-            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame; "
-            "add them or leave out --masks"
+            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame",
+            Remedy("give_camera_masks"),
         )
     return path
 
@@ -210,9 +210,9 @@ def _make_people(
     names: Sequence[str], models: Mapping[str, str] | str, heights: Mapping[str, float] | float | None
 ) -> tuple[Person, ...]:
     if isinstance(models, Mapping):
-        check_names(models, names, "person", "--model")
+        check_names(models, names, "person", "the body models")
     if isinstance(heights, Mapping):
-        check_names(heights, names, "person", "--height")
+        check_names(heights, names, "person", "the heights")
     people = []
     for i, name in enumerate(names):
         model = models.get(name, DEFAULT_MODEL) if isinstance(models, Mapping) else models

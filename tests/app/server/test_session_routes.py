@@ -136,7 +136,7 @@ async def test_foreign_requests_and_public_pages_open_nothing(folders, serve):
     listed = json.loads((await public.get("/sessions"))[1])
     assert (listed["recent"], listed["folder"], listed["refusal"]) == ([], "", text)
     assert refusal(True, True) is None
-    assert "--no-token" in refusal(True, False)
+    assert "without a token" in refusal(True, False)
 
 
 async def test_paths_are_completed(folders, serve):
