@@ -25,7 +25,8 @@ from tracker.session.matching import (
 from tracker.session.session import PALETTE, Person, Session, create_session
 
 DEFAULT_MODEL = "gavrila34"
-_VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
+"""By which files of a folder are taken for videos."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,8 @@ class NewSession:
     """Folder of CAM.png or CAM.mp4 of the empty scene."""
     masks: Path | None = None
     """Folder of CAM/%06d.png."""
+    side_names: Mapping[str, str] = field(default_factory=dict)
+    """Name after which the background and masks of a camera are filed, by camera; its own for cameras left out."""
     offsets: Mapping[str, int] = field(default_factory=dict)
     """Shift by camera name: frame k of the session is frame k + offset of the camera."""
     people: Sequence[str] = ("person",)
@@ -63,11 +66,47 @@ class NewSession:
     """Unit of the calibration's translations; by default the one that its layout fixes, else metres."""
 
 
+@dataclass(frozen=True)
+class SessionParts:
+    """What a session is made of, checked: all of it fits together."""
+
+    request: NewSession
+    cameras: tuple[CameraSource, ...]
+    people: tuple[Person, ...]
+    fps: float
+    """Frames per second."""
+    n_frames: int
+
+    def make(self) -> Session:
+        """Make the session folder.
+
+        Raises:
+            SessionError: the folder is not empty, or cannot be written.
+        """
+        return create_session(
+            self.request.folder, cameras=self.cameras, people=self.people, fps=self.fps, n_frames=self.n_frames,
+            up=self.request.up,
+        )  # fmt: skip
+
+
 def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None) -> Session:
     """Make a session folder of a calibration and footage. Nothing is written unless all of it fits.
 
     Args:
         request: what to make it of.
+        report: called with a sentence after each check that has passed.
+
+    Raises:
+        TrackerError: as `check_parts` and `SessionParts.make` do.
+    """
+    return check_parts(request, report).make()
+
+
+def check_parts(request: NewSession, report: Callable[[str], None] = lambda _: None) -> SessionParts:
+    """Check that a calibration and footage fit together, and write nothing.
+
+    Args:
+        request: what a session is to be made of.
         report: called with a sentence after each check that has passed.
 
     Raises:
@@ -108,7 +147,7 @@ def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None
         check_side_files(source)
     people = _make_people(request.people, request.models, request.heights)
     report("The body models fit: " + ", ".join(f"{p.name} {p.model.height_m:.2f} m" for p in people) + ".")
-    return create_session(request.folder, cameras=sources, people=people, fps=fps, n_frames=n_frames, up=request.up)
+    return SessionParts(request, sources, people, fps, n_frames)
 
 
 def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = None) -> list[str]:
@@ -129,11 +168,12 @@ def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = Non
 
 
 def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -> CameraSource:
+    side_name = request.side_names.get(camera.name, camera.name)
     return CameraSource(
         camera,
         footage.path,
-        find_background(request.background, camera.name) if request.background is not None else None,
-        find_masks(request.masks, camera.name) if request.masks is not None else None,
+        find_background(request.background, side_name) if request.background is not None else None,
+        find_masks(request.masks, side_name) if request.masks is not None else None,
         request.offsets.get(camera.name, 0),
         None if footage.fps is None or same_rate(footage.fps, fps) else footage.fps,
     )
@@ -149,11 +189,11 @@ def footage_in(folder: Path) -> list[Path]:
         entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     except OSError as error:
         raise SessionError(f"expected a folder of videos, found that {folder} cannot be read ({error})") from error
-    videos = [path for path in entries if path.suffix.lower() in _VIDEO_SUFFIXES and path.is_file()]
+    videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
     found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
     if not found:
         raise SessionError(
-            f"expected videos ({', '.join(_VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
+            f"expected videos ({', '.join(VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
             "choose the folder that holds the footage of all cameras"
         )
     return found
@@ -169,7 +209,7 @@ def find_background(folder: Path, camera: str) -> Path:
     Raises:
         RecordingError: there is none.
     """
-    for suffix in (*IMAGE_SUFFIXES, *_VIDEO_SUFFIXES):
+    for suffix in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES):
         path = folder / f"{camera}{suffix}"
         if path.is_file():
             return path
