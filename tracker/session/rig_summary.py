@@ -1,4 +1,4 @@
-"""How the cameras of a session stand: distances to the point at which they look, heights, and what is odd about them."""
+"""How the cameras of a session stand: distances to the point they look at, heights, and what is odd about them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -96,8 +96,8 @@ def _floor_doubts(names: Sequence[str], centers_world: Array, heights_m: Array, 
     if not below or np.linalg.norm(centers_world, axis=1).min() < _UNDER_FLOOR_M:
         return []
     return [
-        f"Under the floor (origin, {up} up): {', '.join(below)}. Another axis may point up, or the origin does not lie on "
-        "the floor."
+        f"Under the floor (origin, {up} up): {', '.join(below)}. Another axis may point up, or the origin does not lie "
+        "on the floor."
     ]
 
 
