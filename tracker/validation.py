@@ -145,7 +145,7 @@ def _trail(declared: Any, value: Any, path: str) -> list[_Step]:
 
 
 def _resolve(declared: Any, value: Any) -> tuple[Any, str, str]:
-    """Return a type without its wrappers, of a union the member that looks like the value; its description and title."""
+    """Return a type without its wrappers (of a union the member that looks like the value), description and title."""
     description = title = ""
     while isinstance(declared, msgspec.inspect.Metadata):
         schema = declared.extra_json_schema or {}

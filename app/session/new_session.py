@@ -52,7 +52,7 @@ class NewSessionForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     models: Annotated[
         list[TypedPath], Meta(max_length=20, title="Body model", description="at most 20 body models")
     ] = []
-    """Body models, presets or .toml files: one for all people, or one for each in their order; empty for the default."""
+    """Presets or .toml files of bodies: one for all people, or one for each in their order; empty for the default."""
     up: Up = "z"
     """World axis that points up."""
     units: Units | None = None
