@@ -111,6 +111,7 @@ PAGE_ROOMS = [
     "search",
     "scene",
     "inspector",
+    "sessions",
     "shell",
     "starting",
     ".",
