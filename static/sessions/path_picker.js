@@ -78,7 +78,7 @@ export class PathPicker {
     this.#note.textContent = listing.is_cut_off ? "Not all entries are shown." : listing.entries.length ? "" : "This folder is empty.";
     this.#list.replaceChildren(...listing.entries.map((entry) => this.#row(entry)));
     this.#list.scrollTop = 0;
-    this.#list.querySelector("button")?.focus();
+    /** @type {HTMLElement} */ (this.#list.querySelector("button:not(:disabled)") ?? this.#list).focus();
     return true;
   }
 
@@ -129,7 +129,7 @@ export function previewOf(path) {
  * @param {number} step
  */
 function moveFocus(list, step) {
-  const buttons = [.../** @type {NodeListOf<HTMLButtonElement>} */ (list.querySelectorAll("button:not(:disabled)"))];
+  const buttons = /** @type {HTMLButtonElement[]} */ ([...list.querySelectorAll("button:not(:disabled)")]);
   const at = buttons.findIndex((one) => one === document.activeElement);
   buttons[Math.max(0, Math.min(buttons.length - 1, at + step))]?.focus();
 }
