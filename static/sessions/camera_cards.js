@@ -100,6 +100,7 @@ export class CameraCards {
     picture.alt = choice.footage ? `First frame of ${name}` : `${name} has no footage`;
     picture.title = "Drag onto another camera to exchange their footage";
     picture.draggable = false;
+    picture.addEventListener("error", () => (picture.alt = `The footage of ${name} cannot be read`));
     if (choice.footage) picture.src = previewOf(choice.footage);
     const title = Object.assign(document.createElement("b"), { textContent: name });
     const offset = document.createElement("input");
