@@ -117,9 +117,8 @@ export class NewSession {
       }
     }
     if (number !== this.#nSurveys) return;
-    const files = JSON.stringify([footage, calibration]);
-    this.#cards.show(found.cameras, found.footage, found.assigned, files === this.#surveyed);
-    this.#surveyed = files;
+    this.#cards.show(found.cameras, found.footage, found.assigned, this.#files === this.#surveyed);
+    this.#surveyed = this.#files;
     this.#showRig(found.rig);
     if (!this.#checks.children.length) found.problems.forEach((problem) => this.#add("is-failed", problem));
     if (found.footage.length) this.#propose(footage);
@@ -160,6 +159,9 @@ export class NewSession {
   async #run(keepsAssignment) {
     this.#begin();
     this.#make.disabled = true;
+    clearTimeout(this.#timer);
+    if (this.#files !== this.#surveyed) await this.#survey(); // else the cameras would be those of other files
+    this.#begin();
     try {
       await postJson("sessions/new", this.#request(keepsAssignment), (line) => this.#showLine(JSON.parse(line)));
     } catch (error) {
@@ -232,6 +234,11 @@ export class NewSession {
     this.#checks.append(item);
     item.scrollIntoView({ block: "nearest" });
     return item;
+  }
+
+  /** Footage and calibration in one text. */
+  get #files() {
+    return JSON.stringify([this.#value("footage"), this.#value("calibration")]);
   }
 
   /** @param {string} name */

@@ -4,7 +4,7 @@ import { button, byId } from "../widgets/elements.js";
 
 /**
  * @typedef {{name: string, path: string, kind: "folder" | "session" | "video" | "file"}} Entry
- * @typedef {{folder: string, parent: string | null, entries: Entry[], is_cut_off: boolean}} Listing
+ * @typedef {{folder: string, parent: string | null, entries: Entry[], is_cut_off: boolean}} FolderContents
  * @typedef {"folder" | "file" | "footage"} Wanted kind of the choice; footage is a video, or a folder of images
  */
 
@@ -21,8 +21,8 @@ export class PathPicker {
   #choose = byId("path-picker-choose", HTMLButtonElement);
   /** @type {Wanted} */
   #wanted = "folder";
-  /** @type {Listing | null} */
-  #listing = null;
+  /** @type {FolderContents | null} */
+  #contents = null;
   #take = (/** @type {string} */ _path) => {};
 
   constructor() {
@@ -30,7 +30,7 @@ export class PathPicker {
       event.preventDefault();
       void this.#go(this.#path.value);
     });
-    this.#up.addEventListener("click", () => this.#listing?.parent && void this.#go(this.#listing.parent));
+    this.#up.addEventListener("click", () => this.#contents?.parent && void this.#go(this.#contents.parent));
     this.#list.addEventListener("keydown", (event) => {
       if (event.key === "Backspace") this.#up.click();
       else if (event.key === "ArrowDown" || event.key === "ArrowUp") moveFocus(this.#list, event.key === "ArrowDown" ? 1 : -1);
@@ -38,7 +38,7 @@ export class PathPicker {
       event.preventDefault();
     });
     button("path-picker-cancel", () => this.#dialog.close());
-    this.#choose.addEventListener("click", () => this.#listing && this.#finish(this.#listing.folder));
+    this.#choose.addEventListener("click", () => this.#contents && this.#finish(this.#contents.folder));
   }
 
   /**
@@ -53,7 +53,7 @@ export class PathPicker {
     this.#take = take;
     this.#title.textContent = TITLES[wanted];
     this.#choose.hidden = wanted === "file";
-    this.#listing = null;
+    this.#contents = null;
     this.#list.replaceChildren();
     this.#dialog.showModal();
     void this.#go(from).then((isThere) => !isThere && from && void this.#go(""));
@@ -70,13 +70,13 @@ export class PathPicker {
       this.#note.textContent = (await answer?.text()) ?? "The program does not answer.";
       return false;
     }
-    /** @type {Listing} */
-    const listing = await answer.json();
-    this.#listing = listing;
-    this.#path.value = listing.folder;
-    this.#up.disabled = listing.parent === null;
-    this.#note.textContent = listing.is_cut_off ? "Not all entries are shown." : listing.entries.length ? "" : "This folder is empty.";
-    this.#list.replaceChildren(...listing.entries.map((entry) => this.#row(entry)));
+    /** @type {FolderContents} */
+    const contents = await answer.json();
+    this.#contents = contents;
+    this.#path.value = contents.folder;
+    this.#up.disabled = contents.parent === null;
+    this.#note.textContent = contents.is_cut_off ? "Not all entries are shown." : contents.entries.length ? "" : "This folder is empty.";
+    this.#list.replaceChildren(...contents.entries.map((entry) => this.#row(entry)));
     this.#list.scrollTop = 0;
     /** @type {HTMLElement} */ (this.#list.querySelector("button:not(:disabled)") ?? this.#list).focus();
     return true;

@@ -241,3 +241,19 @@ async def test_what_cannot_be_read_is_said_before_anything_is_made(form):
     await page.get_by_text("no video for camera LEFT").wait_for()
     assert not await page.locator("#open-made-session").is_visible()
     assert program.posted[0]["cameras"] == []
+
+
+async def test_other_files_are_looked_at_before_the_session_is_made(form):
+    """However quickly Create follows, it takes the cameras of the files that the form has."""
+    page, program = form
+    await choose_files(page)
+    other = {"path": "/data/other/FRONT.mp4", "name": "FRONT.mp4"}
+    program.survey = SURVEY | {"footage": [other], "assigned": {"FRONT": other["path"]}}
+    await page.evaluate("""() => {
+      const footage = document.querySelector("#new-footage");
+      footage.value = "/data/other";
+      footage.dispatchEvent(new Event("input", { bubbles: true }));
+      document.querySelector("#make-session").click();
+    }""")
+    await until(lambda: program.posted)
+    assert [c["footage"] for c in program.posted[0]["cameras"]] == [other["path"]]
