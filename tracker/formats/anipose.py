@@ -1,9 +1,10 @@
 """Calibrations in the TOML layout of anipose, Pose2Sim and Caliscope.
 
 One section per camera: `name`, `size` (width, height), `matrix` (3x3), `distortions` (OpenCV's order), `rotation`
-(Rodrigues vector, or a 3x3 matrix) and `translation` with `X_camera = R X_world + t`, `fisheye`. A section
-`metadata` is not a camera. Caliscope's `camera_array.toml` has its sections below `cameras`; they are named after its
-videos, `cam_0` and so on. The file does not state whether its lengths are metres or millimetres; the caller does.
+(Rodrigues vector, or a 3x3 matrix) and `translation` with `X_camera = R X_world + t`, and `fisheye`: with true, the
+distortions are k1 to k4 of OpenCV's equidistant model. A section `metadata` is not a camera. Caliscope's
+`camera_array.toml` has its sections below `cameras`; they are named after its videos, `cam_0` and so on. The file does
+not state whether its lengths are metres or millimetres; the caller does.
 """
 
 from collections.abc import Sequence
@@ -63,7 +64,7 @@ def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
             "distortions": c.distortion.tolist(),
             "rotation": rigid.so3_log(c.T_camera_world[:3, :3]).tolist(),
             "translation": c.T_camera_world[:3, 3].tolist(),
-            "fisheye": False,
+            "fisheye": c.fisheye,
         }
     data["metadata"] = {"adjusted": False, "error": 0.0}
     write_text_atomic(Path(path), tomli_w.dumps(data))

@@ -14,7 +14,8 @@ from msgspec import Meta
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import DISTORTION_COUNTS, Camera
+from tracker.geometry.cameras import Camera
+from tracker.geometry.lenses import coefficient_counts, count_words
 from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check, quoted
 
 Units = Literal["m", "cm", "mm"]
@@ -60,13 +61,10 @@ class _CameraSection(msgspec.Struct):
     fisheye: bool = False
 
     def __post_init__(self) -> None:
-        if self.fisheye:
+        if len(self.distortions) not in coefficient_counts(self.fisheye):
             raise ValueError(
-                "expected OpenCV's lens model with 4, 5 or 8 coefficients, found a fisheye lens, which is not "
-                "supported; undistort the footage first and calibrate it without fisheye"
+                f"expected {count_words(self.fisheye)} values as 'distortions', found {len(self.distortions)}"
             )
-        if len(self.distortions) not in DISTORTION_COUNTS:
-            raise ValueError(f"expected 0, 4, 5 or 8 values as 'distortions', found {len(self.distortions)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +80,8 @@ class CameraEntry:
     """As in `Camera`."""
     T_world_camera: Array
     """Pose, (4, 4), metres."""
+    fisheye: bool = False
+    """As in `Camera`."""
 
     def camera(self, footage_size: tuple[int, int] | None = None) -> Camera:
         """Return the camera; its size is that of the footage if the file does not state one.
@@ -103,7 +103,7 @@ class CameraEntry:
                     f"{self.K[0, 2]:.0f}, {self.K[1, 2]:.0f} is not that of footage of {size[0]}x{size[1]} pixels; "
                     "calibrate at the size of the footage"
                 )
-        return Camera(self.name, size, self.K, self.distortion, self.T_world_camera)
+        return Camera(self.name, size, self.K, self.distortion, self.T_world_camera, self.fisheye)
 
 
 def read_entry(section: str, data: Any, where: str, metres_per_unit: float) -> CameraEntry:
@@ -125,7 +125,7 @@ def read_entry(section: str, data: Any, where: str, metres_per_unit: float) -> C
     T_camera_world = rigid.transform(_rotation(row.rotation, where), translation)
     size = None if row.size is None else (int(row.size[0]), int(row.size[1]))
     K, distortion = np.array(row.matrix), np.array(row.distortions, dtype=np.float64)
-    return CameraEntry(name, size, K, distortion, rigid.inverse(T_camera_world))
+    return CameraEntry(name, size, K, distortion, rigid.inverse(T_camera_world), row.fisheye)
 
 
 def _rotation(value: list[Any], where: str) -> Array:

@@ -281,7 +281,7 @@ ENTITIES = '<!DOCTYPE x [<!ENTITY a "aaaa">' + "".join(
         (text("a.json", '{"a": {"K": "no matrix", "R": [1, 2], "t": 3}}'), "'a': expected a list as 'rotation'|'a'"),
         (text("a.json", '{"a": {"K": [[1e999]], "R": 1, "t": 3}}'), "not valid JSON|'a'"),
         (inverted, "seem to map camera to world.*invert"),
-        (fisheye, "fisheye lens, which is not supported"),
+        (fisheye, "expected 0 or 4 fisheye values"),
         (lambda folder: folder, "is a folder"),
         (lambda folder: folder / "none.json", "none.json not found"),
     ],
