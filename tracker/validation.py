@@ -107,7 +107,8 @@ def explain(error: msgspec.ValidationError, value: Any, declaration: Any) -> tup
             break
         step = outer if outer.description else step
     found = "a number out of range" if what == "Number out of range" else quoted(step.value)
-    return (step.description or _expectation(what, at.declared)) + _of(" as", step.key), found
+    name = next((s.title for s in reversed(trail) if s.title), step.key)
+    return (step.description or _expectation(what, at.declared)) + _of(" as", name), found
 
 
 def quoted(value: Any) -> str:
@@ -129,13 +130,15 @@ class _Step(NamedTuple):
     """Its type, of `msgspec.inspect`."""
     description: str
     """What it is expected to be; empty if the declaration does not describe it."""
+    title: str
+    """Name of the field in which a user enters it; empty for what a file holds, whose keys the user sees."""
 
 
 def _trail(declared: Any, value: Any, path: str) -> list[_Step]:
     """Follow a path such as `.joints[3].axes[0].name` through data and their declaration, as far as both go."""
     trail = [_Step("", value, *_resolve(declared, value))]
     for name, index in re.findall(r"\.([^.\[\]]+)|\[(\d+)\]", path):
-        key, value, declared, _ = trail[-1]
+        key, value, declared, *_ = trail[-1]
         inner = _inner(declared, name, int(index or 0))
         try:
             value = value[name or int(index)]
@@ -150,18 +153,19 @@ def _trail(declared: Any, value: Any, path: str) -> list[_Step]:
     return trail
 
 
-def _resolve(declared: Any, value: Any) -> tuple[Any, str]:
-    """Return a type without its wrappers, of a union the member that looks like the value; and its description."""
-    description = ""
+def _resolve(declared: Any, value: Any) -> tuple[Any, str, str]:
+    """Return a type without its wrappers (of a union the member that looks like the value), description and title."""
+    description = title = ""
     while isinstance(declared, msgspec.inspect.Metadata):
-        description = (declared.extra_json_schema or {}).get("description", description)
+        schema = declared.extra_json_schema or {}
+        description, title = schema.get("description", description), schema.get("title", title)
         declared = declared.type
     if isinstance(declared, msgspec.inspect.UnionType):
         members = [_resolve(member, value) for member in declared.types]
         like = [m for m in members if isinstance(m[0], _LISTS) == isinstance(value, list)]
-        declared, described = next((m for m in like if not isinstance(m[0], msgspec.inspect.NoneType)), members[0])
-        description = description or described
-    return declared, description
+        chosen = next((m for m in like if not isinstance(m[0], msgspec.inspect.NoneType)), members[0])
+        declared, description, title = chosen[0], description or chosen[1], title or chosen[2]
+    return declared, description, title
 
 
 def _inner(declared: Any, name: str, index: int) -> Any:

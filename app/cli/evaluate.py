@@ -10,6 +10,7 @@ import tyro
 from app.cli.arguments import OptionalName, OptionalPath, OptionalRange, OptionalWhole, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import Target, check_stride, load_target, parse_frames
+from app.remedies import command_line_text
 from tracker.errors import SessionError
 
 if TYPE_CHECKING:
@@ -95,7 +96,8 @@ def evaluate(
     if reference.motion is not None:
         result = evaluate_poses(result, motion, reference.motion, wanted)
     apart = distance_note(joints, reference.joints, wanted, axes) if align == "none" else None
-    notes = [note for note in (length_note(session.n_frames, reference.n_frames), apart) if note is not None]
+    noted = length_note(session.n_frames, reference.n_frames), None if apart is None else command_line_text(*apart)
+    notes = [note for note in noted if note is not None]
     return {"person": person.name, **asdict(result), "notes": notes}
 
 

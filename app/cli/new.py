@@ -88,9 +88,12 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         poses=arguments.poses,
         rescale=arguments.rescale,
     )
-    made = assemble(request, note=lambda sentence: print(f"note: {sentence}", file=sys.stderr))
+    notes: list[str] = []
+    made = assemble(request, note=notes.append)
     print(f"made {made.folder}: {len(made.cameras)} cameras, {made.n_frames} frames at {made.fps:g} per second")
     print(summarize_rig([c.camera for c in made.cameras], made.up).sentence)
+    for sentence in notes:
+        print(f"note: {sentence}", file=sys.stderr)
     if not request.cameras and (without := unfilmed_cameras(request)):
         used = ", ".join(c.camera.name for c in made.cameras)
         print(f"used: {used}; calibrated cameras without footage are left out: {', '.join(without)}")

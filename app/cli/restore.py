@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.cli.arguments import OptionalName, SessionArg
 from app.cli.json_output import format_json
+from app.remedies import command_line_text
 from tracker.errors import DamagedStoreError, SessionError
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def _damage(path: Path) -> str | None:
     try:
         AnnotationStore(path, read_only=True).close()
     except DamagedStoreError as error:
-        return str(error)
+        return command_line_text(error)
     return None
 
 

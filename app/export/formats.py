@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 
 if TYPE_CHECKING:
     from tracker.export.motion import ExportedMotion
@@ -123,4 +123,4 @@ def find_format(name: str | None, out: Path) -> ExportFormat:
     if name is None and by_suffix is not None:
         return by_suffix
     found = f"'{name}'" if name is not None else f"none, and no known suffix in '{out.name}'"
-    raise TrackerError(f"expected --format to be one of {', '.join(FORMATS)}, found {found}")
+    raise TrackerError(f"expected a format among {', '.join(FORMATS)}, found {found}", Remedy("name_format"))

@@ -22,6 +22,7 @@ from app.page.observability_feed import ObservabilityFeed
 from app.page.search_feed import SearchFeed
 from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
 from app.page.server_messages import HistoryMessage, InconsistentMessage, NoticeMessage, StateMessage
+from app.remedies import page_text
 from app.state import page_view
 from app.state.identity import Identity
 from app.state.page_view import View
@@ -138,7 +139,7 @@ class PageConnection:
                 raise MessageError("a text message", f"a binary one of {len(received.data)} bytes")
             message = parse(received.data)
         except MessageError as error:
-            await self._notice(str(error))
+            await self._notice(page_text(error))
             return
         last = self._waiting[-1] if self._waiting else None
         if last is not None and type(last) is type(message) and (_is_move(last, message) or type(last) in _COALESCED):
@@ -155,7 +156,7 @@ class PageConnection:
                 try:
                     await asyncio.to_thread(self._carry_out, message)
                 except TrackerError as error:
-                    await self._notice(str(error))
+                    await self._notice(page_text(error))
                 except Exception as error:
                     _LOG.exception("a message of a page failed: %s", message)
                     await self._notice(f"expected to carry out '{type(message).__name__}', found a fault: {error!r}")
@@ -211,7 +212,7 @@ class PageConnection:
                 if state.track.failed and (sent is None or sent.track is not state.track):
                     await self._notice(state.track.message)
             except TrackerError as error:
-                await self._notice(str(error))
+                await self._notice(page_text(error))
             if state.search.running:
                 await asyncio.sleep(max(0.0, began + _WATCHABLE_S - self._loop.time()))
 

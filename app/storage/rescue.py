@@ -19,6 +19,7 @@ import msgspec
 import numpy as np
 from platformdirs import user_data_path
 
+from app.remedies import page_text
 from tracker.errors import SessionError, TrackerError
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Change, MarkChange, PinChange, PoseChange, PoseRecord
@@ -148,7 +149,7 @@ def find(folder: Path, store_id: str) -> list[RescueFile]:
         try:
             data = _read(path)
         except TrackerError as error:
-            found.append(RescueFile(path, 0, "", str(error)))
+            found.append(RescueFile(path, 0, "", page_text(error)))
             continue
         # A copy of the session has the same id: its edits are those of the folder that they were made in.
         if data.session == str(folder) or not Path(data.session).exists():

@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
-from tracker.errors import CalibrationError
+from tracker.errors import CalibrationError, Remedy
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import axes_point
@@ -131,12 +131,12 @@ def check_convention(Ts_stated: Sequence[Array], where: str, expected: str, is_f
         misfit = f"expected {expected}, by which the cameras see no one place"
         if len(others) == 1:
             raise CalibrationError(
-                f"{where}: {misfit}; they do if {_in_words(others[0])}: give '{others[0]}' as the convention of the "
-                f"poses, or rewrite them ({_rewrite(others[0])})"
+                f"{where}: {misfit}, found that they do if {_in_words(others[0])}",
+                Remedy("give_poses", poses=others[0], rewrite=_rewrite(others[0])),
             )
         raise CalibrationError(
-            f"{where}: {misfit}; several other conventions fit: {'; '.join(f'{c} ({_in_words(c)})' for c in others)}: "
-            "give the right one as the convention of the poses"
+            f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({_in_words(c)})' for c in others)}",
+            Remedy("choose_poses"),
         )
     others = [c for c in others if cost[c] <= _RATIO * stated + _MARGIN]
     if is_fixed or not others or stated >= _PARALLEL:

@@ -13,7 +13,7 @@ from tracker.calibrations.layouts import Layout, find_layout
 from tracker.calibrations.pose_conventions import check_convention, read_pose
 from tracker.calibrations.toml_layouts import board_square
 from tracker.calibrations.units import check_units
-from tracker.errors import CalibrationError
+from tracker.errors import CalibrationError, Remedy
 from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names, read_entry
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -214,7 +214,8 @@ def _entry(name: str, section: Section, where: str, metres: float, poses: PoseCo
             raise CalibrationError(
                 f"{where}, camera '{name}': expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] as matrix, found the "
                 "principal point in the last row, so that the file holds row vectors, as MATLAB writes them, and its "
-                "rotations are transposed too; transpose both, or give 'row-vectors' as the convention of the poses"
+                "rotations are transposed too",
+                Remedy("give_poses", poses="row-vectors", rewrite="transpose K and R of all cameras"),
             )
         section = section | {"matrix": [list(column) for column in zip(*section["matrix"], strict=True)]}
     return read_entry(name, section, where, metres)

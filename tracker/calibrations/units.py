@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.errors import CalibrationError
+from tracker.errors import CalibrationError, Remedy
 from tracker.formats.camera_section import METRES, CameraEntry, Units
 from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import axes_point
@@ -40,10 +40,12 @@ def check_units(entries: Sequence[CameraEntry], where: str, units: Units, square
     squares = "multiply the translations by the side of a square of the board in metres"
     least = MIN_STUDIO_M if sees_point else _MIN_APART_M
     # Metres are the default of a file that may show a table or a head; another unit was chosen.
+    limit = f"within {MAX_STUDIO_M:g} m" if distance_m > MAX_STUDIO_M else f"at least {least:g} m"
     if distance_m > MAX_STUDIO_M or (units != "m" and 0 < distance_m < least):
         raise CalibrationError(
-            f"{where}: expected cameras {least:g} to {MAX_STUDIO_M:g} m {place}, found {in_units:.3g} {_WORDS[units]}: "
-            f"the unit is another; {squares if square == 1 else _advice(in_units, units)}"
+            f"{where}: expected cameras {limit} {place}, found {in_units:.4g} {_WORDS[units]}, so that the unit is another"
+            + (f"; {squares}" if square == 1 else ""),
+            None if square == 1 else _remedy(in_units, units),
         )
     notes = []
     if square == 1:
@@ -65,16 +67,14 @@ def _distance(entries: Sequence[CameraEntry]) -> tuple[float, str, bool]:
     Ts: list[Array] = [entry.T_world_camera for entry in entries]
     point = axes_point(Ts)
     if len(Ts) > 1 and point.is_determined and point.angles_rad.max() < np.pi / 3:
-        return float(np.median(point.distances)), "from where they look", True
+        return float(np.median(point.distances)), "from the point at which they look", True
     return max(float(np.linalg.norm(T[:3, 3])) for T in Ts), "from the origin", False
 
 
-def _advice(distance: float, units: Units) -> str:
+def _remedy(distance: float, units: Units) -> Remedy:
     """Name the units by which the distance is that of a studio."""
     fitting = [u for u in METRES if u != units and MIN_STUDIO_M <= distance * METRES[u] <= MAX_STUDIO_M]
     fitting.sort(key=lambda u: not _LIKELY_M[0] <= distance * METRES[u] <= _LIKELY_M[1])
     if not fitting:
-        return "check the unit of the board's squares, and calibrate in metres, cm or mm"
-    named = [f"{u} ({distance * METRES[u]:.2g} m)" for u in fitting]
-    squares = "" if units != "m" else ", or multiply the translations if they count squares of the board"
-    return f"give the unit {' or '.join(named)}{squares}"
+        return Remedy("give_unit", units=f"of the right length: none of {', '.join(METRES)} gives a studio")
+    return Remedy("give_unit", units=" or ".join(f"{u} ({distance * METRES[u]:.2g} m)" for u in fitting))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.errors import FormatError
+from tracker.errors import FormatError, Remedy
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.number_rows import MAX_VALUES
 from tracker.formats.trc import MarkerTable
@@ -188,8 +188,8 @@ def joint_errors(
     both: NDArray[np.bool_] = np.all(np.isfinite(estimate) & np.isfinite(truth), axis=-1)  # (n, m)
     if not both[:, is_limb].any():
         raise FormatError(
-            "the estimate and the reference have no limb joint of the same frame in common; "
-            "check --frames, --person and the reference's frame numbers"
+            "the estimate and the reference have no limb joint of the same frame in common",
+            Remedy("check_reference_frames"),
         )
     R_align = np.eye(3)
     if align == "rigid-all":
@@ -235,7 +235,7 @@ def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: 
     """
     common = [f for f in frames if f in estimated.poses and f in true.poses]
     if not common:
-        raise FormatError("the estimate and the reference have no frame in common; check --frames and --person")
+        raise FormatError("the estimate and the reference have no frame in common", Remedy("check_reference_frames"))
     parts = [p.name for p in true.model.parts if p.name in estimated.model.part_index]
     if not parts:
         raise FormatError(
@@ -284,7 +284,7 @@ def remap_axes(table: MarkerTable, axes: str) -> MarkerTable:
     """
     matrix = axes_matrix(axes)
     if np.linalg.det(matrix) < 0:
-        raise FormatError(f"--axes {axes} would mirror the world, left to right; turn one sign, e.g. x,-z,y")
+        raise FormatError(f"the axes {axes} would mirror the world, left to right", Remedy("turn_axis"))
     return replace(table, points=table.points @ matrix.T)
 
 
@@ -300,7 +300,7 @@ def axes_matrix(axes: str) -> Array:
         if word.lstrip("+-") in ("x", "y", "z"):
             matrix[row, "xyz".index(word[-1])] = -1.0 if word.startswith("-") else 1.0
     if len(words) != 3 or abs(np.linalg.det(matrix)) != 1:
-        raise FormatError(f"--axes expected three different axes such as x,-z,y, found '{axes}'")
+        raise FormatError(f"expected three different axes such as x,-z,y, found '{axes}'", Remedy("name_axes"))
     return matrix
 
 

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.reading import CalibratedCameras, read_cameras
-from tracker.errors import RecordingError, SessionError
+from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
@@ -15,6 +15,7 @@ from tracker.footage.video import Footage, open_footage
 from tracker.formats.camera_section import CameraEntry, Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
+from tracker.geometry.ground_plane import UP_ROTATIONS
 from tracker.session.matching import (
     camera_name,
     check_image_numbers,
@@ -32,7 +33,8 @@ from tracker.validation import same_form
 T = TypeVar("T")
 
 DEFAULT_MODEL = "gavrila34"
-_VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
+"""By which files of a folder are taken for videos."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,8 @@ class NewSession:
     """Folder of CAM.png or CAM.mp4 of the empty scene."""
     masks: Path | None = None
     """Folder of CAM/%06d.png."""
+    side_names: Mapping[str, str] = field(default_factory=dict)
+    """Name after which the background and masks of a camera are filed, by camera; its own for cameras left out."""
     offsets: Mapping[str, int] = field(default_factory=dict)
     """Shift by camera name: frame k of the session is frame k + offset of the camera."""
     people: Sequence[str] = ("person",)
@@ -74,6 +78,29 @@ class NewSession:
     """Whether a calibration at a whole multiple of the footage's size is scaled to it."""
 
 
+@dataclass(frozen=True)
+class SessionParts:
+    """What a session is made of, checked: all of it fits together."""
+
+    request: NewSession
+    cameras: tuple[CameraSource, ...]
+    people: tuple[Person, ...]
+    fps: float
+    """Frames per second."""
+    n_frames: int
+
+    def make(self) -> Session:
+        """Make the session folder.
+
+        Raises:
+            SessionError: the folder is not empty, or cannot be written.
+        """
+        return create_session(
+            self.request.folder, cameras=self.cameras, people=self.people, fps=self.fps, n_frames=self.n_frames,
+            up=self.request.up,
+        )  # fmt: skip
+
+
 def assemble(
     request: NewSession,
     report: Callable[[str], None] = lambda _: None,
@@ -85,6 +112,24 @@ def assemble(
         request: what to make it of.
         report: called with a sentence after each check that has passed.
         note: called with each sentence on what may be wrong, such as a camera without a pose; `report` by default.
+
+    Raises:
+        TrackerError: as `check_parts` and `SessionParts.make` do.
+    """
+    return check_parts(request, report, note).make()
+
+
+def check_parts(
+    request: NewSession,
+    report: Callable[[str], None] = lambda _: None,
+    note: Callable[[str], None] | None = None,
+) -> SessionParts:
+    """Check that a calibration and footage fit together, and write nothing.
+
+    Args:
+        request: what a session is to be made of.
+        report: called with a sentence after each check that has passed.
+        note: called with each sentence on what may be wrong; `report` by default.
 
     Raises:
         SessionError: an unknown name, a camera without footage or footage without a camera.
@@ -101,19 +146,19 @@ def assemble(
     for name in (*request.cameras, *request.camera_paths):
         if name in calibration.left_out:
             raise SessionError(
-                f"camera '{name}' is asked for, but {calibration.left_out[name]}; calibrate it with the others, or use "
-                "the cameras without it"
+                f"camera '{name}' is asked for, but {calibration.left_out[name]}; calibrate it with the others, or "
+                "leave it out"
             )
-    check_names(request.cameras, list(calibrated), "camera", "--cameras")
+    check_names(request.cameras, list(calibrated), "camera", "the cameras to use")
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
-        raise SessionError(f"expected each camera once as --cameras, found '{twice[0]}' twice; leave one out")
+        raise SessionError(f"expected each camera to use once, found '{twice[0]}' twice; leave one out")
     without = [] if request.cameras else unfilmed_cameras(request, list(calibrated))
     names = list(request.cameras) or [n for n in calibrated if n not in without]
     report(f"The calibration has {len(calibrated)} cameras: {', '.join(calibrated)}.")
     if without:
         report(f"Cameras without footage are left out: {', '.join(without)}.")
     unused = (calibrated.keys() | calibration.left_out.keys()) - set(names)
-    check_names(request.offsets, names, "camera", "--offset")
+    check_names(request.offsets, names, "camera", "the offsets")
     paths = match_footage(names, request.videos, request.camera_paths, unused)
     report("Each camera has footage: " + ", ".join(f"{name} ({paths[name].name})" for name in names) + ".")
     footage = {name: open_footage(paths[name], name) for name in names}
@@ -132,12 +177,12 @@ def assemble(
         check_side_files(source)
     people = _make_people(request.people, request.models, request.heights)
     report("The body models fit: " + ", ".join(f"{p.name} {p.model.height_m:.2f} m" for p in people) + ".")
-    made = create_session(request.folder, cameras=sources, people=people, fps=fps, n_frames=n_frames, up=request.up)
-    rig = summarize_rig(list(cameras.values()), request.up)
-    report(rig.sentence)
-    for sentence in rig.doubts:
-        note(sentence)
-    return made
+    if request.up in UP_ROTATIONS:
+        rig = summarize_rig(list(cameras.values()), request.up)
+        report(rig.sentence)
+        for sentence in rig.doubts:
+            note(sentence)
+    return SessionParts(request, sources, people, fps, n_frames)
 
 
 def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = None) -> list[str]:
@@ -179,6 +224,7 @@ def _with_compared_names(request: NewSession) -> NewSession:
         camera_paths=keys(request.camera_paths),
         cameras=tuple(map(same_form, request.cameras)),
         offsets=keys(request.offsets),
+        side_names=keys(request.side_names),
         people=tuple(map(same_form, request.people)),
         models=keys(models) if isinstance(models, Mapping) else models,
         heights=keys(heights) if isinstance(heights, Mapping) else heights,
@@ -205,8 +251,8 @@ def _fitted(entry: CameraEntry, footage: Footage, rescale: bool) -> Camera:
     found += f" {size[0]}x{size[1]}"
     if is_multiple:
         raise RecordingError(
-            f"{found}, a ratio of {ratio:g}; scale the calibration if the camera shows the same field of view at both "
-            "sizes, and calibrate at the size of the footage if it cuts the picture"
+            f"{found}, a ratio of {ratio:g}, which is right only if the camera shows the same view at both sizes",
+            Remedy("rescale"),
         )
     if camera.size != size and max(abs(camera.width - size[0]), abs(camera.height - size[1])) == 1:
         raise RecordingError(
@@ -222,11 +268,12 @@ def _fitted(entry: CameraEntry, footage: Footage, rescale: bool) -> Camera:
 
 
 def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -> CameraSource:
+    side_name = request.side_names.get(camera.name, camera.name)
     return CameraSource(
         camera,
         footage.path,
-        find_background(request.background, camera.name) if request.background is not None else None,
-        find_masks(request.masks, camera.name) if request.masks is not None else None,
+        find_background(request.background, side_name) if request.background is not None else None,
+        find_masks(request.masks, side_name) if request.masks is not None else None,
         request.offsets.get(camera.name, 0),
         None if footage.fps is None or same_rate(footage.fps, fps) else footage.fps,
     )
@@ -242,11 +289,11 @@ def footage_in(folder: Path) -> list[Path]:
         entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     except OSError as error:
         raise SessionError(f"expected a folder of videos, found that {folder} cannot be read ({error})") from error
-    videos = [path for path in entries if path.suffix.lower() in _VIDEO_SUFFIXES and path.is_file()]
+    videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
     found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
     if not found:
         raise SessionError(
-            f"expected videos ({', '.join(_VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
+            f"expected videos ({', '.join(VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
             "choose the folder that holds the footage of all cameras"
         )
     return found
@@ -262,13 +309,13 @@ def find_background(folder: Path, camera: str) -> Path:
     Raises:
         RecordingError: there is none.
     """
-    for suffix in (*IMAGE_SUFFIXES, *_VIDEO_SUFFIXES):
+    for suffix in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES):
         path = find_entry(folder, f"{camera}{suffix}")
         if path.is_file():
             return path
     raise RecordingError(
-        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4; "
-        "add it or leave out --background"
+        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4",
+        Remedy("give_camera_background"),
     )
 
 
@@ -281,8 +328,8 @@ def find_masks(folder: Path, camera: str) -> Path:
     path = find_entry(folder, camera)
     if not any(path.glob("[0-9]" * 6 + ".png")):
         raise RecordingError(
-            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame; "
-            "add them or leave out --masks"
+            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame",
+            Remedy("give_camera_masks"),
         )
     return path
 
@@ -303,9 +350,9 @@ def _make_people(
     names: Sequence[str], models: Mapping[str, str] | str, heights: Mapping[str, float] | float | None
 ) -> tuple[Person, ...]:
     if isinstance(models, Mapping):
-        check_names(models, names, "person", "--model")
+        check_names(models, names, "person", "the body models")
     if isinstance(heights, Mapping):
-        check_names(heights, names, "person", "--height")
+        check_names(heights, names, "person", "the heights")
     people = []
     for i, name in enumerate(names):
         model = models.get(name, DEFAULT_MODEL) if isinstance(models, Mapping) else models

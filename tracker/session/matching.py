@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from tracker.errors import RecordingError, SessionError
+from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.image_folder import ImageFolder, missing_numbers
 from tracker.footage.video import Footage
 from tracker.validation import FrameRate, check, same_form
@@ -26,7 +26,7 @@ def match_footage(
     Raises:
         SessionError: footage without a camera, or a camera without footage or with two.
     """
-    check_names(camera_paths, names, "camera", "--camera")
+    check_names(camera_paths, names, "camera", "the footage by camera")
     paths = dict(camera_paths)
     for video in videos:
         name = camera_name(video)
@@ -34,18 +34,15 @@ def match_footage(
             continue
         if name not in names:
             raise SessionError(
-                f"video {video} belongs to no calibrated camera: expected one named {', '.join([*names, *unused])}; "
-                f"rename it, leave it out or say --camera NAME={video}"
+                f"video {video} belongs to no calibrated camera: expected one named {', '.join([*names, *unused])}",
+                Remedy("name_footage", video=video),
             )
         if name in paths:
             raise SessionError(f"camera '{name}' has two videos, {paths[name]} and {video}; leave one out")
         paths[name] = video
     missing = [n for n in names if n not in paths]
     if missing:
-        raise SessionError(
-            f"no video for camera {', '.join(missing)}; give a file named {missing[0]}.mp4, "
-            f"say --camera {missing[0]}=PATH, or choose other cameras with --cameras"
-        )
+        raise SessionError(f"no video for camera {', '.join(missing)}", Remedy("give_footage", camera=missing[0]))
     return paths
 
 
@@ -81,14 +78,11 @@ def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
             )
     wanted = fps if fps is not None else next(iter(rates.values()), None)
     if wanted is None:
-        raise RecordingError("folders of images have no frame rate; give it with --fps RATE")
-    check(wanted, FrameRate, "--fps" if fps is not None else "footage", RecordingError)
+        raise RecordingError("folders of images have no frame rate", Remedy("give_rate"))
+    check(wanted, FrameRate, "the given rate" if fps is not None else "footage", RecordingError)
     if fps is None and any(not same_rate(rate, wanted) for rate in rates.values()):
         found = ", ".join(f"'{name}' {rate:.6g}" for name, rate in rates.items())
-        raise RecordingError(
-            f"expected one frame rate for all cameras, found {found}; convert the videos to the same rate, or give the "
-            "rate at which all cameras filmed with --fps RATE"
-        )
+        raise RecordingError(f"expected one frame rate for all cameras, found {found}", Remedy("give_common_rate"))
     return wanted
 
 
@@ -107,8 +101,7 @@ def common_length(footage: Mapping[str, Footage], offsets: Mapping[str, int]) ->
     if len({f.n_frames for f in footage.values()}) > 1 and len(set(rest.values())) > 1:
         found = ", ".join(f"'{name}' {f.n_frames}" for name, f in footage.items())
         raise RecordingError(
-            f"expected videos of the same number of frames, found {found}; "
-            "cut them to the same start and end, or say --offset CAM=N for a camera that began N frames earlier"
+            f"expected videos of the same number of frames, found {found}", Remedy("give_frame_offset")
         )
     return min(rest.values())
 
@@ -138,21 +131,21 @@ def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, in
     for name, (path, numbers) in numbered.items():
         if gaps := sorted(every.difference(numbers)):
             raise RecordingError(
-                f"camera '{name}': {path} has no image with number {_listed(gaps)}, which other cameras have; images "
-                "of one instant need equal numbers: restore it, delete that number in the other folders, or say "
-                "--offset CAM=N for a camera that began N images earlier"
+                f"camera '{name}': {path} has no image with number {_listed(gaps)}, which other cameras have: images "
+                "of one instant need equal numbers",
+                Remedy("give_image_offset"),
             )
 
 
-def check_names(given: Iterable[str], known: Sequence[str], what: str, option: str) -> None:
-    """Check that names which an option gives are known.
+def check_names(given: Iterable[str], known: Sequence[str], what: str, among: str) -> None:
+    """Check that given names are known; `what` and `among` are for the message, such as "camera" and "the offsets".
 
     Raises:
         SessionError: one is not; the message lists those that are.
     """
     unknown = [n for n in given if n not in known]
     if unknown:
-        raise SessionError(f"{option} names an unknown {what} '{unknown[0]}'; expected one of {', '.join(known)}")
+        raise SessionError(f"unknown {what} '{unknown[0]}' among {among}; expected one of {', '.join(known)}")
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.control.tracking import track_settings
+from app.remedies import page_text
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
 from app.state.progress import TrackState
@@ -309,7 +310,7 @@ class Tracking:
             if error is None:
                 how = "done"
             else:
-                why = str(error) if isinstance(error, TrackerError) else f"the tracker failed: {error}"
+                why = page_text(error) if isinstance(error, TrackerError) else f"the tracker failed: {error}"
                 how = f"stopped, because {why}"
             self._end(run, how, error is not None)
             self._session_state.request_evidence()

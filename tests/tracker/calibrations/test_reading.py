@@ -197,11 +197,9 @@ def test_units(tmp_path):
         4.176, abs=1e-3
     )
     path = rows_json(tmp_path)
-    with pytest.raises(
-        CalibrationError, match=r"found 4.18 centimetres: the unit is another; give the unit m \(4.2 m\)"
-    ):
+    with pytest.raises(CalibrationError, match=r"found 4.18 centimetres, so that the unit is another"):
         read_cameras(path, "cm")
-    with pytest.raises(CalibrationError, match=r"found 4.18 millimetres: .*give the unit m "):
+    with pytest.raises(CalibrationError, match=r"found 4.18 millimetres"):
         read_cameras(path, "mm")
 
 
@@ -286,7 +284,7 @@ ENTITIES = '<!DOCTYPE x [<!ENTITY a "aaaa">' + "".join(
         (text("camera_without_suffix", "[cam]\nname = 1\n"), "'cam'"),
         (text("a.json", '{"a": {"K": "no matrix", "R": [1, 2], "t": 3}}'), "'a': expected a list as 'rotation'|'a'"),
         (text("a.json", '{"a": {"K": [[1e999]], "R": 1, "t": 3}}'), "not valid JSON|'a'"),
-        (inverted, "see no one place; they do if X_world = R X_camera.*invert them"),
+        (inverted, "see no one place, found that they do if X_world = R X_camera"),
         (fisheye, "expected 0 or 4 fisheye values"),
         (lambda folder: folder, "found a folder without one"),
         (lambda folder: folder / "none.json", "none.json not found"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from clips import SIZE, encode, write_images
 
-from tracker.errors import CalibrationError, ModelError, RecordingError, SessionError
+from tracker.errors import CalibrationError, ModelError, RecordingError, Remedy, SessionError
 from tracker.evaluation.metrics import at_rate
 from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
@@ -42,10 +42,11 @@ def new(room, **changes):
     return assemble(NewSession(room / "s", **(settings | changes)))
 
 
-def assert_refused(room, kind, expected, **changes):
+def assert_refused(room, kind, expected, remedy=None, **changes):
     before = sorted(room.iterdir())
-    with pytest.raises(kind, match=expected):
+    with pytest.raises(kind, match=expected) as caught:
         new(room, **changes)
+    assert remedy in (None, caught.value.remedy)
     assert sorted(room.iterdir()) == before  # nothing half-written
 
 
@@ -74,7 +75,7 @@ def test_folder_of_images_beside_a_video(room):
 
 def test_images_alone_need_a_rate(room):
     folders = [write_images(room / name, [f"{i}.png" for i in range(9)]) for name in ("front", "left")]
-    assert_refused(room, RecordingError, "--fps", videos=folders)
+    assert_refused(room, RecordingError, "no frame rate", Remedy("give_rate"), videos=folders)
     assert new(room, videos=folders, fps=25.0).fps == 25.0
 
 
@@ -148,9 +149,8 @@ def test_missing_side_files(room):
 def test_video_without_camera(room):
     encode(room / "top.mp4", n=9)
     videos = [room / f"{n}.mp4" for n in ("front", "left", "top")]
-    assert_refused(
-        room, SessionError, r"top\.mp4 belongs to no calibrated camera.*front, left.*--camera", videos=videos
-    )
+    expected = r"top\.mp4 belongs to no calibrated camera.*front, left"
+    assert_refused(room, SessionError, expected, Remedy("name_footage", video=videos[2]), videos=videos)
 
 
 def test_camera_without_video(room):
@@ -161,8 +161,9 @@ def test_camera_without_video(room):
     assert [c.camera.name for c in session.cameras] == ["front"]
     assert "Cameras without footage are left out: left." in said
     assert unfilmed_cameras(request) == ["left"]
-    expected = r"no video for camera left.*--camera left=PATH"
-    assert_refused(room, SessionError, expected, videos=[room / "front.mp4"], cameras=["front", "left"])
+    remedy = Remedy("give_footage", camera="left")
+    without = {"videos": [room / "front.mp4"], "cameras": ["front", "left"]}
+    assert_refused(room, SessionError, "no video for camera left", remedy, **without)
     assert_refused(room, SessionError, r"no video for camera front, left", videos=[])
 
 
@@ -185,7 +186,7 @@ def test_truncated_video(room):
 
 def test_different_lengths(room):
     encode(room / "left.mp4", n=12)
-    assert_refused(room, RecordingError, r"'front' 9, 'left' 12; .*--offset")
+    assert_refused(room, RecordingError, "'front' 9, 'left' 12", Remedy("give_frame_offset"))
     assert_refused(room, RecordingError, "'front' 9, 'left' 12", offsets={"left": 1})
 
 
@@ -257,7 +258,7 @@ def test_a_size_that_counts_to_the_last_pixel(room):
 @pytest.mark.parametrize("times", [2, 3, 0.5])
 def test_a_calibration_at_a_multiple_of_the_footage_is_scaled_if_told(room, times):
     calibrate_at(room, (int(times * SIZE[0]), int(times * SIZE[1])))
-    assert_refused(room, RecordingError, f"a ratio of {max(times, 1 / times):g}; scale the calibration if")
+    assert_refused(room, RecordingError, f"a ratio of {max(times, 1 / times):g}, which is right only if")
     for source in new(room, rescale=True).cameras:
         assert source.camera.size == SIZE
         np.testing.assert_allclose(source.camera.K, K, atol=1e-9)
@@ -323,17 +324,17 @@ def test_a_camera_without_a_pose_is_left_out_unless_it_is_asked_for(room):
 @pytest.mark.parametrize(
     ("changes", "kind", "expected"),
     [
-        ({"camera_paths": {"lft": "x.mp4"}}, SessionError, "--camera names an unknown camera 'lft'.*front, left"),
-        ({"cameras": ["left", "lft"]}, SessionError, "--cameras names an unknown camera 'lft'.*front, left"),
+        ({"camera_paths": {"lft": "x.mp4"}}, SessionError, "unknown camera 'lft' among the footage.*front, left"),
+        ({"cameras": ["left", "lft"]}, SessionError, "unknown camera 'lft' among the cameras.*front, left"),
         ({"cameras": ["left", "left"]}, SessionError, "'left' twice"),
-        ({"offsets": {"lft": 1}}, SessionError, "--offset names an unknown camera 'lft'"),
+        ({"offsets": {"lft": 1}}, SessionError, "unknown camera 'lft' among the offsets"),
         ({"offsets": {"left": -2}}, SessionError, "others an offset of 2"),
         ({"offsets": {"left": 9}}, SessionError, "check the footage and the offsets"),
-        ({"models": {"bob": "gavrila22"}}, SessionError, "--model names an unknown person 'bob'"),
-        ({"heights": {"bob": 1.7}}, SessionError, "--height names an unknown person 'bob'"),
+        ({"models": {"bob": "gavrila22"}}, SessionError, "unknown person 'bob' among the body models"),
+        ({"heights": {"bob": 1.7}}, SessionError, "unknown person 'bob' among the heights"),
         ({"heights": 17.5}, ModelError, "0.3 to 3 metres"),
         ({"models": "gavrila23"}, ModelError, "gavrila22"),
-        ({"units": "mm"}, CalibrationError, "found 1.41 millimetres: the unit is another; give the unit m"),
+        ({"units": "mm"}, CalibrationError, "found 1.41 millimetres, so that the unit is another"),
         ({"up": "q"}, SessionError, "axis that points up"),
     ],
 )

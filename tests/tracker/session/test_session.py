@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from clips import SIZE, encode
 
-from tracker.errors import CalibrationError, ModelError, SessionError
+from tracker.errors import CalibrationError, ModelError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
@@ -210,5 +210,6 @@ def test_missing_parts(tmp_path, cameras):
 
 
 def test_no_session(tmp_path):
-    with pytest.raises(SessionError, match="quadrille new"):
+    with pytest.raises(SessionError, match="is not a session") as caught:
         load_session(tmp_path)
+    assert caught.value.remedy == Remedy("make_session")
