@@ -40,10 +40,11 @@ def check_units(entries: Sequence[CameraEntry], where: str, units: Units, square
     squares = "multiply the translations by the side of a square of the board in metres"
     least = MIN_STUDIO_M if sees_point else _MIN_APART_M
     # Metres are the default of a file that may show a table or a head; another unit was chosen.
+    found = f"{in_units:.3g}" if in_units < 1000 else f"{in_units:.0f}"
     limit = f"within {MAX_STUDIO_M:g} m" if distance_m > MAX_STUDIO_M else f"at least {least:g} m"
     if distance_m > MAX_STUDIO_M or (units != "m" and 0 < distance_m < least):
         raise CalibrationError(
-            f"{where}: expected cameras {limit} {place}, found {in_units:.4g} {_WORDS[units]}, so that the unit is another"
+            f"{where}: expected cameras {limit} {place}, found {found} {_WORDS[units]}, so that the unit is another"
             + (f"; {squares}" if square == 1 else ""),
             None if square == 1 else _remedy(in_units, units),
         )
