@@ -64,7 +64,7 @@ def read_document(path: Path) -> Document:
         data = parse_xml(text, str(path), KIND)
         data = storage_data(data) if data.tag == "opencv_storage" else data
     else:
-        raise named(path, "another kind of file" if text.strip() else "an empty file", "export the calibration anew")
+        raise named(path, "another kind of file" if text.strip() else "an empty file", "export the calibration again")
     return Document(path, syntax, data)
 
 

@@ -12,7 +12,7 @@ from tracker.formats.camera_section import Units
 
 
 @dataclass(frozen=True)
-class Layout:
+class CalibrationLayout:
     """One way in which programs write calibrated cameras."""
 
     name: str
@@ -38,8 +38,8 @@ class Layout:
 
 _OPENCV = "X_camera = R X_world + t"
 
-LAYOUTS: tuple[Layout, ...] = (
-    Layout(
+LAYOUTS: tuple[CalibrationLayout, ...] = (
+    CalibrationLayout(
         "Kalibr (`camchain.yaml`)",
         "groups with `camera_model` and `intrinsics`",
         "each camera from the one before; the first defines the world",
@@ -47,17 +47,19 @@ LAYOUTS: tuple[Layout, ...] = (
         data.is_kalibr,
         data.read_kalibr,
     ),
-    Layout(
+    CalibrationLayout(
         "MC-Calib",
         "`camera_pose_matrix` in groups",
-        "X_world = R X_camera + t (4x4)",
+        "X_world = R X_camera + t",
         None,
         data.is_mc_calib,
         data.read_mc_calib,
     ),
-    Layout("multical", "groups `cameras` and `camera_poses`", _OPENCV, None, data.is_multical, data.read_multical),
-    Layout("CMU Panoptic", "the key `calibDataSource`", _OPENCV, "cm", data.is_panoptic, data.read_words),
-    Layout(
+    CalibrationLayout(
+        "multical", "groups `cameras` and `camera_poses`", _OPENCV, None, data.is_multical, data.read_multical
+    ),
+    CalibrationLayout("CMU Panoptic", "the key `calibDataSource`", _OPENCV, "cm", data.is_panoptic, data.read_words),
+    CalibrationLayout(
         "JARVIS (one file for each camera)",
         "`intrinsicMatrix`, `R` and `T`",
         "row vectors: K and R are transposed",
@@ -65,7 +67,7 @@ LAYOUTS: tuple[Layout, ...] = (
         data.is_jarvis,
         data.read_row_vectors,
     ),
-    Layout(
+    CalibrationLayout(
         "DANNCE (`jsonencode(params)`)",
         "`K`, `RDistort`, `r` and `t`",
         "row vectors: K and r are transposed",
@@ -73,7 +75,7 @@ LAYOUTS: tuple[Layout, ...] = (
         data.is_dannce,
         data.read_row_vectors,
     ),
-    Layout(
+    CalibrationLayout(
         "OpenPose (one file for each camera)",
         "`CameraMatrix` (3x4) and `Intrinsics`",
         _OPENCV,
@@ -82,7 +84,7 @@ LAYOUTS: tuple[Layout, ...] = (
         data.read_openpose,
         by_program=False,
     ),
-    Layout(
+    CalibrationLayout(
         "EasyMocap (`intri.yml` and `extri.yml`)",
         "`K_NAME`, or `R_NAME` and `T_NAME`",
         _OPENCV,
@@ -91,7 +93,7 @@ LAYOUTS: tuple[Layout, ...] = (
         data.read_words,
         by_program=False,
     ),
-    Layout(
+    CalibrationLayout(
         "Caliscope (`camera_array.toml`)",
         "sections below `cameras`",
         _OPENCV,
@@ -99,7 +101,7 @@ LAYOUTS: tuple[Layout, ...] = (
         toml.is_caliscope,
         toml.read_caliscope,
     ),
-    Layout(
+    CalibrationLayout(
         "Caliscope before 0.5, pyxy3d (`config.toml`)",
         "sections with `port` or `cam_id` at the top",
         _OPENCV,
@@ -107,8 +109,10 @@ LAYOUTS: tuple[Layout, ...] = (
         toml.is_pyxy3d,
         toml.read_top_sections,
     ),
-    Layout("FreeMoCap", "`charuco_...` in `metadata`", _OPENCV, None, toml.is_freemocap, toml.read_top_sections),
-    Layout(
+    CalibrationLayout(
+        "FreeMoCap", "`charuco_...` in `metadata`", _OPENCV, None, toml.is_freemocap, toml.read_top_sections
+    ),
+    CalibrationLayout(
         "anipose, Pose2Sim (`Calib.toml`)",
         "TOML sections with `matrix`, `rotation` and `translation`",
         _OPENCV,
@@ -117,7 +121,7 @@ LAYOUTS: tuple[Layout, ...] = (
         toml.read_top_sections,
         by_program=False,
     ),
-    Layout(
+    CalibrationLayout(
         "AIST++ and other lists of anipose's cameras",
         "a list with anipose's keys",
         _OPENCV,
@@ -126,7 +130,7 @@ LAYOUTS: tuple[Layout, ...] = (
         data.read_words,
         by_program=False,
     ),
-    Layout(
+    CalibrationLayout(
         "Qualisys (`.qca.txt`)",
         "XML `calibration` with `cameras`",
         "place and world-to-camera rotation, y up and z backwards",
@@ -134,7 +138,7 @@ LAYOUTS: tuple[Layout, ...] = (
         mocap.is_qualisys,
         mocap.read_qualisys,
     ),
-    Layout(
+    CalibrationLayout(
         "Vicon (`.xcp`)",
         "XML with `KeyFrames`",
         "place and world-to-camera quaternion; without lens distortion",
@@ -142,7 +146,7 @@ LAYOUTS: tuple[Layout, ...] = (
         mocap.is_vicon,
         mocap.read_vicon,
     ),
-    Layout(
+    CalibrationLayout(
         "OpenCV's words in JSON, YAML or XML",
         "a matrix under `K`, `camera_matrix`, ... of each camera",
         _OPENCV,
@@ -155,6 +159,15 @@ LAYOUTS: tuple[Layout, ...] = (
 """In the order in which they are tried: those that share words with others first."""
 
 
-def find_layout(document: Document) -> Layout | None:
+def find_layout(document: Document) -> CalibrationLayout | None:
     """Return the layout of a file by its content; None if it is of none."""
     return next((layout for layout in LAYOUTS if layout.recognizes(document)), None)
+
+
+def markdown_table() -> str:
+    """Return the table for documents."""
+    rows = ["| layout | recognized by | poses | unit |", "|---|---|---|---|"]
+    for layout in LAYOUTS:
+        poses = f"`{layout.poses}`" if "=" in layout.poses else layout.poses
+        rows.append(f"| {layout.name} | {layout.recognized_by} | {poses} | {layout.unit or 'given, else m'} |")
+    return "\n".join(rows) + "\n"

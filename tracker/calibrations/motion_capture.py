@@ -121,7 +121,7 @@ def read_vicon(document: Document) -> dict[str, Section]:
         quaternion = np.roll(values.row("ORIENTATION", 4), 1)
         if abs(np.linalg.norm(quaternion) - 1) > _ROUNDING:
             expected, found_norm = "a unit quaternion as ORIENTATION", f"a norm of {np.linalg.norm(quaternion):.3g}"
-            raise refuse(document, name, expected, found_norm, "export the file anew")
+            raise refuse(document, name, expected, found_norm, "export the file again")
         R = matrix_from_quaternion(quaternion)
         (focal,), (cu, cv) = values.row("FOCAL_LENGTH", 1), values.row("PRINCIPAL_POINT", 2)
         ratio = values.get("PIXEL_ASPECT_RATIO") or 1.0
@@ -181,5 +181,5 @@ class _Numbers:
         numbers = _words(self.values.get(key))
         if len(numbers) != count:
             found = repr(self.values.get(key, "none"))[:40]
-            raise refuse(self._document, self._camera, f"{count} numbers as {key}", found, "export the file anew")
+            raise refuse(self._document, self._camera, f"{count} numbers as {key}", found, "export the file again")
         return numbers

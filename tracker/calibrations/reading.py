@@ -9,7 +9,7 @@ from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
 from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics, is_transposed
 from tracker.calibrations.document import Document, read_document, refuse
 from tracker.calibrations.foreign import foreign, named
-from tracker.calibrations.layouts import Layout, find_layout
+from tracker.calibrations.layouts import CalibrationLayout, find_layout
 from tracker.calibrations.pose_conventions import check_convention, read_pose
 from tracker.calibrations.toml_layouts import board_square
 from tracker.calibrations.units import check_units
@@ -80,7 +80,7 @@ def read_cameras(
 # --- files ----------------------------------------------------------------------------------------------------------
 
 
-def _documents(paths: Sequence[Path]) -> list[tuple[Document, Layout]]:
+def _documents(paths: Sequence[Path]) -> list[tuple[Document, CalibrationLayout]]:
     """Read files with their layouts; of a folder those that have one.
 
     Raises:
@@ -100,9 +100,9 @@ def _documents(paths: Sequence[Path]) -> list[tuple[Document, Layout]]:
     return found
 
 
-def _in_folder(folder: Path) -> list[tuple[Document, Layout]]:
+def _in_folder(folder: Path) -> list[tuple[Document, CalibrationLayout]]:
     files = sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES and p.is_file())
-    found: list[tuple[Document, Layout]] = []
+    found: list[tuple[Document, CalibrationLayout]] = []
     failure: CalibrationError | None = None
     for path in files[:_MAX_FILES]:
         try:
@@ -122,7 +122,7 @@ def _in_folder(folder: Path) -> list[tuple[Document, Layout]]:
     return found
 
 
-def _with_other_half(found: tuple[Document, Layout]) -> list[tuple[Document, Layout]]:
+def _with_other_half(found: tuple[Document, CalibrationLayout]) -> list[tuple[Document, CalibrationLayout]]:
     """Add the other half of EasyMocap's pair of files, which lies beside it."""
     document, layout = found
     other = {"intri": "extri", "extri": "intri"}.get(document.path.stem)
@@ -132,7 +132,9 @@ def _with_other_half(found: tuple[Document, Layout]) -> list[tuple[Document, Lay
     return [found, (read_document(pair), layout)]
 
 
-def _sections(documents: list[tuple[Document, Layout]], footage: Collection[str]) -> tuple[Layout, dict[str, Section]]:
+def _sections(
+    documents: list[tuple[Document, CalibrationLayout]], footage: Collection[str]
+) -> tuple[CalibrationLayout, dict[str, Section]]:
     """Return the cameras of all files by name."""
     first, layout = documents[0]
     if other := next((d for d, its_layout in documents if its_layout.name != layout.name), None):
@@ -222,7 +224,7 @@ def _entry(name: str, section: Section, where: str, metres: float, poses: PoseCo
 
 
 def _with_convention(
-    entries: tuple[CameraEntry, ...], where: str, layout: Layout, poses: PoseConvention | None
+    entries: tuple[CameraEntry, ...], where: str, layout: CalibrationLayout, poses: PoseConvention | None
 ) -> tuple[tuple[CameraEntry, ...], str | None]:
     """Return the cameras with their poses in the right convention, and a note where it is not sure."""
     stated: list[Array] = [rigid.inverse(entry.T_world_camera) for entry in entries]

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from rigs import cameras, looking, ring
 from stated_poses import CONVENTIONS, stated
 
 from tracker.calibrations.document import read_document
-from tracker.calibrations.layouts import LAYOUTS, find_layout
+from tracker.calibrations.layouts import LAYOUTS, find_layout, markdown_table
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
@@ -151,3 +152,8 @@ def test_five_hundred_cameras(tmp_path):
         path = WRITERS[name](tmp_path, rig)
         path.write_text(path.read_text() + "\n" * 500_000)  # blanks of a generous program
         assert len(read_cameras(path).entries) == 525
+
+
+def test_the_document_lists_the_table():
+    text = (Path(__file__).resolve().parents[3] / "docs" / "recordings.md").read_text("utf-8")
+    assert markdown_table() in text
