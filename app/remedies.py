@@ -47,6 +47,13 @@ PHRASES = {
     "give_camera_masks": Phrases("add them or leave out --masks", "add them, or leave the field Masks empty"),
     "give_background": Phrases("give one with --background", "make the session again with a folder of backgrounds"),
     "make_session": Phrases("make one with 'quadrille new'", "choose another folder, or make one with New session…"),
+    "rescale": Phrases(
+        "say --rescale if it does, and calibrate at the size of the footage if it does not",
+        "scale the matrices of the calibration if it does, and calibrate at the size of the footage if it does not",
+    ),
+    "give_unit": Phrases("say --units {units}", "choose {units} as unit"),
+    "give_poses": Phrases("say --poses {poses}, or rewrite them ({rewrite})", "rewrite them ({rewrite})"),
+    "choose_poses": Phrases("say which with --poses", "rewrite them to X_camera = R X_world + t"),
     # files of a session that have moved
     "relink": Phrases(
         "put it back, or run quadrille relink {session} --search FOLDER",

@@ -5,6 +5,7 @@ message says was expected.
 """
 
 import re
+import unicodedata
 from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
@@ -39,6 +40,14 @@ Color: TypeAlias = Annotated[str, Meta(pattern=r"^#[0-9a-fA-F]{6}\Z", descriptio
 FrameRate: TypeAlias = Annotated[
     float, Meta(ge=1e-3, le=1e5, description="a frame rate above 0, from 0.001 to 100000 per second")
 ]
+
+
+def same_form(name: str) -> str:
+    """Return a name in the one Unicode form in which names are compared (NFC).
+
+    A Mac stores a letter and its accent apart, so that a file's name differs from the same name typed.
+    """
+    return unicodedata.normalize("NFC", name)
 
 
 def check(value: Any, declaration: Any, where: str, error_type: type[TrackerError]) -> Any:

@@ -76,7 +76,7 @@ def make_session(form: NewSessionForm, report: Report) -> None:
             and two cameras that seem to be, or `made` and the folder.
     """
     try:
-        parts = check_parts(_request(form), lambda text: report("passed", text))
+        parts = check_parts(_request(form), lambda text: report("passed", text), lambda text: report("warning", text))
         if _is_refused(form, parts, report):
             return
         made = parts.make()

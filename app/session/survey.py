@@ -10,8 +10,8 @@ from msgspec import Meta
 from app.remedies import page_text
 from app.session.new_session import MAX_CAMERAS, Up
 from app.session.path_choice import TypedPath, typed_path
+from tracker.calibrations.reading import read_cameras
 from tracker.errors import TrackerError
-from tracker.formats.calibration import read_cameras
 from tracker.formats.camera_section import CameraEntry, Units
 from tracker.session.assemble import footage_in
 from tracker.session.matching import camera_name
@@ -53,8 +53,10 @@ def survey(form: SurveyForm) -> Survey:
     footage: list[Path] = []
     try:
         if form.calibration is not None:
-            entries = read_cameras(typed_path(form.calibration), form.units)
+            calibration = read_cameras(typed_path(form.calibration), form.units)
+            entries = calibration.entries
             rig = _rig(summarize_rig([e.camera(None if e.size else _SOME_SIZE) for e in entries], form.up))
+            rig["doubts"] = [*calibration.notes, *rig["doubts"]]
     except TrackerError as error:
         problems.append(page_text(error))
     try:

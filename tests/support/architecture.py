@@ -13,6 +13,7 @@ ROOMS = [
     "tracker.body",
     "tracker.motion",
     "tracker.formats",
+    "tracker.calibrations",
     "tracker.footage",
     "tracker.session",
     "tracker.store",

@@ -1,4 +1,4 @@
-"""A calibrated camera with OpenCV's model of projection and lens distortion."""
+"""A calibrated camera with OpenCV's models of projection and lens distortion."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,14 +11,31 @@ from numpy.typing import NDArray
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-
-DISTORTION_COUNTS = (0, 4, 5, 8)
+from tracker.geometry.lenses import (
+    coefficient_counts,
+    count_words,
+    distort_slopes,
+    fisheye_directions,
+    fisheye_limit,
+    fisheye_project,
+)
 
 _MAX_LENS_RADIUS = 20.0
 """Tangent of the widest angle from the optical axis at which the distortion is examined: 87 degrees."""
 
+_BORDER_SAMPLES = 257
+"""Points along each side of an image that its undistorted image is fitted to."""
+BEYOND_PX = -32000.0
+"""Column of what no lens shows, in maps of OpenCV, which are 16 bit wide."""
+
 Region = tuple[int, int, int, int]
 """A box in an image, px: first column, first row, column after the last, row after the last."""
+
+MAX_PINHOLE_ANGLE = np.radians(75.0)
+"""Largest angle from the axis that the undistorted picture of a fisheye lens is made to hold, rad. There it stretches
+bodies 15 times as much along the radius as in its middle (1/cos^2), and at 90 degrees without end."""
+MAX_PINHOLE_GROWTH = 4.0
+"""Largest number of undistorted pixels per pixel of a fisheye's footage: twice as many along either side."""
 
 NEAR_PLANE_M = 0.05
 """Depth of the near plane, metres: nothing closer to a camera is drawn or matched."""
@@ -30,7 +47,7 @@ class Camera:
 
     Pixel centres lie at integers; axes are OpenCV's (x right, y down, z forward). *Original* pixels are those
     of the footage as filmed. *Undistorted* pixels are those of `pinhole`, the same camera without lens distortion;
-    everything is drawn and matched in them.
+    everything is drawn and matched in them. The undistorted picture of a fisheye lens is larger than the footage.
     """
 
     name: str
@@ -40,14 +57,17 @@ class Camera:
     K: Array
     """Pinhole matrix, (3, 3), px."""
     distortion: Array
-    """OpenCV coefficients k1, k2, p1, p2[, k3[, k4, k5, k6]]; (0,), (4,), (5,) or (8,)."""
+    """OpenCV coefficients k1, k2, p1, p2[, k3[, k4, k5, k6]]; (0,), (4,), (5,) or (8,). Those of a fisheye lens are
+    k1, k2, k3, k4 of the equidistant model, or none; (0,) or (4,)."""
     T_world_camera: Array
     """Pose, (4, 4), metres: maps camera coordinates to world coordinates."""
+    fisheye: bool = False
+    """Whether the lens follows OpenCV's equidistant model (`cv2.fisheye`), otherwise Brown and Conrady's."""
 
     def __post_init__(self) -> None:
-        if self.distortion.shape not in [(n,) for n in DISTORTION_COUNTS]:
+        if self.distortion.shape not in [(n,) for n in coefficient_counts(self.fisheye)]:
             raise CalibrationError(
-                f"camera '{self.name}': expected 0, 4, 5 or 8 distortion coefficients, "
+                f"camera '{self.name}': expected {count_words(self.fisheye)} distortion coefficients, "
                 f"found {self.distortion.size}; correct 'distortions' in the calibration file"
             )
         assert self.K.shape == (3, 3)
@@ -81,12 +101,34 @@ class Camera:
     @property
     def is_pinhole(self) -> bool:
         """Whether there is no lens distortion, so that original and undistorted pixels coincide."""
-        return not np.any(self.distortion)
+        return not self.fisheye and not np.any(self.distortion)
 
     @cached_property
     def pinhole(self) -> "Camera":
-        """The same camera without lens distortion: the camera of undistorted pixels."""
+        """The same camera without lens distortion: the camera of undistorted pixels.
+
+        For a fisheye lens, its image holds the footage up to `MAX_PINHOLE_ANGLE` from the axis, at the focal lengths of
+        `K`, so that the middle keeps its resolution. An image of more than `MAX_PINHOLE_GROWTH` times the footage's
+        pixels is reduced to that.
+        """
+        if self.fisheye:
+            return self._fisheye_pinhole()
         return self if self.is_pinhole else replace(self, distortion=np.zeros(0))
+
+    def _fisheye_pinhole(self) -> "Camera":
+        xy = self._px_to_slopes(_border(self.size))
+        directions = fisheye_directions(xy, self.distortion)
+        angles = np.arctan2(np.linalg.norm(directions[:, :2], axis=-1), directions[:, 2])
+        widest = min(MAX_PINHOLE_ANGLE, fisheye_limit(self.distortion))
+        slopes = np.tan(np.where(angles < widest, angles, widest))  # NaN is beyond the lens
+        border_px = self._slopes_to_px(xy / np.linalg.norm(xy, axis=-1, keepdims=True) * slopes[:, None])
+        low, high = np.floor(border_px.min(axis=0)), np.ceil(border_px.max(axis=0))
+        width, height = (int(n) + 1 for n in high - low)
+        K = self.K.copy()
+        K[:2, 2] -= low
+        whole = replace(self, size=(width, height), K=K, distortion=np.zeros(0), fisheye=False)
+        most = MAX_PINHOLE_GROWTH * self.width * self.height
+        return whole if width * height <= most else whole.scaled(float(np.sqrt(most / (width * height))))
 
     def scaled(self, scale: float) -> "Camera":
         """Return the camera of the image resized by `scale`, pixel areas (not centres) kept aligned."""
@@ -113,12 +155,11 @@ class Camera:
         return rigid.apply(self.T_camera_world, points_world)[..., 2]
 
     def project(self, points_world: Array) -> Array:
-        """Project world points `(..., 3)` to original pixels `(..., 2)`; NaN behind the camera."""
-        points_camera = rigid.apply(self.T_camera_world, np.asarray(points_world, dtype=np.float64))
-        z = points_camera[..., 2:]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            xy = np.where(z > 1e-9, points_camera[..., :2] / z, np.nan)
-        return self._normalized_to_px(xy)
+        """Project world points `(..., 3)` to original pixels `(..., 2)`; NaN behind the camera.
+
+        A fisheye lens may see points beside and behind the camera; NaN where its model ends.
+        """
+        return self._directions_to_px(rigid.apply(self.T_camera_world, np.asarray(points_world, dtype=np.float64)))
 
     def project_with_jacobian(self, points_world: Array) -> tuple[Array, Array]:
         """Project world points `(N, 3)` to undistorted pixels, with derivatives, as the function of this name does."""
@@ -127,30 +168,32 @@ class Camera:
     def rays(self, points_px: Array) -> Array:
         """Return unit directions in the world, `(..., 3)`, of the viewing rays of original pixels `(..., 2)`.
 
-        The rays start at `center_world`.
+        The rays start at `center_world`. NaN for pixels that a fisheye lens leaves black.
         """
-        xy = self._px_to_normalized(np.asarray(points_px, dtype=np.float64))
-        directions_camera = np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
+        directions_camera = self._px_to_directions(np.asarray(points_px, dtype=np.float64))
         directions_camera /= np.linalg.norm(directions_camera, axis=-1, keepdims=True)
         return directions_camera @ self.T_world_camera[:3, :3].T
 
     def back_project(self, points_px: Array, depths_m: Array | float) -> Array:
-        """Return world points `(..., 3)` seen at original pixels `(..., 2)` at the given depths (see `depths`)."""
-        xy = self._px_to_normalized(np.asarray(points_px, dtype=np.float64))
-        z = np.broadcast_to(np.asarray(depths_m, dtype=np.float64), xy.shape[:-1])[..., None]
-        return rigid.apply(self.T_world_camera, np.concatenate([xy * z, z], axis=-1))
+        """Return world points `(..., 3)` seen at original pixels `(..., 2)` at the given depths (see `depths`).
+
+        NaN where the ray never has that depth, as that of a fisheye beyond 90 degrees, which has negative depths only.
+        """
+        directions = self._px_to_directions(np.asarray(points_px, dtype=np.float64))
+        z = directions[..., 2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            lengths = np.where((z > 0) | (depths_m < 0), depths_m / z, np.nan)
+        return rigid.apply(self.T_world_camera, directions * lengths[..., None])
 
     def undistort_points(self, points_px: Array) -> Array:
-        """Map original pixels `(..., 2)` to undistorted pixels."""
-        if self.is_pinhole:
-            return np.asarray(points_px, dtype=np.float64)
-        return self.pinhole._normalized_to_px(self._px_to_normalized(np.asarray(points_px, dtype=np.float64)))
+        """Map original pixels `(..., 2)` to undistorted pixels; NaN where a fisheye sees 90 degrees aside or more."""
+        points = np.asarray(points_px, dtype=np.float64)
+        return points if self.is_pinhole else self.pinhole._directions_to_px(self._px_to_directions(points))
 
     def distort_points(self, points_px: Array) -> Array:
-        """Map undistorted pixels `(..., 2)` to original pixels."""
-        if self.is_pinhole:
-            return np.asarray(points_px, dtype=np.float64)
-        return self._normalized_to_px(self.pinhole._px_to_normalized(np.asarray(points_px, dtype=np.float64)))
+        """Map undistorted pixels `(..., 2)` to original pixels; NaN where the model of a fisheye ends."""
+        points = np.asarray(points_px, dtype=np.float64)
+        return points if self.is_pinhole else self._directions_to_px(self.pinhole._px_to_directions(points))
 
     def within_lens(self, points_px: Array) -> NDArray[np.bool_]:
         """Return whether undistorted pixels, `(..., 2)`, lie where the model of the distortion holds; False for NaN.
@@ -159,20 +202,23 @@ class Camera:
         """
         if self.is_pinhole:
             return np.asarray(np.isfinite(points_px).all(axis=-1))
-        radius = np.linalg.norm(self.pinhole._px_to_normalized(points_px), axis=-1)
+        radius = np.linalg.norm(self.pinhole._px_to_slopes(points_px), axis=-1)
         return np.asarray(radius < self._lens_radius)
 
     @cached_property
     def _lens_radius(self) -> float:
         """Distance from the axis, at depth 1, up to which the distorted distance grows; infinite if it always does."""
+        if self.fisheye:
+            limit = fisheye_limit(self.distortion)
+            return float(np.tan(limit)) if limit < np.pi / 2 else np.inf
         radii = np.linspace(0.0, _MAX_LENS_RADIUS, 4001)
         points = np.stack([radii, np.zeros_like(radii)], axis=-1)
-        steps = np.diff(self._normalized_to_px(points)[:, 0])
+        steps = np.diff(self._slopes_to_px(distort_slopes(points, self.distortion))[:, 0])
         falls = np.flatnonzero(steps <= 0)
         return float(radii[falls[0]]) if len(falls) else np.inf
 
     def undistort_image(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Resample an image as filmed, `(H, W[, C])`, to undistorted pixels of the same size."""
+        """Resample an image as filmed, `(H, W[, C])`, to the undistorted pixels of `pinhole`; black beyond it."""
         assert image.shape[:2] == (self.height, self.width), (image.shape, self.size)
         if self.is_pinhole:
             return image
@@ -180,34 +226,68 @@ class Camera:
 
     @cached_property
     def _undistort_maps(self) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
-        return cv2.initUndistortRectifyMap(  # type: ignore[return-value]
-            self.K, self.distortion, np.eye(3), self.K, self.size, cv2.CV_16SC2
-        )
+        return cv2.convertMaps(*self.distortion_map(self.pinhole), cv2.CV_16SC2)  # type: ignore[return-value]
 
-    def _normalized_to_px(self, xy: Array) -> Array:
-        x, y = xy[..., 0], xy[..., 1]
-        if not self.is_pinhole:
-            k1, k2, p1, p2, k3, k4, k5, k6 = np.pad(self.distortion, (0, 8 - self.distortion.size))
-            r2 = x * x + y * y
-            radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
-            x, y = (
-                x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
-                y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+    def distortion_map(self, view: "Camera") -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the original pixel of each pixel of a view without distortion, columns and rows, (H, W) each.
+
+        Args:
+            view: `pinhole`, scaled or cropped.
+        """
+        assert view.is_pinhole
+        if not self.fisheye:
+            return cv2.initUndistortRectifyMap(  # type: ignore[return-value]
+                self.K, self.distortion, np.eye(3), view.K, view.size, cv2.CV_32FC1
             )
-        u = self.K[0, 0] * x + self.K[0, 1] * y + self.K[0, 2]
-        v = self.K[1, 1] * y + self.K[1, 2]
-        return np.stack([u, v], axis=-1)
+        k = np.pad(self.distortion, (0, 4 - self.distortion.size))
+        columns, rows = cv2.fisheye.initUndistortRectifyMap(self.K, k, np.eye(3), view.K, view.size, cv2.CV_32FC1)
+        # OpenCV leaves out the skew here.
+        columns += np.float32(self.K[0, 1] / self.K[1, 1]) * (rows - np.float32(self.K[1, 2]))
+        if np.isfinite(self._lens_radius):
+            grid = np.stack(np.meshgrid(np.arange(view.width), np.arange(view.height)), axis=-1)
+            radii = np.linalg.norm(view._px_to_slopes(grid.astype(np.float64)), axis=-1)
+            columns[radii >= self._lens_radius] = BEYOND_PX
+        return columns, rows  # type: ignore[return-value]
 
-    def _px_to_normalized(self, points_px: Array) -> Array:
+    def _directions_to_px(self, directions: Array) -> Array:
+        """Map directions in camera coordinates, (..., 3), of any length to original pixels, (..., 2)."""
+        if self.fisheye:
+            return self._slopes_to_px(fisheye_project(directions, self.distortion))
+        z = directions[..., 2:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            xy = np.where(z > 1e-9, directions[..., :2] / z, np.nan)
+        return self._slopes_to_px(xy if self.is_pinhole else distort_slopes(xy, self.distortion))
+
+    def _px_to_directions(self, points_px: Array) -> Array:
+        """Map original pixels, (..., 2), to directions in camera coordinates, (..., 3), of no particular length."""
+        xy = self._px_to_slopes(points_px)
+        if self.fisheye:
+            return fisheye_directions(xy, self.distortion)
+        if not self.is_pinhole and xy.size:
+            criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
+            flat = points_px.reshape(-1, 1, 2)
+            out = cv2.undistortPoints(flat, self.K, self.distortion, criteria=criteria)
+            xy = np.asarray(out, dtype=np.float64).reshape(points_px.shape)
+        return np.concatenate([xy, np.ones((*xy.shape[:-1], 1))], axis=-1)
+
+    def _slopes_to_px(self, xy: Array) -> Array:
+        """Apply `K` to slopes, (..., 2), distorted ones if the camera has a lens."""
+        u = self.K[0, 0] * xy[..., 0] + self.K[0, 1] * xy[..., 1] + self.K[0, 2]
+        return np.stack([u, self.K[1, 1] * xy[..., 1] + self.K[1, 2]], axis=-1)
+
+    def _px_to_slopes(self, points_px: Array) -> Array:
+        """Apply the inverse of `K` to pixels, (..., 2)."""
         y = (points_px[..., 1] - self.K[1, 2]) / self.K[1, 1]
         x = (points_px[..., 0] - self.K[0, 2] - self.K[0, 1] * y) / self.K[0, 0]
-        xy = np.stack([x, y], axis=-1)
-        if self.is_pinhole or xy.size == 0:
-            return xy
-        criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
-        flat = points_px.reshape(-1, 1, 2)
-        out = cv2.undistortPoints(flat, self.K, self.distortion, criteria=criteria)
-        return np.asarray(out, dtype=np.float64).reshape(points_px.shape)
+        return np.stack([x, y], axis=-1)
+
+
+def _border(size: tuple[int, int]) -> Array:
+    """Return points along the border of an image, (n, 2), px."""
+    low, (right, bottom) = -0.5, np.array(size) - 0.5
+    u, v = np.linspace(low, right, _BORDER_SAMPLES), np.linspace(low, bottom, _BORDER_SAMPLES)
+    sides = ((u, low), (u, bottom), (low, v), (right, v))
+    return np.concatenate([np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in sides])
 
 
 def project_with_jacobian(Ts_camera_world: Array, K: Array, points_world: Array) -> tuple[Array, Array]:

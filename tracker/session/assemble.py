@@ -3,26 +3,34 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
+from tracker.calibrations.convention_names import PoseConvention
+from tracker.calibrations.reading import CalibratedCameras, read_cameras
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
 from tracker.footage.video import Footage, open_footage
-from tracker.formats.calibration import read_cameras
-from tracker.formats.camera_section import Units
+from tracker.formats.camera_section import CameraEntry, Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
+from tracker.geometry.ground_plane import UP_ROTATIONS
 from tracker.session.matching import (
     camera_name,
     check_image_numbers,
     check_names,
     common_length,
     common_rate,
+    find_entry,
     match_footage,
     same_rate,
 )
+from tracker.session.rig_summary import summarize_rig
 from tracker.session.session import PALETTE, Person, Session, create_session
+from tracker.validation import same_form
+
+T = TypeVar("T")
 
 DEFAULT_MODEL = "gavrila34"
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
@@ -35,8 +43,8 @@ class NewSession:
 
     folder: Path
     """Where the session goes; must not exist, or be empty."""
-    calibration: Path
-    """TOML, JSON, YAML or XML file (`tracker.formats.calibration`)."""
+    calibration: Path | Sequence[Path]
+    """A file or folder, or a file for each camera (`tracker.calibrations`)."""
     videos: Sequence[Path] = ()
     """Video files or image folders, each named after its camera."""
     camera_paths: Mapping[str, Path] = field(default_factory=dict)
@@ -64,6 +72,10 @@ class NewSession:
     """World axis that points up."""
     units: Units | None = None
     """Unit of the calibration's translations; by default the one that its layout fixes, else metres."""
+    poses: PoseConvention | None = None
+    """Convention of the calibration's poses; by default that of its layout, unless the cameras contradict it."""
+    rescale: bool = False
+    """Whether a calibration at a whole multiple of the footage's size is scaled to it."""
 
 
 @dataclass(frozen=True)
@@ -89,25 +101,35 @@ class SessionParts:
         )  # fmt: skip
 
 
-def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None) -> Session:
+def assemble(
+    request: NewSession,
+    report: Callable[[str], None] = lambda _: None,
+    note: Callable[[str], None] | None = None,
+) -> Session:
     """Make a session folder of a calibration and footage. Nothing is written unless all of it fits.
 
     Args:
         request: what to make it of.
         report: called with a sentence after each check that has passed.
+        note: called with each sentence on what may be wrong, such as a camera without a pose; `report` by default.
 
     Raises:
         TrackerError: as `check_parts` and `SessionParts.make` do.
     """
-    return check_parts(request, report).make()
+    return check_parts(request, report, note).make()
 
 
-def check_parts(request: NewSession, report: Callable[[str], None] = lambda _: None) -> SessionParts:
+def check_parts(
+    request: NewSession,
+    report: Callable[[str], None] = lambda _: None,
+    note: Callable[[str], None] | None = None,
+) -> SessionParts:
     """Check that a calibration and footage fit together, and write nothing.
 
     Args:
         request: what a session is to be made of.
         report: called with a sentence after each check that has passed.
+        note: called with each sentence on what may be wrong; `report` by default.
 
     Raises:
         SessionError: an unknown name, a camera without footage or footage without a camera.
@@ -115,8 +137,18 @@ def check_parts(request: NewSession, report: Callable[[str], None] = lambda _: N
         CalibrationError: the calibration is malformed.
         ModelError: a body model is unknown or malformed.
     """
-    request = replace(request, videos=tuple(request.videos))
-    calibrated = {c.name: c for c in read_cameras(request.calibration, request.units)}
+    request = _with_compared_names(request)
+    note = note or report
+    calibration = _read_calibration(request)
+    calibrated = {c.name: c for c in calibration.entries}
+    for sentence in calibration.notes:
+        note(sentence)
+    for name in (*request.cameras, *request.camera_paths):
+        if name in calibration.left_out:
+            raise SessionError(
+                f"camera '{name}' is asked for, but {calibration.left_out[name]}; calibrate it with the others, or "
+                "leave it out"
+            )
     check_names(request.cameras, list(calibrated), "camera", "the cameras to use")
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
         raise SessionError(f"expected each camera to use once, found '{twice[0]}' twice; leave one out")
@@ -125,15 +157,13 @@ def check_parts(request: NewSession, report: Callable[[str], None] = lambda _: N
     report(f"The calibration has {len(calibrated)} cameras: {', '.join(calibrated)}.")
     if without:
         report(f"Cameras without footage are left out: {', '.join(without)}.")
-    unused = calibrated.keys() - set(names)
+    unused = (calibrated.keys() | calibration.left_out.keys()) - set(names)
     check_names(request.offsets, names, "camera", "the offsets")
     paths = match_footage(names, request.videos, request.camera_paths, unused)
     report("Each camera has footage: " + ", ".join(f"{name} ({paths[name].name})" for name in names) + ".")
     footage = {name: open_footage(paths[name], name) for name in names}
     try:
-        cameras = {name: calibrated[name].camera(footage[name].size) for name in names}
-        for name in names:
-            check_size(name, footage[name].path, footage[name].size, cameras[name].size)
+        cameras = {name: _fitted(calibrated[name], footage[name], request.rescale) for name in names}
         report("All footage can be read and has the calibrated shape.")
         fps = common_rate(footage, request.fps)
         check_image_numbers(footage, request.offsets)
@@ -147,6 +177,11 @@ def check_parts(request: NewSession, report: Callable[[str], None] = lambda _: N
         check_side_files(source)
     people = _make_people(request.people, request.models, request.heights)
     report("The body models fit: " + ", ".join(f"{p.name} {p.model.height_m:.2f} m" for p in people) + ".")
+    if request.up in UP_ROTATIONS:
+        rig = summarize_rig(list(cameras.values()), request.up)
+        report(rig.sentence)
+        for sentence in rig.doubts:
+            note(sentence)
     return SessionParts(request, sources, people, fps, n_frames)
 
 
@@ -161,10 +196,75 @@ def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = Non
         CalibrationError: the calibration is malformed.
     """
     if calibrated is None:
-        calibrated = [c.name for c in read_cameras(request.calibration, request.units)]
-    filmed = {*request.camera_paths, *map(camera_name, request.videos)}
+        calibrated = [c.name for c in _read_calibration(request).entries]
+    filmed = _filmed(request)
     missing = [n for n in calibrated if n not in filmed]
     return missing if len(missing) < len(calibrated) else []
+
+
+def _read_calibration(request: NewSession) -> CalibratedCameras:
+    return read_cameras(request.calibration, request.units, request.poses, _filmed(request))
+
+
+def _filmed(request: NewSession) -> set[str]:
+    """Return the names of the cameras that have footage."""
+    return {*map(same_form, request.camera_paths), *map(camera_name, request.videos)}
+
+
+def _with_compared_names(request: NewSession) -> NewSession:
+    """Return a request whose names have the Unicode form in which they are compared."""
+
+    def keys(values: Mapping[str, T]) -> dict[str, T]:
+        return {same_form(name): value for name, value in values.items()}
+
+    models, heights = request.models, request.heights
+    return replace(
+        request,
+        videos=tuple(request.videos),
+        camera_paths=keys(request.camera_paths),
+        cameras=tuple(map(same_form, request.cameras)),
+        offsets=keys(request.offsets),
+        side_names=keys(request.side_names),
+        people=tuple(map(same_form, request.people)),
+        models=keys(models) if isinstance(models, Mapping) else models,
+        heights=keys(heights) if isinstance(heights, Mapping) else heights,
+    )
+
+
+def _fitted(entry: CameraEntry, footage: Footage, rescale: bool) -> Camera:
+    """Return a camera of the size of its footage.
+
+    Raises:
+        CalibrationError: the size is unknown.
+        RecordingError: the calibration is for another size, and not to be scaled.
+    """
+    camera, size = entry.camera(footage.size), footage.size
+    ratio = max(camera.width / size[0], size[0] / camera.width)
+    is_multiple = (
+        camera.size != size
+        and ratio.is_integer()
+        and ((camera.width * size[1] == camera.height * size[0]) and ratio > 1)
+    )
+    if is_multiple and rescale:
+        return camera.scaled(size[0] / camera.width)
+    found = f"camera '{entry.name}': the calibration is for {camera.width}x{camera.height} pixels, and the footage has"
+    found += f" {size[0]}x{size[1]}"
+    if is_multiple:
+        raise RecordingError(
+            f"{found}, a ratio of {ratio:g}, which is right only if the camera shows the same view at both sizes",
+            Remedy("rescale"),
+        )
+    if camera.size != size and max(abs(camera.width - size[0]), abs(camera.height - size[1])) == 1:
+        raise RecordingError(
+            f"{found}: some programs write the index of the last pixel as size; correct 'size' in the calibration to "
+            f"{size[0]}, {size[1]}, and leave all else as it is"
+        )
+    if camera.size == size[::-1] and entry.eccentricity(size) < entry.eccentricity(camera.size) / 2:
+        raise RecordingError(
+            f"{found}; its principal point shows that its size is height and width: exchange them in the calibration"
+        )
+    check_size(entry.name, footage.path, size, camera.size)
+    return camera
 
 
 def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -> CameraSource:
@@ -212,7 +312,7 @@ def find_background(folder: Path, camera: str) -> Path:
         RecordingError: there is none.
     """
     for suffix in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES):
-        path = folder / f"{camera}{suffix}"
+        path = find_entry(folder, f"{camera}{suffix}")
         if path.is_file():
             return path
     raise RecordingError(
@@ -227,7 +327,7 @@ def find_masks(folder: Path, camera: str) -> Path:
     Raises:
         RecordingError: there is none, or it has no masks.
     """
-    path = folder / camera
+    path = find_entry(folder, camera)
     if not any(path.glob("[0-9]" * 6 + ".png")):
         raise RecordingError(
             f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame",

@@ -6,7 +6,7 @@ from pathlib import Path
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.image_folder import ImageFolder, missing_numbers
 from tracker.footage.video import Footage
-from tracker.validation import FrameRate, check
+from tracker.validation import FrameRate, check, same_form
 
 RATE_TOLERANCE = 5e-4
 """Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much."""
@@ -48,7 +48,15 @@ def match_footage(
 
 def camera_name(video: Path) -> str:
     """Return the camera after which a video file or an image folder is named."""
-    return video.name if video.is_dir() else video.stem
+    return same_form(video.name if video.is_dir() else video.stem)
+
+
+def find_entry(folder: Path, name: str) -> Path:
+    """Return the path of a file or folder by its name, in whichever Unicode form the system stores it."""
+    path = folder / name
+    if not path.exists() and folder.is_dir():
+        return next((entry for entry in folder.iterdir() if same_form(entry.name) == same_form(name)), path)
+    return path
 
 
 def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:

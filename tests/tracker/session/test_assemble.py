@@ -1,4 +1,7 @@
+import shutil
 import tomllib
+import unicodedata
+from dataclasses import replace
 from fractions import Fraction
 
 import cv2
@@ -230,10 +233,92 @@ def test_variable_rate(room):
 
 def test_size_unlike_the_calibration(room):
     (room / "left.mp4").unlink()
-    folder = write_images(room / "left", [f"{i}.png" for i in range(9)], size=(32, 24))
+    folder = write_images(room / "left", [f"{i}.png" for i in range(9)], size=(40, 24))
     assert_refused(
-        room, RecordingError, "camera 'left': expected 64x48.*found 32x24", videos=[room / "front.mp4", folder]
+        room, RecordingError, "camera 'left': expected 64x48.*found 40x24", videos=[room / "front.mp4", folder]
     )
+
+
+def calibrate_at(room, size):
+    """Calibrate both cameras at another size of the same picture."""
+    scale = np.array([size[0] / SIZE[0], size[1] / SIZE[1]])
+    scaled = K * [[scale[0]], [scale[1]], [1]]
+    scaled[:2, 2] += (scale - 1) / 2
+    Ts = [rigid.transform(t=np.array([0.0, i, 1.0])) for i in range(2)]
+    rig = [Camera(name, size, scaled, np.zeros(0), T) for name, T in zip(("front", "left"), Ts, strict=True)]
+    write_calibration(room / "Calib.toml", rig)
+
+
+def test_a_size_that_counts_to_the_last_pixel(room):
+    calibrate_at(room, (SIZE[0] - 1, SIZE[1] - 1))
+    expected = "for 63x47 pixels, and the footage has 64x48: .*correct 'size' in the calibration to 64, 48"
+    assert_refused(room, RecordingError, expected)
+
+
+@pytest.mark.parametrize("times", [2, 3, 0.5])
+def test_a_calibration_at_a_multiple_of_the_footage_is_scaled_if_told(room, times):
+    calibrate_at(room, (int(times * SIZE[0]), int(times * SIZE[1])))
+    assert_refused(room, RecordingError, f"a ratio of {max(times, 1 / times):g}, which is right only if")
+    for source in new(room, rescale=True).cameras:
+        assert source.camera.size == SIZE
+        np.testing.assert_allclose(source.camera.K, K, atol=1e-9)
+
+
+def test_only_whole_multiples_of_the_same_shape_are_scaled(room):
+    calibrate_at(room, (2 * SIZE[0], SIZE[1]))
+    assert_refused(room, RecordingError, "expected 128x48", rescale=True)
+    calibrate_at(room, (SIZE[0] * 3 // 2, SIZE[1] * 3 // 2))
+    assert_refused(room, RecordingError, "expected 96x72", rescale=True)
+
+
+def test_a_size_written_as_height_and_width(room):
+    rows = [Camera(name, SIZE[::-1], K, np.zeros(0), rigid.transform(t=np.ones(3))) for name in ("front", "left")]
+    write_calibration(room / "Calib.toml", [replace(c, T_world_camera=np.eye(4)) for c in rows])
+    assert_refused(room, RecordingError, "its size is height and width: exchange them")
+
+
+def test_names_are_equal_in_both_unicode_forms(room):
+    composed, apart = (unicodedata.normalize(form, "Büro") for form in ("NFC", "NFD"))
+    rig = [Camera(name, SIZE, K, np.zeros(0), rigid.transform(t=np.array([0, 0, 1.0]))) for name in (composed, "left")]
+    for named in (apart, composed):
+        write_calibration(room / "Calib.toml", [replace(c, name=named) if c is rig[0] else c for c in rig])
+        for filmed in (apart, composed):
+            folder = room / f"{named == apart}{filmed == apart}"
+            (folder / "bg").mkdir(parents=True)
+            shutil.copy(room / "front.mp4", folder / f"{filmed}.mp4")
+            cv2.imwrite(str(folder / "bg" / f"{apart}.png"), np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+            cv2.imwrite(str(folder / "bg" / "left.png"), np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
+            request = NewSession(
+                folder / "s",
+                calibration=room / "Calib.toml",
+                videos=[folder / f"{filmed}.mp4", room / "left.mp4"],
+                background=folder / "bg",
+                cameras=(apart, "left"),
+                offsets={composed: 0},
+                people=(apart,),
+                heights={composed: 1.8},
+            )
+            session = assemble(request)
+            assert [c.camera.name for c in session.cameras] == [composed, "left"]
+            assert session.people[0].name == composed
+            assert session.people[0].model.height_m == 1.8
+
+
+def test_a_camera_without_a_pose_is_left_out_unless_it_is_asked_for(room):
+    text = (room / "Calib.toml").read_text()
+    (room / "Calib.toml").write_text(
+        text + '\n[third]\nname = "third"\nsize = [64, 48]\nmatrix = [[50, 0, 32], [0, 50, 24], [0, 0, 1]]\n'
+        'rotation = "null"\ntranslation = "null"\n'
+    )
+    encode(room / "third.mp4", n=9)
+    notes = []
+    videos = [room / f"{name}.mp4" for name in ("left", "front", "third")]
+    request = NewSession(room / "s", calibration=room / "Calib.toml", videos=videos)
+    assert len(assemble(request, note=notes.append).cameras) == 2
+    assert notes[0] == "Camera 'third' is left out: the calibration has no pose for it."
+    shutil.rmtree(room / "s")
+    for asked in ({"cameras": ["front", "third"]}, {"camera_paths": {"third": room / "third.mp4"}}):
+        assert_refused(room, SessionError, "camera 'third' is asked for, but the calibration has no pose", **asked)
 
 
 @pytest.mark.parametrize(
@@ -249,7 +334,7 @@ def test_size_unlike_the_calibration(room):
         ({"heights": {"bob": 1.7}}, SessionError, "unknown person 'bob' among the heights"),
         ({"heights": 17.5}, ModelError, "0.3 to 3 metres"),
         ({"models": "gavrila23"}, ModelError, "gavrila22"),
-        ({"units": "mm"}, CalibrationError, "look like metres"),
+        ({"units": "mm"}, CalibrationError, "found 1.41 millimetres, so that the unit is another"),
         ({"up": "q"}, SessionError, "axis that points up"),
     ],
 )
