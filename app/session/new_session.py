@@ -66,4 +66,4 @@ def make_session(form: NewSessionForm, report: Callable[[str], None]) -> Session
         up=form.up,
         units=form.units,
     )
-    return assemble(request, report)
+    return assemble(request, report, report)

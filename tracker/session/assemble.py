@@ -1,6 +1,6 @@
 """Make a session from a calibration and loose footage: match them, and check that they fit together."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,7 +18,9 @@ from tracker.session.matching import (
     check_image_numbers,
     check_names,
     common_length,
+    common_offsets,
     common_rate,
+    footage_notes,
     match_footage,
     same_rate,
 )
@@ -59,16 +61,21 @@ class NewSession:
     folders of images."""
     up: str = "z"
     """World axis that points up."""
+    common_frames: bool = False
+    """Whether frames that only some cameras have are left out: at the end, of numbered images at both ends."""
     units: Units | None = None
     """Unit of the calibration's translations; by default the one that its layout fixes, else metres."""
 
 
-def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None) -> Session:
+def assemble(
+    request: NewSession, report: Callable[[str], None] = lambda _: None, note: Callable[[str], None] = lambda _: None
+) -> Session:
     """Make a session folder of a calibration and footage. Nothing is written unless all of it fits.
 
     Args:
         request: what to make it of.
         report: called with a sentence after each check that has passed.
+        note: called with each sentence on something that a person should look at.
 
     Raises:
         SessionError: an unknown name, a camera without footage or footage without a camera.
@@ -97,10 +104,14 @@ def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None
             check_size(name, footage[name].path, footage[name].size, cameras[name].size)
         report("All footage can be read and has the calibrated shape.")
         fps = common_rate(footage, request.fps)
-        check_image_numbers(footage, request.offsets)
-        n_frames = common_length(footage, request.offsets)
+        check_image_numbers(footage, request.offsets, request.common_frames)
+        if request.common_frames:
+            request = replace(request, offsets=common_offsets(footage, request.offsets))
+        n_frames = common_length(footage, request.offsets, request.common_frames)
         report(f"All cameras have {n_frames} frames at {fps:g} per second.")
-        sources = tuple(_source(request, cameras[name], footage[name], fps) for name in names)
+        sources = tuple(_source(request, cameras[name], footage[name], fps, n_frames) for name in names)
+        for sentence in (*_left_out(sources, n_frames), *footage_notes(footage, fps, request.offsets)):
+            note(sentence)
     finally:
         for f in footage.values():
             f.close()
@@ -128,14 +139,24 @@ def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = Non
     return missing if len(missing) < len(calibrated) else []
 
 
-def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -> CameraSource:
+def _left_out(sources: Sequence[CameraSource], n_frames: int) -> Iterator[str]:
+    """Say which frames are left out because other cameras lack them."""
+    for source in sources:
+        if source.footage_frames is not None:
+            rest = source.footage_frames - source.offset - n_frames
+            yield f"camera '{source.camera.name}': frames that other cameras lack are left out at its end: {rest}"
+
+
+def _source(request: NewSession, camera: Camera, footage: Footage, fps: float, n_frames: int) -> CameraSource:
+    offset = request.offsets.get(camera.name, 0)
     return CameraSource(
         camera,
         footage.path,
         find_background(request.background, camera.name) if request.background is not None else None,
         find_masks(request.masks, camera.name) if request.masks is not None else None,
-        request.offsets.get(camera.name, 0),
+        offset,
         None if footage.fps is None or same_rate(footage.fps, fps) else footage.fps,
+        footage.n_frames if request.common_frames and footage.n_frames > n_frames + offset else None,
     )
 
 

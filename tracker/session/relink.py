@@ -202,6 +202,8 @@ def _check_footage(session: Session, source: CameraSource, path: Path) -> None:
     name, offsets = source.camera.name, [c.offset for c in session.cameras]
     # Videos of one length lose frames at the end by the offsets of the others.
     lengths = {session.n_frames + source.offset, session.n_frames + max(offsets)}
+    if source.footage_frames is not None:
+        lengths = {source.footage_frames}
     expected_fps = session.fps if source.declared_fps is None else source.declared_fps
     with closing(open_footage(path, name)) as footage:
         check_size(name, path, footage.size, source.camera.size)
