@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tracker.errors import RecordingError, SessionError
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.frame_rates import same_rate
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
 from tracker.footage.video import Footage, open_footage
@@ -22,7 +23,6 @@ from tracker.session.matching import (
     common_rate,
     footage_notes,
     match_footage,
-    same_rate,
 )
 from tracker.session.session import PALETTE, Person, Session, create_session
 

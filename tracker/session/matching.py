@@ -4,17 +4,14 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from tracker.errors import RecordingError, SessionError
+from tracker.footage.frame_rates import same_rate, usual_rate
 from tracker.footage.image_folder import ImageFolder, missing_numbers
 from tracker.footage.video import Footage
 from tracker.validation import FrameRate, check
 
-RATE_TOLERANCE = 5e-4
-"""Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much."""
 _NOTED_JITTER = 0.04
 """Share of the interval between frames from which jitter is reported. Ticks of a millisecond, as of Matroska, shift
 stamps by up to 3% at 30 frames per second."""
-_CAMERA_RATES = (24000 / 1001, 24.0, 25.0, 30000 / 1001, 30.0, 50.0, 60000 / 1001, 60.0, 100.0, 120.0, 200.0, 240.0)
-"""Frame rates of cameras and of television, 1/s."""
 
 
 def match_footage(
@@ -72,7 +69,7 @@ def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
     rates = {name: f.fps for name, f in footage.items() if f.fps is not None}
     for name, f in footage.items():
         if fps is None and not f.has_constant_rate:
-            usual = _usual_rate(rates[name])
+            usual = usual_rate(rates[name])
             raise RecordingError(
                 f"camera '{name}': {f.path} has a variable frame rate, expected a constant one: {_irregularity(f)}; "
                 f"say --fps {usual:g} if frame k of all cameras is of one instant all the same, else convert it to a "
@@ -87,7 +84,7 @@ def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
         shaky = [f"'{name}': {_irregularity(f)}" for name, f in footage.items() if _jitter(f) > _NOTED_JITTER]
         raise RecordingError(
             f"expected one frame rate for all cameras, found {found}{''.join(f' ({s})' for s in shaky)}; convert the "
-            f"videos to the same rate, or give the rate at which all cameras filmed with --fps {_usual_rate(wanted):g}"
+            f"videos to the same rate, or give the rate at which all cameras filmed with --fps {usual_rate(wanted):g}"
         )
     return wanted
 
@@ -102,12 +99,6 @@ def _irregularity(footage: Footage) -> str:
     jitter, n_gaps = footage.stamps.jitter, footage.stamps.n_gaps
     text = f"its time stamps lie up to {100 * jitter:.0f}% of a frame from even ones"
     return text + (f", with {n_gaps} gaps in which frames may be missing" if n_gaps else "")
-
-
-def _usual_rate(rate: float) -> float:
-    """Return the rate of cameras that a measured rate, 1/s, is nearest to, if it is within 1%."""
-    nearest = min(_CAMERA_RATES, key=lambda r: abs(r / rate - 1))
-    return nearest if abs(nearest / rate - 1) < 0.01 else float(f"{rate:.6g}")
 
 
 def footage_notes(footage: Mapping[str, Footage], fps: float, offsets: Mapping[str, int]) -> list[str]:
@@ -139,11 +130,6 @@ def footage_notes(footage: Mapping[str, Footage], fps: float, offsets: Mapping[s
             f"to pair them by their stamps, make the session with the offsets {needed}"
         )
     return notes
-
-
-def same_rate(rate: float, other: float) -> bool:
-    """Return whether two frame rates, 1/s, are equal within rounding."""
-    return abs(rate / other - 1) <= RATE_TOLERANCE
 
 
 def common_length(footage: Mapping[str, Footage], offsets: Mapping[str, int], shorten: bool = False) -> int:

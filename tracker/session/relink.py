@@ -12,10 +12,11 @@ from typing import Literal, NamedTuple
 
 from tracker.errors import RecordingError, SessionError, TrackerError
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size, read_background
 from tracker.footage.video import open_footage
 from tracker.session.assemble import check_side_files, find_background, find_masks
-from tracker.session.matching import check_names, same_rate
+from tracker.session.matching import check_names
 from tracker.session.session import Session, save_cameras
 
 Kind = Literal["footage", "background", "masks"]

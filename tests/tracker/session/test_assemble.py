@@ -7,7 +7,8 @@ import pytest
 from clips import SIZE, encode, encode_stamped, write_images
 
 from tracker.errors import CalibrationError, ModelError, RecordingError, SessionError
-from tracker.evaluation.metrics import at_rate
+from tracker.evaluation.clocks import place_rows
+from tracker.evaluation.references import placement
 from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
 from tracker.formats.trc import MarkerTable
@@ -290,7 +291,8 @@ def test_rate_that_overrides_what_the_videos_declare(room):
         assert (at.fps, [c.declared_fps for c in at.cameras]) == (240.0, [30.0, 25.0])
     assert tomllib.loads((room / "s" / "session.toml").read_text())["version"] == 3
     table = MarkerTable(("p",), np.arange(9), np.arange(9) / 240, np.zeros((9, 1, 3)), 240.0)
-    assert at_rate(table, session.fps) is table  # a TRC file of the true rate is read frame by frame
+    placed = place_rows(table, "TRC file", session.fps, placement(session))
+    assert placed.frames.tolist() == list(range(9))  # a TRC file of the true rate is read frame by frame
 
 
 def test_rate_that_the_videos_declare_is_not_stored_twice(room):
