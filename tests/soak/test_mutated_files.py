@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from memory import memory_mb
 from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
+from tracker.formats.calibration import read_cameras
 
 from tracker.errors import TrackerError
-from tracker.evaluation.metrics import at_rate
+from tracker.evaluation.clocks import place_rows
 from tracker.formats.anipose import read_calibration
-from tracker.formats.calibration import read_cameras
 from tracker.formats.joint_maps import guess_joint_map, read_joint_map
 from tracker.formats.model_toml import format_model, load_model, parse_model
 from tracker.formats.pose_csv import read_pose_table
@@ -115,7 +115,7 @@ def read_model(path):
 
 def read_markers(path):
     table = read_trc(path)
-    at_rate(table, 25.0)
+    place_rows(table, f"TRC file {path}", 25.0)
     guess_joint_map(table.names, path.name)
 
 

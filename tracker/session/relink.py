@@ -12,10 +12,11 @@ from typing import Literal, NamedTuple
 
 from tracker.errors import RecordingError, Remedy, SessionError, TrackerError
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size, read_background
 from tracker.footage.video import open_footage
 from tracker.session.assemble import check_side_files, find_background, find_masks
-from tracker.session.matching import check_names, same_rate
+from tracker.session.matching import check_names
 from tracker.session.session import Session, save_cameras
 
 Kind = Literal["footage", "background", "masks"]
@@ -205,6 +206,8 @@ def _check_footage(session: Session, source: CameraSource, path: Path) -> None:
     name, offsets = source.camera.name, [c.offset for c in session.cameras]
     # Videos of one length lose frames at the end by the offsets of the others.
     lengths = {session.n_frames + source.offset, session.n_frames + max(offsets)}
+    if source.footage_frames is not None:
+        lengths = {source.footage_frames}
     expected_fps = session.fps if source.declared_fps is None else source.declared_fps
     with closing(open_footage(path, name)) as footage:
         check_size(name, path, footage.size, source.camera.size)

@@ -92,6 +92,22 @@ def test_equal_names_in_strange_folders_are_left_to_the_user(room):
     assert missing_files(session) == ()
 
 
+def test_a_longer_video_of_common_frames_is_found_again(room):
+    take = room / "take1"
+    encode(take / "b.mp4", n=12)
+    videos = [take / "a.mp4", take / "b.mp4"]
+    shutil.rmtree(room / "s" / "s")
+    request = NewSession(room / "s" / "s", calibration=take / "Calib.toml", videos=videos, common_frames=True)
+    assemble(request)
+    take = moved(room)
+    encode(room / "disk" / "b.mp4", n=9)
+    refuse(
+        room, RecordingError, "'b': expected 12 frames .* found 9", Places(camera_paths={"b": room / "disk" / "b.mp4"})
+    )
+    session, _ = relink(loaded(room), Places(search=[take]))
+    assert missing_files(session) == ()
+
+
 def test_other_footage_is_refused(room):
     take = moved(room)
     encode(take / "b.mp4", n=12)
