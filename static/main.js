@@ -6,6 +6,7 @@ import * as panesRoom from "./panes/index.js";
 import * as posingRoom from "./posing/index.js";
 import * as sceneRoom from "./scene/index.js";
 import * as searchRoom from "./search/index.js";
+import * as sessionsRoom from "./sessions/index.js";
 import * as shellRoom from "./shell/index.js";
 import { exposeState } from "./shell/test_hook.js";
 import { started } from "./starting/index.js";
@@ -18,7 +19,8 @@ const timeline = timelineRoom.mount(context);
 const search = searchRoom.mount(context);
 const scene = sceneRoom.mount(context, panes);
 const inspector = inspectorRoom.mount(context, { panes, posing, scene });
-shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector });
+const sessions = sessionsRoom.mount(context);
+shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector, sessions });
 exposeState(context, panes.grid);
 
 await started;

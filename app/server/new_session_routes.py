@@ -15,7 +15,7 @@ from app.server import connections
 from app.server.page_requests import read_body, require_page
 from app.session.footage_preview import preview
 from app.session.new_session import NewSessionForm, make_session
-from app.session.path_choice import listing, typed_path
+from app.session.path_choice import folder_contents, typed_path
 from app.session.survey import SurveyForm, survey
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import PRESETS
@@ -59,7 +59,7 @@ class NewSessionRoutes:
     async def _list(self, request: web.Request) -> web.Response:
         require_page(request, self._refusal)
         try:
-            found = await asyncio.to_thread(listing, request.query.get("path", "")[:_MAX_PATH])
+            found = await asyncio.to_thread(folder_contents, request.query.get("path", "")[:_MAX_PATH])
         except TrackerError as error:
             raise web.HTTPBadRequest(text=page_text(error)) from error
         entries = [entry._asdict() for entry in found.entries]

@@ -46,7 +46,7 @@ class Entry(NamedTuple):
     """`folder`, `session`, `video` or `file`."""
 
 
-class Listing(NamedTuple):
+class FolderContents(NamedTuple):
     """What is in a folder."""
 
     folder: str
@@ -58,7 +58,7 @@ class Listing(NamedTuple):
     """Whether there are more than `_MAX_READ` entries."""
 
 
-def listing(text: str) -> Listing:
+def folder_contents(text: str) -> FolderContents:
     """Return the folders and regular files in the folder that a user has chosen, or that holds the file.
 
     Args:
@@ -80,7 +80,7 @@ def listing(text: str) -> Listing:
     entries = [Entry(e.name, e.path, kind) for e, kind in kinds if kind is not None]
     entries.sort(key=lambda e: (e.kind not in ("folder", "session"), e.name.casefold()))
     parent = None if folder.parent == folder else str(folder.parent)
-    return Listing(str(folder), parent, entries, len(read) > _MAX_READ)
+    return FolderContents(str(folder), parent, entries, len(read) > _MAX_READ)
 
 
 def _reason(error: Exception) -> str:

@@ -11,7 +11,7 @@ HOUSE = {
     "static/  the page": [
         ["main.js"],
         ["shell"],
-        ["inspector"],
+        ["inspector", "sessions"],
         ["search", "scene"],
         ["posing", "timeline"],
         ["panes"],

@@ -112,6 +112,7 @@ PAGE_ROOMS = [
     "search",
     "scene",
     "inspector",
+    "sessions",
     "shell",
     "starting",
     ".",

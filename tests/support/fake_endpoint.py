@@ -152,6 +152,10 @@ class FakeEndpoint:
     """Addresses of the thumbnails that the pages requested."""
     start: str = "first"
     """Identifies the start of the pretended program."""
+    name: str = "elbow_rotation"
+    """Of the session."""
+    sources: tuple = tuple(SOURCES)
+    """Of the poses, in turn each ten frames."""
 
     def __post_init__(self):
         self.pose = {(p, name): np.add(at, (0.9 * p, 0, 0)) for p in range(self.n_people) for name, at in REST.items()}
@@ -431,7 +435,7 @@ class FakeEndpoint:
             for p in range(self.n_people)
         ]
         await socket.send_str(encoded({
-            "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
+            "type": "session", "name": self.name, "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
             "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start,
         }))  # fmt: skip
         for message in (self.state, self.settings, self.view_3d, self.body_sizes):
@@ -452,7 +456,7 @@ class FakeEndpoint:
 
     def cell(self, frame):
         return {
-            "source": SOURCES[frame // 10 % 8],
+            "source": self.sources[frame // 10 % len(self.sources)],
             "cost_px": 1 + 0.5 * np.sin(frame / 7) + (frame == 50) * 9,
             "keyframe": frame % 20 == 0,
             "status": "" if frame < 10 else status_of(frame),

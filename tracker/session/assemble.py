@@ -288,7 +288,9 @@ def footage_in(folder: Path) -> list[Path]:
     try:
         entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     except OSError as error:
-        raise SessionError(f"expected a folder of videos, found that {folder} cannot be read ({error})") from error
+        raise SessionError(
+            f"expected a folder of videos, found that {folder} cannot be read ({error.strerror}); check the path"
+        ) from error
     videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
     found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
     if not found:

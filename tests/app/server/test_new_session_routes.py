@@ -35,9 +35,8 @@ async def test_a_folder_is_listed_without_what_cannot_be_read(folders, serve):
     assert not {"pipe.mp4", "gone.mp4", ".hidden.mp4"} & kinds.keys()
     above = json.loads((await client.get(f"/sessions/folder?path={walk}/FRONT.mp4"))[1])
     assert above["entries"] == found["entries"]
-    assert {
-        e["kind"] for e in json.loads((await client.get(f"/sessions/folder?path={walk.parent}"))[1])["entries"]
-    } >= {"session"}
+    sessions = json.loads((await client.get(f"/sessions/folder?path={walk.parent}"))[1])["entries"]
+    assert "session" in {e["kind"] for e in sessions}
     for text in ("relative", "%00", f"{walk}/nothing/x", "~nobody-of-this-name"):
         status, why = await client.get(f"/sessions/folder?path={text}")
         assert (status, why.startswith("expected")) == (400, True), why
