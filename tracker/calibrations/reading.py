@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tracker.calibrations.camera_words import Section, is_absent
+from tracker.calibrations.camera_words import Section, is_absent, plain_text
 from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
 from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics, is_transposed
 from tracker.calibrations.document import Document, read_document, refuse
@@ -152,7 +152,7 @@ def _sections(
                 raise CalibrationError(
                     f"{document.where}: camera '{name}' is in two files or twice; give each camera its own name"
                 )
-            found[name] = section | {"name": same_form(str(section.get("name") or name))}
+            found[name] = section | {"name": same_form(plain_text(section.get("name") or name))}
     return layout, found
 
 
