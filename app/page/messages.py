@@ -46,7 +46,7 @@ _NO_CELL: dict[str, Any] = {
 
 def session(session: Session) -> wire.SessionMessage:
     """Describe the session."""
-    cameras = tuple(wire.CameraInfo(c.camera.name, c.camera.width, c.camera.height) for c in session.cameras)
+    cameras = tuple(wire.CameraInfo(c.camera.name, *c.camera.pinhole.size) for c in session.cameras)
     people = tuple(_person(p) for p in session.people)
     return wire.SessionMessage(
         session.name, session.fps, session.n_frames, cameras, people, DOUBTFUL_FROM, LOST_FROM, _START

@@ -308,7 +308,7 @@ def _lines_px(session: Session, scene: PersonScene) -> dict[str, Array]:
         axes = silhouette_axes(scene)
     except TrackerError:
         return {}
-    widths = {c.camera.name: c.camera.width for c in session.cameras}
+    widths = {c.camera.name: c.camera.pinhole.width for c in session.cameras}
     return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in axes}
 
 

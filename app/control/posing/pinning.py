@@ -13,6 +13,7 @@ from app.state.people import ShownPose
 from tracker.body.limbs import display_name
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
+from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
 from tracker.posing.pinned_fit import fit_frame
 
@@ -76,9 +77,10 @@ class Pinning:
         ):
             return
         source = session.cameras[camera].camera
-        if _clipped(position_px, source.size) != position_px:
+        if not _is_shown(source, position_px):
+            width, height = source.pinhole.size
             raise TrackerError(
-                f"expected a pin within the {source.width}x{source.height} px of {source.name}, found it at "
+                f"expected a pin within the {width}x{height} px of {source.name}, found it at "
                 f"({position_px[0]:.0f}, {position_px[1]:.0f}); set it where the image shows the joint"
             )
         with self._activities.editing():
@@ -95,7 +97,10 @@ class Pinning:
             drag = self._drag
             if drag is None or page != drag.page:
                 return
-            position_px = _clipped(position_px, self._session_state.session.cameras[drag.camera].camera.size)
+            source = self._session_state.session.cameras[drag.camera].camera
+            position_px = _clipped(position_px, source.pinhole.size)
+            if not _is_shown(source, position_px):
+                return
             pins = _with_pin(
                 self._session_state.state.pins, drag.person, PointObservation(drag.point, drag.camera, position_px)
             )
@@ -241,6 +246,12 @@ def _with_pin(pins: Pins, person: int, pin: PointObservation) -> Pins:
     others = [p for p in pins[person] if (p.point, p.camera) != (pin.point, pin.camera)]
     own = tuple(sorted([*others, pin], key=lambda p: (p.point, p.camera)))
     return (*pins[:person], own, *pins[person + 1 :])
+
+
+def _is_shown(source: Camera, position_px: tuple[float, float]) -> bool:
+    """Return whether an undistorted picture shows footage at a position; black corners of a fisheye's have none."""
+    is_within = _clipped(position_px, source.pinhole.size) == position_px
+    return is_within and (not source.fisheye or bool(source.is_filmed(np.array(position_px))))
 
 
 def _clipped(position_px: tuple[float, float], size: tuple[int, int]) -> tuple[float, float]:
