@@ -11,12 +11,11 @@ from typing import NamedTuple
 from tracker.errors import SessionError
 from tracker.files import sync_folder
 from tracker.store import checksums, verification
+from tracker.store.recovery import JOURNALS
 
 FOLDER = "backups"
 """Folder of the backups, beside the store."""
 _N_KEPT = 3
-_JOURNALS = ("-journal", "-wal", "-shm")
-"""Endings of the files that SQLite may leave beside a store after a crash; they belong to that very file."""
 
 
 class Restored(NamedTuple):
@@ -104,11 +103,11 @@ def restore(path: Path, backup: Path | None = None) -> Restored:
 def _set_aside(path: Path) -> Path | None:
     """Rename a store and its journals, which must not be applied to another file; returns its new path."""
     if not path.exists():
-        for ending in _JOURNALS:
+        for ending in JOURNALS:
             path.with_name(path.name + ending).unlink(missing_ok=True)
         return None
     kept = path.with_name(f"{path.stem}-replaced-{_stamp()}{path.suffix}")
-    for ending in _JOURNALS:  # first: a store without its journal is repaired by hand, a strange journal is not
+    for ending in JOURNALS:  # first: a store without its journal is repaired by hand, a strange journal is not
         beside = path.with_name(path.name + ending)
         if beside.exists():
             beside.rename(kept.with_name(kept.name + ending))
