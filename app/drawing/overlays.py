@@ -28,7 +28,7 @@ from tracker.session.session import Person, Session
 from tracker.tracking.contour.fit_steps import residual_segments
 
 _PERSON_KINDS = (
-    "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
+    "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes", "former",
 )  # fmt: skip
 """Kinds of lines that belong to a person, and are left out when the person is hidden."""
 _SHORT_M = 0.01
@@ -39,7 +39,7 @@ _EDGE_STRIDE_PX = 3
 
 PathKind = Literal[
     "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
-    "result", "residual", "part_edge", "epipolar", "accepted", "rejected", "floor", "floor_sight",
+    "former", "result", "residual", "part_edge", "epipolar", "accepted", "rejected", "floor", "floor_sight",
 ]  # fmt: skip
 Side = Literal["left", "right", ""]
 SIDES: tuple[Side, ...] = get_args(Side)

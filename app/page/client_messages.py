@@ -24,7 +24,7 @@ from app.page.inspector_messages import (
     SetView3d,
 )
 from app.page.message_types import Command, Frame, Index, Name, Number
-from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins
+from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack
 from app.page.search_messages import (
     CompareRun,
     PreviewCandidate,
@@ -228,7 +228,7 @@ class Save(Command, frozen=True, tag="save"):
 
 ClientMessage: TypeAlias = Union[  # noqa: UP007
     Seek, Select, SetView, ShowPerson, Solo, ShowBefore, ShowCurves, WatchTab, ShowHistory, LookThrough, Pause3d,
-    Drag, PoseEdit, DragPin, RemovePins, FitPose,
+    Drag, PoseEdit, DragPin, RemovePins, FitPose, TakeLimbBack,
     RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
     TakeCandidate, ShowLandscape, SetLandscapeDof,
     StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, FollowTracking,

@@ -10,6 +10,7 @@ import numpy as np
 from app.drawing import dof_labels, overlays, part_outlines, pin_marks
 from app.drawing.curves import CurveGroup, plots_of, samples
 from app.drawing.floor_lines import floor_lines
+from app.drawing.former_limbs import former_limb_lines
 from app.page import search_messages
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
@@ -130,6 +131,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         *overlays.paths(session, state, view, views),
         *pin_marks.pin_lines(session, state, view),
         *floor_lines(session, state),
+        *former_limb_lines(session, state, view),
     ]:
         count = len(path.segments_px)
         rows.append(Path(path.camera, path.person, path.kind, path.color, path.side, first, count))
@@ -277,6 +279,10 @@ def _compared(last: PoseComparison | None) -> wire.Compared | None:
         before_view_costs_px=last.before_view_costs_px,
         after_view_costs_px=last.after_view_costs_px,
         warning=last.warning,
+        moved=tuple(
+            wire.MovedLimb(person, limb_display_name(move.limb.name), round(100 * move.distance_m, 1))
+            for person, move in last.moved
+        ),
         is_before_shown=last.is_before_shown,
     )
 

@@ -189,6 +189,15 @@ class PreviewedCandidate(Part, frozen=True):
     """Index among the best candidates of the run."""
 
 
+class MovedLimb(Part, frozen=True):
+    """A limb that the fit moved although nobody had touched it."""
+
+    person: int
+    limb: str
+    """For display: `left arm`."""
+    distance_cm: float
+
+
 class Compared(Part, frozen=True):
     """The last fit or search, while its result is shown unchanged."""
 
@@ -203,6 +212,8 @@ class Compared(Part, frozen=True):
     after_view_costs_px: tuple[float | None, ...]
     warning: str
     """Where the edges and the user's placement disagree by much, as a sentence; empty if nowhere."""
+    moved: tuple[MovedLimb, ...]
+    """Limbs that a fit moved although nobody had touched them, farthest first; their former places are drawn."""
     is_before_shown: bool
     """Whether the views show the poses before. The costs are theirs then, and the overlay has no handles."""
 

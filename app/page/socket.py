@@ -360,6 +360,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.search_view,
         state.range_comparison,
         state.compared if not state.is_stored_drawn else None,
+        () if state.compared is None else state.compared.moved,
         state.drag,
         state.drag_seqs,
         state.visibility.hidden,

@@ -6,6 +6,7 @@ from typing import Literal
 
 from app.state.people import ShownPose
 from tracker.geometry.arrays import Array
+from tracker.posing.limb_moves import LimbMove
 
 ComparedWork = Literal["fit", "search"]
 
@@ -32,6 +33,8 @@ class PoseComparison:
     after_view_costs_px: tuple[float | None, ...]
     warning: str = ""
     """Where edges and the user's placement disagree by much: a sentence for the user, or empty."""
+    moved: tuple[tuple[int, LimbMove], ...] = ()
+    """Limbs that a fit moved although nobody had touched them, each after the index of its person; farthest first."""
     is_before_shown: bool = False
     """Whether the views show the poses before."""
 

@@ -12,8 +12,8 @@
  * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
  * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |
- *   "new_sizes" | "result" | "residual" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight"}
- *   PathKind
+ *   "new_sizes" | "former" | "result" | "residual" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" |
+ *   "floor_sight"} PathKind
  * @typedef {"running" | "paused" | "over"} RunState
  * @typedef {"left" | "right" | ""} Side
  * @typedef {{type: "seek", frame: number}} Seek
@@ -44,7 +44,8 @@
  * @typedef {{type: "pin", phase: GesturePhase, frame: number, camera: number, person: number, point: string, u: number,
  *   v: number, live: boolean}} DragPin
  * @typedef {{type: "unpin", frame: number, person: number, point: string | null, camera: number | null}} RemovePins
- * @typedef {{type: "fit", frame: number, person?: number | null}} FitPose
+ * @typedef {{type: "fit", frame: number, person?: number | null, point?: string | null}} FitPose
+ * @typedef {{type: "limb_back", frame: number}} TakeLimbBack
  * @typedef {{type: "search", action: "step" | "stage" | "frame" | "contours" | "chains" | "stop", person?: number |
  *   null}} RunSearch
  * @typedef {{type: "search", action: "again", run?: number | null, person?: number | null}} RepeatSearch
@@ -104,9 +105,10 @@
  *   per_second: number, best_px: number | null, message: string}} Job
  * @typedef {{run: number, step: number, steps: number, stage: string | null}} ReplayedStep
  * @typedef {{run: number, candidate: number}} PreviewedCandidate
+ * @typedef {{person: number, limb: string, distance_cm: number}} MovedLimb
  * @typedef {{number: number, work: "fit" | "search", before_px: number | null, after_px: number | null,
- *   before_view_costs_px: (number | null)[], after_view_costs_px: (number | null)[], warning: string, is_before_shown:
- *   boolean}} Compared
+ *   before_view_costs_px: (number | null)[], after_view_costs_px: (number | null)[], warning: string, moved:
+ *   MovedLimb[], is_before_shown: boolean}} Compared
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total:
  *   number, per_second: number, doubtful: number, lost: number, back: boolean, message: string}} Track
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
@@ -201,11 +203,12 @@
  *   HoldPoint} PoseEdit
  * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowBefore | ShowCurves | WatchTab | ShowHistory |
  *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
- *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed |
- *   SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof |
- *   StartTracking | ControlTracking | EditRange | CompareRange | StopRange | ToggleMark | FollowTracking |
- *   SetTrackSettings | SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes |
- *   AcquireSizes | FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | TakeLimbBack | RunSearch | RepeatSearch |
+ *   SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape |
+ *   SetLandscapeDof | StartTracking | ControlTracking | EditRange | CompareRange | StopRange | ToggleMark |
+ *   FollowTracking | SetTrackSettings | SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides |
+ *   ApplySizes | DraftSizes | AcquireSizes | FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo | Save}
+ *   ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
  *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage} TextMessage
