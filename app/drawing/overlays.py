@@ -28,7 +28,7 @@ from tracker.session.session import Person, Session
 from tracker.tracking.contour.fit_steps import residual_segments
 
 _PERSON_KINDS = (
-    "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes", "former",
+    "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
 )  # fmt: skip
 """Kinds of lines that belong to a person, and are left out when the person is hidden."""
 _SHORT_M = 0.01

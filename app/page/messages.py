@@ -18,6 +18,7 @@ from app.page.encoding import encode_binary
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import Picking
 from app.state.page_view import View
+from app.state.people import DepthNote
 from app.state.progress import TrackState
 from app.state.search import PreviewState, ReplayState, SearchState
 from app.state.state import State
@@ -99,6 +100,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
         compared_run=state.search_view.compared_run,
         preview=_preview(state.search_view.preview),
         compared=_compared(state.compared),
+        unseen_depth=_unseen_depth(state.unseen_depth),
         track=_track(state.track),
         range=wire.RangeWork(
             state.ranges.running, state.ranges.what, state.ranges.done, state.ranges.total, state.ranges.message
@@ -285,6 +287,10 @@ def _compared(last: PoseComparison | None) -> wire.Compared | None:
         ),
         is_before_shown=last.is_before_shown,
     )
+
+
+def _unseen_depth(note: DepthNote | None) -> wire.UnseenDepth | None:
+    return None if note is None else wire.UnseenDepth(note.person, note.unseen.points, note.unseen.camera)
 
 
 def _track(track: TrackState) -> wire.Track:

@@ -218,6 +218,16 @@ class Compared(Part, frozen=True):
     """Whether the views show the poses before. The costs are theirs then, and the overlay has no handles."""
 
 
+class UnseenDepth(Part, frozen=True):
+    """Points that the user placed in opposite or neighbouring views alone."""
+
+    person: int
+    points: tuple[str, ...]
+    """Names of the points, the last placed one first."""
+    camera: int
+    """The view that looks across, and would show the depth of the first point."""
+
+
 class FloorPicking(Part, frozen=True):
     """Progress of setting the floor."""
 
@@ -282,6 +292,8 @@ class StateMessage(Message, frozen=True, tag="state"):
     preview: PreviewedCandidate | None
     compared: Compared | None
     """Null where there is no such result, or it has changed."""
+    unseen_depth: UnseenDepth | None
+    """Null where the views have shown the depth of the last placed point, or the pose has changed since."""
     track: Track
     range: RangeWork
     follow: bool

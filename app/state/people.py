@@ -7,6 +7,7 @@ from typing import NamedTuple
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.posing.placed_depth import UnseenDepth
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +69,18 @@ class HeldPoint(NamedTuple):
     """Name of the point."""
     camera: int | None
     """Index of a view in which it was placed; None where it was held by command."""
+
+
+@dataclass(frozen=True, eq=False)
+class DepthNote:
+    """Points placed in opposite or neighbouring views alone. It holds as long as the pose is shown unchanged."""
+
+    frame: int
+    person: int
+    """Index of the person."""
+    values: Array
+    """The pose, (n_values,)."""
+    unseen: UnseenDepth
 
 
 @dataclass(frozen=True, eq=False)

@@ -109,6 +109,7 @@
  * @typedef {{number: number, work: "fit" | "search", before_px: number | null, after_px: number | null,
  *   before_view_costs_px: (number | null)[], after_view_costs_px: (number | null)[], warning: string, moved:
  *   MovedLimb[], is_before_shown: boolean}} Compared
+ * @typedef {{person: number, points: string[], camera: number}} UnseenDepth
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total:
  *   number, per_second: number, doubtful: number, lost: number, back: boolean, message: string}} Track
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
@@ -119,9 +120,9 @@
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   part_costs_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, replay:
  *   ReplayedStep | null, compared_run: number | null, preview: PreviewedCandidate | null, compared: Compared | null,
- *   track: Track, range: RangeWork, follow: boolean, snapped: number | null, floor: FloorPicking | null, footage:
- *   FootageProgress, compiling: string | null, undo: string | null, redo: string | null, saved: boolean, save_error:
- *   string | null}} StateMessage
+ *   unseen_depth: UnseenDepth | null, track: Track, range: RangeWork, follow: boolean, snapped: number | null, floor:
+ *   FloorPicking | null, footage: FootageProgress, compiling: string | null, undo: string | null, redo: string | null,
+ *   saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage

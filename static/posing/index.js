@@ -11,7 +11,7 @@ import { PoseNotes } from "./pose_notes.js";
 import { PinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
-import { pinBindings, posingBindings } from "./posing_keys.js";
+import { noteBindings, pinBindings, posingBindings } from "./posing_keys.js";
 
 /** @typedef {ReturnType<typeof mount>} PosingRoom */
 
@@ -28,7 +28,7 @@ export function mount({ store, send, notify, reasons, actions }, { grid }) {
   const jointBar = new JointBar(byId("joint-bar", HTMLElement), store, posing, notify);
   new FrameCard(store, posing);
   new PinBar(store, pinning);
-  new PoseNotes({ store, actions, pinning, grid });
-  const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away)];
+  const notes = new PoseNotes({ store, actions, pinning, grid });
+  const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...noteBindings(notes, reasons.away)];
   return { posing, pinning, bindings };
 }

@@ -2,6 +2,7 @@
 
 import { hasSearch } from "../model/selectors.js";
 import { byId } from "../widgets/elements.js";
+import { displayName } from "../widgets/text.js";
 
 /** @typedef {{text: string, button?: {text: string, title: string, run: () => void}}} Note */
 
@@ -23,12 +24,12 @@ export class PoseNotes {
     this.#pinning = pinning;
     this.#grid = grid;
     store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("session")) this.#show();
+      if (changed.has("state") || changed.has("session") || changed.has("filled")) this.#show();
     });
   }
 
   #show() {
-    const notes = this.#ofFit();
+    const notes = [...this.#ofFit(), ...this.#ofDepth()];
     const described = JSON.stringify(notes);
     if (described === this.#shown) return;
     this.#shown = described;
@@ -53,6 +54,32 @@ export class PoseNotes {
       notes.push({ text: last.warning, button: { text, title, run: () => this.#actions.toggleBefore() } });
     }
     return notes;
+  }
+
+  /** Why nothing looks across the last placed joint, or null; for the palette. */
+  get whyNotAcross() {
+    return this.#store.facts.state?.unseen_depth ? null : "The views have shown the depth of the last placed joint.";
+  }
+
+  /** Fill the grid with the view that looks across the last placed joint. */
+  showAcross() {
+    const { state, filled } = this.#store.facts;
+    const camera = state?.unseen_depth?.camera;
+    if (camera !== undefined && camera !== filled) this.#grid.toggleFill(camera);
+  }
+
+  /** The last placed joint, if no view has shown its depth. @returns {Note[]} */
+  #ofDepth() {
+    const { state, session, filled } = this.#store.facts;
+    const unseen = state?.unseen_depth;
+    if (!unseen || !session) return [];
+    const [point, ...others] = unseen.points;
+    const name = session.cameras[unseen.camera].name;
+    const more = others.length ? ` and ${others.length} more` : "";
+    const text = `No view has shown the depth of the ${displayName(point)}${more}: drag it in ${name}, which looks across.`;
+    if (filled === unseen.camera) return [{ text }];
+    const title = `Fill the grid with ${name} (Alt+V)`;
+    return [{ text, button: { text: `Show ${name}`, title, run: () => this.showAcross() } }];
   }
 }
 

@@ -108,3 +108,20 @@ export function pinBindings(pinning, why) {
   ];
   return inArea("Pins", bindings, why);
 }
+
+/**
+ * @param {import("./pose_notes.js").PoseNotes} notes
+ * @param {() => string | null} away
+ */
+export function noteBindings(notes, away) {
+  return inArea("Posing", [
+    {
+      keys: ["Alt V"],
+      label: "Fill the grid with the view that looks across the last placed joint",
+      words: "depth opposite side",
+      matches: alt("KeyV", false),
+      why: () => away() ?? notes.whyNotAcross,
+      run: () => notes.showAcross(),
+    },
+  ]);
+}

@@ -170,7 +170,7 @@ class FakeEndpoint:
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
-            "compared": None, "compared_run": None, "preview": None,
+            "compared": None, "unseen_depth": None, "compared_run": None, "preview": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0, 4.0, 5.0, 6.0], "locked": [], "other_sizes": False, "solo": False,

@@ -11,7 +11,7 @@ from tracker.geometry.arrays import Array
 from tracker.posing.edits import copy_dofs, limb_of
 
 _MOVED_M = 0.1
-"""Distance from which a limb counts as moved, metres. An adult's forearm and calf are about as thick, so that such a limb
+"""Distance from which a limb counts as moved, metres. An adult's forearm and calf are about as thick: the limb then
 covers other pixels than before."""
 
 

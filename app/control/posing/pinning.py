@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from app.control.posing.depth_check import note_unseen_depth
 from app.control.session.activities import Activities
 from app.control.session.comparing import note_comparison
 from app.control.session.session_state import Pins, SessionState
@@ -133,6 +134,7 @@ class Pinning:
         self._save(drag)
         self._drag = self._session_state.open_edit_owner = None
         self._session_state.set(is_pin_held=False)
+        note_unseen_depth(self._session_state, drag.person, drag.point)
 
     def remove(self, frame: int, person: int, point: str | None = None, camera: int | None = None) -> None:
         """Remove pins of a person on a frame: of one point, in one view, or all; one entry of the history."""

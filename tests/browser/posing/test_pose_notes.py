@@ -4,9 +4,11 @@ import pytest
 from page_driver import shows, until
 
 COMPARED = {
-    "number": 4, "work": "fit", "before_px": 5.74, "after_px": 5.44, "before_view_costs_px": [], "after_view_costs_px": [],
-    "warning": "", "is_before_shown": False,
-    "moved": [{"person": 1, "limb": "left arm", "distance_cm": 21.3}, {"person": 0, "limb": "right leg", "distance_cm": 12.0}],
+    "number": 4, "work": "fit", "before_px": 5.74, "after_px": 5.44, "before_view_costs_px": [],
+    "after_view_costs_px": [], "warning": "", "is_before_shown": False,
+    "moved": [
+        {"person": 1, "limb": "left arm", "distance_cm": 21.3}, {"person": 0, "limb": "right leg", "distance_cm": 12.0}
+    ],
 }  # fmt: skip
 
 
@@ -67,3 +69,21 @@ async def test_a_fit_can_be_limited_to_a_person_or_a_limb(page, endpoint):
     assert endpoint.heard("fit") == [
         limb, limb, {"type": "fit", "frame": 12, "person": 0}, {"type": "fit", "frame": 12, "person": None}
     ]  # fmt: skip
+
+
+async def test_the_view_across_is_named_and_fills_the_grid(page, endpoint):
+    await page.keyboard.press("Alt+v")
+    await page.locator("#notices .notice", has_text="The views have shown the depth").wait_for()
+    await tell(endpoint, unseen_depth={"person": 0, "points": ["l_wrist", "l_knee"], "camera": 1})
+    note = page.locator("#pose-notes li")
+    await note.wait_for()
+    assert "No view has shown the depth of the l wrist and 1 more: drag it in RIGHT" in await note.inner_text()
+    await note.get_by_role("button", name="Show RIGHT").click()
+    await shows(page, "quadrille.state.filled === 1 && !document.querySelector('#pose-notes button')")
+    await page.keyboard.press("2")
+    await shows(page, "quadrille.state.filled === null")
+    await page.keyboard.press("Alt+v")
+    await shows(page, "quadrille.state.filled === 1")
+    await tell(endpoint, unseen_depth=None)
+    await shows(page, "document.querySelectorAll('#pose-notes li').length === 0")
+    await page.keyboard.press("2")
