@@ -14,7 +14,7 @@ import * as timelineRoom from "./timeline/index.js";
 const context = model.mount();
 const panes = panesRoom.mount(context);
 const posing = posingRoom.mount(context, panes);
-const timeline = timelineRoom.mount(context);
+const timeline = timelineRoom.mount(context, panes);
 const search = searchRoom.mount(context);
 const scene = sceneRoom.mount(context, panes);
 const inspector = inspectorRoom.mount(context, { panes, posing, scene });

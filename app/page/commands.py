@@ -148,6 +148,7 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.CompareRange: _compare_range,
     wire.StopRange: lambda controller, _, __: controller.ranges.stop(),
     wire.ToggleMark: _mark,
+    wire.ConfirmKeyframe: lambda controller, _, m: controller.inconsistent_frames.confirm(m.person, m.frame),
     wire.FollowTracking: lambda controller, _, m: controller.tracking.follow(m.follow),
     wire.EditFloor: _floor,
     wire.MarkFloor: lambda controller, _, m: controller.floor.mark(m.camera, (m.u, m.v)),

@@ -6,6 +6,7 @@ make them, `protocol_docs` writes the page's types and docs/protocol.md from the
 
 from typing import Literal, TypeAlias, Union, get_args
 
+from app.page.check_messages import InconsistentMessage, MovedLimb, UnseenDepth
 from app.page.inspector_messages import (
     AcquisitionMessage,
     BodySizesMessage,
@@ -189,15 +190,6 @@ class PreviewedCandidate(Part, frozen=True):
     """Index among the best candidates of the run."""
 
 
-class MovedLimb(Part, frozen=True):
-    """A limb that the fit moved although nobody had touched it."""
-
-    person: int
-    limb: str
-    """For display: `left arm`."""
-    distance_cm: float
-
-
 class Compared(Part, frozen=True):
     """The last fit or search, while its result is shown unchanged."""
 
@@ -216,16 +208,6 @@ class Compared(Part, frozen=True):
     """Limbs that a fit moved although nobody had touched them, farthest first; their former places are drawn."""
     is_before_shown: bool
     """Whether the views show the poses before. The costs are theirs then, and the overlay has no handles."""
-
-
-class UnseenDepth(Part, frozen=True):
-    """Points that the user placed in opposite or neighbouring views alone."""
-
-    person: int
-    points: tuple[str, ...]
-    """Names of the points, the last placed one first."""
-    camera: int
-    """The view that looks across, and would show the depth of the first point."""
 
 
 class FloorPicking(Part, frozen=True):
@@ -371,13 +353,6 @@ class TimelineMessage(Message, frozen=True, tag="timeline"):
     cells: dict[str, Cell | None]
     replace: bool
     """Whether all other frames have no pose."""
-
-
-class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
-    """Frames whose pose does not agree with the motion around it (`tracker/motion/consistency.py`)."""
-
-    frames: tuple[int, ...]
-    """All of them, ascending."""
 
 
 class DofObservability(Part, frozen=True):

@@ -21,7 +21,7 @@ from app.page.message_types import Message
 from app.page.observability_feed import ObservabilityFeed
 from app.page.search_feed import SearchFeed
 from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
-from app.page.server_messages import HistoryMessage, InconsistentMessage, NoticeMessage, StateMessage
+from app.page.server_messages import HistoryMessage, NoticeMessage, StateMessage
 from app.state import page_view
 from app.state.identity import Identity
 from app.state.page_view import View
@@ -300,8 +300,9 @@ class PageConnection:
 
     async def _send_checks(self, sent: State | None, state: State) -> None:
         """Send what was found about frames other than the shown one, if it changed."""
-        if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
-            await self._send(InconsistentMessage(state.inconsistent_frames))
+        checked = (state.inconsistent_frames, state.keyframe_doubts)
+        if sent is None or (sent.inconsistent_frames, sent.keyframe_doubts) != checked:
+            await self._send(messages.inconsistent(state))
         if sent is None or sent.range_comparison is not state.range_comparison:
             await self._send(messages.range_comparison(state.range_comparison))
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.motion.keyframe_doubts import RaisedView
 from tracker.posing.placed_depth import UnseenDepth
 
 
@@ -81,6 +82,20 @@ class DepthNote:
     values: Array
     """The pose, (n_values,)."""
     unseen: UnseenDepth
+
+
+class KeyframeDoubt(NamedTuple):
+    """A keyframe that its neighbours or views contradict."""
+
+    person: int
+    """Index of the person."""
+    frame: int
+    distance_m: float | None
+    """Distance from the motion of its neighbours, metres; None if they agree with it."""
+    point: str
+    """Name of the farthest point, for display; empty if they agree."""
+    views: tuple[RaisedView, ...]
+    """Views whose cost is raised, most raised first."""
 
 
 @dataclass(frozen=True, eq=False)

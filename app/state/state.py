@@ -7,7 +7,16 @@ import numpy as np
 
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import FloorState
-from app.state.people import AcquisitionState, DepthNote, DragState, HeldPoint, ShownPose, SizeDraft, Visibility
+from app.state.people import (
+    AcquisitionState,
+    DepthNote,
+    DragState,
+    HeldPoint,
+    KeyframeDoubt,
+    ShownPose,
+    SizeDraft,
+    Visibility,
+)
 from app.state.progress import FindState, FootageState, RangeState, TrackState
 from app.state.run_choices import RunChoices
 from app.state.search import CostLandscape, SearchState, SearchView
@@ -66,6 +75,8 @@ class State:
     ranges: RangeState = field(default_factory=RangeState)
     inconsistent_frames: tuple[int, ...] = ()
     """Frames whose poses disagree with their neighbours, ascending (see `tracker.motion.consistency`)."""
+    keyframe_doubts: tuple[KeyframeDoubt, ...] = ()
+    """Keyframes that their neighbours or views contradict, by person and frame."""
     pins: tuple[tuple[PointObservation, ...], ...] = ()
     """The pins of each person on the frame, by point and camera."""
     is_pin_held: bool = False
@@ -214,6 +225,7 @@ class StateChanges(TypedDict, total=False):
     locked: tuple[frozenset[int], ...]
     ranges: RangeState
     inconsistent_frames: tuple[int, ...]
+    keyframe_doubts: tuple[KeyframeDoubt, ...]
     pins: tuple[tuple[PointObservation, ...], ...]
     is_pin_held: bool
     held: frozenset[HeldPoint]

@@ -99,6 +99,15 @@ export class Actions {
     this.#send({ type: "range", action: "reviewed", first, last, person });
   }
 
+  /**
+   * Keep a doubted keyframe as it is.
+   *
+   * @param {{person: number, frame: number}} keyframe
+   */
+  confirmKeyframe({ person, frame }) {
+    this.#send({ type: "confirm_keyframe", person, frame });
+  }
+
   /** @param {boolean} on whether to compare the marked range, or to end the comparison */
   compareRange(on) {
     const { range } = this.#store.facts;
@@ -149,9 +158,12 @@ export class Actions {
     this.#send({ type: "curves", group });
   }
 
-  /** @param {number} person */
-  selectPerson(person) {
-    this.#send({ type: "select", person, point: null });
+  /**
+   * @param {number} person
+   * @param {string | null} point
+   */
+  selectPerson(person, point = null) {
+    this.#send({ type: "select", person, point });
   }
 
   /**

@@ -68,6 +68,7 @@
  * @typedef {{type: "compare_range", first: number | null, last: number | null}} CompareRange
  * @typedef {{type: "stop_range"}} StopRange
  * @typedef {{type: "mark", toggle: "keyframe" | "reviewed"}} ToggleMark
+ * @typedef {{type: "confirm_keyframe", person: number, frame: number}} ConfirmKeyframe
  * @typedef {{type: "follow", follow: boolean}} FollowTracking
  * @typedef {{method?: "chamfer" | "contour" | "voxel", stride?: number, cameras?: string[], estimate?: "refine" |
  *   "search", order?: number, past_poses?: number, recover?: boolean, backward_pass?: boolean, smooth?: boolean}}
@@ -130,7 +131,10 @@
  *   boolean, ambiguous: boolean, limbs_lost: number[]}} Cell
  * @typedef {{type: "timeline", person: number | null, cells: Record<string, Cell | null>, replace: boolean}}
  *   TimelineMessage
- * @typedef {{type: "inconsistent", frames: number[]}} InconsistentMessage
+ * @typedef {{camera: number, cost_px: number, usual_px: number}} RaisedViewCost
+ * @typedef {{person: number, frame: number, distance_cm: number | null, point: string, views: RaisedViewCost[]}}
+ *   KeyframeDoubt
+ * @typedef {{type: "inconsistent", frames: number[], keyframes: KeyframeDoubt[]}} InconsistentMessage
  * @typedef {{frame: number, method: string, other_method: string, cost_px: number | null, other_cost_px: number | null,
  *   status: string, other_status: string, apart_mm: number, farthest_mm: number, farthest: string}} ComparedPose
  * @typedef {{type: "range_comparison", first: number | null, last: number | null, people: ComparedPose[][]}}
@@ -207,9 +211,9 @@
  *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | TakeLimbBack | RunSearch | RepeatSearch |
  *   SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape |
  *   SetLandscapeDof | StartTracking | ControlTracking | EditRange | CompareRange | StopRange | ToggleMark |
- *   FollowTracking | SetTrackSettings | SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides |
- *   ApplySizes | DraftSizes | AcquireSizes | FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo | Save}
- *   ClientMessage
+ *   ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d | SetHeight | SetPartSizes | SetGirdleWidth |
+ *   CoupleSides | ApplySizes | DraftSizes | AcquireSizes | FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo |
+ *   Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
  *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage} TextMessage

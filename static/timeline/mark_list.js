@@ -38,7 +38,7 @@ export function markSection() {
   const list = document.createElement("dl");
   list.append(
     ...STATUSES.map((status) => row(statusSwatch(status), STATUS_MEANINGS[status])),
-    row(diamondSwatch(), "keyframe"),
+    row(diamondSwatch(), "keyframe; larger with an exclamation mark: check it"),
     ...SOURCES.map((source) => row(sourceSwatch(source), SOURCE_MEANINGS[source])),
     ...LINES.map(([kind, color, meaning]) => row(sampleOf(kind, `var(--image-${color})`), meaning)),
   );
