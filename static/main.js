@@ -15,7 +15,7 @@ const context = model.mount();
 const panes = panesRoom.mount(context);
 const posing = posingRoom.mount(context, panes);
 const timeline = timelineRoom.mount(context, panes);
-const search = searchRoom.mount(context);
+const search = searchRoom.mount(context, timeline);
 const scene = sceneRoom.mount(context, panes);
 const inspector = inspectorRoom.mount(context, { panes, posing, scene });
 shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector });

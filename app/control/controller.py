@@ -116,6 +116,8 @@ class Controller:
         self.view_3d = View3dSettings(session_state)
         """Chooses what the 3-D view shows."""
         self.inconsistent_frames = InconsistentFrames(session_state)
+        """Finds frames and keyframes that disagree with those around them."""
+        self.tracking.after_run = self.comparing_runs.compare_run
         self._footage_scan = FootageScan(session_state)
         self._save_retry = SaveRetry(session_state)
         self._compiling = None if compiler is None else KernelWarmup(session_state, compiler)

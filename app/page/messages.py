@@ -328,5 +328,5 @@ def inconsistent(state: State) -> check_messages.InconsistentMessage:
 def range_comparison(found: RangeComparison | None) -> search_messages.RangeComparisonMessage:
     """Describe the poses of a range against those that they replaced."""
     if found is None:
-        return search_messages.RangeComparisonMessage(None, None, ())
-    return search_messages.RangeComparisonMessage(found.first, found.last, found.frames)
+        return search_messages.RangeComparisonMessage(None, None, (), (), None)
+    return search_messages.RangeComparisonMessage(found.first, found.last, found.frames, found.stretches, found.run)

@@ -60,6 +60,23 @@ class ComparedPose:
     """Name of that joint, for display."""
 
 
+Verdict = Literal["better", "worse", "same"]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Frames on which the present poses of a person are better or worse than those that they replaced."""
+
+    person: int
+    """Index of the person."""
+    first: int
+    last: int
+    """Included."""
+    frames: int
+    """Number of frames that are better or worse; on the others neither is."""
+    verdict: Verdict
+
+
 @dataclass(frozen=True, eq=False)
 class RangeComparison:
     """The poses of a range of frames against those that they replaced."""
@@ -71,3 +88,7 @@ class RangeComparison:
     """By person; frames whose pose replaced none are left out."""
     others: Mapping[int, Mapping[int, Array]]
     """The replaced poses, (n_values,), in the present body, by frame and index of the person."""
+    stretches: tuple[Stretch, ...] = ()
+    """Stretches on which the present poses are better or worse, by person; of a run as they were at its end."""
+    run: int | None = None
+    """Number of the tracking run that has just replaced the poses, counted since the start; None for another range."""

@@ -115,12 +115,15 @@ export class Actions {
     else if (range) this.#send({ type: "compare_range", first: range.first, last: range.last });
   }
 
-  /** Take the replaced poses of the compared range. */
-  takeReplaced() {
-    const { rangeComparison } = this.#store.facts;
-    if (!rangeComparison || rangeComparison.first === null || rangeComparison.last === null) return;
-    const { first, last } = rangeComparison;
-    this.#send({ type: "range", action: "take_replaced", first, last, person: null });
+  /**
+   * Take the replaced poses of the compared range, or of a stretch of one person.
+   *
+   * @param {{person: number | null, first: number, last: number}} [stretch] `last` is included
+   */
+  takeReplaced(stretch) {
+    const { first, last } = this.#store.facts.rangeComparison ?? { first: null, last: null };
+    if (stretch) this.#send({ type: "range", action: "take_replaced", first: stretch.first, last: stretch.last, person: stretch.person });
+    else if (first !== null && last !== null) this.#send({ type: "range", action: "take_replaced", first, last, person: null });
   }
 
   stopRange() {

@@ -137,8 +137,10 @@
  * @typedef {{type: "inconsistent", frames: number[], keyframes: KeyframeDoubt[]}} InconsistentMessage
  * @typedef {{frame: number, method: string, other_method: string, cost_px: number | null, other_cost_px: number | null,
  *   status: string, other_status: string, apart_mm: number, farthest_mm: number, farthest: string}} ComparedPose
- * @typedef {{type: "range_comparison", first: number | null, last: number | null, people: ComparedPose[][]}}
- *   RangeComparisonMessage
+ * @typedef {{person: number, first: number, last: number, frames: number, verdict: "better" | "worse" | "same"}}
+ *   Stretch
+ * @typedef {{type: "range_comparison", first: number | null, last: number | null, people: ComparedPose[][], stretches:
+ *   Stretch[], run: number | null}} RangeComparisonMessage
  * @typedef {{level: "known" | "weak" | "unknown", sigma: number, sentence: string}} DofObservability
  * @typedef {{type: "observability", frame: number, person: number, dofs: DofObservability[]}} ObservabilityMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null, bound_m:
