@@ -47,7 +47,7 @@ export function mount(context, rooms) {
   const notices = new Notices();
   context.onNotice((notice) => notices.show(notice));
   new TopBar(store, actions);
-  new Comparison(store, actions, context.notify);
+  new Comparison(store, actions);
   const people = new People(store, actions, posing);
   showProgressMarks(store);
   watchConnection(byId("banner", HTMLElement), store);

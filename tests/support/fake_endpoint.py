@@ -57,7 +57,7 @@ NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
 SOURCES = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
 LIMBS = ["left arm", "right arm", "left leg", "right leg", "head"]
-LIMBS_LOST = {"doubtful": [0.31, 0.01, 0.0, 0.02, 0.0], "lost": [0.97, 0.04, 0.0, 0.0, 0.01]}
+LIMBS_LOST = {"doubtful": [0.01, 0.31, 0.0, 0.02, 0.0], "lost": [0.97, 0.04, 0.0, 0.0, 0.01]}
 """Probabilities of the limbs of a frame by its status."""
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
 DOFS = [{"joint": "torso", "name": name, "unit": "cm", "low": None, "high": None} for name in ("x", "y", "z")] + [
@@ -108,6 +108,14 @@ def encoded(message):
 def status_of(frame):
     """Frames 31 and 32 are doubtful, 50 is lost; there is no pose from 100 on."""
     return "doubtful" if frame in (31, 32) else "lost" if frame == 50 else "good"
+
+
+def limb_of(point):
+    """Display name of the limb of a point."""
+    side, _, joint = point.partition("_")
+    if not joint:
+        return "head" if point == "head" else "body"
+    return f"{SIDES[side + '_']} {'leg' if joint in ('hip', 'knee') else 'arm'}"
 
 
 def curve(index, frame):
@@ -174,7 +182,7 @@ class FakeEndpoint:
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
-            "compared": None, "compared_run": None, "preview": None,
+            "compared": None, "unseen_depth": None, "compared_run": None, "preview": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0, 4.0, 5.0, 6.0], "locked": [], "other_sizes": False, "solo": False,
@@ -428,9 +436,7 @@ class FakeEndpoint:
                 "limbs": LIMBS,
                 "dofs": DOFS,
                 "point_dofs": {name: [0, 1, 2, 4, 5, 6] if name == "torso" else [3] for name in REST},
-                "point_limbs": {
-                    name: {"name": "body" if name == "torso" else "left arm", "dofs": [3]} for name in REST
-                },
+                "point_limbs": {name: {"name": limb_of(name), "dofs": [3]} for name in REST},
             }
             for p in range(self.n_people)
         ]
@@ -444,7 +450,7 @@ class FakeEndpoint:
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
             told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
             await socket.send_str(encoded(told))
-        await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING}))
+        await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING, "keyframes": []}))
         if self.views:
             await self.send_frame([socket])
 
