@@ -324,6 +324,7 @@ class Tracking:
         self._save(run)
         track = self._session_state.state.track
         self._run = None
+        run.job.discard()
         self._session_state.set(
             track=TrackState(message=f"{how}: {_summary(len(run.session.tracked), track)}", failed=failed)
         )
