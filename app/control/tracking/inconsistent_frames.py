@@ -1,6 +1,8 @@
 """Find the frames whose poses disagree with their neighbours, in the background."""
 
+import time
 from collections.abc import Iterable
+from itertools import product
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from tracker.motion.consistency import inconsistent_frames
 
 _REST_S = 0.3
 """Minimum time between two checks: a tracker writes twice a second."""
+_REST_SHARE = 3.0
+"""Rest after an interval of many, in the time that it took. Each query of an edit gives up the interpreter, and waits
+for it again while a check computes: beside a check without rests, the first edits in a long recording took seconds."""
 _REACH = 3
 """A changed pose affects the result of frames up to this distance."""
 _MAX_INTERVAL = 2000
@@ -44,9 +49,13 @@ class InconsistentFrames:
         with session_state.lock:
             changed = sorted(session_state.saver.index.timeline(self._seen))
         self._seen = version
-        for first, last in _intervals(changed):
-            for person in range(len(session_state.models)):
-                self._check_interval(person, first, last)
+        people, took_s = range(len(session_state.models)), 0.0
+        for i, (person, (first, last)) in enumerate(product(people, _intervals(changed))):
+            if i >= len(people):  # a long recording, not an edit
+                time.sleep(_REST_SHARE * took_s)
+            began_s = time.monotonic()
+            self._check_interval(person, first, last)
+            took_s = time.monotonic() - began_s
         found = tuple(sorted(set().union(*self._found)))
         with session_state.lock:
             if found != session_state.state.inconsistent_frames:

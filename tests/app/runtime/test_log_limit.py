@@ -16,7 +16,8 @@ from app.server.access import Access
 from app.server.static_files import static_folder
 
 ODD = [
-    b"\x00\x01\x02\r\n\r\n", b"FOO\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n", b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n",
+    b"\x00\x01\x02\r\n\r\n", b"FOO\r\n\r\n", b"GET / HTTP/9.9\r\n\r\n",
+    b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n",
     b"GET http://[::1 HTTP/1.1\r\nHost: localhost\r\n\r\n", b"GET / HTTP/1.1\r\nHost: localhost\r\nA: \x00\r\n\r\n",
     b"GET /" + 9000 * b"a" + b" HTTP/1.1\r\nHost: localhost\r\n\r\n", b"GET / HTTP/1.1\r\nHost: local\xe9host\r\n\r\n",
     b"GET / HTTP/1.1\r\nHost: localhost\r\nOrigin: http://\xe9\r\n\r\n",
