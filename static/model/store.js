@@ -29,6 +29,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
  * @property {import("./series.js").Curves | null} curves the current group of curves
  * @property {import("./series.js").Tab | null} drawer the open tab; null while the drawer is closed
+ * @property {number} drawerPx height that the open drawer takes from the views, CSS pixels
  * @property {{choice: import("./theme.js").ThemeChoice, isDark: boolean}} theme
  * @property {import("./protocol.js").SettingsMessage | null} settings of tracker and search
  * @property {import("./protocol.js").View3dMessage | null} view3d what the 3-D view shows
@@ -87,6 +88,7 @@ export class Store {
     visible: null,
     curves: null,
     drawer: null,
+    drawerPx: 0,
     theme: { choice: "system", isDark: true },
     settings: null,
     view3d: null,

@@ -95,17 +95,32 @@ export class Pane {
   }
 
   /**
-   * Zoom to some joints; without any, show the whole image.
+   * Zoom to a box; without one, show the whole image.
    *
-   * @param {{u: number, v: number}[]} joints
+   * @param {import("./pane_view.js").ImageBox | null} box
    */
-  frame(joints) {
-    const us = joints.map(({ u }) => u);
-    const vs = joints.map(({ v }) => v);
-    if (joints.length) {
-      this.view.frame({ left: Math.min(...us), top: Math.min(...vs), right: Math.max(...us), bottom: Math.max(...vs) });
-    } else this.view.reset();
+  frame(box) {
+    if (box) this.view.frame(box);
+    else this.view.reset();
     this.#redraw();
+  }
+
+  /**
+   * Keep a framed box in view that has moved with the frame. The caller draws.
+   *
+   * @param {import("./pane_view.js").ImageBox} box
+   */
+  refit(box) {
+    this.view.refit(box);
+  }
+
+  /**
+   * Move the view with what it shows, image pixels. The caller draws.
+   *
+   * @param {{du: number, dv: number}} way
+   */
+  follow({ du, dv }) {
+    this.view.follow(du, dv);
   }
 
   /**

@@ -5,9 +5,9 @@ import { alt, inArea, plain } from "../widgets/key_matching.js";
 
 /**
  * @param {{grid: import("./pane_grid.js").PaneGrid, gestures: import("./gestures.js").Gestures, layers: import("../model/layers.js").Layers,
- *   layersMenu: import("./layers_menu.js").LayersMenu}} parts
+ *   layersMenu: import("./layers_menu.js").LayersMenu, say: (text: string) => void}} parts
  */
-export function paneBindings({ grid, gestures, layers, layersMenu }) {
+export function paneBindings({ grid, gestures, layers, layersMenu, say }) {
   return inArea("Views", [
     { keys: ["A"], label: "Layers", matches: plain("a"), run: () => layersMenu.toggle() },
     {
@@ -42,6 +42,13 @@ export function paneBindings({ grid, gestures, layers, layersMenu }) {
       label: "Link the zoom of all views (toggle)",
       matches: alt("Digit0", false),
       run: () => grid.toggleLink(),
+    },
+    {
+      keys: ["Alt V"],
+      label: "Zoomed views follow the people from frame to frame (toggle)",
+      words: "pan track playback steady still",
+      matches: alt("KeyV", false),
+      run: () => say(`Zoomed views ${grid.togglePeopleFollowed() ? "follow the people." : "stay where they are."}`),
     },
     {
       keys: [],

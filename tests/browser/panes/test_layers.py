@@ -185,7 +185,7 @@ class TestGrid:
     async def fit(self, page, endpoint, n_cameras):
         """Side by side, as large as there is room for, in pictures as fine as they are shown."""
         await page.set_viewport_size({"width": 1280, "height": 720})
-        await shows(page, "document.querySelector('#panes').clientWidth < 800")
+        await shows(page, "document.querySelector('#workspace').clientWidth === 1280")
         whole = await page.locator("#panes").bounding_box()
         boxes = [await pane.bounding_box() for pane in await page.locator(".pane:visible").all()]
         assert len(boxes) == n_cameras
