@@ -65,7 +65,7 @@ async def test_framed_people_stay_framed_and_an_edit_moves_no_view(page, endpoin
     await shows(page, "quadrille.state.views[0].zoom > 1.05")
     before = (await state_of(page))["views"][0]
     u, _ = await handle_of(page, 0, "torso")
-    endpoint.pose = {key: at + (0.4, 0, 0) for key, at in endpoint.pose.items()}
+    endpoint.pose = {key: np.add(at, (0.4, 0, 0)) for key, at in endpoint.pose.items()}
     await endpoint.send_overlay()
     await shows(page, f"quadrille.state.overlay.handles[0].u > {u} + 50")
     assert (await state_of(page))["views"][0] == before
@@ -99,8 +99,8 @@ async def test_a_session_opens_framed_on_the_people_where_they_are_now(page, end
 
 async def test_people_who_are_found_are_framed(page, endpoint):
     finding = {
-        "type": "finding", "running": True, "stage": "tracking", "share": 1.0, "notes": [], "message": "", "failed": False,
-        "frame": None, "axes": [],
+        "type": "finding", "running": True, "stage": "tracking", "share": 1.0, "notes": [], "message": "",
+        "failed": False, "frame": None, "axes": [],
     }  # fmt: skip
     endpoint.state["people"][0]["source"] = None
     await endpoint.broadcast(endpoint.state)
@@ -113,7 +113,10 @@ async def test_people_who_are_found_are_framed(page, endpoint):
     await shows(page, "quadrille.state.views.every((view) => view.zoom > 1.05)")
 
 
-@pytest.mark.parametrize("endpoint", [{"sizes": PORTRAIT}, {}, {"n_cameras": 8}], indirect=True, ids=["portrait", "4:3", "8"])
+FOOTAGE = {"portrait": {"sizes": PORTRAIT}, "4:3": {}, "8 cameras": {"n_cameras": 8}}
+
+
+@pytest.mark.parametrize("endpoint", FOOTAGE.values(), indirect=True, ids=FOOTAGE)
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])
 async def test_a_drawer_keeps_the_arrangement_of_the_panes(page, endpoint, size):
     await page.set_viewport_size({"width": size[0], "height": size[1]})

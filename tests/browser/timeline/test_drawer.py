@@ -17,7 +17,7 @@ async def test_a_drawer_opens_again_in_its_session_only_and_only_with_content(pa
     await page.wait_for_timeout(300)
     assert await page.locator("#drawer").is_hidden()  # nothing is compared
     await page.keyboard.press("c")
-    await page.evaluate("localStorage.setItem('quadrille.drawer.other', localStorage['quadrille.drawer.elbow_rotation'])")
+    await page.evaluate("localStorage.setItem('quadrille.drawer.other', '\"arms\"')")
     await page.evaluate("localStorage.removeItem('quadrille.drawer.elbow_rotation')")
     await page.reload()
     await shows(page, OPENED)
@@ -30,7 +30,7 @@ async def test_a_drawer_whose_content_is_gone_closes(page, endpoint):
     await shows(page, "quadrille.state.drawer === 'arms'")
     await endpoint.broadcast(EMPTY)
     await shows(page, "quadrille.state.drawer === null")
-    # Whoever opens it all the same sees why it is empty.
+    # On request it opens all the same, and says why it is empty.
     await page.keyboard.press("c")
     await shows(page, "quadrille.state.drawer === 'arms'")
     await endpoint.broadcast(EMPTY)
