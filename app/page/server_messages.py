@@ -204,7 +204,7 @@ class Compared(Part, frozen=True):
     warning: str
     """Where the edges and the user's placement disagree by much, as a sentence; empty if nowhere."""
     is_before_shown: bool
-    """Whether the views show the poses before. The costs are theirs then, and the overlay has no handles."""
+    """Whether the views show the poses before. The costs and handles are theirs then, and no joint can be dragged."""
 
 
 class FloorPicking(Part, frozen=True):

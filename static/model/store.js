@@ -66,6 +66,7 @@ import { defaultLayers } from "./layers.js";
  * @property {boolean} linkedViews whether all views follow the zoom of one
  * @property {number | null} filled the camera whose pane fills the grid
  * @property {import("./layers.js").LayerChoice} layers visible layers and their opacity
+ * @property {boolean} bare whether the views show pictures alone, without anything drawn over them
  * @property {(import("./image_tone.js").ImageTone | undefined)[]} imageTones tone of each camera's image
  * @property {number[]} reductions pixels of each camera's image per displayed pixel, per side; 0 if not visible
  */
@@ -125,6 +126,7 @@ export class Store {
     linkedViews: false,
     filled: null,
     layers: defaultLayers(),
+    bare: false,
     imageTones: [],
     reductions: [],
   };

@@ -31,5 +31,5 @@ export function mount({ store, send, notify, latency, layers, imageTones, recent
   new PlaceholderFrames(store, recentImages);
   new ViewRequest(store, send);
   new PoseLegend(store);
-  return { grid, gestures, bindings: paneBindings({ grid, gestures, layers, layersMenu, say }) };
+  return { grid, gestures, bindings: paneBindings({ store, grid, gestures, layers, layersMenu, say }) };
 }

@@ -12,7 +12,7 @@ const SECOND_DIGIT_MS = 700;
 /** Facts that change the marks over the overlay. @type {(keyof import("../model/store.js").Facts)[]} */
 const MARKED = ["hover", "hoverPart", "pinHover", "heldPin", "observability", "finding"];
 /** Facts that change the pictures. @type {(keyof import("../model/store.js").Facts)[]} */
-const PICTURED = ["shown", "placeholder", "layers", "imageTones"];
+const PICTURED = ["shown", "placeholder", "layers", "imageTones", "bare"];
 
 /** @typedef {{watch: (pane: Pane, camera: number) => void}} PointerTarget handles the pointer in a pane */
 
@@ -202,6 +202,7 @@ export class PaneGrid {
   #update(changed) {
     if (changed.has("session")) this.#build();
     if (changed.has("filled")) this.#fill();
+    if (changed.has("bare")) document.body.classList.toggle("is-bare", this.#store.facts.bare);
     if (changed.has("finding")) this.#expectPeople();
     const isMoved = changed.has("overlay") && this.#follower.take(this.panes, this.#store.facts);
     if (changed.has("overlay")) this.#frameAtOpening();

@@ -124,11 +124,11 @@ async def test_a_drawer_keeps_the_arrangement_of_the_panes(page, endpoint, size)
     before, width = await tracks_of(page), await page.locator("#panes").evaluate("(panes) => panes.clientWidth")
     for key in ("b", "c", "Shift+l"):
         await page.keyboard.press(key)
-        await shows(page, "quadrille.state.drawer !== null && quadrille.state.drawerPx > 100")
+        await shows(page, "quadrille.state.drawer !== null && document.querySelector('#drawer').offsetHeight > 100")
         assert await tracks_of(page) == before
         assert await page.locator("#panes").evaluate("(panes) => panes.clientWidth") == width
     await page.locator("#close-drawer").click()
-    await shows(page, "quadrille.state.drawerPx === 0")
+    await shows(page, "document.querySelector('#drawer').offsetHeight === 0")
     assert await tracks_of(page) == before
 
 

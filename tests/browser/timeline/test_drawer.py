@@ -42,10 +42,12 @@ async def test_a_drawer_whose_content_is_gone_closes(page, endpoint):
 @pytest.mark.parametrize("height", [720, 1080])
 async def test_no_lane_of_the_timeline_is_cut_off(page, endpoint, height):
     await page.evaluate("localStorage.removeItem('quadrille.first_steps')")
+    for kind in ("search", "curves", "doubts"):
+        await page.evaluate("(kind) => localStorage.setItem(`quadrille.drawer-height-${kind}`, '2000')", kind)
     await page.set_viewport_size({"width": 1280, "height": height})
     for key in ("b", "c", "Shift+l"):
         await page.keyboard.press(key)
-        await shows(page, "quadrille.state.drawerPx > 0")
+        await shows(page, "document.querySelector('#drawer').offsetHeight > 0")
         timeline = await page.locator("#timeline").bounding_box()
         assert timeline["y"] + timeline["height"] <= height
         views = await page.locator("#panes").bounding_box()
