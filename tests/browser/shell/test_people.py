@@ -166,6 +166,6 @@ async def test_the_top_bar_has_room_while_kernels_are_compiled(couple, endpoint)
     await couple.set_viewport_size({"width": 1280, "height": 720})
     endpoint.state["compiling"] = "contours"
     await endpoint.broadcast(endpoint.state)
-    await shows(couple, "!document.querySelector('#compiling').hidden")
+    await shows(couple, "document.querySelector('#work-compiling')")
     bar = "document.querySelector('.top-bar')"
     assert await couple.evaluate(f"{bar}.scrollWidth <= {bar}.clientWidth")
