@@ -135,6 +135,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             out += _some(changed, others, camera, index, "alternative")
         if replaced:
             out += _some(replaced, former, camera, index, "compared")
+        out += _found(state, bodies, camera, index, view)
         for kind, poses in outlined:
             if poses is not None:
                 out += _outlined(session, poses, camera, index, kind)
@@ -275,6 +276,14 @@ def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
         PosedBody(b.model, s.alternatives[0]) if s.alternatives else b
         for b, s in zip(bodies, state.people, strict=True)
     ]
+
+
+def _found(state: State, bodies: Sequence[PosedBody], camera: Camera, index: int, view: View) -> list[Path]:
+    """Draw the people who were found on the shown frame so far, while the search for people goes on."""
+    candidates = state.finding.candidates
+    if not candidates or state.finding.tried != state.frame or "contours" not in view.layers:
+        return []
+    return _some(candidates, [candidates.get(i, b) for i, b in enumerate(bodies)], camera, index, "candidate")
 
 
 def _some(
