@@ -197,7 +197,7 @@ export class PaneGrid {
     this.#following = new Set(moved);
     for (const camera of moved) {
       const [ofBody, own] = [inside, meant].map((joints) => joints.filter((one) => one.camera === camera));
-      this.panes[camera].frame(cameras.has(camera) ? withMargin(own, extentOf(ofBody)) : ofBody);
+      this.panes[camera].frame(boxOf(cameras.has(camera) ? withMargin(own, extentOf(ofBody)) : ofBody));
     }
     this.#zoomedToJoints = cameras;
   }
