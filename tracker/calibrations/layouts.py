@@ -82,8 +82,8 @@ LAYOUTS: tuple[CalibrationLayout, ...] = (
         "mm",
         data.is_dannce,
         data.read_row_vectors,
-        note="The principal points are read as DANNCE uses them. MATLAB counts pixels from 1: subtract 1 from both numbers "
-        "if its calibrator has made the file.",
+        note="The principal points are read as DANNCE uses them. MATLAB counts pixels from 1: subtract 1 from both "
+        "numbers if its calibrator has made the file.",
     ),
     CalibrationLayout(
         "OpenPose (one file for each camera)",

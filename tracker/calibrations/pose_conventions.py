@@ -131,12 +131,13 @@ def check_convention(
     ratio, margin = (_PAIR_RATIO, _PAIR_MARGIN) if len(Ts_stated) == 2 else (_RATIO, _MARGIN)
     others = _distinct([c for c in cost if cost[c] <= min(_FITS, max(_RATIO * best, best + _MARGIN))], Ts_stated)
     if best < _FITS and stated > ratio * best + margin:
-        condition = f"if {'R and t as read mean: ' if is_turned else ''}{_in_words(others[0])}"
+        rewrite = _rewrite(others[0])
+        condition = f"if R and t, as read, are changed ({rewrite})" if is_turned else f"if {_in_words(others[0])}"
         misfit = f"expected {expected}, by which the cameras see no one place"
         if len(others) == 1:
             raise CalibrationError(
                 f"{where}: {misfit}, found that they do {condition}",
-                Remedy("give_poses", poses=others[0], rewrite=_rewrite(others[0])),
+                Remedy("give_poses", poses=others[0], rewrite="likewise" if is_turned else rewrite),
             )
         raise CalibrationError(
             f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({_in_words(c)})' for c in others)}",
