@@ -52,19 +52,19 @@ def survey(form: SurveyForm) -> Survey:
     rig: dict[str, Any] | None = None
     footage: list[Path] = []
     try:
-        if form.calibration is not None:
-            calibration = read_cameras(typed_path(form.calibration), form.units)
-            entries = calibration.entries
-            rig = _rig(summarize_rig([e.camera(None if e.size else _SOME_SIZE) for e in entries], form.up))
-            rig["doubts"] = [*calibration.notes, *rig["doubts"]]
-    except TrackerError as error:
-        problems.append(page_text(error))
-    try:
         if form.footage is not None:
             footage = footage_in(typed_path(form.footage))[:MAX_CAMERAS]
     except TrackerError as error:
         problems.append(page_text(error))
     by_name = {camera_name(path): str(path) for path in footage}
+    try:
+        if form.calibration is not None:
+            calibration = read_cameras(typed_path(form.calibration), form.units, footage=set(by_name))
+            entries = calibration.entries
+            rig = _rig(summarize_rig([e.camera(None if e.size else _SOME_SIZE) for e in entries], form.up))
+            rig["doubts"] = [*calibration.notes, *rig["doubts"]]
+    except TrackerError as error:
+        problems.append(page_text(error))
     names = [e.name for e in entries]
     return Survey(
         names,

@@ -69,6 +69,7 @@ def read_cameras(
     used: Units = units or layout.unit or "m"
     entries = tuple(_entry(name, section, where, METRES[used], poses) for name, section in usable.items())
     notes = [f"Camera '{name}' is left out: {reason}." for name, reason in left_out.items()]
+    notes += [layout.note] if layout.note else []
     entries, note = _with_convention(entries, where, layout, poses)
     notes += [] if note is None else [note]
     check_names(entries, where)
@@ -229,7 +230,7 @@ def _with_convention(
     """Return the cameras with their poses in the right convention, and a note where it is not sure."""
     stated: list[Array] = [rigid.inverse(entry.T_world_camera) for entry in entries]
     if poses is None:
-        expected = layout.poses_in_words
-        return entries, check_convention(stated, where, expected, layout.by_program)
+        is_turned = not layout.has_opencv_poses
+        return entries, check_convention(stated, where, layout.poses_in_words, layout.by_program, is_turned)
     changed = [rigid.inverse(read_pose(T, poses)) for T in stated]
     return tuple(replace(e, T_world_camera=T) for e, T in zip(entries, changed, strict=True)), None

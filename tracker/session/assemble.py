@@ -153,6 +153,11 @@ def check_parts(
                 f"camera '{name}' is asked for, but {calibration.left_out[name]}; calibrate it with the others, or "
                 "leave it out"
             )
+    if len(calibrated) == 1 and len(request.videos) > 1 and not request.cameras:
+        raise SessionError(
+            f"the calibration has the camera '{next(iter(calibrated))}' alone, and there are {len(request.videos)} "
+            "videos; give the files of all cameras or their folder, or one calibration of all"
+        )
     check_names(request.cameras, list(calibrated), "camera", "the cameras to use")
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
         raise SessionError(f"expected each camera to use once, found '{twice[0]}' twice; leave one out")

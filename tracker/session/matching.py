@@ -211,15 +211,17 @@ def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, in
             )
 
 
-def check_names(given: Iterable[str], known: Sequence[str], what: str, among: str) -> None:
+def check_names(given: Iterable[str], known: Sequence[str], what: str, among: str) -> list[str]:
     """Check that given names are known; `what` and `among` are for the message, such as "camera" and "the offsets".
 
     Raises:
         SessionError: one is not; the message lists those that are.
     """
-    unknown = [n for n in given if n not in known]
+    given, compared = list(given), {same_form(name): name for name in known}
+    unknown = [n for n in given if same_form(n) not in compared]
     if unknown:
         raise SessionError(f"unknown {what} '{unknown[0]}' among {among}; expected one of {', '.join(known)}")
+    return [compared[same_form(n)] for n in given]
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -1,6 +1,7 @@
 """Moved footage gets its new place; other footage is refused, and nothing is written then."""
 
 import shutil
+import unicodedata
 from contextlib import closing
 from dataclasses import replace
 
@@ -16,7 +17,8 @@ from tracker.formats.anipose import write_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.session.assemble import NewSession, assemble
-from tracker.session.relink import Places, missing_files, relink, require_files
+from tracker.session.matching import check_names
+from tracker.session.relink import Places, _files_named, missing_files, relink, require_files
 from tracker.session.session import load_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
@@ -158,3 +160,10 @@ def test_a_proxy_follows_its_footage(room):
     assert proxy.fits(take / "a.mp4")
     assert not proxy.follow(take / "b.mp4")
     assert not Proxy(session.folder / FOLDER, "b").follow(take / "b.mp4")
+
+
+def test_names_are_searched_in_both_unicode_forms(tmp_path):
+    composed, apart = (unicodedata.normalize(form, "Büro.mp4") for form in ("NFC", "NFD"))
+    (tmp_path / apart).write_bytes(b"")
+    assert _files_named({composed}, [tmp_path]) == {composed: [tmp_path / apart]}
+    assert check_names([apart], [composed], "camera", "the cameras") == [composed]
