@@ -153,8 +153,9 @@ def _scale(header: dict[str, str], where: str) -> float:
 def _whole(text: str | None) -> int | None:
     """Return a header's whole number; None if it is none, or no frame number."""
     number = _number(text)
-    is_frame = isinstance(number, float) and number.is_integer() and abs(number) <= MAX_FRAMES
-    return int(number) if is_frame and not isinstance(number, str) else None
+    if isinstance(number, float) and number.is_integer() and abs(number) <= MAX_FRAMES:
+        return int(number)
+    return None
 
 
 def _number(text: str | None) -> float | str | None:
