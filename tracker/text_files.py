@@ -1,11 +1,17 @@
-"""Read text files within limits, with errors that name the file and the place."""
+"""Read text files within limits, with errors that name the file and the place.
 
+Text is UTF-8, or UTF-16 or UTF-32 with a byte order mark. Bytes of another encoding, such as Latin-1, become U+FFFD
+(`LOST`): comments and paths may hold them, names may not (`refuse_lost`).
+"""
+
+import codecs
 import os
 import re
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from io import TextIOWrapper
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -16,6 +22,17 @@ from tracker.errors import TrackerError
 
 MAX_NESTING = 32
 """Deepest nesting of brackets and longest dotted key of a TOML file."""
+LOST = "\N{REPLACEMENT CHARACTER}"
+"""Stands for each byte that is not UTF-8."""
+_FREE = re.compile("path|folder|directory|comment|note|remark|description|date|author|user|operator|software", re.I)
+"""Keys whose values are free text: no program looks for a camera, joint or file by them."""
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_MARKS = (
+    (codecs.BOM_UTF32_LE, "utf-32"),  # begins as UTF-16's
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
 _MAX_LINE = 1_000_000
 """Longest line of a table, characters."""
 
@@ -35,26 +52,37 @@ class TextKind:
 
 
 def read_text(path: Path, kind: TextKind) -> str:
-    """Read a whole text file.
+    """Read a whole text file; `LOST` stands for bytes that are not UTF-8.
 
     Raises:
-        TrackerError: of the kind's type; the file is missing, too large, or not UTF-8 text.
+        TrackerError: of the kind's type; the file is missing, too large, or not text.
     """
     with _reading(path, kind), path.open("rb") as file:
         _check_size(os.fstat(file.fileno()).st_size, path, kind)
         data = file.read(kind.max_bytes + 1)  # a pipe or device does not know its size
         _check_size(len(data), path, kind)
-        return data.decode("utf-8-sig")
+        encoding = _encoding_of(data)
+        try:
+            return data.decode(encoding)
+        except UnicodeDecodeError:
+            text = data.decode(encoding, "replace")
+            if encoding != "utf-8-sig" or _CONTROL.search(text):
+                raise  # no text of any encoding
+            return text
 
 
 def read_lines(path: Path, kind: TextKind) -> Iterator[str]:
     """Yield the lines of a text file, without their ends. Only one line is in memory.
 
+    `LOST` stands for bytes that are not UTF-8.
+
     Raises:
-        TrackerError: of the kind's type; the file is missing, too large, or not UTF-8 text, or a line is too long.
+        TrackerError: of the kind's type; the file is missing, too large, or not text, or a line is too long.
     """
-    with _reading(path, kind), path.open(encoding="utf-8-sig") as file:
-        _check_size(os.fstat(file.fileno()).st_size, path, kind)
+    with _reading(path, kind), path.open("rb") as data:
+        _check_size(os.fstat(data.fileno()).st_size, path, kind)
+        encoding = _encoding_of(data.peek(4))
+        file = TextIOWrapper(data, encoding, errors="replace" if encoding == "utf-8-sig" else "strict")
         size = number = 0
         while line := file.readline(_MAX_LINE + 1):
             size, number = size + len(line), number + 1
@@ -63,6 +91,8 @@ def read_lines(path: Path, kind: TextKind) -> Iterator[str]:
                 raise kind.error(
                     f"{kind.name} {path}, line {number}: expected at most {_MAX_LINE} characters; {kind.remedy}"
                 )
+            if LOST in line and _CONTROL.search(line):
+                raise ValueError(f"other bytes in line {number}")
             yield line.rstrip("\n")
 
 
@@ -90,7 +120,7 @@ def parse_toml(text: str, source: str, kind: TextKind) -> dict[str, Any]:
     if depth > MAX_NESTING or _LONG_KEY.search(plain):
         raise kind.error(too_deep)
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
     except RecursionError as error:
         # Possessive quantifiers of Python 3.11.2 match too little, so that some strings hide brackets after them.
         raise kind.error(too_deep) from error
@@ -98,6 +128,9 @@ def parse_toml(text: str, source: str, kind: TextKind) -> dict[str, Any]:
         # The parser gives no line for a construct left open at the end: report the last line.
         place = str(error).replace("at end of document", f"at line {max(1, len(text.splitlines()))}, the last")
         raise kind.error(f"{where} is not valid TOML: {place}; correct it") from error
+    if LOST in text:
+        refuse_lost(data, where, kind)
+    return data
 
 
 def read_json(path: Path, kind: TextKind) -> Any:
@@ -108,9 +141,52 @@ def read_json(path: Path, kind: TextKind) -> Any:
     """
     text = read_text(path, kind)
     try:
-        return msgspec.json.decode(text)
+        data = msgspec.json.decode(text)
+        if LOST in text:
+            refuse_lost(data, f"{kind.name} {path}", kind)
     except (msgspec.DecodeError, RecursionError) as error:
         raise kind.error(f"{kind.name} {path} is not valid JSON: {error}; {kind.remedy}") from error
+    return data
+
+
+def refuse_lost(data: Any, where: str, kind: TextKind, key: str = "") -> None:
+    """Check that no name in plain data has lost letters to another encoding; free text may have.
+
+    Args:
+        data: content of a file, or of a part of it.
+        where: kind and path of the file, for messages.
+        kind: of the file.
+        key: under which the data stands.
+
+    Raises:
+        TrackerError: of the kind's type; a key, or text under a key that is not known to be free, has `LOST`.
+    """
+    if isinstance(data, dict):
+        for inner, value in data.items():
+            refuse_lost(str(inner), where, kind)
+            refuse_lost(value, where, kind, str(inner))
+    elif isinstance(data, list):
+        for value in data:
+            refuse_lost(value, where, kind, key)
+    elif isinstance(data, str) and LOST in data and not _FREE.search(key):
+        raise kind.error(
+            f"{where}: expected UTF-8 text in names, found {data[:60]!r}{f' as {key!r}' * bool(key)}, where "
+            f"{LOST} stands for bytes of another encoding; save the file as UTF-8"
+        )
+
+
+def _encoding_of(start: bytes) -> str:
+    """Return the encoding of a text by its byte order mark; UTF-8 without one.
+
+    Raises:
+        ValueError: every second byte is zero, as in UTF-16 without a mark.
+    """
+    for mark, encoding in _MARKS:
+        if start.startswith(mark):
+            return encoding
+    if len(start) >= 4 and (start[0] == start[2] == 0 or start[1] == start[3] == 0) and any(start[:4]):
+        raise ValueError("zero bytes, as in UTF-16 without a byte order mark: save it as UTF-8")
+    return "utf-8-sig"
 
 
 @contextmanager

@@ -105,8 +105,8 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         print(f"the videos declare {' or '.join(sorted(declared))} frames per second")
     for note in notes:
         print(f"note: {note}")
-    if note := exchange_note(made):
-        print(f"warning: {note}", file=sys.stderr)
+    if warning := exchange_note(made):
+        print(f"warning: {warning}", file=sys.stderr)
 
 
 def _models(arguments: NewArguments) -> Mapping[str, str] | str | None:

@@ -1,9 +1,11 @@
 """Text files are refused by size and depth before they are parsed, and read from whatever a path names."""
 
 import contextlib
+import json
 import os
 import threading
 import time
+import tomllib
 import tracemalloc
 from pathlib import Path
 
@@ -62,7 +64,7 @@ def test_a_byte_order_mark_is_no_text(tmp_path):
         ("none", "odd file .*none not found; check the path"),
         (
             "latin",
-            "odd file .*latin cannot be read: expected UTF-8 text, found: .* position 3.*; mend it",
+            "odd file .*latin cannot be read: expected UTF-8 text, found: .*( position 3|bytes in line 1).*; mend it",
         ),
         (".", "cannot be read: expected UTF-8 text, found: .*Is a directory"),
         ("x" * 400, "cannot be read: .*File name too long"),
@@ -70,9 +72,45 @@ def test_a_byte_order_mark_is_no_text(tmp_path):
     ],
 )
 def test_paths_that_are_no_text_file(tmp_path, read, name, expected):
-    (tmp_path / "latin").write_bytes(b"abc\xfcdef")
+    (tmp_path / "latin").write_bytes(b"abc\xfcd\x01f")
     with pytest.raises(SessionError, match=expected):
         read(tmp_path / name, KIND)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-32"])
+def test_encodings_with_a_mark(tmp_path, encoding):
+    """As PowerShell and Notepad write text."""
+    (tmp_path / "a").write_bytes('größe = "é"\r\nb = 2\r\n'.encode(encoding))
+    assert read_text(tmp_path / "a", KIND).startswith('größe = "é"')
+    assert all_lines(tmp_path / "a", KIND) == ['größe = "é"', "b = 2"]
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-16-be"])
+@pytest.mark.parametrize("read", [read_text, read_toml, all_lines])
+def test_utf_16_without_a_mark_is_named(tmp_path, read, encoding):
+    (tmp_path / "a").write_bytes("abc = 1".encode(encoding))
+    with pytest.raises(SessionError, match="zero bytes, as in UTF-16 without a byte order mark: save it as UTF-8"):
+        read(tmp_path / "a", KIND)
+
+
+@pytest.mark.parametrize("text", ["a = 1 # José\n", "image_path = 'C:\\Büro'\n", "[m]\ncomment = ['Büro']\n"])
+def test_comments_and_paths_may_be_of_another_encoding(tmp_path, text):
+    (tmp_path / "a").write_bytes(text.encode("latin-1"))
+    assert read_toml(tmp_path / "a", KIND).keys() == tomllib.loads(text).keys()
+
+
+NAMES = ["name = 'Büro'", "['Büro']\na = 1", "[a]\nmarkers = ['x', 'é']", "[path]\nname = 'é'"]
+
+
+@pytest.mark.parametrize("text", NAMES)
+def test_names_of_another_encoding_are_refused(tmp_path, text):
+    """Nobody knows which letters they are."""
+    (tmp_path / "a").write_bytes(text.encode("latin-1"))
+    with pytest.raises(SessionError, match=r"expected UTF-8 text in names, found .*save the file as UTF-8"):
+        read_toml(tmp_path / "a", KIND)
+    (tmp_path / "a").write_bytes(json.dumps(tomllib.loads(text), ensure_ascii=False).encode("latin-1"))
+    with pytest.raises(SessionError, match="expected UTF-8 text in names"):
+        read_json(tmp_path / "a", KIND)
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])

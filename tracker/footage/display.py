@@ -1,9 +1,8 @@
 """Turn decoded frames as their display matrix says: quarter turns and mirror images."""
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
-from av.sidedata.sidedata import Type
 from av.video.frame import VideoFrame
 
 from tracker.geometry.arrays import Image
@@ -36,10 +35,10 @@ def display_turn(frame: VideoFrame) -> DisplayTurn:
 
     FFmpeg's matrix maps a pixel (x, y) to (a x + c y, b x + d y), with y downwards (libavutil/display.h).
     """
-    data = frame.side_data.get(Type.DISPLAYMATRIX)
+    data = frame.side_data.get("DISPLAYMATRIX")
     if data is None:
         return DisplayTurn(False, False, False)
-    a, b, _, c, d = np.frombuffer(bytes(data), np.int32)[:5].tolist()
+    a, b, _, c, d = np.frombuffer(cast(bytes, data), np.int32)[:5].tolist()
     if abs(b) + abs(c) > abs(a) + abs(d):
         return DisplayTurn(True, c < 0, b < 0)
     return DisplayTurn(False, a < 0, d < 0)

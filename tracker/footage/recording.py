@@ -44,7 +44,8 @@ class Recording:
             in_background: do not wait for lists that are not cached; see `listed_share`.
 
         Raises:
-            RecordingError: footage is missing, unreadable, truncated or empty, or its size is not the camera's.
+            RecordingError: footage is missing, unreadable, truncated or empty, its size is not the camera's, or it ends
+                before its offset.
         """
         self._cameras = tuple(cameras)
         self._pool = ThreadPoolExecutor(max(1, len(self._cameras)), thread_name_prefix="decode")
@@ -53,6 +54,8 @@ class Recording:
         )
         for source, footage in zip(self._cameras, self._footage, strict=True):
             check_size(source.camera.name, footage.path, footage.size, source.camera.size)
+        if self.listed_share is None:
+            self._check_offsets()
         self.fps = next((f.fps for f in self._footage if f.fps is not None), None)
         self._cache: OrderedDict[_Key, Image] = OrderedDict()
         self._cache_bytes, self._cached_bytes = cache_bytes, 0
@@ -132,7 +135,21 @@ class Recording:
 
     def _check(self, k: int) -> None:
         if k < 0 or (self.listed_share is None and k >= self.n_frames):
+            self._check_offsets()
             raise RecordingError(f"expected a frame from 0 to {self.n_frames - 1}, found {k}")
+
+    def _check_offsets(self) -> None:
+        """Check that each camera has a frame after its offset.
+
+        Raises:
+            RecordingError: one has none.
+        """
+        for source, footage in zip(self._cameras, self._footage, strict=True):
+            if footage.n_frames <= source.offset:
+                raise RecordingError(
+                    f"camera '{source.camera.name}': expected an offset below its {footage.n_frames} frames, found "
+                    f"{source.offset}; correct it in session.toml, or check the footage {footage.path}"
+                )
 
     def _read_one(self, camera: int, k: int) -> Image | None:
         footage = self._footage[camera]

@@ -266,7 +266,7 @@ class VideoFile:
 
     def _to_rgb(self, frame: VideoFrame) -> Image:
         # One converter for all frames: preparing one takes longer than a conversion.
-        image = self._converter.reformat(frame, format="rgb24").to_ndarray()
+        image: Image = np.asarray(self._converter.reformat(frame, format="rgb24").to_ndarray(), np.uint8)
         return display_turn(frame).apply(image)
 
     def _decode_frame(self, k: int) -> VideoFrame | None:

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import msgspec
 import yaml
 
-from tracker.text_files import MAX_NESTING, TextKind
+from tracker.text_files import LOST, MAX_NESTING, TextKind, refuse_lost
 
 _OPENCV_HEADER = re.compile(r"\A\s*%YAML[: ][^\n]*\n")
 """OpenCV writes `%YAML:1.0`, which is not YAML."""
@@ -45,7 +45,10 @@ def parse_yaml(text: str, source: str, kind: TextKind) -> Any:
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             if depth > MAX_NESTING or isinstance(event, yaml.AliasEvent):
                 raise kind.error(f"{where}: expected plain data, found references or deep nesting; {kind.remedy}")
-        return _with_matrices(yaml.load(text, Loader=_Loader))
+        data = _with_matrices(yaml.load(text, Loader=_Loader))
+        if LOST in text:
+            refuse_lost(data, where, kind)
+        return data
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         mark = getattr(error, "problem_mark", None)
         place = "" if mark is None else f" at line {mark.line + 1}"
@@ -60,9 +63,12 @@ def parse_json(text: str, source: str, kind: TextKind) -> Any:
         TrackerError: of the kind's type; the text is not JSON.
     """
     try:
-        return _with_matrices(msgspec.json.decode(text))
+        data = _with_matrices(msgspec.json.decode(text))
     except (msgspec.DecodeError, RecursionError) as error:
         raise kind.error(f"{kind.name} {source} is not valid JSON: {error}; {kind.remedy}") from error
+    if LOST in text:
+        refuse_lost(data, f"{kind.name} {source}", kind)
+    return data
 
 
 def parse_xml(text: str, source: str, kind: TextKind) -> ElementTree.Element:
@@ -72,7 +78,10 @@ def parse_xml(text: str, source: str, kind: TextKind) -> ElementTree.Element:
         TrackerError: of the kind's type; the text is not XML.
     """
     try:
-        return ElementTree.fromstring(text)
+        root = ElementTree.fromstring(text)
+        for element in root.iter() if LOST in text else ():
+            refuse_lost({element.tag: [element.text, *element.attrib.values()]}, f"{kind.name} {source}", kind)
+        return root
     except (ElementTree.ParseError, ValueError) as error:  # a declared encoding is no business of text
         raise kind.error(f"{kind.name} {source} is not valid XML: {error}; {kind.remedy}") from error
 

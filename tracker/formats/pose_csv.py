@@ -26,7 +26,7 @@ from tracker.errors import FormatError
 from tracker.files import write_text_atomic
 from tracker.formats.number_rows import NumberRows
 from tracker.geometry.arrays import Array
-from tracker.text_files import TextKind, read_lines
+from tracker.text_files import TextKind, read_lines, refuse_lost
 from tracker.validation import Name, check_version, quoted
 
 VERSION = 1
@@ -142,6 +142,7 @@ def _read_head(lines: Sequence[str], where: str) -> _Head:
         raise FormatError(f"{where} is not a table of poses: expected '{_TITLE}{VERSION}' as its first line")
     check_version({"version": int(version)}, VERSION, where, FormatError)
     head = {k.strip(): v.strip() for k, _, v in (line[1:].partition("=") for line in lines[1:])}
+    refuse_lost(head, where, _KIND)
     try:
         return msgspec.convert(head, _Head, strict=False)
     except msgspec.ValidationError as error:
@@ -152,6 +153,7 @@ def _read_head(lines: Sequence[str], where: str) -> _Head:
 
 def _read_columns(columns: Sequence[str], where: str) -> tuple[tuple[str, ...], list[float]]:
     names, factors = [], []
+    refuse_lost(list(columns), where, _KIND)
     for column in columns:
         unit = next((u for u in _FACTORS if column.endswith(u)), None)
         if unit is None:

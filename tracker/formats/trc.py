@@ -18,7 +18,7 @@ from tracker.errors import FormatError
 from tracker.files import write_text_atomic
 from tracker.formats.number_rows import NumberRows
 from tracker.geometry.arrays import Array
-from tracker.text_files import TextKind, read_lines
+from tracker.text_files import LOST, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_FRAMES, FrameRate, check, quoted
 
 _METRES = {
@@ -79,6 +79,8 @@ def read_trc(path: str | Path) -> MarkerTable:
     scale = _scale(header, where)
     rate = check(_number(header.get("DataRate")), FrameRate, f"{where}, line 3, DataRate", FormatError)
     names = tuple(n.strip() for n in head[3].split("\t")[2:] if n.strip())
+    if LOST in head[3]:  # in the first line there is a path, which nobody needs
+        refuse_lost(list(names), f"{where}, line 4", _KIND)
     if not 1 <= len(names) <= _MAX_POINTS or len(set(names)) != len(names):
         raise FormatError(
             f"{where}, line 4: expected 1 to {_MAX_POINTS} point names, each once, found {quoted(list(names))}; "
@@ -151,8 +153,9 @@ def _scale(header: dict[str, str], where: str) -> float:
 def _whole(text: str | None) -> int | None:
     """Return a header's whole number; None if it is none, or no frame number."""
     number = _number(text)
-    is_frame = isinstance(number, float) and number.is_integer() and abs(number) <= MAX_FRAMES
-    return int(number) if is_frame and not isinstance(number, str) else None
+    if isinstance(number, float) and number.is_integer() and abs(number) <= MAX_FRAMES:
+        return int(number)
+    return None
 
 
 def _number(text: str | None) -> float | str | None:

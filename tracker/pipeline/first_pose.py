@@ -146,6 +146,11 @@ class _Trial:
         self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say,
         show: Show = lambda frame, found: None,
     ) -> None:  # fmt: skip
+        if len(session.cameras) < 2:
+            raise TrackerError(
+                f"expected two cameras or more to find people, found '{session.cameras[0].camera.name}' alone, which "
+                "shows no depth; place the body by hand, or set it from known joints"
+            )
         self._show = show
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
         self._finder = SilhouetteFinder(session.cameras, observer.recording)

@@ -105,7 +105,7 @@ def _irregularity(footage: Footage) -> str:
 
 
 def footage_notes(footage: Mapping[str, Footage], fps: float, offsets: Mapping[str, int]) -> list[str]:
-    """Return sentences on what a person should check: jitter, cameras that start later, mirrored pictures.
+    """Return sentences on what a person should know: a lone camera, jitter, late starts, mirrored pictures.
 
     Args:
         footage: of each camera by name.
@@ -113,6 +113,11 @@ def footage_notes(footage: Mapping[str, Footage], fps: float, offsets: Mapping[s
         offsets: shifts by camera name; with any, starts are not compared.
     """
     notes = []
+    if len(footage) == 1:
+        notes.append(
+            "one camera shows no depth: bodies can be placed by hand or from known joints, exported and evaluated; "
+            "people are found by two cameras or more, and tracked poses will be lost"
+        )
     for name, f in footage.items():
         if _jitter(f) > _NOTED_JITTER:
             notes.append(f"camera '{name}': {_irregularity(f)}; its frames are taken as they are, {fps:g} per second")

@@ -42,3 +42,14 @@ def test_init_by_voxels_refuses_sizes_that_show_no_limbs(run, session):
         expected = f"voxels of 10 to 100 mm, found {size} mm"
         assert_refused(run("init", session, "--method", "voxels", "--frame", "3", "--voxel-size", size), [expected])
     assert not (session / "annotations.sqlite").exists()
+
+
+def test_people_are_not_searched_with_one_camera(run, tmp_path):
+    words = ("new", tmp_path / "s", "--calibration", SAMPLE / "calibration.toml", "--videos", SAMPLE / "FRONT.mp4")
+    status, out, _ = run(*words)
+    assert status == 0
+    assert "note: one camera shows no depth" in out
+    expected = ["two cameras or more to find people", "'FRONT' alone", "by hand, or set it from known joints"]
+    for method in ("voxels", "axis", "auto"):
+        assert_refused(run("init", tmp_path / "s", "--method", method), expected)
+    assert run("init", tmp_path / "s", "--joints", SAMPLE / "truth.trc")[0] == 0

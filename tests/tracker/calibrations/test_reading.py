@@ -300,3 +300,16 @@ def test_real_calibrations_are_read_without_a_doubt(data_folder, recording):
     found = read_cameras(data_folder(recording) / "Calib.toml")
     assert len(found.entries) == 4
     assert found.notes == ()
+
+
+def test_text_of_other_encodings(tmp_path):
+    """A mark tells UTF-16; of Latin-1, comments and paths are read, and no name is guessed."""
+    path = tmp_path / "a.toml"
+    write_calibration(path, CAMERAS)
+    plain = path.read_text() + "path = 'C:/Büro'  # José\n"  # of the last section, metadata
+    for encoding in ("utf-16", "latin-1"):
+        path.write_bytes(plain.encode(encoding))
+        assert [c.name for c in read_calibration(path)] == ["cam0", "cam1", "cam2"]
+    path.write_bytes(plain.replace('name = "cam1"', 'name = "Büro"').encode("latin-1"))
+    with pytest.raises(CalibrationError, match=r"UTF-8 text in names, found .B.ro. as .name."):
+        read_calibration(path)

@@ -46,16 +46,16 @@ def files(draw):
     truth = np.arange(start, stop)
     if draw(st.booleans()):  # a gap whose rows are cut out
         truth = truth[(truth < start + 2) | (truth > start + 12)]
-    counting = draw(st.sampled_from(["from 0", "from 1", "anew from 0", "anew from 1"]))
-    frames = truth + {"from 0": 0, "from 1": 1, "anew from 0": -start, "anew from 1": 1 - start}[counting]
+    counting = draw(st.sampled_from(["from 0", "from 1", "restart at 0", "restart at 1"]))
+    frames = truth + {"from 0": 0, "from 1": 1, "restart at 0": -start, "restart at 1": 1 - start}[counting]
     data_rate = draw(st.sampled_from([fps, float(nominal)]))
     stamp_rate = draw(st.sampled_from([fps, data_rate]))
-    stamps = draw(st.sampled_from(["from 0", "from 1", "anew"]))
-    times = (truth + {"from 0": 0, "from 1": 1, "anew": -start}[stamps]) / stamp_rate
+    stamps = draw(st.sampled_from(["from 0", "from 1", "restart"]))
+    times = (truth + {"from 0": 0, "from 1": 1, "restart": -start}[stamps]) / stamp_rate
     times = np.round(times, draw(st.sampled_from([2, 3, 6, 15])))
     origin = draw(st.sampled_from([None, 0, 1, start, start + 1, int(frames[0])]))
     file = table(frames, times, data_rate, truth, origin)
-    says_nothing = start > 0 and counting.startswith("anew") and stamps == "anew" and origin in (None, 0, 1)
+    says_nothing = start > 0 and counting.startswith("restart") and stamps == "restart" and origin in (None, 0, 1)
     # These two say frame 0 and frame `start + 1` as clearly as files that begin there.
     like_frame_0 = start == 1 and int(frames[0]) in (0, 1) and times[0] == 0
     like_next = start > 0 and counting == "from 1" and stamps == "from 1" and origin in (None, 0, start + 1)

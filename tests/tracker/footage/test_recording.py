@@ -43,6 +43,12 @@ def test_range_is_what_all_cameras_have(two):
             recording.read(k)
 
 
+def test_an_offset_beyond_the_footage_is_named(tmp_path):
+    late = source("a", encode(tmp_path / "a.mp4", n=20), offset=10_000_000)
+    with pytest.raises(RecordingError, match="'a': expected an offset below its 20 frames, found 10000000"):
+        Recording([late])
+
+
 def test_frames_cannot_be_written(two):
     with pytest.raises(ValueError):
         Recording(two).read(0)[0][:] = 0

@@ -44,6 +44,20 @@ def test_people_can_read_it(tmp_path):
     assert float(row["left_elbow.extension_deg"]) == 90
 
 
+def test_text_of_other_encodings(tmp_path):
+    write_pose_table(tmp_path / "a.csv", load_model("gavrila22"), np.zeros((1, 22)))
+    text = (tmp_path / "a.csv").read_text()
+    (tmp_path / "a.csv").write_bytes(text.encode("utf-16"))
+    assert read_pose_table(tmp_path / "a.csv").model == "gavrila22"
+    with_path = text.replace("# height_m", "# path = C:\\Büro\n# height_m")
+    (tmp_path / "a.csv").write_bytes(with_path.encode("latin-1"))
+    assert read_pose_table(tmp_path / "a.csv").model == "gavrila22"
+    for old, new in (("gavrila22", "größe"), ("torso.x", "tørso.x")):
+        (tmp_path / "a.csv").write_bytes(text.replace(old, new).encode("latin-1"))
+        with pytest.raises(FormatError, match=r"a\.csv.*expected UTF-8 text in names"):
+            read_pose_table(tmp_path / "a.csv")
+
+
 def test_quaternions_have_no_unit(tmp_path):
     model = parse_model(BALL, "ball")
     write_pose_table(tmp_path / "a.csv", model, model.neutral()[None])

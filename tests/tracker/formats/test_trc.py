@@ -136,6 +136,26 @@ def test_few_short_rows_of_many_points_are_refused_before_they_fill_the_memory(w
         read_trc(write("".join(f"{k}\t0\n" for k in range(9)), header=HEADER.replace("Knee\t\t\tHeel", names)))
 
 
+ROW = "1\t0\t1\t2\t3\t4\t5\t6\n"
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "cp1252", "utf-16", "utf-8-sig"])
+def test_the_path_in_the_first_line_may_be_of_any_encoding(tmp_path, encoding):
+    text = HEADER.replace("x.trc", "C:\\Users\\José\\é.trc", 1).format(units="m") + ROW
+    (tmp_path / "a.trc").write_bytes(text.encode(encoding))
+    table = read_trc(tmp_path / "a.trc")
+    assert (table.names, table.points[0, 1].tolist()) == (("Knee", "Heel"), [4.0, 5.0, 6.0])
+
+
+def test_names_of_another_encoding_are_refused(tmp_path):
+    text = HEADER.replace("Knee", "Knöchel", 1).format(units="m") + ROW
+    (tmp_path / "a.trc").write_bytes(text.encode("latin-1"))
+    with pytest.raises(FormatError, match=r"a\.trc, line 4: expected UTF-8 text in names.*Kn.*save the file as UTF-8"):
+        read_trc(tmp_path / "a.trc")
+    (tmp_path / "a.trc").write_bytes(text.encode("utf-16"))
+    assert read_trc(tmp_path / "a.trc").names == ("Knöchel", "Heel")
+
+
 def test_missing(tmp_path):
     with pytest.raises(FormatError, match="not found"):
         read_trc(tmp_path / "none.trc")

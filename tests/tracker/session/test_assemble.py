@@ -214,7 +214,8 @@ def test_frames_that_all_cameras_have(room, longer, offsets, n):
 
 
 def test_common_frames_of_equal_videos_leave_nothing_out(room):
-    session = new(room, common_frames=True)
+    session, notes = noted(room, common_frames=True)
+    assert notes == []
     assert (session.n_frames, [c.footage_frames for c in session.cameras]) == (9, [None, None])
     assert tomllib.loads((room / "s" / "session.toml").read_text())["version"] == 1
 
@@ -268,6 +269,10 @@ def test_a_camera_that_starts_later_by_its_stamps(room):
     assert notes[0].endswith("offsets front=15")
     _, notes = noted(room, folder=room / "t", offsets={"front": 1})
     assert notes == []  # the user has paired them
+
+
+def test_one_camera_alone_says_what_it_can_do(room):
+    assert "one camera shows no depth" in noted(room, cameras=["left"])[1][0]
 
 
 def test_mirrored_video_is_named(room):
