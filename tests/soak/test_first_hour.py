@@ -22,12 +22,19 @@ from stranger import Errors, Stranger, table
 
 from tracker.evaluation.metrics import evaluate_joints
 from tracker.evaluation.references import read_joints
+from tracker.formats.joint_maps import joints_of
+from tracker.formats.trc import read_trc
+from tracker.simulate import Simulation, simulate
 
 RECORDINGS = {
     "balance_real": {"person": "reference_joints.trc"},
     "two_people": {"man": "ground_truth_person1.trc", "woman": "ground_truth_person2.trc"},
+    "portrait": {"person": "truth.trc"},
+    "fisheye": {"person": "truth.trc"},
 }
 """The people of each recording, and their references."""
+SIMULATED = {"portrait": {"size": (480, 640)}, "fisheye": {"fisheyes": ("FRONT",)}}
+"""Recordings that are made: upright pictures, and one camera of four with a fisheye lens of 120 degrees."""
 LIMBS = [
     f"{side}_{joint}"
     for limb in (("knee", "ankle"), ("elbow", "wrist"))
@@ -38,7 +45,9 @@ LIMBS = [
 ORDER = ["torso", "torso", "left_shoulder", "right_shoulder", *LIMBS]
 """What is dragged to place a person, from the trunk outwards, each in the next view."""
 MOST_DRAGS = 20
-MOST_MM = {"balance_real": (60, 40, 45), "two_people": (90, 60, 80)}
+MOST_MM = {
+    "balance_real": (60, 40, 45), "two_people": (90, 60, 80), "portrait": (60, 40, 45), "fisheye": (60, 40, 45)
+}  # fmt: skip
 """Bounds of the errors of each person: placed, fitted, and exported in the end. The woman is 15 % smaller than the
 default body."""
 STRETCHES = 3
@@ -46,6 +55,8 @@ STEP = 10
 """Frames between two that the stranger looks at."""
 SHORT = 10
 """Frames of a recording that a short run takes."""
+WHOLE = 100
+"""Frames of a made recording in a full run."""
 HALF_HOUR_S = 1800
 REPORT_S = 300
 PANELS = ("c", "b", "v", "h", "Shift+H", "a", "Control+k", "?", "Shift+L", "Alt+i")
@@ -53,6 +64,24 @@ ARRIVED = (
     "quadrille.state.state.frame === quadrille.state.target && quadrille.state.shown.frame === quadrille.state.target "
     "&& quadrille.state.overlay.frame === quadrille.state.target"
 )
+
+
+@pytest.fixture
+def footage(data_folder, tmp_path):
+    """Find the folder of a recording's files, or make it: one person who exercises, in a folder as users have it."""
+
+    def find(name, n_frames):
+        if name not in SIMULATED:
+            return data_folder(name)
+        made, folder = tmp_path / "made", tmp_path / name
+        simulate(made, Simulation("exercise", n_frames=n_frames, **SIMULATED[name]))
+        folder.mkdir()
+        for path in (*made.glob("*.mp4"), made / "background", made / "truth.trc"):
+            path.rename(folder / path.name)
+        (made / "calibration.toml").rename(folder / "Calib.toml")
+        return folder
+
+    return find
 
 
 async def make_session(hour):
@@ -332,10 +361,11 @@ async def go_on(hour, until_s, report):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("recording", RECORDINGS)
-async def test_a_stranger_gets_through_the_first_hour(recording, tmp_path, data_folder, cases, report, monkeypatch):
+async def test_a_stranger_gets_through_the_first_hour(recording, tmp_path, footage, cases, report, monkeypatch):
     for name in ("STATE", "DATA"):
         monkeypatch.setenv(f"XDG_{name}_HOME", str(tmp_path / name.lower()))
     began, n_frames, log = time.monotonic(), None if cases(100) >= 100 else SHORT, tmp_path / "program.log"
+    data = footage(recording, 2 * SHORT if n_frames else WHOLE)
     program = Program(None, has_token=True, log=log)
     async with (
         async_playwright() as playwright,
@@ -345,7 +375,7 @@ async def test_a_stranger_gets_through_the_first_hour(recording, tmp_path, data_
         page = await context.new_page()
         await page.add_init_script(WITHOUT_3D)
         errors, stranger = Errors(page), Stranger(page)
-        hour = Hour(stranger, data_folder(recording), tmp_path / "session", RECORDINGS[recording], n_frames)
+        hour = Hour(stranger, data, tmp_path / "session", RECORDINGS[recording], n_frames)
         try:
             await program.start()
             await page.goto(program.address, timeout=120_000)

@@ -35,16 +35,19 @@ class Framing(NamedTuple):
 
 
 def framings(cameras: Sequence[Camera], points_world: Array) -> tuple[Framing, ...]:
-    """Return the place of points, (N, 3), N > 0, metres, in the view of each camera, in undistorted pixels."""
+    """Return the place of points, (N, 3), N > 0, metres, in the view of each camera.
+
+    It is in undistorted pixels, but for a fisheye lens in those of the footage, which alone have a border.
+    """
     return tuple(_framing(camera, points_world) for camera in cameras)
 
 
 def _framing(camera: Camera, points_world: Array) -> Framing:
     center = points_world.mean(axis=0)
     ahead = points_world[camera.depths(points_world) > NEAR_PLANE_M]
-    points_px = camera.pinhole.project(ahead)
-    beyond = np.maximum(np.maximum(-0.5 - points_px, points_px - (np.array(camera.pinhole.size) - 0.5)), 0)
-    beside = np.linalg.norm(beyond, axis=-1)
+    points_px = camera.project(ahead) if camera.fisheye else camera.pinhole.project(ahead)
+    beyond = np.maximum(np.maximum(-0.5 - points_px, points_px - (np.array(camera.size) - 0.5)), 0)
+    beside = np.nan_to_num(np.linalg.norm(beyond, axis=-1), nan=np.inf)
     return Framing(
         camera.name,
         float(np.linalg.norm(center - camera.center_world)),

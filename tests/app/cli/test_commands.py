@@ -319,17 +319,20 @@ def test_several_people(run, tmp_path):
 
 def test_simulate(run, tmp_path):
     options = ("--frames", "2", "--cameras", "2", "--size", "160", "120", "--body", "model", "--masks")
+    options += ("--fisheye", "cam2")
     status, out, err = run("simulate", tmp_path / "sim", *options)
     assert (status, out) == (0, f"made {tmp_path / 'sim'}\n")
     assert err.splitlines()[-1].startswith("rendering: 4 of 4, ")  # an image of each camera for each frame
     made = load_session(tmp_path / "sim")
     assert (made.n_frames, [c.camera.name for c in made.cameras]) == (2, ["cam1", "cam2"])
     assert {c.camera.size for c in made.cameras} == {(160, 120)}
+    assert [c.camera.fisheye for c in made.cameras] == [False, True]
     for name in ("truth.trc", "truth.csv", "truth_model.toml", "masks/cam2/000001.png", "background/cam1.png"):
         assert (tmp_path / "sim" / name).is_file(), name
     assert run("info", tmp_path / "sim")[0] == 0
     assert_refused(run("simulate", tmp_path / "sim"), ["exists already"])
     assert_refused(run("simulate", tmp_path / "no", "--scene", "moonwalk"), ["elbow_rotation"])
+    assert_refused(run("simulate", tmp_path / "no", "--fisheye", "cam1"), ["FRONT, RIGHT, BACK, LEFT or all", "cam1"])
     assert [p.name for p in tmp_path.iterdir()] == ["sim"]
 
 

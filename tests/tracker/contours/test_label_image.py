@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+from fisheye import with_fisheye
 from staging import SIZE, at, camera_at, solid
 
 from tracker.contours.label_image import part_labels
@@ -34,6 +35,15 @@ def test_the_nearer_of_two_bodies_is_seen_and_where_they_meet_the_surface_decide
         (cv2.Laplacian(expected.astype(np.float32), cv2.CV_32F) != 0).astype(np.uint8), np.ones((3, 3))
     )
     assert np.all((labels == expected) | (borders > 0))
+    assert np.mean(labels != expected) < 0.002
+
+
+def test_a_fisheye_is_labelled_in_its_undistorted_picture():
+    camera, model = with_fisheye(FRONT), solid((RADIUS,) * 3)
+    labels = part_labels([at(model, 0.0, 0.8, 0.0)], camera)
+    assert labels.shape == (camera.pinhole.height, camera.pinhole.width)
+    np.testing.assert_array_equal(labels, part_labels([at(model, 0.0, 0.8, 0.0)], camera.pinhole))
+    expected = met_first([(0.0, 0.8, 0.0)], camera.pinhole)
     assert np.mean(labels != expected) < 0.002
 
 

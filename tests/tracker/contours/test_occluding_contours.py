@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fisheye import with_fisheye
 from scipy.spatial import cKDTree
 from staging import at, camera_at, cameras_around, solid
 
@@ -205,3 +206,13 @@ def test_lens_distortion_is_left_out(gavrila):
     bent = replace(camera, distortion=np.array([-0.2, 0.05, 0.001, 0.001]))
     body = [PosedBody(gavrila, gavrila.neutral())]
     np.testing.assert_array_equal(trace(body, bent).pieces_px, trace(body, camera).pieces_px)
+
+
+def test_contours_of_a_fisheye_lie_in_its_undistorted_picture(gavrila):
+    camera = with_fisheye(cameras_around(1)[0])
+    body = [PosedBody(gavrila, gavrila.neutral())]
+    pieces = trace(body, camera).pieces_px
+    np.testing.assert_array_equal(pieces, trace(body, camera.pinhole).pieces_px)
+    filmed = camera.distort_points(pieces.reshape(-1, 2).astype(float))
+    across = filmed[:, None] - camera.project(body[0].points_world)
+    assert np.linalg.norm(across, axis=-1).min(axis=0).max() < 25  # no joint is far from an outline

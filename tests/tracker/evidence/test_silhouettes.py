@@ -3,6 +3,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from fisheye import with_fisheye
 
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.camera_source import CameraSource
@@ -71,6 +72,9 @@ def test_shadows_and_highlights_are_background(camera):
 def test_pixels_are_as_filmed(camera):
     silhouette = found(camera)
     assert silhouette.mask.shape == (H, W)
+    wide = found(replace(camera, camera=with_fisheye(camera.camera)))
+    np.testing.assert_array_equal(wide.mask, silhouette.mask)
+    assert wide.camera.fisheye
     assert np.array_equal(silhouette.camera.distortion, camera.camera.distortion)
 
 
