@@ -21,7 +21,7 @@ _LIFT_M = 0.012
 
 def points_occluded(bodies: Sequence[PosedBody], cameras: Sequence[Camera], points_world: Array) -> NDArray[np.bool_]:
     """Return whether any body occludes each point, (V, n); see `points_occluded_by_body`."""
-    return points_occluded_by_body(bodies, cameras, points_world).any(axis=1)
+    return np.asarray(points_occluded_by_body(bodies, cameras, points_world).any(axis=1))
 
 
 def points_occluded_by_body(
