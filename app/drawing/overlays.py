@@ -119,9 +119,12 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         ("preview", None if preview is None else preview.poses),
         ("result", result),
     )
-    for index in sorted(view.cameras):
-        camera = session.cameras[index].camera.pinhole
-        if "contours" not in state.compiled:  # the contours' kernels are being compiled
+    seen = {index: session.cameras[index].camera.pinhole for index in sorted(view.cameras)}
+    is_traced = "contours" in state.compiled  # otherwise the contours' kernels are being compiled
+    has_edges = is_traced and "part_edges" in view.layers
+    edges = dict(zip(seen, part_edges.part_edges(bodies, list(seen.values())), strict=True)) if has_edges else {}
+    for index, camera in seen.items():
+        if not is_traced:
             out += _skeletons(session, bodies, camera, index)
             continue
         if not view.layers.isdisjoint(("contours", "hidden")):
@@ -139,8 +142,8 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         for kind, poses in outlined:
             if poses is not None:
                 out += _outlined(session, poses, camera, index, kind)
-        if "part_edges" in view.layers:
-            out.append(Path(index, 0, "part_edge", KIND_COLORS["part_edge"], part_edges.part_edges(bodies, camera)))
+        if index in edges:
+            out.append(Path(index, 0, "part_edge", KIND_COLORS["part_edge"], edges[index]))
         if views is not None:
             out += [s for s in _segments(bodies, views[index], index, view) if s.kind in view.layers]
             if replay is not None and replay.fitted_from is not None:

@@ -5,6 +5,7 @@ Every request must name the server by an expected name (against DNS rebinding). 
 same name and port. Every account of this machine reaches loopback, so a request must also have the token.
 """
 
+import hashlib
 import ipaddress
 import logging
 import re
@@ -33,10 +34,19 @@ class Access:
     invitation: "Invitation | None" = None
     """Stands for the token once, in the address that a browser is started with."""
 
+    @property
+    def root(self) -> str:
+        """Path below which the page is served to those who have the token; "/" without a token.
+
+        A browser sends cookies to every port of a machine, also to the server of another account. It sends the token's
+        cookie only below this path, which nobody can guess and which does not admit by itself.
+        """
+        return "/" if self.token is None else f"/{hashlib.sha256(f'root {self.token}'.encode()).hexdigest()[:32]}/"
+
     def cookie(self, host: str) -> str:
         """Return the name of the token's cookie for a Host header.
 
-        Programs on other ports share cookies, so it has the port. A later start replaces it.
+        It has the port, so that programs on several ports do not replace one another's. A later start replaces it.
         """
         called = _HOST.fullmatch(host)
         return f"quadrille_{(called and called['port']) or _DEFAULT_PORTS['http']}"

@@ -2,8 +2,11 @@
 
 import asyncio
 from collections.abc import Callable
+from typing import Any
 
 from aiohttp import web
+from aiohttp.http_parser import RawRequestMessage
+from yarl import URL
 
 MAX_CONNECTIONS = 100
 """Connections at a time. A page has about eight; some systems allow a process 256 open files."""
@@ -24,13 +27,32 @@ _FULL = (
 class LimitedRunner(web.AppRunner):
     """A runner whose sites limit the number and the age of their connections."""
 
-    def __init__(self, app: web.Application) -> None:
-        """Prepare to run an application, without a log of its requests."""
+    def __init__(self, app: web.Application, root: str = "/") -> None:
+        """Prepare to run an application, without a log of its requests.
+
+        Args:
+            app: the application.
+            root: path below which it is served, besides its own paths.
+        """
+        self._root = root
         super().__init__(
             app, access_log=None, handle_signals=False, shutdown_timeout=2.0, keepalive_timeout=KEEPALIVE_S,
             lingering_time=LINGER_S,
         )  # fmt: skip
         self._open: dict[_Connection, None] = {}  # in the order of their beginning
+
+    async def _make_server(self) -> web.Server:
+        server = await super()._make_server()
+        make_request, root = server.request_factory, self._root
+
+        def make_routed(message: RawRequestMessage, *args: Any) -> web.BaseRequest:
+            if root != "/" and message.path.startswith(root):
+                path = message.path.removeprefix(root[:-1])
+                message = message._replace(path=path, url=URL(path, encoded=True))
+            return make_request(message, *args)
+
+        server.request_factory = make_routed
+        return server
 
     @property
     def server(self) -> Callable[[], asyncio.Protocol] | None:  # type: ignore[override]

@@ -188,6 +188,8 @@ class _Handler(BaseHTTPRequestHandler):
         hosts = self.headers.get_all("Host", [])
         host = hosts[0] if len(hosts) == 1 else None
         path = self.path.partition("?")[0]
+        if path.startswith(root := self.server.doorway.access.root):
+            path = "/" + path.removeprefix(root)
         answer = self.server.doorway.answer(path, host, self.headers.get("Origin"))
         sources = "'none'" if host is None or answer.status == HTTPStatus.FORBIDDEN else connect_sources(host)
         with suppress(OSError):

@@ -23,6 +23,9 @@ from app.server.static_files import KEPT, POLICY, PREFIX, ROUTE, PageFiles, conn
 
 _LOG = logging.getLogger(__name__)
 _SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
+_ROOT: web.AppKey[str] = web.AppKey("root", str)
+_ENTRY = '<!doctype html><title>Quadrille</title><meta http-equiv="refresh" content="0; url={root}">'
+"""Answer to an address with a token: the browser goes on to the page's own address, and does not keep this one."""
 _MAX_MESSAGE_BYTES = 1 << 20  # what a page sends is a line or two of JSON
 _MAX_PATH_CHARACTERS = 2000
 _MAX_NAME_BYTES = 255
@@ -48,14 +51,17 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
     """
     app = web.Application(middlewares=[_guard(access)])
     app[_SOCKETS] = weakref.WeakSet()
+    app[_ROOT] = access.root
     proxy, files = viser_proxy.ViserProxy(viser_socket), PageFiles(static)
 
     async def page(request: web.Request) -> web.StreamResponse:
-        response = web.Response(text=files.index(), content_type="text/html")
-        if access.token is not None and "token" in request.query:
-            # Set with the page itself: after a redirect, a browser that followed a link would not send a Strict cookie.
-            name = access.cookie(request.headers["Host"])
-            response.set_cookie(name, access.token, httponly=True, samesite="Strict", path="/")
+        if access.token is None or "token" not in request.query:
+            return web.Response(text=files.index(), content_type="text/html")
+        # No redirect: after one, a browser that followed a link would not send a Strict cookie.
+        response = web.Response(text=_ENTRY.format(root=access.root), content_type="text/html")
+        response.headers["Content-Location"] = access.root
+        name = access.cookie(request.headers["Host"])
+        response.set_cookie(name, access.token, httponly=True, samesite="Strict", path=access.root)
         return response
 
     async def page_file(request: web.Request) -> web.StreamResponse:
@@ -112,7 +118,7 @@ async def serve_forever(app: web.Application, sockets: Sequence[socket.socket], 
         sockets: that listen (`address.listen`).
         on_ready: called once when the server answers.
     """
-    runner = connections.LimitedRunner(app)
+    runner = connections.LimitedRunner(app, app[_ROOT])
     await runner.setup()
     try:
         for each in sockets:

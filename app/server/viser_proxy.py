@@ -60,7 +60,7 @@ class ViserProxy:
             if request.headers.get("Upgrade", "").lower() == "websocket":
                 return await self._socket(request)
             if request.path == "/viser":
-                raise web.HTTPFound("/viser/")  # relative addresses, and those in viser's page, need the slash
+                raise web.HTTPFound("viser/")  # relative addresses, and those in viser's page, need the slash
             return await self._fetch(request)
         except aiohttp.ClientError as error:
             raise web.HTTPBadGateway(text="The 3-D view does not answer; start quadrille again.\n") from error

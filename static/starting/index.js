@@ -30,10 +30,17 @@ async function hasStarted() {
   return false;
 }
 
-/** Let the program exchange the token in the address for a cookie. Where it refuses the page, show its refusal. */
+/**
+ * Let the program exchange the token in the address for a cookie and the page's own address, to which the cookie is
+ * bound. Where it refuses the page, show its refusal.
+ */
 async function enter() {
   const answer = await fetch(location.href, { cache: "no-store" });
-  if (answer.ok) return;
+  if (answer.ok) {
+    const root = answer.headers.get("Content-Location");
+    if (root !== null) history.replaceState(null, "", root);
+    return;
+  }
   location.reload();
   await new Promise(() => {});
 }

@@ -1,5 +1,7 @@
 """An hour of scripted annotation in a browser: nothing goes wrong, and neither the program nor the page grows.
 
+A second page subscribes to all that the protocol offers, starts short tracking runs and breaks half of them off.
+
 `QUADRILLE_SOAK=1` takes the whole hour, and only then memory is judged: caches fill in the first half. To run it alone:
 `QUADRILLE_SOAK=1 python -m pytest -m slow tests/soak/test_hours_of_annotation.py`.
 """
@@ -8,8 +10,10 @@ import asyncio
 import random
 import shutil
 import time
+from contextlib import asynccontextmanager
 from pathlib import Path
 
+import aiohttp
 import numpy as np
 import pytest
 from chromium import FLAGS, chromium_path
@@ -18,6 +22,7 @@ from page_driver import dragging, shows
 from playwright.async_api import async_playwright
 from program import ROOT, started, visited
 
+from app.state.page_view import LAYERS
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 
@@ -32,7 +37,7 @@ KEPT_S = 60.0
 """The least of this time is what the program keeps: what a frame or a search takes and gives back is some 30 MB, which
 leaves the slope of half an hour uncertain by more than what is allowed."""
 POINTS = ("left_wrist", "right_wrist", "left_elbow", "right_elbow", "left_knee", "right_ankle", "head", "torso")
-KEYS = ("Control+z", "Control+z", "Control+Shift+z", "h", "h", "Shift+H", "Shift+H", "]", "[", "m", "c", "r")
+KEYS = ("g", "g", "Control+z", "Control+z", "Control+Shift+z", "h", "h", "Shift+H", "Shift+H", "]", "[", "m", "c", "r")
 N_FRAMES = 50
 SEED = 7
 
@@ -57,7 +62,44 @@ async def go_to(page, frame):
         raise AssertionError(f"{error}; target, frame and job are {at}") from None
 
 
-async def act(page, rng):
+SUBSCRIPTIONS = (
+    {"type": "view", "layers": LAYERS, "reductions": [1, 1, 1, 1], "by_part": True},
+    {"type": "history", "limit": 2000},
+    {"type": "curves", "group": "arms"},
+    {"type": "watch", "tab": "search"},
+)
+
+
+@asynccontextmanager
+async def subscribed(address):
+    """The socket of a page that is sent everything."""
+    async with (
+        aiohttp.ClientSession() as session,
+        session.ws_connect(address.replace("http", "ws") + "ws", max_msg_size=0) as socket,
+    ):
+
+        async def hear():
+            async for _ in socket:
+                pass
+
+        for message in SUBSCRIPTIONS:
+            await socket.send_json(message)
+        hearing = asyncio.create_task(hear())
+        yield socket
+        hearing.cancel()
+
+
+async def track(page, socket, rng):
+    """Track some frames, to the end or not."""
+    frame = await page.evaluate("quadrille.state.state.frame")
+    await socket.send_json({"type": "track", "action": "forward", "until": min(frame + 4, N_FRAMES - 1)})
+    await asyncio.sleep(rng.uniform(0.0, 1.0))
+    if rng.random() < 0.5:
+        await socket.send_json({"type": "track", "action": "stop"})
+    await shows(page, "quadrille.state.state.track.running === false", 120)
+
+
+async def act(page, socket, rng):
     """What an annotator does on a frame: look, drag some joints in some views, change their mind, search, go on."""
     # Another frame than the page shows: it would ask for none, though an undo on its way may still leave this one.
     shown = await page.evaluate("quadrille.state.target")
@@ -74,6 +116,8 @@ async def act(page, rng):
     if rng.random() < 0.1:
         await page.locator("#search-frame").click()
         await shows(page, "quadrille.state.state.job.running === false", 120)
+    if rng.random() < 0.3:
+        await track(page, socket, rng)
     if rng.random() < 0.1:
         await page.locator("#play").click()
         await asyncio.sleep(1.0)
@@ -106,12 +150,14 @@ async def test_an_hour_of_annotation_loses_nothing_and_does_not_grow(tmp_path, c
         await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS) as browser,
         started(folder) as program,
         visited(browser, program.address) as page,
+        subscribed(program.address) as socket,
     ):
         devtools = await page.context.new_cdp_session(page)
         await devtools.send("Performance.enable")
         begun = measured = time.monotonic()
         while time.monotonic() < begun + length_s:
-            await act(page, rng)
+            await act(page, socket, rng)
+            assert not socket.closed, "the program has closed the socket of the second page"
             n += 1
             if time.monotonic() >= measured + min(MEASURED_S, length_s / 6):
                 measured = time.monotonic()

@@ -21,7 +21,7 @@ _LIFT_M = 0.012
 
 def points_occluded(bodies: Sequence[PosedBody], cameras: Sequence[Camera], points_world: Array) -> NDArray[np.bool_]:
     """Return whether any body occludes each point, (V, n); see `points_occluded_by_body`."""
-    return points_occluded_by_body(bodies, cameras, points_world).any(axis=1)
+    return np.asarray(points_occluded_by_body(bodies, cameras, points_world).any(axis=1))
 
 
 def points_occluded_by_body(
@@ -50,37 +50,49 @@ def points_occluded_by_body(
     return occluded
 
 
-def part_edges(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:
+def part_edges(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[FloatArray]:
     """Return the visible curves in which surfaces of parts intersect: drawn, but never matched (GD96 Sect. 5).
 
-    The surface of each part is cut by the implicit function of every part near it.
+    Args:
+        bodies: all bodies in the scene.
+        cameras: the views.
 
     Returns:
-        End points x0, y0, x1, y1 in undistorted px, (N, 4).
+        For each view end points x0, y0, x1, y1 in undistorted px, (N, 4).
     """
     surfaces = surfaces_of(tuple(b.model for b in bodies))
     Ts = occluding_contours.part_poses(bodies)
+    curves = _intersections(bodies, Ts, surfaces)
+    shown = []
+    for camera in cameras:
+        pieces, points = _cut(curves, camera)
+        # Where both surfaces face the camera, a small step towards it leaves both parts.
+        towards = camera.center_world - points
+        lifted = points + _LIFT_M * towards / np.linalg.norm(towards, axis=-1, keepdims=True)
+        nothing = np.zeros((len(Ts), len(points)), dtype=bool)
+        shown.append(pieces[~_occluded_points(camera, Ts, surfaces, lifted, nothing)])
+    return shown
+
+
+def _intersections(bodies: Sequence[PosedBody], Ts: Array, surfaces: Surfaces) -> Array:
+    """Return segments of the curves in which parts intersect, (n, 2, 3), metres.
+
+    The surface of each part is cut by the implicit function of every part near it.
+    """
     shapes = [s for b in bodies for s in b.model.shapes]
-    grids = [s.grid(N_RINGS, N_SECTORS)[0] + c for s, c in zip(shapes, surfaces.centers, strict=True)]
-    segments = np.empty((6 * (N_RINGS + N_SECTORS), 2, 3), np.float32)
-    shown = [np.empty((0, 4), np.float32)]
-    for a in range(len(shapes)):
-        grid = grids[a] @ Ts[a, :3, :3].T + Ts[a, :3, 3]
-        for b in range(a):  # each pair once: the curve lies on both surfaces
-            apart = Ts[a, :3] @ (*surfaces.centers[a], 1.0) - Ts[b, :3] @ (*surfaces.centers[b], 1.0)
-            if np.linalg.norm(apart) > surfaces.radii[a] + surfaces.radii[b]:
-                continue
+    centers_world = np.einsum("pij,pj->pi", Ts[:, :3, :3], surfaces.centers) + Ts[:, :3, 3]
+    apart_m = np.linalg.norm(centers_world[:, None] - centers_world, axis=-1)
+    is_near = np.tril(apart_m <= surfaces.radii[:, None] + surfaces.radii, -1)  # each pair once: it is on both surfaces
+    buffer, found = np.empty((6 * (N_RINGS + N_SECTORS), 2, 3), np.float32), [np.empty((0, 2, 3))]
+    for a in np.flatnonzero(is_near.any(axis=1)):
+        grid = (shapes[a].grid(N_RINGS, N_SECTORS)[0] + surfaces.centers[a]) @ Ts[a, :3, :3].T + Ts[a, :3, 3]
+        for b in np.flatnonzero(is_near[a]):
             local = (grid - Ts[b, :3, 3]) @ Ts[b, :3, :3] - surfaces.centers[b]
             # The root makes the implicit function nearly linear across the surface, for interpolation.
             depth = shapes[b].inside_outside(local) ** (1 / shapes[b].degree) - 1.0
-            n = _zero_line(depth.astype(np.float32), grid.astype(np.float32), segments)
-            pieces, points = _cut(segments[:n].astype(np.float64), camera)
-            # Where both surfaces face the camera, a small step towards it leaves both parts.
-            towards = camera.center_world - points
-            lifted = points + _LIFT_M * towards / np.linalg.norm(towards, axis=-1, keepdims=True)
-            nothing = np.zeros((len(shapes), len(points)), dtype=bool)
-            shown.append(pieces[~_occluded_points(camera, Ts, surfaces, lifted, nothing)])
-    return np.concatenate(shown)
+            n = _zero_line(depth.astype(np.float32), grid.astype(np.float32), buffer)
+            found.append(buffer[:n].astype(np.float64))
+    return np.concatenate(found)
 
 
 def _cut(segments: Array, camera: Camera) -> tuple[FloatArray, Array]:

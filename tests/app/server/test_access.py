@@ -99,3 +99,11 @@ def test_any_text_can_be_compared_with_the_token(found):
 )
 def test_the_cookie_has_the_port_that_the_page_is_called_by(host, name):
     assert REMOTE.cookie(host) == f"quadrille_{name}"
+
+
+def test_the_root_is_not_to_be_guessed_and_stays_with_the_token():
+    roots = {Access(token=token).root for token in ("secret", "other")}
+    assert len(roots) == 2
+    assert Access(token="secret").root in roots
+    assert all(len(root) == 34 and "secret" not in root for root in roots)
+    assert LOCAL.root == "/"

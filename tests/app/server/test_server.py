@@ -7,11 +7,12 @@ from pathlib import Path
 import aiohttp
 import pytest
 from aiohttp import web
-from serving import listening
+from serving import listening, running
 from yarl import URL
 
 from app.server import address, server
 from app.server.access import Access, Invitation
+from app.server.connections import LimitedRunner
 from app.server.static_files import static_folder
 from tracker.errors import TrackerError
 
@@ -192,7 +193,7 @@ async def test_viser_is_fetched_below_its_own_root(client, fake_viser):
     assert "Origin" not in fake_viser.requests[0].headers
     async with client.get("/viser", allow_redirects=False) as response:
         assert response.status == 302
-        assert response.headers["Location"] == "/viser/"
+        assert response.headers["Location"] == "viser/"
 
 
 @pytest.mark.parametrize("path", ["/viser", "/viser/"])
@@ -247,6 +248,8 @@ class TestToken:
             cookie = response.cookies[NAMED.cookie(host["Host"])]
             assert cookie["httponly"]
             assert cookie["samesite"] == "Strict"
+            assert cookie["path"] == response.headers["Content-Location"] == NAMED.root
+            assert f'url={NAMED.root}"' in await response.text()
         holder = host | {"Cookie": f"{cookie.key}={cookie.value}"}
         for path in ("/", "/static/main.js", "/viser/"):
             async with client.get(path, headers=holder) as response:
@@ -254,6 +257,21 @@ class TestToken:
         async with client.ws_connect("/ws", headers=holder) as sock:
             await sock.send_str("hello")
             assert await sock.receive_str() == "hello"
+
+    async def test_everything_is_served_below_the_root_to_those_who_have_the_cookie(self, fake_viser):
+        app = server.create_app(EchoPanes(), fake_viser.socket_path, NAMED, static_folder())
+        async with running(LimitedRunner(app, NAMED.root)) as port, aiohttp.ClientSession() as session:
+            root, name = f"http://127.0.0.1:{port}{NAMED.root}", NAMED.cookie(f"127.0.0.1:{port}")
+            for path in ("", "static/main.js", "viser/", "ws"):
+                async with session.get(root + path) as response:  # the path alone does not admit
+                    assert response.status == 403
+            holder = {"Cookie": f"{name}={NAMED.token}"}
+            for path, content in (("", b"<html"), ("static/main.js", b"import"), ("viser/a%20b?c", b"viser /a%20b?c")):
+                async with session.get(URL(root + path, encoded=True), headers=holder) as response:
+                    assert (response.status, content in await response.read()) == (200, True)
+            async with session.ws_connect(root + "ws", headers=holder) as sock:
+                await sock.send_str("hello")
+                assert await sock.receive_str() == "hello"
 
     @pytest.mark.parametrize("token", ["\xe9", "secret\xe9", "%C3%A9", "%ED%A0%80", "\u20ac"])
     async def test_a_token_that_is_not_ascii_is_refused_like_any_other(self, port, token):

@@ -25,6 +25,7 @@ async def test_another_session_takes_the_place_of_the_first(browser, tmp_path, m
         errors = Errors(page)
         await page.add_init_script(WITHOUT_3D)
         await page.goto(program.address, timeout=120_000)
+        await page.wait_for_url(lambda url: "token" not in url)
         await shows(page, "window.quadrille?.state.overlay", 120)
         await page.keyboard.press("Control+o")
         await page.keyboard.type(str(tmp_path / "dance"))

@@ -4,8 +4,10 @@ import asyncio
 from contextlib import asynccontextmanager
 
 import pytest
+from aiohttp import web
 from fake_endpoint import FakeEndpoint
 from page_driver import OPENED, shows
+from serving import listening
 
 from app.server.address import Serving
 from app.server.doorway import STEPS, Doorway
@@ -72,3 +74,48 @@ async def test_a_page_whose_program_has_ended_says_so(browser, doorway):
         await shows(page, "document.querySelector('#steps li')")
         doorway.__exit__(None, None, None)
         await shows(page, f"{COVERED} && document.querySelector('#start-note').innerText.includes('does not answer')")
+
+
+@asynccontextmanager
+async def another_port():
+    """The server of another account of this machine; gives its port and the cookies that browsers send it."""
+    heard = []
+
+    async def hear(request):
+        heard.append(request.headers.get("Cookie"))
+        return web.Response(text="hello")
+
+    app = web.Application()
+    app.router.add_get("/{path:.*}", hear)
+    async with listening(app) as port:
+        yield port, heard
+
+
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
+async def test_other_ports_of_this_machine_get_no_cookie(browser, doorway, blank_viser, name):
+    address = doorway.address.replace("127.0.0.1", name)
+    async with program(doorway, blank_viser), another_port() as (port, heard), opened(browser, address) as page:
+        await page.wait_for_url(f"http://{name}:{doorway.port}{doorway.access.root}")
+        await shows(page, OPENED)
+        assert [c["path"] for c in await page.context.cookies(page.url)] == [doorway.access.root]
+        await page.reload()
+        await shows(page, OPENED)
+        assert page.errors == []
+        other = await page.context.new_page()
+        await other.goto(f"http://{name}:{port}/any/path")
+        assert set(heard) == {None}
+
+
+async def test_an_open_page_comes_back_after_a_restart(browser, doorway, blank_viser):
+    async with opened(browser, doorway.address) as page:
+        await shows(page, "document.querySelector('#steps li')")
+        async with program(doorway, blank_viser):
+            await shows(page, OPENED)
+        doorway.__exit__(None, None, None)
+        with Doorway(Serving(port=doorway.port, browser=False)) as again:
+            assert again.access.root == doorway.access.root
+            await page.reload()
+            await shows(page, "document.querySelector('#steps li')")
+            async with program(again, blank_viser):
+                await shows(page, OPENED)
+                assert page.errors == []

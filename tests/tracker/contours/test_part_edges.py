@@ -5,6 +5,7 @@ from staging import at, camera_at, own_evidence, solid
 
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
+from tracker.contours import part_edges as part_edges_module
 from tracker.contours.part_edges import part_edges, points_occluded
 from tracker.search.chamfer_cost import ChamferCost
 
@@ -30,13 +31,13 @@ def dense(pieces_px):
 
 
 def test_part_edges_lie_on_both_surfaces():
-    found = dense(part_edges(two_balls(), FRONT))
+    found = dense(part_edges(two_balls(), [FRONT])[0])
     circle = FRONT.project(seam())
     # The grid's cells are 15 degrees wide: its chords stray by up to 2% of the radius of 26 px.
     assert cKDTree(circle).query(found)[0].max() < 0.6
     # Seen from the side, the circle is whole but for its ends at the outline, where the lift off the surfaces ends.
     side = camera_at("side", (4.0, 1.5, 0.0))
-    from_side = dense(part_edges(two_balls(), side))
+    from_side = dense(part_edges(two_balls(), [side])[0])
     assert cKDTree(side.project(seam(4000))).query(from_side)[0].max() < 0.6
     seen = side.project(seam()[400:1600])
     assert cKDTree(from_side).query(seen)[0].max() < 1.5
@@ -44,20 +45,22 @@ def test_part_edges_lie_on_both_surfaces():
 
 def test_part_edges_hidden_by_another_body():
     screen = at(solid((0.05, 0.5, 0.5), name="screen"), 1, 0, 0)
-    assert len(part_edges([*two_balls(), screen], FRONT)) == 0
-    assert len(part_edges([*two_balls(), at(screen.model, -1, 0, 0)], FRONT)) == len(part_edges(two_balls(), FRONT))
+    assert len(part_edges([*two_balls(), screen], [FRONT])[0]) == 0
+    assert len(part_edges([*two_balls(), at(screen.model, -1, 0, 0)], [FRONT])[0]) == len(
+        part_edges(two_balls(), [FRONT])[0]
+    )
 
 
 def test_no_part_edges_between_parts_apart():
     model = solid((RADIUS,) * 3)
-    assert part_edges([at(model, 0, -0.3, 0), at(model, 0, 0.3, 0)], FRONT).shape == (0, 4)
+    assert part_edges([at(model, 0, -0.3, 0), at(model, 0, 0.3, 0)], [FRONT])[0].shape == (0, 4)
 
 
 def test_part_edges_never_enter_the_cost():
     bodies = two_balls()
     # The seam runs far from the outlines, of which alone the edges are made: were it scored, it would cost.
     seen = occluding_contours.trace(bodies, FRONT)
-    apart = cKDTree(dense(seen.pieces_px[~seen.occluded])).query(dense(part_edges(bodies, FRONT)))[0]
+    apart = cKDTree(dense(seen.pieces_px[~seen.occluded])).query(dense(part_edges(bodies, [FRONT])[0]))[0]
     assert apart.mean() > 8
     cost = ChamferCost(own_evidence(bodies, [FRONT]), bodies)([b.values for b in bodies])
     assert cost.total_px < 0.5
@@ -103,3 +106,13 @@ def test_points_hidden_in_several_views_are_those_whose_sight_passes_a_part(gavr
                 wanted |= (inside[0] >= 1.5) & (inside.min(axis=0) < 1.0)
         assert 20 < wanted.sum() < 180
         assert np.mean(found == wanted) > 0.96  # lines that graze a part may go either way
+
+
+def test_curves_are_found_once_for_all_views(monkeypatch):
+    calls, zero_line = [], part_edges_module._zero_line
+    monkeypatch.setattr(part_edges_module, "_zero_line", lambda *args: (calls.append(1), zero_line(*args))[1])
+    side = camera_at("side", (0.0, 4.0, 0.0))
+    front, across = part_edges([*two_balls(), at(two_balls()[0].model, 9, 9, 9)], [FRONT, side])
+    assert len(calls) == 1  # neither for each view, nor with what is far away
+    assert len(front)
+    assert np.array_equal(across, part_edges(two_balls(), [side])[0])
