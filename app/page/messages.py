@@ -11,7 +11,7 @@ from app.drawing import dof_labels, overlays, part_outlines, pin_marks
 from app.drawing.curves import CurveGroup, plots_of, samples
 from app.drawing.floor_lines import floor_lines
 from app.drawing.former_limbs import former_limb_lines
-from app.page import check_messages, search_messages
+from app.page import search_messages
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
 from app.page.encoding import encode_binary
@@ -281,15 +281,15 @@ def _compared(last: PoseComparison | None) -> wire.Compared | None:
         after_view_costs_px=last.after_view_costs_px,
         warning=last.warning,
         moved=tuple(
-            check_messages.MovedLimb(person, limb_display_name(move.limb.name), round(100 * move.distance_m, 1))
+            search_messages.MovedLimb(person, limb_display_name(move.limb.name), round(100 * move.distance_m, 1))
             for person, move in last.moved
         ),
         is_before_shown=last.is_before_shown,
     )
 
 
-def _unseen_depth(note: DepthNote | None) -> check_messages.UnseenDepth | None:
-    return None if note is None else check_messages.UnseenDepth(note.person, note.unseen.points, note.unseen.camera)
+def _unseen_depth(note: DepthNote | None) -> search_messages.UnseenDepth | None:
+    return None if note is None else search_messages.UnseenDepth(note.person, note.unseen.points, note.unseen.camera)
 
 
 def _track(track: TrackState) -> wire.Track:
@@ -308,20 +308,20 @@ def _track(track: TrackState) -> wire.Track:
     )
 
 
-def inconsistent(state: State) -> check_messages.InconsistentMessage:
+def inconsistent(state: State) -> search_messages.InconsistentMessage:
     """List the frames and keyframes that disagree with the motion around them or with views."""
     doubts = tuple(
-        check_messages.KeyframeDoubt(
+        search_messages.KeyframeDoubt(
             doubt.person, doubt.frame, None if doubt.distance_m is None else round(100 * doubt.distance_m, 1),
             doubt.point,
             tuple(
-                check_messages.RaisedViewCost(view.camera, round(view.cost_px, 2), round(view.usual_px, 2))
+                search_messages.RaisedViewCost(view.camera, round(view.cost_px, 2), round(view.usual_px, 2))
                 for view in doubt.views
             ),
         )
         for doubt in state.keyframe_doubts
     )  # fmt: skip
-    return check_messages.InconsistentMessage(state.inconsistent_frames, doubts)
+    return search_messages.InconsistentMessage(state.inconsistent_frames, doubts)
 
 
 def range_comparison(found: RangeComparison | None) -> search_messages.RangeComparisonMessage:

@@ -1,12 +1,12 @@
 """Text messages from the program to the page: the one declaration of their types and fields.
 
-Those about searches are in `search_messages`, those for the inspector in `inspector_messages`. `messages` and the feeds
-make them, `protocol_docs` writes the page's types and docs/protocol.md from them.
+Those about searches and poses that deserve a look are in `search_messages`, those for the inspector in
+`inspector_messages`. `messages` and the feeds make them, `protocol_docs` writes the page's types and docs/protocol.md
+from them.
 """
 
 from typing import Literal, TypeAlias, Union, get_args
 
-from app.page.check_messages import InconsistentMessage, MovedLimb, UnseenDepth
 from app.page.inspector_messages import (
     AcquisitionMessage,
     BodySizesMessage,
@@ -15,7 +15,14 @@ from app.page.inspector_messages import (
     View3dMessage,
 )
 from app.page.message_types import Message, Part, Status
-from app.page.search_messages import RangeComparisonMessage, SearchRunsMessage, SearchSetupMessage
+from app.page.search_messages import (
+    InconsistentMessage,
+    MovedLimb,
+    RangeComparisonMessage,
+    SearchRunsMessage,
+    SearchSetupMessage,
+    UnseenDepth,
+)
 from app.state.comparison import ComparedWork
 
 # --- session -------------------------------------------------------------------------------------------------------

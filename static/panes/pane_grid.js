@@ -8,6 +8,8 @@ import { PaneBorders } from "../layout/pane_borders.js";
 import { isInSight } from "../model/selectors.js";
 import { PaneShares } from "../layout/pane_shares.js";
 
+/** Smallest size of what is framed, in that of the body: a limb is judged by what it hangs on. */
+const MIN_SHARE = 0.4;
 /** Two digits within this time form one number. */
 const SECOND_DIGIT_MS = 700;
 /** Facts that change the marks over the overlay. @type {(keyof import("../model/store.js").Facts)[]} */
@@ -373,9 +375,6 @@ export class PaneGrid {
     if (reductions.join() !== this.#store.facts.reductions.join()) this.#store.set({ reductions });
   }
 }
-
-/** Smallest size of what is framed, in that of the body: a limb is judged by what it hangs on. */
-const MIN_SHARE = 0.4;
 
 /** @typedef {{u: number, v: number}} Place */
 

@@ -46,6 +46,7 @@ export class RunComparison {
     this.#end = button("run-comparison-end", () => actions.compareRange(false));
     store.subscribe((changed) => {
       if (changed.has("rangeComparison")) this.#followRun();
+      else if (changed.has("drawer") && store.facts.drawer === null && this.#run) actions.compareRange(false);
       const isOpen = store.facts.drawer === "runs";
       this.#panel.hidden = this.#controls.hidden = !isOpen;
       if (!isOpen) return;
@@ -54,7 +55,7 @@ export class RunComparison {
     });
   }
 
-  /** Open the tab when a run has replaced poses by better or worse ones. */
+  /** Open the tab when a run has replaced poses by better or worse ones. Closing the drawer ends it. */
   #followRun() {
     const run = this.#store.facts.rangeComparison?.run ?? null;
     const isFirst = this.#run === undefined; // the page was opened after the run

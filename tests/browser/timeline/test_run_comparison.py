@@ -102,3 +102,6 @@ async def test_gain_and_harm_of_a_run_are_opened_and_decided_by_stretch(page, en
     await endpoint.broadcast(run | {"run": 2})
     await shows(page, "document.querySelectorAll('#run-stretches li').length === 3")
     assert await page.evaluate("quadrille.state.drawer") == "runs"
+    await page.locator("#close-drawer").click()
+    await until(lambda: endpoint.heard("compare_range"))
+    assert endpoint.heard("compare_range") == [{"type": "compare_range", "first": None, "last": None}]
