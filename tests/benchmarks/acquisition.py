@@ -197,8 +197,8 @@ def section(outcomes: Sequence[Outcome]) -> str:
         "tracked from the joints of frame 0 with the generic body of the height that these joints give, acquired by "
         "`quadrille acquire` without further options, and tracked again. Before → after: mean error of the 12 limb "
         "joints, lost frames, mean cost of the tracked frames. The error of the height is that after it. "
-        "Recordings have the height of the joints instead of the stated one, so that they end beside the figures of the "
-        "first table.",
+        "Recordings have the height of the joints instead of the stated one, so that they end beside the figures of "
+        "the first table.",
         "",
     ]
     return "\n".join([*lines, table(HEADS, {o.name.replace("_", " "): o.cells for o in outcomes})])
