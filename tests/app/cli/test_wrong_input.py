@@ -228,7 +228,7 @@ def test_a_session_open_already(run, session):
 
 
 def test_exchanged_footage_is_told(run, room, monkeypatch):
-    found = CameraExchange(("front", "left"), 0.2, 0.9)
+    found = CameraExchange(("front", "left"), 0.2, 0.9, True)
     monkeypatch.setattr("tracker.evidence.camera_exchange.find_exchange", lambda *_: found)
     status, out, err = run(*new(room))
     assert (status, out) == (0, f"made {room / 's'}: 2 cameras, 6 frames at 25 per second\n")
