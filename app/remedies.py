@@ -28,18 +28,27 @@ PHRASES = {
     ),
     "give_rate": Phrases("give it with --fps RATE", "enter it as Frame rate"),
     "give_common_rate": Phrases(
-        "convert the videos to the same rate, or give the rate at which all cameras filmed with --fps RATE",
-        "convert the videos to the same rate, or enter the rate at which all cameras filmed as Frame rate",
+        "convert the videos to the same rate, or give the rate at which all cameras filmed with --fps {fps}",
+        "convert the videos to the same rate, or enter the rate at which all cameras filmed, such as {fps}, as Frame "
+        "rate",
+    ),
+    "give_constant_rate": Phrases(
+        "say --fps {fps} if frame k of all cameras is of one instant all the same, else convert it to a constant rate "
+        "with frames at the times of the other cameras",
+        "enter {fps} as Frame rate if frame k of all cameras is of one instant all the same, else convert it to a "
+        "constant rate with frames at the times of the other cameras",
     ),
     "give_frame_offset": Phrases(
-        "cut them to the same start and end, or say --offset CAM=N for a camera that began N frames earlier",
-        "cut them to the same start and end, or enter the offset of a camera that began earlier: its number of frames",
+        "if they began together, --common-frames takes the {n} frames that all have; else say --offset CAM=N for a "
+        "camera that began N frames earlier, or cut them to the same start and end",
+        "if they began together, choose Common frames to take the {n} that all have; else enter the offset of a camera "
+        "that began earlier, its number of frames, or cut them to the same start and end",
     ),
     "give_image_offset": Phrases(
-        "restore it, delete that number in the other folders, or say --offset CAM=N for a camera that began N images "
-        "earlier",
-        "restore it, delete that number in the other folders, or enter the offset of a camera that began earlier: its "
-        "number of images",
+        "restore it, take those that all have with --common-frames, or say --offset CAM=N for a camera that began N "
+        "images earlier",
+        "restore it, choose Common frames to take those that all have, or enter the offset of a camera that began "
+        "earlier: its number of images",
     ),
     "give_camera_background": Phrases(
         "add it or leave out --background", "add it, or leave the field Background empty"

@@ -20,21 +20,29 @@ MAX_FRAMES = 10_000_000
 MAX_SIDE_PX = 32_767
 """Largest width and height of a camera's image; OpenCV resamples no larger ones."""
 
+UNPRINTABLE = r"\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff"
+"""Characters that names cannot hold, for a regular expression: controls, which terminals obey, line ends, marks that
+turn the direction of writing (Unicode's Bidi_Control), the byte order mark and halves of characters."""
+
 Number: TypeAlias = Annotated[float, Meta(ge=-1e9, le=1e9, description="a finite number within 1e9")]
 Vector: TypeAlias = Annotated[tuple[Number, Number, Number], Meta(description="3 finite numbers")]
 Name: TypeAlias = Annotated[
-    str, Meta(pattern=r"^[^\x00-\x1f\x7f]{1,200}\Z", description="a name of 1 to 200 characters on one line")
+    str,
+    Meta(
+        pattern=rf"^[^{UNPRINTABLE}]{{1,200}}\Z",
+        description="a name of 1 to 200 characters on one line, without control or direction characters",
+    ),
 ]
 FileStem: TypeAlias = Annotated[
     str,
     Meta(
-        pattern=r"^(?!\.{1,2}\Z)[^\x00-\x1f\x7f/\\]{1,100}\Z",
-        description="a name of 1 to 100 characters on one line, without slashes",
+        pattern=rf"^(?!\.{{1,2}}\Z)[^{UNPRINTABLE}/\\]{{1,100}}\Z",
+        description="a name of 1 to 100 characters on one line, without slashes, control or direction characters",
     ),
 ]
 """A name after which files are named too; it must not lead out of their folder."""
 FilePath: TypeAlias = Annotated[
-    str, Meta(pattern=r"^[^\x00-\x1f\x7f]{1,1000}\Z", description="the path of a file or folder")
+    str, Meta(pattern=r"^[^\x00-\x1f\x7f-\x9f]{1,1000}\Z", description="the path of a file or folder")
 ]
 Color: TypeAlias = Annotated[str, Meta(pattern=r"^#[0-9a-fA-F]{6}\Z", description="a colour such as #f2a33a")]
 FrameRate: TypeAlias = Annotated[

@@ -51,8 +51,11 @@ class NewArguments:
     """.toml file of the person's body from an earlier session, where there is only one person."""
     height: CommonOrNamed = ()
     """body height in metres of all people, or NAME=METRES."""
+    common_frames: bool = False
+    """leave out frames that some cameras lack: those at the end, of numbered images at both ends."""
     fps: OptionalNumber = None
-    """rate at which the cameras filmed, if the videos declare another one (high-speed) or all footage is images."""
+    """rate at which the cameras filmed, if the videos declare another one (high-speed), if their time stamps jitter, or
+    if all footage is images."""
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     """world axis that points up."""
     units: Annotated[Literal["m", "cm", "mm"] | None, tyro.conf.arg(metavar="{m,cm,mm}", help_behavior_hint="")] = None
@@ -82,6 +85,7 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         people=arguments.people,
         models=_models(arguments) or DEFAULT_MODEL,
         heights=parse_common_or_pairs(arguments.height, "--height", float),
+        common_frames=arguments.common_frames,
         fps=arguments.fps,
         up=arguments.up,
         units=arguments.units,
@@ -99,6 +103,8 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         print(f"used: {used}; calibrated cameras without footage are left out: {', '.join(without)}")
     if declared := {f"{c.declared_fps:g}" for c in made.cameras if c.declared_fps is not None}:
         print(f"the videos declare {' or '.join(sorted(declared))} frames per second")
+    for note in notes:
+        print(f"note: {note}")
     if note := exchange_note(made):
         print(f"warning: {note}", file=sys.stderr)
 

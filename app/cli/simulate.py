@@ -19,6 +19,7 @@ def command(
     body: Literal["skinned", "model"] = "skinned",
     size: tuple[int, int] = (640, 480),
     person: str = "",
+    fisheye: tuple[str, ...] = (),
 ) -> None:
     """Make a session of a simulated recording with known truth.
 
@@ -32,11 +33,14 @@ def command(
         body: skinned, a smooth body unlike the model; model, the very shapes that are fitted.
         size: width and height of the images, px, both even.
         person: who plays a scene of one person, such as child_6 or heavy_man; the usual adult by default.
+        fisheye: names of cameras to give a fisheye lens of 120 degrees, such as FRONT; all for all of them.
     """
     from tracker.simulate import Simulation, simulate
 
     reporter = Reporter()
     with reporter.over(frames * cameras, "rendering") as tick:  # one tick per image
-        simulation = Simulation(scene, cameras, frames, seed, size, body=body, masks=masks, person=person)
+        simulation = Simulation(
+            scene, cameras, frames, seed, size, body=body, masks=masks, person=person, fisheyes=fisheye
+        )
         simulate(out, simulation, progress=lambda *_: tick())
     print(f"made {out}")

@@ -29,6 +29,7 @@ def load_target(folder: Path, person: str | None, several: bool) -> Target:
         SessionError: there is no such person, or a name is needed.
     """
     from tracker.session.session import load_session
+    from tracker.validation import same_form
 
     session = load_session(folder)
     names = [p.name for p in session.people]
@@ -36,9 +37,10 @@ def load_target(folder: Path, person: str | None, several: bool) -> Target:
         if several or len(names) == 1:
             return Target(session, tuple(range(len(names))))
         raise SessionError(f"the session has several people: say --person, one of {', '.join(names)}")
-    if person not in names:
+    compared = [same_form(name) for name in names]
+    if same_form(person) not in compared:
         raise SessionError(f"expected --person to be one of {', '.join(names)}, found '{person}'")
-    return Target(session, (names.index(person),))
+    return Target(session, (compared.index(same_form(person)),))
 
 
 def parse_frames(text: str | None, session: "Session") -> range:

@@ -233,8 +233,8 @@ def track(
     from tracker.store.annotation_store import AnnotationStore
 
     session, stopped = at.session, False
-    check_names(cameras, [c.camera.name for c in session.cameras], "camera", "--cameras")
-    task = TrackTask(frames, at.people, settings, tuple(cameras))
+    used = check_names(cameras, [c.camera.name for c in session.cameras], "camera", "--cameras")
+    task = TrackTask(frames, at.people, settings, tuple(used))
     sources = task.sources(session)
     require_files(session)
     with (

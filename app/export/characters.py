@@ -13,6 +13,7 @@ from tracker.export.motion import ExportedMotion
 from tracker.geometry.arrays import Image
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import GroundPlane, up_rotation
+from tracker.geometry.lens_tables import lens_of, undistortion_map
 from tracker.posing.character import drive_character
 
 _GROUND = (38, 40, 44)
@@ -43,8 +44,10 @@ class Characters:
 def draw_bodies(bodies: Sequence[PosedBody], camera: Camera) -> Image:
     """Draw bodies in the colours of their parts, with their visible contours, as a camera without distortion sees them.
 
+    A fisheye lens is kept, since a picture without it would have another size than the footage beside it.
+
     Returns:
-        The image, (H, W, 3) RGB.
+        The image, (H, W, 3) RGB, of the size of the footage.
     """
     plain = camera.pinhole
     colors = [overlay_colors.rgb(part.color) for body in bodies for part in body.model.parts]
@@ -53,6 +56,9 @@ def draw_bodies(bodies: Sequence[PosedBody], camera: Camera) -> Image:
         contour = occluding_contours.trace(bodies, plain)
         ends = np.rint(contour.pieces_px[~contour.occluded].reshape(-1, 2, 2)).astype(np.int32)
         cv2.polylines(image, list(ends), False, _OUTLINE, max(1, round(max(camera.size) / 640)), cv2.LINE_AA)
+    if camera.fisheye:
+        maps = undistortion_map(lens_of(camera))
+        image = cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=_GROUND)
     return np.asarray(image, dtype=np.uint8)
 
 

@@ -34,6 +34,8 @@ class ExportFormat:
     """Axes by default, as programs that read it expect them."""
     gaps: str = "left empty"
     """What happens to frames without a pose."""
+    counts_from_1: bool = False
+    """Whether its frame numbers are the session's plus 1."""
     one_body: bool = False
     """Whether all poses of a person are of one body; those of earlier sizes are refitted."""
 
@@ -64,7 +66,15 @@ _PLACE = frozenset(("axes", "units"))
 FORMATS: Mapping[str, ExportFormat] = {
     f.name: f
     for f in (
-        ExportFormat("trc", "joint centers (TRC)", (".trc",), _by_writer("write_person_trc"), _PLACE, one_person=True),
+        ExportFormat(
+            "trc",
+            "joint centers (TRC)",
+            (".trc",),
+            _by_writer("write_person_trc"),
+            _PLACE,
+            one_person=True,
+            counts_from_1=True,
+        ),
         ExportFormat(
             "csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _by_writer("write_tables"), _PLACE
         ),

@@ -21,7 +21,7 @@ from app.page.message_types import Message
 from app.page.observability_feed import ObservabilityFeed
 from app.page.search_feed import SearchFeed
 from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
-from app.page.server_messages import HistoryMessage, InconsistentMessage, NoticeMessage, StateMessage
+from app.page.server_messages import HistoryMessage, NoticeMessage, StateMessage
 from app.remedies import page_text
 from app.state import page_view
 from app.state.identity import Identity
@@ -301,8 +301,9 @@ class PageConnection:
 
     async def _send_checks(self, sent: State | None, state: State) -> None:
         """Send what was found about frames other than the shown one, if it changed."""
-        if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
-            await self._send(InconsistentMessage(state.inconsistent_frames))
+        checked = (state.inconsistent_frames, state.keyframe_doubts)
+        if sent is None or (sent.inconsistent_frames, sent.keyframe_doubts) != checked:
+            await self._send(messages.inconsistent(state))
         if sent is None or sent.range_comparison is not state.range_comparison:
             await self._send(messages.range_comparison(state.range_comparison))
 
@@ -361,10 +362,12 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.search_view,
         state.range_comparison,
         state.compared if not state.is_stored_drawn else None,
+        () if state.compared is None else state.compared.moved,
         state.drag,
         state.drag_seqs,
         state.visibility.hidden,
         state.compiled,
+        Identity(state.finding.candidates),
     )
     return (*drawn, _pins(state), state.floor.picking)
 

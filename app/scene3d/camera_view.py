@@ -72,7 +72,7 @@ class CameraView:
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Follow the controller's state and the pages' canvases."""
         self._controller = controller
-        self._cameras = [c.camera for c in controller.session.cameras]
+        self._cameras = [c.camera.pinhole for c in controller.session.cameras]
         self._views: dict[int, _PageView] = {}
         # One thread for states and reports, so that neither overtakes the other.
         self._latest: LatestWinsWorker[State | _Report] = LatestWinsWorker(self._take, "camera view")
@@ -140,7 +140,7 @@ class CameraView:
                 self._move_to(seen, camera)
             seen.fov = field_of_view(camera, size[0] / size[1])
             view.client.scene.set_background_image(
-                centred(image, camera.pinhole, size), format="jpeg", jpeg_quality=_JPEG_QUALITY
+                centred(image, camera, size), format="jpeg", jpeg_quality=_JPEG_QUALITY
             )
         view.camera, view.turned_away, view.shown = state.snapped, False, wanted
 

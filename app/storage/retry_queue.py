@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from app.remedies import page_text
-from app.storage.rescue import UnsavedEdit
+from app.storage.rescue_file import UnsavedEdit
 from tracker.errors import TrackerError
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Change, PinChange, PoseChange

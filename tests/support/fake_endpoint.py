@@ -23,7 +23,7 @@ from app.page.message_parsing import parse
 
 WIDTH, HEIGHT, N_FRAMES = 640, 480, 120
 CAMERA_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
-COLORS = ("#ffb454", "#6ccbff")
+COLORS = ("#ffb454", "#6ccbff", "#8be06a", "#ff8fa3", "#c9a6ff", "#ffe066", "#5ee0c8", "#ff9df2")
 REST = {
     "torso": (0.0, 0.25, 0.0),
     "waist": (0.0, 0.18, 0.0),
@@ -57,7 +57,7 @@ NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
 SOURCES = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
 LIMBS = ["left arm", "right arm", "left leg", "right leg", "head"]
-LIMBS_LOST = {"doubtful": [0.31, 0.01, 0.0, 0.02, 0.0], "lost": [0.97, 0.04, 0.0, 0.0, 0.01]}
+LIMBS_LOST = {"doubtful": [0.01, 0.31, 0.0, 0.02, 0.0], "lost": [0.97, 0.04, 0.0, 0.0, 0.01]}
 """Probabilities of the limbs of a frame by its status."""
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
 DOFS = [{"joint": "torso", "name": name, "unit": "cm", "low": None, "high": None} for name in ("x", "y", "z")] + [
@@ -110,6 +110,14 @@ def status_of(frame):
     return "doubtful" if frame in (31, 32) else "lost" if frame == 50 else "good"
 
 
+def limb_of(point):
+    """Display name of the limb of a point."""
+    side, _, joint = point.partition("_")
+    if not joint:
+        return "head" if point == "head" else "body"
+    return f"{SIDES[side + '_']} {'leg' if joint in ('hip', 'knee') else 'arm'}"
+
+
 def curve(index, frame):
     """Value of a curve: twists wrap at half a turn, the gap from frame 60 to 64 has none."""
     value = 90.0 + 60 * np.sin(frame / 9 + index) if index % 4 != 2 else (7.0 * frame + 180) % 360 - 180
@@ -150,6 +158,8 @@ class FakeEndpoint:
     sockets: set = field(default_factory=set)
     thumbnails: list = field(default_factory=list)
     """Addresses of the thumbnails that the pages requested."""
+    walk_m: float = 0.0
+    """How far the people walk from a frame to the next."""
     start: str = "first"
     """Identifies the start of the pretended program."""
     name: str = "elbow_rotation"
@@ -174,7 +184,7 @@ class FakeEndpoint:
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
-            "compared": None, "compared_run": None, "preview": None,
+            "compared": None, "unseen_depth": None, "compared_run": None, "preview": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0, 4.0, 5.0, 6.0], "locked": [], "other_sizes": False, "solo": False,
@@ -428,9 +438,7 @@ class FakeEndpoint:
                 "limbs": LIMBS,
                 "dofs": DOFS,
                 "point_dofs": {name: [0, 1, 2, 4, 5, 6] if name == "torso" else [3] for name in REST},
-                "point_limbs": {
-                    name: {"name": "body" if name == "torso" else "left arm", "dofs": [3]} for name in REST
-                },
+                "point_limbs": {name: {"name": limb_of(name), "dofs": [3]} for name in REST},
             }
             for p in range(self.n_people)
         ]
@@ -444,7 +452,7 @@ class FakeEndpoint:
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
             told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
             await socket.send_str(encoded(told))
-        await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING}))
+        await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING, "keyframes": []}))
         if self.views:
             await self.send_frame([socket])
 
@@ -531,7 +539,7 @@ class FakeEndpoint:
                 for (p, name), at in self.pose.items():
                     if p != person:
                         continue
-                    ((u, v),) = project(at[None], camera)
+                    ((u, v),) = project((at + self.walked)[None], camera)
                     visible = (name.startswith("l_"), name.startswith("r_"))[camera % 2] or name in ("torso", "head")
                     handles.append({
                         "camera": camera, "person": p, "point": name, "u": u, "v": v, "visible": visible,
@@ -553,7 +561,7 @@ class FakeEndpoint:
         around = np.linspace(0, 2 * np.pi, 33)
         lines = []
         for names in BONES:
-            ends = project(np.stack([self.pose[person, n] for n in names]) + shift, camera)
+            ends = project(np.stack([self.pose[person, n] for n in names]) + self.walked + shift, camera)
             axis = ends[1] - ends[0]
             length = np.hypot(*axis) + 1e-9
             along, across = axis / length, np.array([-axis[1], axis[0]]) / length
@@ -564,6 +572,11 @@ class FakeEndpoint:
             )
             lines.append(np.concatenate([ring[:-1], ring[1:]], axis=1))
         return np.concatenate(lines)
+
+    @property
+    def walked(self):
+        """Way of the people from frame 12, where the page opens, to the shown one."""
+        return np.array([self.walk_m * (self.state["frame"] - 12), 0.0, 0.0])
 
     def picture(self, camera, frame, layer):
         """The image of a room with a bright figure that shows its number; masks and a distance image of even colour."""

@@ -1,9 +1,10 @@
-"""Sessions with random poses in the store: several people, gaps, lost frames, cameras with much distortion."""
+"""Sessions with random poses in the store: several people, gaps, lost frames, distorted views and a fisheye."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from fisheye import with_fisheye
 from staging import cameras_around
 
 from tracker.body.model import PosedBody
@@ -18,8 +19,9 @@ FPS = 25.0
 
 
 def distorted_cameras():
-    """Three views of 640x480 with barrel distortion."""
-    return [replace(c, distortion=np.array([K1, 0.0, 0.0, 0.0])) for c in cameras_around(3, size=(640, 480))]
+    """Three views of 640x480, two with barrel distortion and one of a fisheye lens."""
+    first, second, third = cameras_around(3, size=(640, 480))
+    return [*(replace(c, distortion=np.array([K1, 0.0, 0.0, 0.0])) for c in (first, second)), with_fisheye(third)]
 
 
 def random_poses(model, n, seed, sigma_rad=0.5):

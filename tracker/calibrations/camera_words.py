@@ -14,6 +14,7 @@ from tracker.calibrations.lens_words import UnknownLensError, is_fisheye, is_len
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.validation import quoted
 
 Section: TypeAlias = dict[str, Any]
 """One camera: name, size, matrix, distortions, rotation, translation, fisheye; what is missing is None."""
@@ -53,7 +54,7 @@ def camera_groups(data: Any) -> dict[str, Mapping[str, Any]]:
     """Return the keys and values of each camera by its key or index; empty where there is no camera."""
     if isinstance(data, list):
         rows = [item for item in data if isinstance(item, Mapping)]
-        return {str(known_values(row).get("number", i)): row for i, row in enumerate(rows) if is_camera(row)}
+        return {plain_text(known_values(row).get("number", i)): row for i, row in enumerate(rows) if is_camera(row)}
     if not isinstance(data, Mapping):
         return {}
     for key in _LISTS:
@@ -108,6 +109,11 @@ def _flat(group: Mapping[str, Any], depth: int = 0) -> Iterator[tuple[str, Any]]
     yield from ((str(k), v) for k, v in group.items() if k not in inner)
 
 
+def plain_text(value: Any) -> str:
+    """Return text as it is, and a short form of anything else."""
+    return value if isinstance(value, str) else quoted(value)
+
+
 def is_absent(value: Any) -> bool:
     """Return whether a value stands for none, as `null` in JSON and its word in TOML do."""
     return value is None or (isinstance(value, str) and value.strip().lower() in ("", "null", "none", "nan"))
@@ -133,11 +139,11 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
             advice = (
                 "rewrite the camera to K, distortion, R and t of OpenCV's model, or remove the key if it says nothing"
             )
-            raise refuse(document, camera, "known keys of a lens or a convention", f"'{key}'", advice)
+            raise refuse(document, camera, "known keys of a lens or a convention", quoted(key), advice)
     try:
         fisheye = is_fisheye({key: value for key, value in _flat(group) if is_lens_key(spelled(key))})
     except UnknownLensError as error:
-        raise CalibrationError(f"{document.where}, camera '{camera}': {error}") from error
+        raise CalibrationError(f"{document.where}, camera {quoted(camera)}: {error}") from error
     rotation, translation = _pose(known, group, camera, document)
     distortions = _distortions(known, fisheye)
     if not fisheye and isinstance(distortions, list) and len(distortions) in (12, 14):
@@ -172,7 +178,7 @@ def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, docum
         whole_key = next((key for key in ("T_camera_world", "T_world_camera") if key in known), None)
         if rotation is not None or translation is not None or others or whole_key:
             has = ["the rotation"] * (rotation is not None) + ["the translation"] * (translation is not None)
-            has += [f"'{key}'" for key in others] + ["a matrix that is no pose"] * (whole_key is not None)
+            has += [quoted(key) for key in others] + ["a matrix that is no pose"] * (whole_key is not None)
             expected = "its pose as R and t (X_camera = R X_world + t)"
             raise refuse(document, camera, expected, f"{', '.join(has)} alone", "rewrite the pose to R and t")
         return None, None

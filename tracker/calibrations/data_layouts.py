@@ -9,7 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from tracker.calibrations.camera_words import Section, camera_groups, homogeneous, known_values, plain_array, section_of
+from tracker.calibrations.camera_words import (
+    Section,
+    camera_groups,
+    homogeneous,
+    known_values,
+    plain_array,
+    plain_text,
+    section_of,
+)
 from tracker.calibrations.document import Document, refuse
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -29,7 +37,7 @@ def read_words(document: Document) -> dict[str, Section]:
         if known_values(group).get("ignore") is True:
             continue
         section = section_of(group, key or document.stem, document)
-        name = key if section["name"] is None else str(section["name"])
+        name = key if section["name"] is None else plain_text(section["name"])
         name = name if name not in sections else f"{name} ({key})"
         sections[name] = section | ({"name": name} if name else {})
     return sections
@@ -110,8 +118,9 @@ def read_multical(document: Document) -> dict[str, Section]:
     poses |= document.groups["camera_poses"]
     found: dict[str, Section] = {}
     for name, lens in document.groups["cameras"].items():
-        pose = poses.get(name)
-        group = {**lens, **pose} if isinstance(pose, dict) else lens
+        group = {
+            key: value for half in (lens, poses.get(name)) if isinstance(half, dict) for key, value in half.items()
+        }
         found[name] = section_of(group, name, document) | {"name": name}
     return found
 
@@ -131,7 +140,7 @@ def read_mc_calib(document: Document) -> dict[str, Section]:
         CalibrationError: the cameras are in groups that do not know of each other.
     """
     cameras = {n: g for n, g in document.groups.items() if "camera_matrix" in g or "camera_pose_matrix" in g}
-    groups = {str(group.get("camera_group", 0)) for group in cameras.values()}
+    groups = {plain_text(group.get("camera_group", 0)) for group in cameras.values()}
     if len(groups) > 1:
         raise refuse(
             document, None, "one group of cameras", f"{len(groups)} (camera_group), each with a world of its own",

@@ -12,6 +12,7 @@ from tracker.errors import CalibrationError
 from tracker.formats.anipose import KIND
 from tracker.formats.plain_data import parse_json, parse_xml, parse_yaml, storage_data
 from tracker.text_files import parse_toml, read_text
+from tracker.validation import quoted
 
 _TOML_LINE = re.compile(r"\[{1,2}[^\[\]{}\n]+\]{1,2}\s*(#.*)?|[\w.\"'-]+\s*=.*")
 _YAML_LINE = re.compile(r"[^\s:,{}\[\]][^:,{}\[\]]*:(\s.*)?|- .*")
@@ -92,5 +93,5 @@ def is_element(data: Any, tag: str) -> bool:
 
 def refuse(document: Document, camera: str | None, expected: str, found: str, advice: str) -> CalibrationError:
     """Return the error of a file, or of one camera in it."""
-    place = document.where if camera is None else f"{document.where}, camera '{camera}'"
+    place = document.where if camera is None else f"{document.where}, camera {quoted(camera)}"
     return CalibrationError(f"{place}: expected {expected}, found {found}; {advice}")

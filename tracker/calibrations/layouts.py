@@ -28,12 +28,20 @@ class CalibrationLayout:
     """Reads the cameras of one file by their names. The name of a lone camera without one is empty: its file's."""
     by_program: bool = True
     """Whether programs alone write it, so that its convention is beyond doubt where it fits."""
+    note: str = ""
+    """Sentence for users on what its files leave open; usually empty."""
+
+    @property
+    def has_opencv_poses(self) -> bool:
+        """Whether its poses map world to camera."""
+        return self.poses == _OPENCV
 
     @property
     def poses_in_words(self) -> str:
         """The convention of its poses, for messages."""
-        is_opencv = self.poses == _OPENCV
-        return f"poses that map world to camera ({_OPENCV})" if is_opencv else f"poses of {self.name}: {self.poses}"
+        if self.has_opencv_poses:
+            return f"poses that map world to camera ({_OPENCV})"
+        return f"poses of {self.name} ({self.poses})"
 
 
 _OPENCV = "X_camera = R X_world + t"
@@ -74,6 +82,8 @@ LAYOUTS: tuple[CalibrationLayout, ...] = (
         "mm",
         data.is_dannce,
         data.read_row_vectors,
+        note="The principal points are read as DANNCE uses them. MATLAB counts pixels from 1: subtract 1 from both "
+        "numbers if its calibrator has made the file.",
     ),
     CalibrationLayout(
         "OpenPose (one file for each camera)",

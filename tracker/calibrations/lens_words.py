@@ -4,6 +4,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from tracker.validation import quoted
+
 FISHEYE = "fisheye"
 PINHOLE = "pinhole"
 
@@ -72,7 +74,8 @@ def is_fisheye(words: Mapping[str, Any]) -> bool:
     if denied := [key for key in said if spelled(key) in _FLAGS and said[key] == PINHOLE]:
         other = next(key for key in said if said[key] == FISHEYE)
         raise UnknownLensError(
-            f"expected one model of the lens, found {denied[0]} = {words[denied[0]]} and {other} = {words[other]}; "
+            f"expected one model of the lens, found {denied[0]} = {quoted(words[denied[0]])} and {other} = "
+            f"{quoted(words[other])}; "
             "correct the wrong one"
         )
     return True
@@ -82,7 +85,7 @@ def _model(key: str, value: Any) -> str | None:
     """Return the model that a key names; None for none."""
     if isinstance(value, float) and value.is_integer():
         value = int(value)
-    plain, word = spelled(key), spelled(str(value))
+    plain, word = spelled(key), spelled(quoted(value))
     if plain in _FLAGS:
         if word in _YES or word in _FISHEYE_WORDS:
             return FISHEYE
@@ -98,6 +101,6 @@ def _model(key: str, value: Any) -> str | None:
         return PINHOLE
     raise UnknownLensError(
         f"expected OpenCV's model of a lens (pinhole, with radial and tangential distortion) or its fisheye "
-        f"(equidistant), found {key} = {str(value)[:40]!r}; undistort the footage and calibrate with one of these "
+        f"(equidistant), found {key} = {quoted(value)}; undistort the footage and calibrate with one of these "
         "models, or remove the key if it names no lens"
     )

@@ -105,7 +105,9 @@ def _roll(Ts_world_camera: Array) -> float:
     return float(np.sqrt(np.mean(rolls**2, axis=1)).min())
 
 
-def check_convention(Ts_stated: Sequence[Array], where: str, expected: str, is_fixed: bool) -> str | None:
+def check_convention(
+    Ts_stated: Sequence[Array], where: str, expected: str, is_fixed: bool, is_turned: bool = False
+) -> str | None:
     """Check that the stated convention fits: poses that map world to camera, with OpenCV's axes.
 
     Args:
@@ -113,6 +115,7 @@ def check_convention(Ts_stated: Sequence[Array], where: str, expected: str, is_f
         where: names the file in messages.
         expected: names the convention in which the file's poses were read, for messages.
         is_fixed: whether the layout of the file fixes the convention.
+        is_turned: whether that convention is another, from which the poses were turned to the stated ones.
 
     Returns:
         A note, if another convention fits as well and the layout fixes none; None otherwise.
@@ -128,11 +131,13 @@ def check_convention(Ts_stated: Sequence[Array], where: str, expected: str, is_f
     ratio, margin = (_PAIR_RATIO, _PAIR_MARGIN) if len(Ts_stated) == 2 else (_RATIO, _MARGIN)
     others = _distinct([c for c in cost if cost[c] <= min(_FITS, max(_RATIO * best, best + _MARGIN))], Ts_stated)
     if best < _FITS and stated > ratio * best + margin:
+        rewrite = _rewrite(others[0])
+        condition = f"if R and t, as read, are changed ({rewrite})" if is_turned else f"if {_in_words(others[0])}"
         misfit = f"expected {expected}, by which the cameras see no one place"
         if len(others) == 1:
             raise CalibrationError(
-                f"{where}: {misfit}, found that they do if {_in_words(others[0])}",
-                Remedy("give_poses", poses=others[0], rewrite=_rewrite(others[0])),
+                f"{where}: {misfit}, found that they do {condition}",
+                Remedy("give_poses", poses=others[0], rewrite="likewise" if is_turned else rewrite),
             )
         raise CalibrationError(
             f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({_in_words(c)})' for c in others)}",
@@ -142,7 +147,7 @@ def check_convention(Ts_stated: Sequence[Array], where: str, expected: str, is_f
     if is_fixed or not others or stated >= _PARALLEL:
         return None
     return (
-        f"Expected were {expected}; {' or '.join(others)} would fit these cameras as well. Check with "
+        f"The file is read with {expected}; {' or '.join(others)} would fit these cameras as well. Check with "
         "the pictures that the cameras stand where they should."
     )
 

@@ -4,7 +4,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from tracker.calibrations.camera_words import Section, is_absent
+from tracker.calibrations.camera_words import Section, is_absent, plain_text
 from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
 from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics, is_transposed
 from tracker.calibrations.document import Document, read_document, refuse
@@ -69,6 +69,7 @@ def read_cameras(
     used: Units = units or layout.unit or "m"
     entries = tuple(_entry(name, section, where, METRES[used], poses) for name, section in usable.items())
     notes = [f"Camera '{name}' is left out: {reason}." for name, reason in left_out.items()]
+    notes += [layout.note] if layout.note else []
     entries, note = _with_convention(entries, where, layout, poses)
     notes += [] if note is None else [note]
     check_names(entries, where)
@@ -152,7 +153,7 @@ def _sections(
                 raise CalibrationError(
                     f"{document.where}: camera '{name}' is in two files or twice; give each camera its own name"
                 )
-            found[name] = section | {"name": same_form(str(section.get("name") or name))}
+            found[name] = section | {"name": same_form(plain_text(section.get("name") or name))}
     return layout, found
 
 
@@ -229,7 +230,7 @@ def _with_convention(
     """Return the cameras with their poses in the right convention, and a note where it is not sure."""
     stated: list[Array] = [rigid.inverse(entry.T_world_camera) for entry in entries]
     if poses is None:
-        expected = layout.poses_in_words
-        return entries, check_convention(stated, where, expected, layout.by_program)
+        is_turned = not layout.has_opencv_poses
+        return entries, check_convention(stated, where, layout.poses_in_words, layout.by_program, is_turned)
     changed = [rigid.inverse(read_pose(T, poses)) for T in stated]
     return tuple(replace(e, T_world_camera=T) for e, T in zip(entries, changed, strict=True)), None

@@ -6,6 +6,7 @@ from typing import Any
 from tracker.calibrations.camera_words import Section, is_camera, section_of
 from tracker.calibrations.document import Document, refuse
 from tracker.calibrations.lens_words import is_unknown_key, spelled
+from tracker.validation import quoted
 
 _CAMERA_KEYS = {"name", "size", "matrix", "rotation", "translation", "distortions"}
 _CALISCOPE_NUMBERS = ("cam_id", "port")
@@ -50,7 +51,7 @@ def read_top_sections(document: Document) -> dict[str, Section]:
         CalibrationError: a key or value that changes the meaning is not understood.
     """
     if lone := next((key for key, v in document.data.items() if not isinstance(v, dict) and _changes(key)), None):
-        raise refuse(document, None, "known keys of a lens or a convention", f"'{lone}'", "remove it")
+        raise refuse(document, None, "known keys of a lens or a convention", quoted(lone), "remove it")
     groups = {
         key: group
         for key, group in document.groups.items()

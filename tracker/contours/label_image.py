@@ -38,6 +38,7 @@ def part_labels(bodies: Sequence[PosedBody], camera: Camera) -> NDArray[np.uint8
     Returns:
         (H, W): 1 + the index of the visible part, counted through all bodies; 0 for none.
     """
+    camera = camera.pinhole
     labels = np.zeros((camera.height, camera.width), np.uint8)
     if not bodies:
         return labels

@@ -69,7 +69,7 @@ def trace(bodies: Sequence[PosedBody], camera: Camera, piece_px: float = PIECE_P
 def trace_surfaces(surfaces: Surfaces, Ts_world_part: Array, camera: Camera, piece_px: float) -> Contour:
     """Trace the contours of shapes, placed by their parts' poses (P, 4, 4), in a view; see `trace`."""
     n_bodies = int(surfaces.people.max()) + 1
-    pieces = piece_buffer(surfaces, contour_room(camera, n_bodies, piece_px))
+    pieces = piece_buffer(surfaces, contour_room(camera.pinhole, n_bodies, piece_px))
     place_parts(Ts_world_part, surfaces, pieces)
     n = trace_pieces(camera.projection, camera.center_world, surfaces, float(piece_px), pieces)
     out = contour_buffer(n)

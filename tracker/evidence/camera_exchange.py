@@ -37,6 +37,8 @@ and with three of them, no right assignment is reported. Of 38 exchanges of two 
 named; of the two others, in a square, the pair across is named."""
 _ABSENT, _PRESENT = 0.4, 0.6
 """Share of a body's points on the foreground below which it is not there, and above which it is."""
+_FAR_PX = 1e4
+"""Distance in a small picture at which nothing is."""
 _MAX_CAMERAS = 8
 """Among more cameras only those with the least coverage are exchanged."""
 
@@ -82,7 +84,8 @@ def find_exchange(cameras: Sequence[CameraSource], recording: Recording) -> Came
     found = []
     for i, j in combinations(sorted(candidates), 2):
         if cameras[i].camera.size == cameras[j].camera.size:
-            for n_stay, (of_i, of_j) in enumerate(_exchanged(footage[i], footage[j])):
+            exchanges = _exchanged((views[i], footage[i]), (views[j], footage[j]))
+            for n_stay, (of_i, of_j) in enumerate(exchanges):
                 exchanged = [of_i if k == i else of_j if k == j else foregrounds[k] for k in order]
                 found.append((float(_coverage(room, exchanged).mean()), n_stay == 0, i, j))
     before = float(coverage.mean())
@@ -122,7 +125,7 @@ def find_body_exchange(
         if cameras[i].camera.size != cameras[j].camera.size:
             continue
         now = max(share(k, footage[k].foregrounds[0]) for k in (i, j))
-        for of_i, of_j in _exchanged(footage[i], footage[j]):
+        for of_i, of_j in _exchanged((views[i], footage[i]), (views[j], footage[j])):
             there = min(share(i, of_i[0]), share(j, of_j[0]))
             if now < _ABSENT and there > _PRESENT:
                 return cameras[i].camera.name, cameras[j].camera.name
@@ -201,18 +204,52 @@ def _gray(mask: Mask) -> Image:
     return np.repeat((mask * np.uint8(255))[..., None], 3, axis=2)
 
 
-def _exchanged(first: _Footage, second: _Footage) -> list[tuple[list[Mask | None], list[Mask | None]]]:
+def _exchanged(
+    first: tuple[_SmallView, _Footage], second: tuple[_SmallView, _Footage]
+) -> list[tuple[list[Mask | None], list[Mask | None]]]:
     """Return the foregrounds of two cameras, by frame, with their footage exchanged.
+
+    Args:
+        first: one camera, and its footage.
+        second: another one.
 
     Returns:
         The foregrounds of the one and of the other, with the backgrounds exchanged too (as where the calibration has
         the names exchanged), and with backgrounds that stay.
     """
-    found = [(second.foregrounds, first.foregrounds)]
-    if first.background is not None and second.background is not None:
-        a, b = ((f.images, g.background, f.masks) for f, g in ((second, first), (first, second)))
+    (one, own), (other, others) = first, second
+    for_one, for_other = _through(one, other, others), _through(other, one, own)
+    found = [(for_one.foregrounds, for_other.foregrounds)]
+    if own.background is not None and others.background is not None:
+        a, b = ((f.images, g.background, f.masks) for f, g in ((for_one, own), (for_other, others)))
         found.append((_foregrounds(*a), _foregrounds(*b)))
     return found
+
+
+def _through(view: _SmallView, filmed: _SmallView, footage: _Footage) -> _Footage:
+    """Return the footage of a camera, undistorted by the lens of another one.
+
+    Common lenses are taken as alike. The undistorted pictures of fisheye lenses differ even in size.
+    """
+    if not (view.source.fisheye or filmed.source.fisheye):
+        return footage
+    original_px = np.stack(view.source.distortion_map(view.camera), axis=-1).astype(np.float64)
+    share = np.array(filmed.camera.size) / filmed.source.pinhole.size
+    at = (filmed.source.undistort_points(original_px) + 0.5) * share - 0.5
+    columns, rows = np.moveaxis(np.nan_to_num(np.clip(at, -_FAR_PX, _FAR_PX), nan=-_FAR_PX).astype(np.float32), -1, 0)
+
+    def image(found: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.asarray(cv2.remap(found, columns, rows, cv2.INTER_LINEAR), np.float32)
+
+    def mask(found: Mask) -> Mask:
+        return np.asarray(cv2.remap(found.view(np.uint8), columns, rows, cv2.INTER_NEAREST)).view(np.bool_)
+
+    return _Footage(
+        [None if i is None else image(i) for i in footage.images],
+        None if footage.background is None else image(footage.background),
+        [None if m is None else mask(m) for m in footage.masks],
+        [None if m is None else mask(m) for m in footage.foregrounds],
+    )
 
 
 def _changed(image: NDArray[np.float32], empty: NDArray[np.float32]) -> Mask:

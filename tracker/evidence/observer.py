@@ -204,13 +204,13 @@ class Observer:
     ) -> RegionFeatures:
         view, box = self._views[i], self._box(i, region)
         working = view.view.camera
-        camera, scale = working.cropped(box), view.view.scale
+        camera, scale, filmed = working.cropped(box), view.view.scale, view.view.filmed
         if prepared is None:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
-            return RegionFeatures(camera, scale, box[:2], working.size, nothing)
+            return RegionFeatures(camera, scale, box[:2], filmed.size, nothing)
         smooth = view.smooth_region(prepared, box)
         changes = view.changes(prepared, smooth, box) if settings.foreground else None
-        margin_px = FOREGROUND_MARGIN * max(working.size)
+        margin_px = FOREGROUND_MARGIN * max(filmed.size)
         foreground = None if changes is None else background_subtraction.dilate(changes.anything, margin_px)
         # The model of static edges refuses texture, so low thresholds can keep the weaker edges of bodies.
         edges = detect_edges(
@@ -218,8 +218,8 @@ class Observer:
         )
         segments = link_edges(edges.found, edges.gradients, settings.max_segment_px)
         silhouette = (
-            None if changes is None else silhouette_evidence(changes.inside, edges, 2 * default_theta_px(working))
+            None if changes is None else silhouette_evidence(changes.inside, edges, 2 * default_theta_px(filmed))
         )
         return RegionFeatures(
-            camera, scale, box[:2], working.size, edges.found, segments, sample_segments(segments), smooth, silhouette
+            camera, scale, box[:2], filmed.size, edges.found, segments, sample_segments(segments), smooth, silhouette
         )  # fmt: skip

@@ -6,6 +6,7 @@ Silhouettes are in *raw* pixels: as filmed, lens distortion included, at working
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import cv2
@@ -81,8 +82,8 @@ class SilhouetteFinder:
         """
         self.cameras, self.recording = tuple(cameras), recording
         self._shading = shading
-        # Without its lens distortion a camera's working view is the footage itself, reduced.
-        self._views = [WorkingView(c.camera.pinhole) for c in self.cameras]
+        # Without a lens, a camera's working view is the footage itself, reduced.
+        self._views = [WorkingView(replace(c.camera, distortion=np.zeros(0), fisheye=False)) for c in self.cameras]
         self._pool = ThreadPoolExecutor(2, "silhouettes", initializer=cv2.setNumThreads, initargs=(1,))
         self._models = list(self._pool.map(self._model, range(len(self.cameras))))
 

@@ -97,7 +97,8 @@ class ViewEvidence:
     corner_px: tuple[int, int] = (0, 0)
     """First pixel of the region in the whole image, working px."""
     image_size: tuple[int, int] | None = None
-    """Width and height of the whole image, working px; None if the region is the whole image."""
+    """Width and height of the footage at working scale, px; None if the region is the whole image of a lens that is no
+    fisheye."""
     normals: FloatArray = field(default_factory=lambda: np.empty((0, 2), np.float32))
     """Unit gradient at each of `points_px`, from dark to light, (N, 2); zero where the direction is unknown."""
     colors: Image | None = None

@@ -108,4 +108,4 @@ def _camera_at(like: Camera, middle: Array, distance_m: float, up: Array, direct
     x /= np.linalg.norm(x)
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = np.stack([x, np.cross(z, x), z], axis=1), middle + distance_m * outward
-    return replace(like, name="added", distortion=np.zeros(0), T_world_camera=T)
+    return replace(like.pinhole, name="added", T_world_camera=T)

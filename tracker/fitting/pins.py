@@ -26,7 +26,7 @@ class PinBlock:
     """
 
     cameras: tuple[Camera, ...]
-    """Camera of each pin, (N,)."""
+    """Camera of each pin, without its lens, (N,)."""
     points: IntArray
     """Indices into `BodyModel.point_names`, (N,)."""
     positions_px: Array
@@ -65,6 +65,11 @@ def pin_block(model: BodyModel, cameras: Sequence[Camera], pins: Sequence[PointO
         cameras: all views; their distortion is ignored.
         pins: at least one.
     """
-    seen_by = tuple(cameras[p.camera].pinhole for p in pins)
+    seen_by = [cameras[p.camera] for p in pins]
     points = np.array([model.point_names.index(p.point) for p in pins], dtype=np.int64)
-    return PinBlock(seen_by, points, np.array([p.position_px for p in pins]), np.array([sigma_px(c) for c in seen_by]))
+    return PinBlock(
+        tuple(c.pinhole for c in seen_by),
+        points,
+        np.array([p.position_px for p in pins]),
+        np.array([sigma_px(c) for c in seen_by]),
+    )

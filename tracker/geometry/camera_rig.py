@@ -30,7 +30,7 @@ class AxesPoint:
         return self.spread_rad >= MIN_SPREAD_RAD
 
 
-def axes_point(Ts_world_camera: Sequence[Array]) -> AxesPoint:
+def axes_point(Ts_world_camera: Sequence[Array] | Array) -> AxesPoint:
     """Find the point nearest to all optical axes.
 
     Args:

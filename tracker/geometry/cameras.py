@@ -31,9 +31,9 @@ BEYOND_PX = -32000.0
 Region = tuple[int, int, int, int]
 """A box in an image, px: first column, first row, column after the last, row after the last."""
 
-MAX_PINHOLE_ANGLE = np.radians(75.0)
-"""Largest angle from the axis that the undistorted picture of a fisheye lens is made to hold, rad. There it stretches
-bodies 15 times as much along the radius as in its middle (1/cos^2), and at 90 degrees without end."""
+MAX_PINHOLE_ANGLE = np.radians(70.0)
+"""Largest angle from the axis that the undistorted picture of a fisheye lens is made to hold, rad. A picture without
+distortion stretches along the radius by 1/cos^2: 8 times here, 15 times at 75 degrees, without end at 90."""
 MAX_PINHOLE_GROWTH = 4.0
 """Largest number of undistorted pixels per pixel of a fisheye's footage: twice as many along either side."""
 
@@ -91,7 +91,7 @@ class Camera:
     @cached_property
     def projection(self) -> Array:
         """Projection matrix, (3, 4): maps homogeneous world points to homogeneous undistorted pixels."""
-        return self.K @ self.T_camera_world[:3]
+        return self.pinhole.K @ self.T_camera_world[:3]
 
     @property
     def center_world(self) -> Array:
@@ -163,7 +163,7 @@ class Camera:
 
     def project_with_jacobian(self, points_world: Array) -> tuple[Array, Array]:
         """Project world points `(N, 3)` to undistorted pixels, with derivatives, as the function of this name does."""
-        return project_with_jacobian(self.T_camera_world, self.K, points_world)
+        return project_with_jacobian(self.T_camera_world, self.pinhole.K, points_world)
 
     def rays(self, points_px: Array) -> Array:
         """Return unit directions in the world, `(..., 3)`, of the viewing rays of original pixels `(..., 2)`.
@@ -204,6 +204,13 @@ class Camera:
             return np.asarray(np.isfinite(points_px).all(axis=-1))
         radius = np.linalg.norm(self.pinhole._px_to_slopes(points_px), axis=-1)
         return np.asarray(radius < self._lens_radius)
+
+    def is_filmed(self, points_px: Array) -> NDArray[np.bool_]:
+        """Return whether undistorted pixels, `(..., 2)`, show footage; those in the corners of a fisheye's may not."""
+        original = self.distort_points(points_px)
+        with np.errstate(invalid="ignore"):
+            inside = np.all((original >= -0.5) & (original <= np.array(self.size) - 0.5), axis=-1)
+        return np.asarray(inside & self.within_lens(points_px))
 
     @cached_property
     def _lens_radius(self) -> float:
@@ -339,6 +346,7 @@ def epipolar_segment(source: Camera, target: Camera, point_px: Array, near_m: fl
         The end points of the visible segment in undistorted pixels of `target`, (2, 2), clipped to its image,
         or None if the ray does not cross the image.
     """
+    target = target.pinhole
     direction = target.T_camera_world[:3, :3] @ source.pinhole.rays(point_px)
     origin = rigid.apply(target.T_camera_world, source.center_world)
     # The part of the ray t >= 0 in front of the target: z(t) = o_z + t d_z >= near.

@@ -43,7 +43,7 @@ def _framing(camera: Camera, points_world: Array) -> Framing:
     center = points_world.mean(axis=0)
     ahead = points_world[camera.depths(points_world) > NEAR_PLANE_M]
     points_px = camera.pinhole.project(ahead)
-    beyond = np.maximum(np.maximum(-0.5 - points_px, points_px - (np.array(camera.size) - 0.5)), 0)
+    beyond = np.maximum(np.maximum(-0.5 - points_px, points_px - (np.array(camera.pinhole.size) - 0.5)), 0)
     beside = np.linalg.norm(beyond, axis=-1)
     return Framing(
         camera.name,

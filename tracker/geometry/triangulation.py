@@ -31,7 +31,7 @@ class PointObservation(NamedTuple):
 
 
 def sigma_px(camera: Camera) -> float:
-    """Return the standard deviation of a pin in a view, px."""
+    """Return the standard deviation of a pin in the view of a camera with its lens, px."""
     return _SIGMA_SHARE * max(camera.size)
 
 
@@ -68,7 +68,7 @@ def triangulate(cameras: Sequence[Camera], positions_px: Array) -> Triangulation
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
     centers = np.stack([c.center_world for c in views])
     point = np.linalg.solve(across.sum(axis=0), (across @ centers[..., None]).sum(axis=0)[:, 0])
-    point = _nearest_in_the_images(views, positions_px, point)
+    point = _nearest_in_the_images(views, positions_px, np.array([sigma_px(c) for c in cameras]), point)
     behind = [c.name for c in views if c.depths(point) < NEAR_PLANE_M]
     if behind:
         return _nowhere(views, f"the lines of sight meet behind {' and '.join(behind)}: check the pins of this joint")
@@ -86,9 +86,9 @@ def _residuals(views: Sequence[Camera], positions_px: Array, point: Array) -> tu
     return points_px - positions_px, J
 
 
-def _nearest_in_the_images(views: Sequence[Camera], positions_px: Array, point: Array) -> Array:
+def _nearest_in_the_images(views: Sequence[Camera], positions_px: Array, sigmas_px: Array, point: Array) -> Array:
     """Minimize the reprojection error by Gauss-Newton; stop before a step that would lead behind a camera."""
-    weights = 1 / np.array([sigma_px(c) for c in views])[:, None]
+    weights = 1 / sigmas_px[:, None]
     if min(c.depths(point) for c in views) < NEAR_PLANE_M:
         return point
     r, J = _residuals(views, positions_px, point)

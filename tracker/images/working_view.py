@@ -15,7 +15,7 @@ from tracker.geometry.cameras import Camera, Region
 from tracker.images.background_subtraction import Mask
 
 WORKING_AREA_PX = 640 * 480
-"""Largest number of pixels of a view at working scale. Smaller frames are not enlarged."""
+"""Largest number of pixels of a frame as filmed at working scale. Smaller frames are not enlarged."""
 MIN_REGION_PX = 16
 """Smallest width and height of a region, px; edges and distances need neighbours."""
 _REGION_STEP_PX = 8
@@ -24,7 +24,7 @@ _MARGIN_PX = 2
 
 
 def working_scale(camera: Camera) -> float:
-    """Return the working scale of a camera: 1 up to 640x480, smaller above."""
+    """Return the working scale of a camera as calibrated: 1 up to 640x480 px of its footage, smaller above."""
     return min(1.0, float(np.sqrt(WORKING_AREA_PX / (camera.width * camera.height))))
 
 
@@ -93,15 +93,17 @@ class WorkingView:
 
     def _map(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return where each working pixel lies in the footage, u and v, (H, W) each, px."""
-        source, camera = self.source, self.camera
-        return cv2.initUndistortRectifyMap(  # type: ignore[return-value]
-            source.K, source.distortion, np.eye(3), camera.K, camera.size, cv2.CV_32FC1
-        )
+        return self.source.distortion_map(self.camera)
 
     @cached_property
     def _nearest(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """The same map in OpenCV's form for nearest-neighbour interpolation."""
         return cv2.convertMaps(*self._map(), cv2.CV_16SC2, nninterpolation=True)
+
+    @cached_property
+    def filmed(self) -> Camera:
+        """The camera of the footage at working scale, with its lens. The picture of a fisheye is larger undistorted."""
+        return self.source.scaled(self.scale)
 
     @property
     def whole(self) -> Region:
@@ -116,7 +118,8 @@ class WorkingView:
         cells, fractions = self._cells[v0:v1, u0:u1], self._fractions[v0:v1, u0:u1]
         f = self._reduction
         if f > 1:
-            left, top, right, bottom = self._needed(cells, frame.shape[1] // f, frame.shape[0] // f)
+            read = cells.reshape(-1, 2) if self.source.fisheye else _border(cells)
+            left, top, right, bottom = self._needed(read, frame.shape[1] // f, frame.shape[0] // f)
             part = frame[top * f : bottom * f, left * f : right * f]
             frame = np.asarray(cv2.resize(part, (right - left, bottom - top), interpolation=cv2.INTER_AREA), np.uint8)
             cells = cells - np.array([left, top], np.int16)
@@ -134,10 +137,13 @@ class WorkingView:
 
     @staticmethod
     def _needed(cells: NDArray[Any], width: int, height: int) -> Region:
-        """Return the region of the reduced footage that a map reads. The extremes of a lens map lie on the region's
-        border."""
-        border = np.concatenate([cells[0], cells[-1], cells[:, 0], cells[:, -1]])
-        (left, top), (right, bottom) = border.min(axis=0).tolist(), border.max(axis=0).tolist()
+        """Return the region of the reduced footage that entries of a map, (n, 2), read."""
+        (left, top), (right, bottom) = cells.min(axis=0).tolist(), cells.max(axis=0).tolist()
         m = _MARGIN_PX
         left, top = min(max(left - m, 0), width - 1), min(max(top - m, 0), height - 1)
         return left, top, max(min(right + m + 1, width), left + 1), max(min(bottom + m + 1, height), top + 1)
+
+
+def _border(cells: NDArray[Any]) -> NDArray[Any]:
+    """Return the border of a map, (h, w, 2), as rows, (n, 2). The extremes of a common lens's map lie there."""
+    return np.concatenate([cells[0], cells[-1], cells[:, 0], cells[:, -1]])

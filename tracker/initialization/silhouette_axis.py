@@ -55,6 +55,10 @@ def major_axis(mask: Mask, camera: Camera) -> MajorAxis | None:
         return None
     chosen = np.linspace(0, len(rows) - 1, min(len(rows), _MAX_POINTS)).astype(np.intp)
     points = camera.undistort_points(np.column_stack([columns, rows])[chosen].astype(np.float64))
+    if camera.fisheye:  # far aside, a few pixels would outweigh the rest
+        points = points[np.all((points >= -0.5) & (points <= np.array(camera.pinhole.size) - 0.5), axis=1)]
+        if len(points) < _MIN_POINTS:
+            return None
     kept, lines, last, elongation = np.ones(len(points), bool), [], None, 0.0
     for _ in range(_MAX_ROUNDS):
         center = points[kept].mean(axis=0)

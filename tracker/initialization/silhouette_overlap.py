@@ -125,7 +125,7 @@ def _reduced(mask: Mask, camera: Camera, center: Array) -> tuple[FloatArray, Cam
     """Return the cost of covering each cell, (H, W), as shares of the silhouette, and the camera of the cells."""
     depth = max(float(camera.depths(center)), NEAR_PLANE_M)
     whole = camera.pinhole
-    cells = whole.scaled(min(1.0, depth / (camera.K[0, 0] * _CELL_M)))
+    cells = whole.scaled(min(1.0, depth / (whole.K[0, 0] * _CELL_M)))
     shown = camera.undistort_image(mask.astype(np.uint8) * 255)
     inside = (cv2.resize(shown, cells.size, interpolation=cv2.INTER_AREA) > 127).astype(np.uint8)
     soft = _SOFT_M * cells.K[0, 0] / depth

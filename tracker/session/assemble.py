@@ -1,6 +1,6 @@
 """Make a session from a calibration and loose footage: match them, and check that they fit together."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
@@ -9,6 +9,7 @@ from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.reading import CalibratedCameras, read_cameras
 from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.frame_rates import same_rate
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
 from tracker.footage.video import Footage, open_footage
@@ -21,10 +22,11 @@ from tracker.session.matching import (
     check_image_numbers,
     check_names,
     common_length,
+    common_offsets,
     common_rate,
     find_entry,
+    footage_notes,
     match_footage,
-    same_rate,
 )
 from tracker.session.rig_summary import summarize_rig
 from tracker.session.session import PALETTE, Person, Session, create_session
@@ -70,6 +72,8 @@ class NewSession:
     folders of images."""
     up: str = "z"
     """World axis that points up."""
+    common_frames: bool = False
+    """Whether frames that only some cameras have are left out: at the end, of numbered images at both ends."""
     units: Units | None = None
     """Unit of the calibration's translations; by default the one that its layout fixes, else metres."""
     poses: PoseConvention | None = None
@@ -149,6 +153,11 @@ def check_parts(
                 f"camera '{name}' is asked for, but {calibration.left_out[name]}; calibrate it with the others, or "
                 "leave it out"
             )
+    if len(calibrated) == 1 and len(request.videos) > 1 and not request.cameras:
+        raise SessionError(
+            f"the calibration has the camera '{next(iter(calibrated))}' alone, and there are {len(request.videos)} "
+            "videos; give the files of all cameras or their folder, or one calibration of all"
+        )
     check_names(request.cameras, list(calibrated), "camera", "the cameras to use")
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
         raise SessionError(f"expected each camera to use once, found '{twice[0]}' twice; leave one out")
@@ -166,10 +175,14 @@ def check_parts(
         cameras = {name: _fitted(calibrated[name], footage[name], request.rescale) for name in names}
         report("All footage can be read and has the calibrated shape.")
         fps = common_rate(footage, request.fps)
-        check_image_numbers(footage, request.offsets)
-        n_frames = common_length(footage, request.offsets)
+        check_image_numbers(footage, request.offsets, request.common_frames)
+        if request.common_frames:
+            request = replace(request, offsets=common_offsets(footage, request.offsets))
+        n_frames = common_length(footage, request.offsets, request.common_frames)
         report(f"All cameras have {n_frames} frames at {fps:g} per second.")
-        sources = tuple(_source(request, cameras[name], footage[name], fps) for name in names)
+        sources = tuple(_source(request, cameras[name], footage[name], fps, n_frames) for name in names)
+        for sentence in (*_left_out(sources, n_frames), *footage_notes(footage, fps, request.offsets)):
+            note(sentence)
     finally:
         for f in footage.values():
             f.close()
@@ -267,15 +280,25 @@ def _fitted(entry: CameraEntry, footage: Footage, rescale: bool) -> Camera:
     return camera
 
 
-def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -> CameraSource:
+def _left_out(sources: Sequence[CameraSource], n_frames: int) -> Iterator[str]:
+    """Say which frames are left out because other cameras lack them."""
+    for source in sources:
+        if source.footage_frames is not None:
+            rest = source.footage_frames - source.offset - n_frames
+            yield f"camera '{source.camera.name}': frames that other cameras lack are left out at its end: {rest}"
+
+
+def _source(request: NewSession, camera: Camera, footage: Footage, fps: float, n_frames: int) -> CameraSource:
+    offset = request.offsets.get(camera.name, 0)
     side_name = request.side_names.get(camera.name, camera.name)
     return CameraSource(
         camera,
         footage.path,
         find_background(request.background, side_name) if request.background is not None else None,
         find_masks(request.masks, side_name) if request.masks is not None else None,
-        request.offsets.get(camera.name, 0),
+        offset,
         None if footage.fps is None or same_rate(footage.fps, fps) else footage.fps,
+        footage.n_frames if request.common_frames and footage.n_frames > n_frames + offset else None,
     )
 
 

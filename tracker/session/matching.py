@@ -4,12 +4,14 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from tracker.errors import RecordingError, Remedy, SessionError
+from tracker.footage.frame_rates import same_rate, usual_rate
 from tracker.footage.image_folder import ImageFolder, missing_numbers
 from tracker.footage.video import Footage
 from tracker.validation import FrameRate, check, same_form
 
-RATE_TOLERANCE = 5e-4
-"""Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much."""
+_NOTED_JITTER = 0.04
+"""Share of the interval between frames from which jitter is reported. Ticks of a millisecond, as of Matroska, shift
+stamps by up to 3% at 30 frames per second."""
 
 
 def match_footage(
@@ -71,10 +73,10 @@ def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
     """
     rates = {name: f.fps for name, f in footage.items() if f.fps is not None}
     for name, f in footage.items():
-        if not f.has_constant_rate:
+        if fps is None and not f.has_constant_rate:
             raise RecordingError(
-                f"camera '{name}': {f.path} has a variable frame rate, expected a constant one; "
-                "convert it to a constant rate with frames at the times of the other cameras"
+                f"camera '{name}': {f.path} has a variable frame rate, expected a constant one: {_irregularity(f)}",
+                Remedy("give_constant_rate", fps=f"{usual_rate(rates[name]):g}"),
             )
     wanted = fps if fps is not None else next(iter(rates.values()), None)
     if wanted is None:
@@ -82,36 +84,108 @@ def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
     check(wanted, FrameRate, "the given rate" if fps is not None else "footage", RecordingError)
     if fps is None and any(not same_rate(rate, wanted) for rate in rates.values()):
         found = ", ".join(f"'{name}' {rate:.6g}" for name, rate in rates.items())
-        raise RecordingError(f"expected one frame rate for all cameras, found {found}", Remedy("give_common_rate"))
+        shaky = [f"'{name}': {_irregularity(f)}" for name, f in footage.items() if _jitter(f) > _NOTED_JITTER]
+        raise RecordingError(
+            f"expected one frame rate for all cameras, found {found}{''.join(f' ({s})' for s in shaky)}",
+            Remedy("give_common_rate", fps=f"{usual_rate(wanted):g}"),
+        )
     return wanted
 
 
-def same_rate(rate: float, other: float) -> bool:
-    """Return whether two frame rates, 1/s, are equal within rounding."""
-    return abs(rate / other - 1) <= RATE_TOLERANCE
+def _jitter(footage: Footage) -> float:
+    return 0.0 if footage.stamps is None else footage.stamps.jitter
 
 
-def common_length(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -> int:
-    """Return the number of frames that all cameras have; lengths may differ by the offsets alone.
+def _irregularity(footage: Footage) -> str:
+    """Say how far the time stamps of a video are from even ones."""
+    assert footage.stamps is not None
+    jitter, n_gaps = footage.stamps.jitter, footage.stamps.n_gaps
+    text = f"its time stamps lie up to {100 * jitter:.0f}% of a frame from even ones"
+    return text + (f", with {n_gaps} gaps in which frames may be missing" if n_gaps else "")
+
+
+def footage_notes(footage: Mapping[str, Footage], fps: float, offsets: Mapping[str, int]) -> list[str]:
+    """Return sentences on what a person should check: jitter, cameras that start later, mirrored pictures.
+
+    Args:
+        footage: of each camera by name.
+        fps: frame rate of the session, 1/s.
+        offsets: shifts by camera name; with any, starts are not compared.
+    """
+    notes = []
+    for name, f in footage.items():
+        if _jitter(f) > _NOTED_JITTER:
+            notes.append(f"camera '{name}': {_irregularity(f)}; its frames are taken as they are, {fps:g} per second")
+        if f.is_mirrored:
+            notes.append(
+                f"camera '{name}': the video's display matrix mirrors the picture, which is applied, as players do; "
+                "the calibration must be of mirrored pictures too"
+            )
+    starts = {name: f.stamps.start_s for name, f in footage.items() if f.stamps is not None}
+    first = min(starts.values(), default=0.0)
+    late = {name: round((start - first) * fps) for name, start in starts.items()}
+    if len(starts) == len(footage) and any(n > 1 for n in late.values()) and not offsets:
+        listed = ", ".join(f"'{name}' {starts[name] - first:.3g} s ({n} frames)" for name, n in late.items() if n > 1)
+        last = max(late.values())
+        needed = " ".join(f"{name}={last - n}" for name, n in late.items() if last > n)
+        notes.append(
+            f"by their time stamps, some cameras start later than others: {listed}. Frames are paired by their number; "
+            f"to pair them by their stamps, make the session with the offsets {needed}"
+        )
+    return notes
+
+
+def common_length(footage: Mapping[str, Footage], offsets: Mapping[str, int], shorten: bool = False) -> int:
+    """Return the number of frames that all cameras have.
+
+    Args:
+        footage: of each camera by name.
+        offsets: shifts by camera name.
+        shorten: leave out frames at the end that some cameras lack; otherwise lengths may differ by the offsets alone.
 
     Raises:
-        RecordingError: they differ otherwise.
+        RecordingError: the lengths differ otherwise, or nothing is left.
     """
     rest = {name: f.n_frames - offsets.get(name, 0) for name, f in footage.items()}
-    if len({f.n_frames for f in footage.values()}) > 1 and len(set(rest.values())) > 1:
+    for name, n in rest.items():
+        if n < 1:
+            raise RecordingError(
+                f"camera '{name}': expected an offset below its {footage[name].n_frames} frames, found "
+                f"{offsets[name]}; check the footage and the offsets"
+            )
+    if not shorten and len({f.n_frames for f in footage.values()}) > 1 and len(set(rest.values())) > 1:
         found = ", ".join(f"'{name}' {f.n_frames}" for name, f in footage.items())
         raise RecordingError(
-            f"expected videos of the same number of frames, found {found}", Remedy("give_frame_offset")
+            f"expected videos of the same number of frames, found {found}",
+            Remedy("give_frame_offset", n=min(rest.values())),
         )
     return min(rest.values())
 
 
-def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -> None:
+def common_offsets(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -> dict[str, int]:
+    """Return the offsets at which numbered image folders begin with the first number that all have.
+
+    Given offsets, and those of other footage, stay.
+    """
+    firsts = {name: f.numbers[0] for name, f in footage.items() if isinstance(f, ImageFolder) and f.numbers is not None}
+    if offsets or len(firsts) < len(footage):
+        return dict(offsets)
+    begin = max(firsts.values())
+    found = {}
+    for name, f in footage.items():
+        assert isinstance(f, ImageFolder)
+        assert f.numbers is not None
+        found[name] = sum(n < begin for n in f.numbers)
+    return {name: n for name, n in found.items() if n}
+
+
+def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, int], shorten: bool = False) -> None:
     """Check that images with equal numbers are frames of the same instant, if the folders are numbered.
 
     Args:
         footage: of each camera by name.
         offsets: shifts by camera name, set by the user; they replace the comparison between cameras.
+        shorten: whether numbers at the ends may be missing in some folders; see `common_offsets`.
 
     Raises:
         RecordingError: a number is missing in a folder, or in the folder of one camera only.
@@ -125,7 +199,7 @@ def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, in
                 f"camera '{name}': {path} has no image with number {_listed(gaps)}, expected every number from "
                 f"{numbers[0]} to {numbers[-1]}; restore it, or number the images without a gap"
             )
-    if offsets or len(numbered) < 2:
+    if offsets or shorten or len(numbered) < 2:
         return
     every = set().union(*(numbers for _, numbers in numbered.values()))
     for name, (path, numbers) in numbered.items():
@@ -137,15 +211,17 @@ def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, in
             )
 
 
-def check_names(given: Iterable[str], known: Sequence[str], what: str, among: str) -> None:
+def check_names(given: Iterable[str], known: Sequence[str], what: str, among: str) -> list[str]:
     """Check that given names are known; `what` and `among` are for the message, such as "camera" and "the offsets".
 
     Raises:
         SessionError: one is not; the message lists those that are.
     """
-    unknown = [n for n in given if n not in known]
+    given, compared = list(given), {same_form(name): name for name in known}
+    unknown = [n for n in given if same_form(n) not in compared]
     if unknown:
         raise SessionError(f"unknown {what} '{unknown[0]}' among {among}; expected one of {', '.join(known)}")
+    return [compared[same_form(n)] for n in given]
 
 
 def _listed(numbers: Sequence[int]) -> str:

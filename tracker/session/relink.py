@@ -12,11 +12,13 @@ from typing import Literal, NamedTuple
 
 from tracker.errors import RecordingError, Remedy, SessionError, TrackerError
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size, read_background
 from tracker.footage.video import open_footage
 from tracker.session.assemble import check_side_files, find_background, find_masks
-from tracker.session.matching import check_names, same_rate
+from tracker.session.matching import check_names
 from tracker.session.session import Session, save_cameras
+from tracker.validation import same_form
 
 Kind = Literal["footage", "background", "masks"]
 KINDS: tuple[Kind, ...] = ("footage", "background", "masks")
@@ -98,7 +100,9 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
     if places.search:
         named = _files_named({m.path.name for m in missing}, places.search)
         for lost in missing:
-            new = _choose(lost, named.get(lost.path.name, []), partial(_check, session, lost.camera, lost.kind))
+            new = _choose(
+                lost, named.get(same_form(lost.path.name), []), partial(_check, session, lost.camera, lost.kind)
+            )
             if new is not None:
                 found.append(Relinked(lost.camera, lost.kind, lost.path, new))
     _check_once(found)
@@ -118,12 +122,13 @@ def _given(session: Session, places: Places) -> list[Relinked]:
             raise SessionError(
                 f"no camera of {session.folder} has {noun} to relink", Remedy("relink_nothing", kind=given_kind)
             )
+    by_name = {same_form(name): path for name, path in places.camera_paths.items()}
     found = []
     for source in session.cameras:
         name = source.camera.name
         given: dict[Kind, Path] = {}
-        if name in places.camera_paths:
-            given["footage"] = places.camera_paths[name]
+        if (own := by_name.get(same_form(name))) is not None:
+            given["footage"] = own
         if places.background is not None and source.background is not None:
             given["background"] = find_background(places.background, name)
         if places.masks is not None and source.masks is not None:
@@ -136,8 +141,8 @@ def _given(session: Session, places: Places) -> list[Relinked]:
 
 
 def _files_named(names: Iterable[str], folders: Sequence[Path]) -> dict[str, list[Path]]:
-    """Find all files and folders with the given names below some folders."""
-    wanted, found = set(names), dict[str, list[Path]]()
+    """Find all files and folders with the given names below some folders, by the form in which names are compared."""
+    wanted, found = {same_form(name) for name in names}, dict[str, list[Path]]()
     for folder in folders:
         if not folder.is_dir():
             raise SessionError(f"expected a folder to search, found {folder}, which is none", Remedy("relink_search"))
@@ -146,8 +151,9 @@ def _files_named(names: Iterable[str], folders: Sequence[Path]) -> dict[str, lis
         root = Path(os.path.abspath(folder))
         everything = ((Path(at), name) for at, inner, files in os.walk(root) for name in (*inner, *files))
         for at, name in chain([(root.parent, root.name)], everything):
-            if name in wanted and at / name not in found.setdefault(name, []):
-                found[name].append(at / name)
+            key = same_form(name)
+            if key in wanted and at / name not in found.setdefault(key, []):
+                found[key].append(at / name)
     return found
 
 
@@ -205,6 +211,8 @@ def _check_footage(session: Session, source: CameraSource, path: Path) -> None:
     name, offsets = source.camera.name, [c.offset for c in session.cameras]
     # Videos of one length lose frames at the end by the offsets of the others.
     lengths = {session.n_frames + source.offset, session.n_frames + max(offsets)}
+    if source.footage_frames is not None:
+        lengths = {source.footage_frames}
     expected_fps = session.fps if source.declared_fps is None else source.declared_fps
     with closing(open_footage(path, name)) as footage:
         check_size(name, path, footage.size, source.camera.size)

@@ -72,7 +72,7 @@ def summarize_rig(cameras: Sequence[Camera], up: str = "z") -> RigSummary:
 
 
 def _interval(values_m: Array) -> str:
-    low, high = f"{values_m.min():.2f}", f"{values_m.max():.2f}"
+    low, high = (f"{round(float(value), 2) + 0.0:.2f}" for value in (values_m.min(), values_m.max()))
     return f"{low} m" if low == high else f"{low} to {high} m"
 
 

@@ -64,6 +64,8 @@ class Simulation:
     """Who plays a scene of one person, see `population.POPULATION`; the usual adult if empty."""
     masks: bool = False
     """Whether to write true masks too, `masks/CAM/%06d.png`: 0 background, k person k."""
+    fisheyes: tuple[str, ...] = ()
+    """Names of the cameras with a fisheye lens, or `all`."""
 
 
 _DEFAULT = Simulation()
@@ -89,7 +91,7 @@ def simulate(out: str | Path, simulation: Simulation = _DEFAULT, progress: Progr
     out = Path(out).absolute()
     _check(out, n_frames, fps, body)
     cast = cast_of(simulation.scene, seed, simulation.person)
-    cameras = make_cameras(simulation.n_cameras, simulation.size, seed)
+    cameras = make_cameras(simulation.n_cameras, simulation.size, seed, simulation.fisheyes)
     presets = [load_model(PRESET, role.height_m) for role in cast]
     models = [
         altered_model(m, r.build.bone_factors) if body == "skinned" else m for r, m in zip(cast, presets, strict=True)

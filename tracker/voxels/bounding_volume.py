@@ -13,6 +13,8 @@ from tracker.geometry.cameras import NEAR_PLANE_M, viewed_point
 
 _REACH = 1.5
 """Half the edge of the largest volume, in the mean distance of the cameras from the point that they look at."""
+_MIN_COSINE = 0.05
+"""Cosine of the angle from the axis, 87 degrees, from which silhouettes of a fisheye lens span no pyramid."""
 _PIXEL = 1.0
 """Margin around the box of a silhouette, px: a body may reach nearly to the next pixel's centre."""
 
@@ -33,7 +35,8 @@ class BoundingVolume(NamedTuple):
 def bounding_volume(silhouettes: Sequence[ViewSilhouette], missing: int = 0) -> BoundingVolume:
     """Return the box around the intersection of the pyramids that the silhouettes' boxes span.
 
-    A side of a box at the image's border does not bound the person, who may be cut off there.
+    A side of a box at the image's border does not bound the person, who may be cut off there. A silhouette that a
+    fisheye lens shows at its own border, or at right angles to its axis, bounds nobody.
 
     Args:
         silhouettes: of all views. Views with an empty silhouette are left out.
@@ -71,8 +74,10 @@ def _center(silhouettes: Sequence[ViewSilhouette]) -> tuple[Array, float]:
     rays, centers = [], []
     for s in silhouettes:
         v, u = np.nonzero(s.mask)
-        rays.append(s.camera.rays(np.array([u.mean(), v.mean()])))
-        centers.append(s.camera.center_world)
+        ray = s.camera.rays(np.array([u.mean(), v.mean()]))
+        if np.isfinite(ray).all():
+            rays.append(ray)
+            centers.append(s.camera.center_world)
     across = np.eye(3) - np.einsum("ni,nj->nij", rays, rays)
     point = np.linalg.lstsq(across.sum(axis=0), np.einsum("nij,nj->i", across, centers), rcond=None)[0]
     misses = np.linalg.norm(np.einsum("nij,nj->ni", across, point - np.array(centers)), axis=-1)
@@ -80,7 +85,8 @@ def _center(silhouettes: Sequence[ViewSilhouette]) -> tuple[Array, float]:
 
 
 def _pyramid(silhouette: ViewSilhouette) -> Array:
-    """Return the planes (a, b) with a . x <= b, (m, 4), of the pyramid that a silhouette's box spans."""
+    """Return the planes (a, b) with a . x <= b, (m, 4), of the pyramid that a silhouette's box spans; none if it spans
+    none."""
     camera, mask = silhouette.camera, silhouette.mask
     v, u = np.nonzero(mask)
     on_border = (u.min() == 0, v.min() == 0, u.max() == camera.width - 1, v.max() == camera.height - 1)
@@ -91,6 +97,8 @@ def _pyramid(silhouette: ViewSilhouette) -> Array:
     points = np.concatenate([np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in outline]).astype(np.float64)
     corners = np.concatenate([points + d for d in itertools.product((-_PIXEL, _PIXEL), repeat=2)])
     rays = camera.rays(corners) @ camera.T_camera_world[:3, :3].T
+    if not np.all(rays[:, 2] > _MIN_COSINE):  # NaN is beyond the lens
+        return np.empty((0, 4))
     slopes = rays[:, :2] / rays[:, 2:]
     (x0, y0), (x1, y1) = slopes.min(axis=0), slopes.max(axis=0)
     sides = [(-1.0, 0.0, x0), (0.0, -1.0, y0), (1.0, 0.0, -x1), (0.0, 1.0, -y1)]

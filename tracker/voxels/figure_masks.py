@@ -8,6 +8,7 @@ import numpy as np
 
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera
 from tracker.images.background_subtraction import Mask
 from tracker.voxels.voxel_grid import Voxels
 
@@ -49,12 +50,22 @@ def paint(points: Array, size_m: float, silhouette: ViewSilhouette, margin: floa
     if not near.any():
         return painted.view(bool)
     px = camera.project(points[near])
-    half = int(np.ceil((0.5 + margin) * size_m * camera.K[0, 0] / float(np.median(depths[near])))) + 1
+    half = int(np.ceil((0.5 + margin) * size_m * _px_per_m(camera, points[near], depths[near]))) + 1
     inside = (px >= 0).all(axis=1) & (px <= np.array(camera.size) - 1).all(axis=1)
     columns, rows = np.round(px[inside]).astype(int).T
     painted[rows, columns] = 1
     painted = np.asarray(cv2.dilate(painted, np.ones((2 * half + 1, 2 * half + 1), np.uint8)), np.uint8)
     return painted.view(bool)
+
+
+def _px_per_m(camera: Camera, points: Array, depths: Array) -> float:
+    """Return the scale of a view, px per metre, at the middle of points, (N, 3), of known depths, (N,), metres."""
+    if not camera.fisheye:
+        return float(camera.K[0, 0]) / float(np.median(depths))
+    # Across the radius, where an equidistant lens enlarges more than along it.
+    distances = np.linalg.norm(points - camera.center_world, axis=1)
+    angles = np.arccos(np.clip(depths / distances, -1.0, 1.0))
+    return float(camera.K[0, 0] * np.median(1 / (np.sinc(angles / np.pi) * distances)))
 
 
 def figure_masks(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
+from tracker.geometry.lens_tables import Lens, lens_of
 
 _STEPS_PER_PX = 2
 """Entries of the table per raw pixel along each axis."""
@@ -21,17 +22,6 @@ _MAX_ENTRIES = 4096
 BEYOND_LENS = -32000
 """Column and row of points beyond the lens, which it does not show."""
 _BORDER_SAMPLES = 64
-
-
-class Lens(NamedTuple):
-    """The lens of a camera and the size of its image, as values that can be looked up."""
-
-    size: tuple[int, int]
-    """Width and height, px."""
-    K: bytes
-    """Its matrix."""
-    distortion: bytes
-    """Its coefficients."""
 
 
 class SensorLookup(NamedTuple):
@@ -55,16 +45,10 @@ def sensor_lookup(camera: Camera) -> SensorLookup:
     return lookup_of_lens(lens_of(camera))
 
 
-def lens_of(camera: Camera) -> Lens:
-    """Return the lens of a camera, from which its table follows."""
-    return Lens(camera.size, camera.K.tobytes(), camera.distortion.tobytes())
-
-
 @lru_cache(maxsize=32)
 def lookup_of_lens(lens: Lens) -> SensorLookup:
     """Return the table of all cameras with a lens, cached."""
-    K, distortion = np.frombuffer(lens.K).reshape(3, 3), np.frombuffer(lens.distortion)
-    camera = Camera("", lens.size, K, distortion, np.eye(4))
+    camera = lens.camera
     low, high = _border(camera)
     step = max(1 / (_STEPS_PER_PX * max(camera.K[0, 0], camera.K[1, 1])), float((high - low).max()) / _MAX_ENTRIES)
     n_columns, n_rows = (int(np.ceil(n)) + 1 for n in (high - low) / step)
@@ -72,17 +56,18 @@ def lookup_of_lens(lens: Lens) -> SensorLookup:
     points = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3)
     exact = camera.project(points)
     # Beyond the lens the polynomial bends back: nothing is seen there.
-    exact[~camera.within_lens(camera.pinhole.project(points))] = BEYOND_LENS
+    exact[~camera.within_lens(camera.pinhole.project(points)) | np.isnan(exact).any(axis=-1)] = BEYOND_LENS
     pixels = np.round(np.clip(exact, BEYOND_LENS, -BEYOND_LENS)).astype(np.int16).reshape(n_rows, n_columns, 2)
     return SensorLookup(pixels, low, step, _steepest(exact.reshape(n_rows, n_columns, 2)) / step)
 
 
 def _border(camera: Camera) -> tuple[Array, Array]:
-    """Return the lowest and highest sensor coordinates of the image, (2,) each."""
-    width, height = camera.size
+    """Return the lowest and highest sensor coordinates of the image, (2,) each; of a fisheye's, as undistorted."""
+    seen = camera.pinhole if camera.fisheye else camera
+    width, height = seen.size
     u, v = np.linspace(-1, width, _BORDER_SAMPLES), np.linspace(-1, height, _BORDER_SAMPLES)
     sides = [np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in ((u, -1), (u, height), (-1, v), (width, v))]
-    rays = camera.rays(np.concatenate(sides))
+    rays = seen.rays(np.concatenate(sides))
     xy = rays[:, :2] / rays[:, 2:]
     return xy.min(axis=0), xy.max(axis=0)
 

@@ -75,6 +75,8 @@ class Tracking:
         settings, choices = track_settings.restored(kept, session_state.session.camera_names)
         session_state.set(settings=settings, run_choices=choices)
         self._run: _Run | None = None
+        self.after_run: Callable[[range], None] = lambda frames: None
+        """Is told the frames of each run that ended. It must return quickly."""
         session_state.unwritten.append(lambda: self._run is not None and self._run.session.has_unsaved)
 
     @property
@@ -325,6 +327,10 @@ class Tracking:
         self._save(run)
         track = self._session_state.state.track
         self._run = None
+        tracked = run.session.tracked
+        run.job.discard()
+        if tracked:
+            self.after_run(range(min(tracked), max(tracked) + 1))
         self._session_state.set(
             track=TrackState(message=f"{how}: {_summary(len(run.session.tracked), track)}", failed=failed)
         )

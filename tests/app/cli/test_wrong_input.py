@@ -127,7 +127,10 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
         (["--height", "tall"], ["--height", "'tall'"]),
         (["--height", "17.5"], ["0.3 to 3 metres"]),
         (["--height", "nan"], ["0.3 to 3 metres", "nan"]),
-        (["--offset", "left=" + "9" * 30], ["a whole number of frames", "check the footage and the offsets", "-9999"]),
+        (
+            ["--offset", "left=" + "9" * 30],
+            ["'left'", "an offset below its 6 frames", "check the footage"],
+        ),
         (["--fps", "0"], ["a frame rate above 0"]),
         (["--fps", "nan"], ["a frame rate above 0"]),
         (["--model", "ROOM/latin.toml"], ["body model", "latin.toml", "expected UTF-8 text"]),

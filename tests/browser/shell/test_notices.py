@@ -140,7 +140,7 @@ async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(bro
     assert not await page.locator("#first-off").is_visible()
     endpoint.state["compared"] = {
         "number": 1, "work": "fit", "before_px": 6.3, "after_px": 2.4, "before_view_costs_px": [],
-        "after_view_costs_px": [], "warning": "", "is_before_shown": False,
+        "after_view_costs_px": [], "warning": "", "moved": [], "is_before_shown": False,
     }  # fmt: skip
     await endpoint.broadcast(endpoint.state)
     await shows(page, "document.querySelector('#first-fit').classList.contains('is-done')")

@@ -138,6 +138,12 @@ def test_row_vectors_under_opencvs_words(tmp_path):
     assert_same(read_cameras(path, poses="row-vectors").entries, [replace(c, distortion=np.zeros(0)) for c in RIG])
 
 
+def test_pixels_that_matlab_counts_from_one_are_noted(tmp_path):
+    assert "MATLAB counts pixels from 1" in read_cameras(dannce(tmp_path, RIG)).notes[0]
+    (tmp_path / "jarvis").mkdir()
+    assert read_cameras(jarvis(tmp_path / "jarvis", RIG)).notes == ()
+
+
 def test_dannce_corrected_by_half_is_refused(tmp_path):
     path = dannce(tmp_path, RIG)
     data = json.loads(path.read_text())

@@ -293,3 +293,10 @@ ENTITIES = '<!DOCTYPE x [<!ENTITY a "aaaa">' + "".join(
 def test_what_is_not_read_is_named(tmp_path, make, expected):
     with pytest.raises(CalibrationError, match=f"(?s){expected}"):
         read_cameras(make(tmp_path))
+
+
+@pytest.mark.parametrize("recording", ["walk", "balance_real", "fast_arms", "two_people"])
+def test_real_calibrations_are_read_without_a_doubt(data_folder, recording):
+    found = read_cameras(data_folder(recording) / "Calib.toml")
+    assert len(found.entries) == 4
+    assert found.notes == ()

@@ -3,6 +3,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from fisheye import with_fisheye
 from staging import camera_at, view_evidence
 
 from tracker.body.model import PosedBody
@@ -83,15 +84,17 @@ LENS = np.array([-0.1, 0.02, 0.001, -0.001])
 
 
 @pytest.mark.parametrize("size", [(640, 480), (1920, 1080), (1080, 1920), (1023, 771)])
-@pytest.mark.parametrize("lens", [np.zeros(0), LENS], ids=["pinhole", "lens"])
+@pytest.mark.parametrize("lens", [np.zeros(0), LENS, None], ids=["pinhole", "lens", "fisheye"])
 def test_edges_stay_registered_through_undistortion_and_scaling(size, lens):
-    camera = replace(camera_at("c", (2.5, 0.7, 0.3), size=size, focal=0.8 * size[0]), distortion=lens)
+    camera = camera_at("c", (2.5, 0.7, 0.3), size=size, focal=0.8 * size[0])
+    camera = with_fisheye(camera, 100.0) if lens is None else replace(camera, distortion=lens)
     image, outline = square_picture(camera)
     view = observe(camera, image)
     assert view.camera.is_pinhole
     assert view.distance.shape == (view.camera.height, view.camera.width)
-    assert view.camera.width * view.camera.height <= 640 * 480 * 1.01
-    assert view.scale == pytest.approx(view.camera.width / camera.width, abs=1e-3)
+    assert camera.width * camera.height * view.scale**2 <= 640 * 480 * 1.01
+    assert view.scale == pytest.approx(view.camera.width / camera.pinhole.width, abs=1e-3)
+    assert view.theta_px == pytest.approx(0.03 * max(camera.size) * view.scale, abs=0.1)
     off = off_square(view, outline)
     assert len(off) > 50
     # Smoothing rounds the four corners; everywhere else edges are where they belong.

@@ -171,9 +171,11 @@ def test_keypoints_are_where_the_footage_shows_them(tmp_path, couple):
             triples = np.array(row["keypoints"]).reshape(-1, 3)
             assert row["num_keypoints"] == np.count_nonzero(triples[:, 2])
             T = camera.T_camera_world
-            filmed_px, _ = cv2.projectPoints(
-                body.points_world, cv2.Rodrigues(T[:3, :3])[0], T[:3, 3], camera.K, camera.distortion
-            )
+            pose = cv2.Rodrigues(T[:3, :3])[0], T[:3, 3], camera.K, camera.distortion
+            if camera.fisheye:
+                filmed_px = cv2.fisheye.projectPoints(body.points_world[:, None], *pose)[0].reshape(-1, 1, 2)
+            else:
+                filmed_px, _ = cv2.projectPoints(body.points_world, *pose)
             pinhole_px, _ = cv2.projectPoints(
                 body.points_world, cv2.Rodrigues(T[:3, :3])[0], T[:3, 3], camera.K, np.zeros(4)
             )

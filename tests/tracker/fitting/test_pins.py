@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bodies import ARM
+from fisheye import with_fisheye
 from staging import camera_at, cameras_around, posed, seen, shaken
 
 from tracker.fitting.gauss_newton import PosePrior, solve
@@ -13,7 +14,10 @@ from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import PointObservation, sigma_px, triangulate
 
 GAVRILA = load_model("gavrila34")
-CAMERAS = [replace(c, distortion=np.array([-0.2, 0.05, 0.001, -0.001])) for c in cameras_around(4)]
+CAMERAS = [
+    with_fisheye(c) if i == 3 else replace(c, distortion=np.array([-0.2, 0.05, 0.001, -0.001]))
+    for i, c in enumerate(cameras_around(4))
+]
 
 
 @pytest.mark.parametrize("model", [GAVRILA, ARM], ids=lambda m: m.name)

@@ -3,6 +3,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from fisheye import with_fisheye
 from hypothesis import given
 from hypothesis import strategies as st
 from staging import camera_at
@@ -10,6 +11,11 @@ from staging import camera_at
 from tracker.images.working_view import MIN_REGION_PX, WorkingView, fit_region, region_around
 
 LENS = np.array([-0.1, 0.02, 0.001, -0.001])
+lenses = pytest.mark.parametrize("lens", ["pinhole", "lens", "fisheye"])
+
+
+def with_lens(camera, lens):
+    return with_fisheye(camera) if lens == "fisheye" else replace(camera, distortion=LENS[: 4 * (lens == "lens")])
 
 
 def smooth_picture(size, seed=0):
@@ -19,9 +25,9 @@ def smooth_picture(size, seed=0):
 
 
 @pytest.mark.parametrize("size", [(640, 480), (1088, 1920), (1280, 960), (700, 500)])
-@pytest.mark.parametrize("lens", [np.zeros(0), LENS], ids=["pinhole", "lens"])
+@lenses
 def test_regions_are_parts_of_the_whole(size, lens):
-    view = WorkingView(replace(camera_at("c", (4, 0, 0), size=size), distortion=lens))
+    view = WorkingView(with_lens(camera_at("c", (4, 0, 0), size=size), lens))
     frame = smooth_picture(size)
     whole = view.image(frame, view.whole)
     assert whole.shape == (view.camera.height, view.camera.width, 3)
@@ -31,8 +37,9 @@ def test_regions_are_parts_of_the_whole(size, lens):
 
 
 @pytest.mark.parametrize("size", [(640, 480), (1088, 1920)])
-def test_matched_pixels_show_what_the_matched_camera_sees(size):
-    source = replace(camera_at("c", (2.5, 0.7, 0.3), size=size, focal=0.8 * size[0]), distortion=LENS)
+@lenses
+def test_matched_pixels_show_what_the_matched_camera_sees(size, lens):
+    source = with_lens(camera_at("c", (2.5, 0.7, 0.3), size=size, focal=0.8 * size[0]), lens)
     view = WorkingView(source)
     # The colour of a pixel of the footage encodes its position.
     u, v = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
@@ -45,8 +52,9 @@ def test_matched_pixels_show_what_the_matched_camera_sees(size):
         np.testing.assert_allclose(seen[mv, mu, :2], expected, atol=2)
 
 
-def test_a_mask_keeps_its_place():
-    source = replace(camera_at("c", (4, 0, 0), size=(1280, 960)), distortion=LENS)
+@lenses
+def test_a_mask_keeps_its_place(lens):
+    source = with_lens(camera_at("c", (4, 0, 0), size=(1280, 960)), lens)
     view = WorkingView(source)
     mask = np.zeros((960, 1280), np.uint8)
     mask[300:500, 500:900] = 2
@@ -64,10 +72,10 @@ def test_no_black_frame_where_the_lens_leaves_the_picture():
     assert (seen == 200).all()
 
 
-@pytest.mark.parametrize("lens", [np.zeros(0), LENS], ids=["pinhole", "lens"])
+@lenses
 @pytest.mark.parametrize("scale", [1.0, 0.61, 0.5, 0.23])
 def test_another_scale_shows_the_undistorted_image_reduced(lens, scale):
-    source = replace(camera_at("c", (4, 0, 0)), distortion=lens)
+    source = with_lens(camera_at("c", (4, 0, 0)), lens)
     view = WorkingView(source, scale, cv2.BORDER_CONSTANT)
     frame = smooth_picture((640, 480))
     seen = view.image(frame, view.whole).astype(float)

@@ -7,10 +7,11 @@ from fractions import Fraction
 import cv2
 import numpy as np
 import pytest
-from clips import SIZE, encode, write_images
+from clips import SIZE, encode, encode_stamped, write_images
 
 from tracker.errors import CalibrationError, ModelError, RecordingError, Remedy, SessionError
-from tracker.evaluation.metrics import at_rate
+from tracker.evaluation.clocks import place_rows
+from tracker.evaluation.references import placement
 from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
 from tracker.formats.trc import MarkerTable
@@ -40,6 +41,14 @@ def room(tmp_path):
 def new(room, **changes):
     settings = {"calibration": room / "Calib.toml", "videos": [room / "left.mp4", room / "front.mp4"]}
     return assemble(NewSession(room / "s", **(settings | changes)))
+
+
+def noted(room, **changes):
+    """A new session, and what a person is told to look at, beside the notes on the axis that points up."""
+    notes = []
+    settings = {"calibration": room / "Calib.toml", "videos": [room / "left.mp4", room / "front.mp4"]}
+    session = assemble(NewSession(**({"folder": room / "s"} | settings | changes)), note=notes.append)
+    return session, [sentence for sentence in notes if "axis" not in sentence]
 
 
 def assert_refused(room, kind, expected, remedy=None, **changes):
@@ -186,8 +195,85 @@ def test_truncated_video(room):
 
 def test_different_lengths(room):
     encode(room / "left.mp4", n=12)
-    assert_refused(room, RecordingError, "'front' 9, 'left' 12", Remedy("give_frame_offset"))
+    assert_refused(room, RecordingError, "'front' 9, 'left' 12", Remedy("give_frame_offset", n=9))
     assert_refused(room, RecordingError, "'front' 9, 'left' 12", offsets={"left": 1})
+
+
+@pytest.mark.parametrize(("longer", "offsets", "n"), [("left", {}, 9), ("front", {}, 9), ("left", {"front": 2}, 7)])
+def test_frames_that_all_cameras_have(room, longer, offsets, n):
+    encode(room / f"{longer}.mp4", n=12)
+    assert_refused(room, RecordingError, "number of frames", Remedy("give_frame_offset", n=n), offsets=offsets)
+    session, notes = noted(room, offsets=offsets, common_frames=True)
+    assert session.n_frames == n
+    assert [c.offset for c in session.cameras] == [offsets.get("front", 0), 0]
+    assert any(f"'{longer}'" in note and f"at its end: {12 - n}" in note for note in notes)
+    again = load_session(room / "s")
+    assert [c.footage_frames for c in again.cameras] == [c.footage_frames for c in session.cameras]
+    with Recording(again.cameras) as recording:
+        assert recording.n_frames == n
+
+
+def test_common_frames_of_equal_videos_leave_nothing_out(room):
+    session = new(room, common_frames=True)
+    assert (session.n_frames, [c.footage_frames for c in session.cameras]) == (9, [None, None])
+    assert tomllib.loads((room / "s" / "session.toml").read_text())["version"] == 1
+
+
+def test_common_frames_of_images_go_by_their_numbers(room):
+    folders = numbered(room, front=range(20, 29), left=range(22, 32))
+    session = new(room, videos=folders, fps=25.0, common_frames=True)
+    assert (session.n_frames, [c.offset for c in session.cameras]) == (7, [2, 0])
+    with Recording(session.cameras) as recording:
+        front, left = recording.read(0)
+    assert (int(front[0, 0, 1]), int(left[0, 0, 1])) == (4 * 2, 0)  # the images numbered 22
+
+
+def test_numbers_without_a_common_image(room):
+    folders = numbered(room, front=range(9), left=range(20, 29))
+    assert_refused(room, RecordingError, "'front'", videos=folders, fps=25.0, common_frames=True)
+
+
+def jittering(n=9):
+    return [3000 * k + 450 * (-1) ** k + 450 for k in range(n)]
+
+
+def test_jitter_is_named_and_the_rate_overrides_it(room):
+    encode_stamped(room / "left.mp4", jittering())
+    remedy = Remedy("give_constant_rate", fps="30")
+    assert_refused(room, RecordingError, r"camera 'left'.*variable frame rate.*1[4-8]% of a frame", remedy)
+    session, notes = noted(room, fps=30.0)
+    assert session.n_frames == 9
+    assert len(notes) == 1
+    assert "camera 'left': its time stamps lie up to 1" in notes[0]
+
+
+def test_small_jitter_explains_another_mean_rate(room):
+    times = [3000 * k + {4: 240, 8: -150}.get(k, 0) for k in range(9)]  # up to 8% of a frame
+    encode_stamped(room / "left.mp4", times)
+    remedy = Remedy("give_common_rate", fps="30")
+    assert_refused(room, RecordingError, r"'left' 30\.\d+ \('left': its time stamps lie up to \d% of a frame", remedy)
+
+
+def test_gaps_are_named_though_the_rate_is_given(room):
+    encode_stamped(room / "left.mp4", [3000 * k + 3000 * (k > 4) for k in range(9)])
+    _, notes = noted(room, fps=30.0)
+    assert "1 gaps in which frames may be missing" in notes[0]
+
+
+def test_a_camera_that_starts_later_by_its_stamps(room):
+    encode_stamped(room / "left.mp4", [3000 * (k + 15) for k in range(9)])
+    session, notes = noted(room)
+    assert session.n_frames == 9
+    assert "'left' 0.5 s (15 frames)" in notes[0]
+    assert notes[0].endswith("offsets front=15")
+    _, notes = noted(room, folder=room / "t", offsets={"front": 1})
+    assert notes == []  # the user has paired them
+
+
+def test_mirrored_video_is_named(room):
+    encode(room / "left.mp4", n=9, matrix=(-1, 0, 0, 1))
+    _, notes = noted(room)
+    assert "camera 'left': the video's display matrix mirrors" in notes[0]
 
 
 def test_different_rates(room):
@@ -208,7 +294,8 @@ def test_rate_that_overrides_what_the_videos_declare(room):
         assert (at.fps, [c.declared_fps for c in at.cameras]) == (240.0, [30.0, 25.0])
     assert tomllib.loads((room / "s" / "session.toml").read_text())["version"] == 3
     table = MarkerTable(("p",), np.arange(9), np.arange(9) / 240, np.zeros((9, 1, 3)), 240.0)
-    assert at_rate(table, session.fps) is table  # a TRC file of the true rate is read frame by frame
+    placed = place_rows(table, "TRC file", session.fps, placement(session))
+    assert placed.frames.tolist() == list(range(9))  # a TRC file of the true rate is read frame by frame
 
 
 def test_rate_that_the_videos_declare_is_not_stored_twice(room):
@@ -329,7 +416,7 @@ def test_a_camera_without_a_pose_is_left_out_unless_it_is_asked_for(room):
         ({"cameras": ["left", "left"]}, SessionError, "'left' twice"),
         ({"offsets": {"lft": 1}}, SessionError, "unknown camera 'lft' among the offsets"),
         ({"offsets": {"left": -2}}, SessionError, "others an offset of 2"),
-        ({"offsets": {"left": 9}}, SessionError, "check the footage and the offsets"),
+        ({"offsets": {"left": 9}}, RecordingError, "below its 9 frames, found 9; check the footage and the offsets"),
         ({"models": {"bob": "gavrila22"}}, SessionError, "unknown person 'bob' among the body models"),
         ({"heights": {"bob": 1.7}}, SessionError, "unknown person 'bob' among the heights"),
         ({"heights": 17.5}, ModelError, "0.3 to 3 metres"),

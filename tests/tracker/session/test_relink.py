@@ -1,6 +1,7 @@
 """Moved footage gets its new place; other footage is refused, and nothing is written then."""
 
 import shutil
+import unicodedata
 from contextlib import closing
 from dataclasses import replace
 
@@ -16,7 +17,8 @@ from tracker.formats.anipose import write_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.session.assemble import NewSession, assemble
-from tracker.session.relink import Places, missing_files, relink, require_files
+from tracker.session.matching import check_names
+from tracker.session.relink import Places, _files_named, missing_files, relink, require_files
 from tracker.session.session import load_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
@@ -92,6 +94,22 @@ def test_equal_names_in_strange_folders_are_left_to_the_user(room):
     assert missing_files(session) == ()
 
 
+def test_a_longer_video_of_common_frames_is_found_again(room):
+    take = room / "take1"
+    encode(take / "b.mp4", n=12)
+    videos = [take / "a.mp4", take / "b.mp4"]
+    shutil.rmtree(room / "s" / "s")
+    request = NewSession(room / "s" / "s", calibration=take / "Calib.toml", videos=videos, common_frames=True)
+    assemble(request)
+    take = moved(room)
+    encode(room / "disk" / "b.mp4", n=9)
+    refuse(
+        room, RecordingError, "'b': expected 12 frames .* found 9", Places(camera_paths={"b": room / "disk" / "b.mp4"})
+    )
+    session, _ = relink(loaded(room), Places(search=[take]))
+    assert missing_files(session) == ()
+
+
 def test_other_footage_is_refused(room):
     take = moved(room)
     encode(take / "b.mp4", n=12)
@@ -142,3 +160,10 @@ def test_a_proxy_follows_its_footage(room):
     assert proxy.fits(take / "a.mp4")
     assert not proxy.follow(take / "b.mp4")
     assert not Proxy(session.folder / FOLDER, "b").follow(take / "b.mp4")
+
+
+def test_names_are_searched_in_both_unicode_forms(tmp_path):
+    composed, apart = (unicodedata.normalize(form, "Büro.mp4") for form in ("NFC", "NFD"))
+    (tmp_path / apart).write_bytes(b"")
+    assert _files_named({composed}, [tmp_path]) == {composed: [tmp_path / apart]}
+    assert check_names([apart], [composed], "camera", "the cameras") == [composed]

@@ -158,7 +158,7 @@ def edit(folder, old, new):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("version = 1", "version = 4", "version 4, this program reads up to 3; upgrade"),
+        ("version = 1", "version = 5", "version 5, this program reads up to 4; upgrade"),
         ("version = 1", "version = 'x'", "'version': expected a whole number, found 'x'"),
         ("fps = 50.0", "", "expected the key 'fps', found none"),
         ("fps = 50.0", "fps = 'fast'", "a frame rate above 0.* as 'fps', found 'fast'"),

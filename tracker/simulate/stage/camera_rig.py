@@ -1,5 +1,8 @@
 """The cameras of a simulated recording."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from tracker.errors import TrackerError
@@ -15,10 +18,15 @@ CORNER_HEIGHT_M = 2.2
 WALL_HEIGHT_M = 2.5
 """Cameras along the walls look over the racks."""
 WALL_GAP_M = 0.2
+FISHEYE_FIELD_OF_VIEW_DEGREES = 120.0
+"""Field of view along the longer side, as that of wide action cameras."""
+FISHEYE_COEFFICIENTS = (-0.01, 0.006, -0.004, 0.0005)
+"""k1 to k4: some px off the ideal equidistant lens at the border of a picture of 640x480."""
+ALL = "all"
 TARGET_WORLD = (0.0, 0.0, 1.0)
 
 
-def make_cameras(n_cameras: int, size: tuple[int, int], seed: int) -> tuple[Camera, ...]:
+def make_cameras(n_cameras: int, size: tuple[int, int], seed: int, fisheyes: Sequence[str] = ()) -> tuple[Camera, ...]:
     """Mount cameras along the walls of the room, looking at its middle.
 
     They are alike but not equal: aim, focal length, principal point and lens distortion differ a little.
@@ -27,9 +35,10 @@ def make_cameras(n_cameras: int, size: tuple[int, int], seed: int) -> tuple[Came
         n_cameras: 4 stand in the corners; other numbers are spread evenly around and named cam1, cam2, ...
         size: image width and height, px.
         seed: of the small differences.
+        fisheyes: names of the cameras with a fisheye lens; `all` for all. They see wider than the others.
 
     Raises:
-        TrackerError: no camera, or an image too small to show a person.
+        TrackerError: no camera, an image too small to show a person, or a fisheye lens for no camera.
     """
     if n_cameras < 1:
         raise TrackerError(f"expected at least one camera to simulate, found {n_cameras}")
@@ -39,7 +48,21 @@ def make_cameras(n_cameras: int, size: tuple[int, int], seed: int) -> tuple[Came
     degrees = CORNER_DEGREES if n_cameras == 4 else tuple(45.0 - 360.0 * i / n_cameras for i in range(n_cameras))
     names = CORNER_NAMES if n_cameras == 4 else tuple(f"cam{i + 1}" for i in range(n_cameras))
     height = CORNER_HEIGHT_M if n_cameras == 4 else WALL_HEIGHT_M
-    return tuple(_mounted(name, np.radians(d), height, size, rng) for name, d in zip(names, degrees, strict=True))
+    unknown = sorted(set(fisheyes) - {*names, ALL})
+    if unknown:
+        raise TrackerError(
+            f"expected a fisheye lens for {', '.join(names)} or {ALL}, found '{unknown[0]}'; name one of these"
+        )
+    mounted = [_mounted(name, np.radians(d), height, size, rng) for name, d in zip(names, degrees, strict=True)]
+    return tuple(_with_fisheye(c) if {c.name, ALL} & set(fisheyes) else c for c in mounted)
+
+
+def _with_fisheye(camera: Camera) -> Camera:
+    """Return a camera with a fisheye lens instead of its own, and all else as it was."""
+    focal = camera.width / 2 / np.radians(FISHEYE_FIELD_OF_VIEW_DEGREES / 2)
+    K = camera.K.copy()
+    K[[0, 1], [0, 1]] *= focal / (camera.width / 2 / np.tan(np.radians(FIELD_OF_VIEW_DEGREES) / 2))
+    return replace(camera, K=K, distortion=np.array(FISHEYE_COEFFICIENTS), fisheye=True)
 
 
 def _mounted(name: str, direction: float, height_m: float, size: tuple[int, int], rng: np.random.Generator) -> Camera:

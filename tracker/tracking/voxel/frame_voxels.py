@@ -89,7 +89,7 @@ def _share_inside(silhouette: ViewSilhouette, points: Array) -> float:
     """Return the share of points, (N, 3), in the silhouette; of those in the image. 1 if none is in the image."""
     camera = silhouette.camera
     near = camera.depths(points) > 0.1
-    px = np.round(camera.project(points[near])).astype(np.int64)
+    px = np.round(np.nan_to_num(camera.project(points[near]), nan=-1.0)).astype(np.int64)
     px = px[np.all((px >= 0) & (px < camera.size), axis=1)]
     return float(silhouette.mask[px[:, 1], px[:, 0]].mean()) if len(px) else 1.0
 
