@@ -58,11 +58,17 @@ PHRASES = {
     "make_session": Phrases("make one with 'quadrille new'", "choose another folder, or make one with New session…"),
     "rescale": Phrases(
         "say --rescale if it does, and calibrate at the size of the footage if it does not",
-        "scale the matrices of the calibration if it does, and calibrate at the size of the footage if it does not",
+        "tick Scale the calibration to the footage if it does, and calibrate at the size of the footage if it does not",
     ),
-    "give_unit": Phrases("say --units {units}", "choose {units} as unit"),
-    "give_poses": Phrases("say --poses {poses}, or rewrite them ({rewrite})", "rewrite them ({rewrite})"),
-    "choose_poses": Phrases("say which with --poses", "rewrite them to X_camera = R X_world + t"),
+    "give_unit": Phrases("say --units {units}", "choose {units} as Units"),
+    "scale_calibration": Phrases(
+        "scale its translations to metres: no --units of {units} gives a studio",
+        "scale its translations to metres: no Units of {units} gives a studio",
+    ),
+    "give_poses": Phrases(
+        "say --poses {poses}, or rewrite them ({rewrite})", "choose {poses} as Poses, or rewrite them ({rewrite})"
+    ),
+    "choose_poses": Phrases("say which with --poses", "choose one of them as Poses"),
     # files of a session that have moved
     "relink": Phrases(
         "put it back, or run quadrille relink {session} --search FOLDER",

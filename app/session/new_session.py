@@ -9,6 +9,7 @@ from msgspec import Meta
 from app.remedies import page_text
 from app.session.camera_check import exchange_of
 from app.session.path_choice import TypedPath, typed_path
+from tracker.calibrations.convention_names import PoseConvention
 from tracker.errors import SessionError, TrackerError
 from tracker.formats.camera_section import Units
 from tracker.session.assemble import DEFAULT_MODEL, NewSession, SessionParts, check_parts, footage_in
@@ -57,6 +58,10 @@ class NewSessionForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """World axis that points up."""
     units: Units | None = None
     """Unit of the calibration's translations; null for the one that its layout fixes, else metres."""
+    poses: PoseConvention | None = None
+    """Convention of the calibration's poses; null for that of its layout."""
+    rescale: bool = False
+    """Whether a calibration at a whole multiple of the footage's size is scaled to it."""
     fps: Annotated[FrameRate, Meta(title="Frame rate")] | None = None
     """Rate at which the cameras filmed, if the videos declare another one or all footage is images."""
     background: TypedPath | None = None
@@ -117,6 +122,8 @@ def _request(form: NewSessionForm) -> NewSession:
         fps=form.fps,
         up=form.up,
         units=form.units,
+        poses=form.poses,
+        rescale=form.rescale,
     )
 
 

@@ -10,15 +10,13 @@ from msgspec import Meta
 from app.remedies import page_text
 from app.session.new_session import MAX_CAMERAS, Up
 from app.session.path_choice import TypedPath, typed_path
+from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import TrackerError
 from tracker.formats.camera_section import CameraEntry, Units
 from tracker.session.assemble import footage_in
 from tracker.session.matching import camera_name
 from tracker.session.rig_summary import RigSummary, summarize_rig
-
-_SOME_SIZE = (1920, 1080)
-"""Stands for the size of pictures that a calibration does not state; where cameras stand does not depend on it."""
 
 
 class SurveyForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -28,6 +26,7 @@ class SurveyForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     footage: TypedPath | None = None
     up: Up = "z"
     units: Units | None = None
+    poses: PoseConvention | None = None
 
 
 class Survey(msgspec.Struct, frozen=True):
@@ -59,9 +58,9 @@ def survey(form: SurveyForm) -> Survey:
     by_name = {camera_name(path): str(path) for path in footage}
     try:
         if form.calibration is not None:
-            calibration = read_cameras(typed_path(form.calibration), form.units, footage=set(by_name))
+            calibration = read_cameras(typed_path(form.calibration), form.units, form.poses, by_name)
             entries = calibration.entries
-            rig = _rig(summarize_rig([e.camera(None if e.size else _SOME_SIZE) for e in entries], form.up))
+            rig = _rig(summarize_rig([e.camera(e.size or _likely_size(e)) for e in entries], form.up))
             rig["doubts"] = [*calibration.notes, *rig["doubts"]]
     except TrackerError as error:
         problems.append(page_text(error))
@@ -73,6 +72,11 @@ def survey(form: SurveyForm) -> Survey:
         rig,
         problems,
     )
+
+
+def _likely_size(entry: CameraEntry) -> tuple[int, int]:
+    """Return the size of the pictures of a camera whose calibration states none: its principal point is the middle."""
+    return max(1, round(2 * entry.K[0, 2])), max(1, round(2 * entry.K[1, 2]))
 
 
 def _rig(summary: RigSummary) -> dict[str, Any]:

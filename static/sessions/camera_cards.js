@@ -96,12 +96,7 @@ export class CameraCards {
     const card = document.createElement("li");
     card.draggable = true;
     card.classList.toggle("is-left-out", !choice.footage);
-    const picture = document.createElement("img");
-    picture.alt = choice.footage ? `First frame of ${name}` : `${name} has no footage`;
-    picture.title = "Drag onto another camera to exchange their footage";
-    picture.draggable = false;
-    picture.addEventListener("error", () => (picture.alt = `The footage of ${name} cannot be read`));
-    if (choice.footage) picture.src = previewOf(choice.footage);
+    const picture = choice.footage ? firstFrame(name, choice.footage) : noPicture("No footage");
     const title = Object.assign(document.createElement("b"), { textContent: name });
     const offset = document.createElement("input");
     Object.assign(offset, { id: `new-offset-${index}`, type: "number", step: "1", value: String(choice.offset), className: "query-field" });
@@ -188,4 +183,21 @@ export class CameraCards {
 /** @param {string[]} names */
 function listed(names) {
   return names.length > 6 ? `${names.slice(0, 6).join(", ")} and ${names.length - 6} more` : names.join(", ");
+}
+
+/**
+ * @param {string} camera
+ * @param {string} footage
+ */
+function firstFrame(camera, footage) {
+  const picture = document.createElement("img");
+  Object.assign(picture, { alt: `First frame of ${camera}`, src: previewOf(footage), draggable: false });
+  picture.title = "Drag onto another camera to exchange their footage";
+  picture.addEventListener("error", () => picture.replaceWith(noPicture("Cannot be read")));
+  return picture;
+}
+
+/** @param {string} why */
+function noPicture(why) {
+  return Object.assign(document.createElement("div"), { className: "no-picture", textContent: why });
 }

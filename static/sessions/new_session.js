@@ -19,7 +19,7 @@ import { completePaths, postJson } from "./session_requests.js";
 /** Wait for a pause in typing before the files are looked at. */
 const PAUSE_MS = 250;
 /** Fields on which the survey depends. */
-const SURVEYED = ["footage", "calibration", "up", "units"];
+const SURVEYED = ["footage", "calibration", "up", "units", "poses"];
 
 export class NewSession {
   #dialog = byId("new-session", HTMLDialogElement);
@@ -61,7 +61,7 @@ export class NewSession {
     }
     for (const browse of this.#form.querySelectorAll("button[data-browse]")) {
       const { browse: name = "", kind } = /** @type {HTMLElement} */ (browse).dataset;
-      browse.addEventListener("click", () => this.#browse(name, kind === "file" ? "file" : "folder"));
+      browse.addEventListener("click", () => this.#browse(name, kind === "any" ? "any" : "folder"));
     }
   }
 
@@ -82,7 +82,7 @@ export class NewSession {
 
   /**
    * @param {string} name of a field
-   * @param {"folder" | "file"} kind
+   * @param {"folder" | "any"} kind
    */
   #browse(name, kind) {
     const field = this.#field(name);
@@ -109,7 +109,8 @@ export class NewSession {
     /** @type {Survey} */
     let found = { cameras: [], footage: [], assigned: {}, rig: null, problems: [] };
     if (footage || calibration) {
-      const form = { footage: footage || null, calibration: calibration || null, up: this.#value("up"), units: this.#value("units") || null };
+      const [up, units, poses] = ["up", "units", "poses"].map((name) => this.#value(name) || null);
+      const form = { footage: footage || null, calibration: calibration || null, up, units, poses };
       try {
         await postJson("sessions/survey", form, (line) => (found = JSON.parse(line)));
       } catch (error) {
@@ -187,6 +188,8 @@ export class NewSession {
       models: list("models"),
       up: this.#value("up"),
       units: optional("units"),
+      poses: optional("poses"),
+      rescale: this.#field("rescale").checked,
       fps: this.#value("fps") ? Number(this.#value("fps")) : null,
       background: optional("background"),
       masks: optional("masks"),

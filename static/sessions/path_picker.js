@@ -5,10 +5,10 @@ import { button, byId } from "../widgets/elements.js";
 /**
  * @typedef {{name: string, path: string, kind: "folder" | "session" | "video" | "file"}} Entry
  * @typedef {{folder: string, parent: string | null, entries: Entry[], is_cut_off: boolean}} FolderContents
- * @typedef {"folder" | "file" | "footage"} Wanted kind of the choice; footage is a video, or a folder of images
+ * @typedef {"folder" | "any" | "footage"} Wanted kind of the choice; footage is a video, or a folder of images
  */
 
-const TITLES = { folder: "Choose a folder", file: "Choose a file", footage: "Choose a video or a folder of images" };
+const TITLES = { folder: "Choose a folder", any: "Choose a file or a folder", footage: "Choose a video or a folder of images" };
 const MARKS = { folder: "▸", session: "▸", video: "", file: "" };
 
 export class PathPicker {
@@ -52,7 +52,6 @@ export class PathPicker {
     this.#wanted = wanted;
     this.#take = take;
     this.#title.textContent = TITLES[wanted];
-    this.#choose.hidden = wanted === "file";
     this.#contents = null;
     this.#list.replaceChildren();
     this.#dialog.showModal();

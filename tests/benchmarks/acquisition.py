@@ -196,7 +196,9 @@ def section(outcomes: Sequence[Outcome]) -> str:
         "(`tracker/simulate/people/population.py`; a number in a name is an age), with noise and clutter. Each is "
         "tracked from the joints of frame 0 with the generic body of the height that these joints give, acquired by "
         "`quadrille acquire` without further options, and tracked again. Before → after: mean error of the 12 limb "
-        "joints, lost frames, mean cost of the tracked frames. The error of the height is that after it.",
+        "joints, lost frames, mean cost of the tracked frames. The error of the height is that after it. "
+        "Recordings have the height of the joints instead of the stated one, so that they end beside the figures of "
+        "the first table.",
         "",
     ]
     return "\n".join([*lines, table(HEADS, {o.name.replace("_", " "): o.cells for o in outcomes})])

@@ -77,5 +77,5 @@ def _remedy(distance: float, units: Units) -> Remedy:
     fitting = [u for u in METRES if u != units and MIN_STUDIO_M <= distance * METRES[u] <= MAX_STUDIO_M]
     fitting.sort(key=lambda u: not _LIKELY_M[0] <= distance * METRES[u] <= _LIKELY_M[1])
     if not fitting:
-        return Remedy("give_unit", units=f"of the right length: none of {', '.join(METRES)} gives a studio")
+        return Remedy("scale_calibration", units=", ".join(METRES))
     return Remedy("give_unit", units=" or ".join(f"{u} ({distance * METRES[u]:.2g} m)" for u in fitting))

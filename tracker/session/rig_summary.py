@@ -57,7 +57,7 @@ def summarize_rig(cameras: Sequence[Camera], up: str = "z") -> RigSummary:
     names = tuple(c.name for c in cameras)
     centers, axes = Ts[:, :3, 3], Ts[:, :3, 2]
     heights = centers @ UP_ROTATIONS[up][:, 2]
-    point = axes_point(Ts)
+    point = axes_point([c.T_world_camera for c in cameras])
     meet = len(cameras) > 1 and point.is_determined and point.angles_rad.max() < _MAX_AIM_RAD
     distances = point.distances if meet else None
     if distances is None:

@@ -119,3 +119,21 @@ async def test_nothing_is_made_while_two_cameras_seem_exchanged(serve, form, tmp
     assert [*lines[-1], lines[-2]] == ["made", {"passed": "No two cameras seem to be exchanged."}]
     lines = await client.make(form | {"folder": str(tmp_path / "kept"), "keep_assignment": True})
     assert [next(iter(line)) for line in lines[-2:]] == ["warning", "made"]
+
+
+async def test_poses_of_another_convention_are_named_as_a_choice_of_the_form(folders, serve, form):
+    """A file that does not state the size of its pictures is surveyed too."""
+    client, entries = await serve(), {}
+    for camera in load_session(folders[0]).cameras:
+        T, K = camera.camera.T_world_camera, camera.camera.K
+        entries[camera.camera.name] = {"K": K.tolist(), "R": T[:3, :3].tolist(), "t": T[:3, 3].tolist()}
+    (folders[0] / "inverse.json").write_text(json.dumps(entries))
+    chosen = {"calibration": str(folders[0] / "inverse.json"), "footage": form["footage"]}
+    found = json.loads((await client.open(chosen, "/sessions/survey"))[1])
+    assert (found["rig"], "choose camera-to-world as Poses" in found["problems"][0]) == (None, True), found
+    found = json.loads((await client.open(chosen | {"poses": "camera-to-world"}, "/sessions/survey"))[1])
+    right = json.loads((await client.open({"calibration": form["calibration"]}, "/sessions/survey"))[1])
+    assert found["problems"] == []
+    np.testing.assert_allclose(found["rig"]["distances_m"], right["rig"]["distances_m"], atol=2e-3)
+    lines = await client.make(form | chosen | {"poses": "camera-to-world"})
+    assert "made" in lines[-1], lines

@@ -10,6 +10,8 @@ from page_driver import shows
 from program import WITHOUT_3D, Program
 from stranger import Errors
 
+from tracker.session.session import load_session
+
 pytestmark = pytest.mark.slow
 
 
@@ -41,6 +43,46 @@ async def test_another_session_takes_the_place_of_the_first(browser, tmp_path, m
         assert (tmp_path / "dance" / "lock.json").exists()
         recent = json.loads((tmp_path / "state" / "quadrille" / "recent_sessions.json").read_text())
         assert [entry["folder"] for entry in recent] == [str(tmp_path / "dance"), str(tmp_path / "walk")]
+    finally:
+        await context.close()
+        await program.kill()
+
+
+async def test_a_session_is_made_of_footage_with_two_names_exchanged(browser, tmp_path, monkeypatch, data_folder):
+    """The form shows the cameras, exchanges the two on request, and opens the session with its first steps."""
+    walk, mixed = data_folder("walk"), tmp_path / "mixed"
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    shutil.copytree(SAMPLE, tmp_path / "sample")
+    mixed.mkdir()
+    exchanged = {"FRONT": "LEFT", "LEFT": "FRONT"}
+    for name in ("FRONT", "RIGHT", "BACK", "LEFT"):
+        shutil.copy(walk / f"{name}.mp4", mixed / f"{exchanged.get(name, name)}.mp4")
+    program = Program(tmp_path / "sample", has_token=True)
+    await program.start()
+    context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
+    try:
+        page = await context.new_page()
+        await page.add_init_script(WITHOUT_3D)
+        await page.goto(program.address, timeout=120_000)
+        await shows(page, "window.quadrille?.state.overlay", 120)
+        await page.click("#first-new-session")
+        await page.fill("#new-footage", str(mixed))
+        await page.fill("#new-calibration", str(walk / "Calib.toml"))
+        await page.fill("#new-background", str(walk / "background"))
+        pictures = "[...document.querySelectorAll('#new-cameras img')]"
+        await shows(page, f"{pictures}.filter((one) => one.naturalWidth).length === 4")
+        assert await page.locator("#rig .rig-camera").count() == 8
+        await page.click("#make-session")
+        await page.get_by_role("button", name="Exchange these two").click(timeout=60_000)
+        await shows(page, "!document.querySelector('#open-made-session').hidden", 60)
+        made = load_session(tmp_path / "mixed_session")
+        assert {c.camera.name: c.footage.stem for c in made.cameras} == {
+            "FRONT": "LEFT", "RIGHT": "RIGHT", "BACK": "BACK", "LEFT": "FRONT",
+        }  # fmt: skip
+        async with page.expect_event("load", timeout=60_000):
+            await page.click("#open-made-session")
+        await shows(page, "window.quadrille?.state.session?.name === 'mixed_session'", 60)
+        await page.locator("#first-steps").wait_for()
     finally:
         await context.close()
         await program.kill()

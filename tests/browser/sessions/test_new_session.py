@@ -123,10 +123,10 @@ async def test_files_are_chosen_in_a_dialog(form):
     await page.click("#path-picker-up")
     await page.click("#path-picker-entries button:has-text('cameras.toml')")
     assert await page.locator("#new-calibration").input_value() == "/data/cameras.toml"
-    assert await page.locator("#new-folder").input_value() == "/data/videos_session"
+    await shows(page, "document.querySelector('#new-folder').value === '/data/videos_session'")
     await shows(page, "document.querySelectorAll('#new-cameras li').length === 4")
     files = {"footage": "/data/videos", "calibration": "/data/cameras.toml"}
-    await until(lambda: program.surveyed[-1] == files | {"up": "z", "units": None})
+    await until(lambda: program.surveyed[-1] == files | {"up": "z", "units": None, "poses": None})
     await page.keyboard.press("Escape")
     assert not await page.locator("#new-session").is_visible()
 
@@ -182,6 +182,8 @@ async def test_footage_is_given_to_cameras_by_menu_drag_and_hand(form):
     assert await assigned(page) == ["FRONT.mp4", "LEFT.mp4", "BACK.mp4", "gopro7.mp4"]
     await page.fill("#new-offset-3", "4")
     await menus.nth(2).select_option("")
+    await page.select_option("#new-poses", "camera-to-world")
+    await page.check("#new-rescale")
     await page.select_option("#new-units", "mm")  # the choices stay
     await shows(page, "document.querySelectorAll('#new-cameras li.is-left-out').length === 1")
     for field, value in {
@@ -197,10 +199,10 @@ async def test_footage_is_given_to_cameras_by_menu_drag_and_hand(form):
     assert [(c["name"], c["footage"].split("/")[-1], c["offset"]) for c in sent["cameras"]] == [
         ("FRONT", "FRONT.mp4", 0), ("RIGHT", "LEFT.mp4", 0), ("LEFT", "gopro7.mp4", 4),
     ]  # fmt: skip
-    assert {k: sent[k] for k in ("people", "heights_cm", "models", "masks", "units", "keep_assignment")} == {
+    assert sent.items() >= {
         "people": ["ann", "bob"], "heights_cm": [170, 158.5], "models": ["gavrila22"], "masks": "/data/m",
-        "units": "mm", "keep_assignment": False,
-    }  # fmt: skip
+        "units": "mm", "poses": "camera-to-world", "rescale": True, "keep_assignment": False,
+    }.items()  # fmt: skip
 
 
 async def test_exchanged_cameras_are_exchanged_by_a_button_before_anything_is_made(form):

@@ -23,7 +23,7 @@ def in_units(factor, rig=None):
         (100, "mm", "cm (4 m)"),
         (1, "mm", "m (4 m)"),
         (1, "cm", "m (4 m)"),
-        (1e6, None, "none of m, cm, mm"),
+        (1e6, None, "m, cm, mm"),
     ],
 )
 def test_a_wrong_unit_names_those_that_fit(tmp_path, factor, units, remedy):

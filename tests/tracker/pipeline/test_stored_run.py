@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from tracker.errors import SessionError, TrackerError
+from tracker.errors import Remedy, SessionError, TrackerError
 from tracker.formats.model_toml import format_model
 from tracker.pipeline import methods
 from tracker.pipeline.methods import METHODS, make_tracker
@@ -161,8 +161,9 @@ def test_a_cleared_frame_ends_what_the_backward_pass_may_use(session, store):
 
 def test_without_a_pose_there_is_nothing_to_begin_from(session, store):
     store.undo()
-    with pytest.raises(SessionError, match="place the body"), run_of(session, store, range(2, 6)):
+    with pytest.raises(SessionError, match="expected a pose") as caught, run_of(session, store, range(2, 6)):
         pass
+    assert caught.value.remedy == Remedy("place_body")
 
 
 def test_an_unknown_method_is_refused():

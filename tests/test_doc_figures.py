@@ -1,0 +1,93 @@
+"""Figures that several documents show are those of the first table of docs/accuracy.md, where they are kept."""
+
+import re
+
+import pytest
+from architecture import ROOT
+
+KEPT_IN = "docs/accuracy.md"
+
+
+def tables(page):
+    """Tables of a document in order: for each the cells of its rows, without marks of code."""
+    found, table = [], []
+    for line in [*(ROOT / page).read_text("utf-8").splitlines(), ""]:
+        if line.startswith("|"):
+            table.append([cell.strip().replace("`", "") for cell in line.strip("|").split("|")])
+        elif table:
+            found.append((table[0], table[2:]))
+            table = []
+    return found
+
+
+def table_with(page, *heads):
+    """The only table of a document whose header has these cells; rows by their first cell, cells by their column."""
+    (found,) = [(header, rows) for header, rows in tables(page) if set(heads) <= set(header)]
+    header, rows = found
+    return [dict(zip(header, row, strict=True)) | {"": row} for row in rows]
+
+
+def numbers(text):
+    return re.findall(r"\d+(?:\.\d+)?", text)
+
+
+def kept():
+    """Errors, mm, and lost frames by recording, by height alone and with the acquired body, of people in order."""
+    header, rows = tables(KEPT_IN)[0]
+    assert header == ["recording", "frames", "by height alone", "lost", "acquired body", "lost"]
+    return {row[0].split(":")[0]: [numbers(cell) for cell in row[2:]] for row in rows if ":" in row[0] and row[4]}
+
+
+def test_the_table_is_found():
+    assert kept().keys() == {"walk", "balance_real", "fast_arms", "two_people"}
+    assert all(len(cells) == 4 for cells in kept().values())
+    assert len(kept()["two_people"][0]) == 2
+
+
+def test_the_readme_shows_the_same_figures():
+    rows = {r["recording"].split(":")[0]: r for r in table_with("README.md", "by height alone", "lost frames")}
+    for name, (alone, alone_lost, acquired, acquired_lost) in kept().items():
+        assert numbers(rows[name]["by height alone"]) == alone, name
+        assert numbers(rows[name]["acquired body"]) == acquired, name
+        assert numbers(rows[name]["lost frames"]) == alone_lost + acquired_lost, name
+
+
+def test_the_comparison_of_trackers_shows_the_same_figures():
+    shown = {(r["recording"], r["body"]): r["chamfer"] for r in table_with(KEPT_IN, "chamfer", "contour", "body")}
+    n_compared = 0
+    for (recording, body), cell in shown.items():
+        name, _, which = recording.partition(", ")
+        if which == "with masks":
+            continue
+        person = 1 if which == "woman" else 0
+        at = 0 if body == "by height alone" else 2
+        assert numbers(cell) == [kept()[name][at][person], kept()[name][at + 1][person]], (recording, body)
+        n_compared += 1
+    assert n_compared >= 2 * 4
+
+
+def test_starts_from_the_reference_show_the_same_figures():
+    rows = table_with(KEPT_IN, "from nothing", "from the reference joints")
+    for row in rows:
+        name, _, which = row["recording"].partition(", ")
+        person = 1 if which == "woman" else 0
+        wanted = [kept()[name][2][person], kept()[name][3][person]]
+        assert numbers(row["from the reference joints"]) == wanted, row["recording"]
+    assert len(rows) == 5
+
+
+def test_people_found_show_the_same_figures():
+    """The benchmark's table, and that of the starts."""
+    made = {r["variant"]: r for r in table_with(KEPT_IN, "frames called good", "lost frames")}
+    starts = {r["recording"]: numbers(r["from nothing"]) for r in table_with(KEPT_IN, "from nothing")}
+    names = {"two_people, man": "two people, person1", "two_people, woman": "two people, person2"}
+    for recording, figures in starts.items():
+        row = made[names.get(recording, recording.replace("_", " "))]
+        assert [row["error, mm"], row["lost frames"]] == figures, recording
+
+
+@pytest.mark.parametrize(("row", "column"), [("gavrila34 of 1.75 m", 0), ("acquire (all views, six frames)", 2)])
+def test_acquisition_shows_the_same_figures(row, column):
+    rows = {r["body"]: r for r in table_with("docs/acquisition.md", "MPJPE of track", "mean cost")}
+    assert numbers(rows[row]["MPJPE of track"]) == kept()["walk"][column]
+    assert numbers(rows[row]["lost frames"])[:1] == kept()["walk"][column + 1]
