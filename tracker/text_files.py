@@ -1,5 +1,6 @@
 """Read text files within limits, with errors that name the file and the place."""
 
+import io
 import os
 import re
 import tomllib
@@ -8,16 +9,20 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import msgspec
 
 from tracker.errors import TrackerError
+from tracker.files import IrregularFileError, open_regular
 
 MAX_NESTING = 32
 """Deepest nesting of brackets and longest dotted key of a TOML file."""
 _MAX_LINE = 1_000_000
 """Longest line of a table, characters."""
+
+
+_PIPE_OF_SHELL = re.compile(r"/dev/fd/\d+|/proc/self/fd/\d+")
 
 
 @dataclass(frozen=True)
@@ -40,9 +45,9 @@ def read_text(path: Path, kind: TextKind) -> str:
     Raises:
         TrackerError: of the kind's type; the file is missing, too large, or not UTF-8 text.
     """
-    with _reading(path, kind), path.open("rb") as file:
+    with _reading(path, kind), _open(path) as file:
         _check_size(os.fstat(file.fileno()).st_size, path, kind)
-        data = file.read(kind.max_bytes + 1)  # a pipe or device does not know its size
+        data = file.read(kind.max_bytes + 1)  # a pipe does not know its size
         _check_size(len(data), path, kind)
         return data.decode("utf-8-sig")
 
@@ -53,7 +58,7 @@ def read_lines(path: Path, kind: TextKind) -> Iterator[str]:
     Raises:
         TrackerError: of the kind's type; the file is missing, too large, or not UTF-8 text, or a line is too long.
     """
-    with _reading(path, kind), path.open(encoding="utf-8-sig") as file:
+    with _reading(path, kind), io.TextIOWrapper(_open(path), encoding="utf-8-sig") as file:
         _check_size(os.fstat(file.fileno()).st_size, path, kind)
         size = number = 0
         while line := file.readline(_MAX_LINE + 1):
@@ -113,6 +118,15 @@ def read_json(path: Path, kind: TextKind) -> Any:
         raise kind.error(f"{kind.name} {path} is not valid JSON: {error}; {kind.remedy}") from error
 
 
+def _open(path: Path) -> BinaryIO:
+    """Open a regular file, or a pipe that a shell has opened, as in `--calibration <(command)`: that one has a writer.
+
+    Raises:
+        OSError: it is neither, or cannot be read.
+    """
+    return path.open("rb") if _PIPE_OF_SHELL.fullmatch(str(path)) else open_regular(path)
+
+
 @contextmanager
 def _reading(path: Path, kind: TextKind) -> Iterator[None]:
     """Raise the kind's error for what goes wrong while a file is read."""
@@ -120,6 +134,8 @@ def _reading(path: Path, kind: TextKind) -> Iterator[None]:
         yield
     except FileNotFoundError as error:
         raise kind.error(f"{kind.name} {path} not found; check the path") from error
+    except IrregularFileError as error:
+        raise kind.error(f"{kind.name} {path} cannot be read: {error.strerror}; {kind.remedy}") from error
     except (OSError, ValueError) as error:  # a null byte in a path is a ValueError, wrong UTF-8 too
         raise kind.error(
             f"{kind.name} {path} cannot be read: expected UTF-8 text, found: {error}; {kind.remedy}"

@@ -4,6 +4,7 @@ from contextlib import closing
 from typing import Any
 
 from app.runtime.progress import Reporter
+from tracker.errors import RecordingError
 from tracker.files import refuse_links
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_folder import ImageFolder
@@ -27,8 +28,14 @@ def index(session: Session, progress: Reporter) -> dict[str, Any]:
     """
     folder = session.folder / FOLDER
     refuse_links(session.folder, FOLDER)
-    folder.mkdir(exist_ok=True)
-    refuse_links(folder, *(path.name for path in folder.iterdir()))
+    try:
+        folder.mkdir(exist_ok=True)
+        refuse_links(folder, *(path.name for path in folder.iterdir()))
+    except OSError as error:
+        raise RecordingError(
+            f"cannot write the proxies into {folder}: {error.strerror}; make the session's folder writable, or copy the "
+            "session to where you may write"
+        ) from error
     made: dict[str, int] = {}
     stopped = False
     with SessionLock(folder):
