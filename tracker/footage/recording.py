@@ -132,6 +132,13 @@ class Recording:
 
     def _check(self, k: int) -> None:
         if k < 0 or (self.listed_share is None and k >= self.n_frames):
+            short = [(c, f) for c, f in zip(self._cameras, self._footage, strict=True) if c.offset >= f.n_frames]
+            if short:
+                source, footage = short[0]
+                raise RecordingError(
+                    f"camera '{source.camera.name}': expected an offset below the {footage.n_frames} frames of its "
+                    f"footage, found {source.offset}; correct it"
+                )
             raise RecordingError(f"expected a frame from 0 to {self.n_frames - 1}, found {k}")
 
     def _read_one(self, camera: int, k: int) -> Image | None:
