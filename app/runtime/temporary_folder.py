@@ -15,18 +15,15 @@ _PREFIX = "quadrille-"
 class TemporaryFolder:
     """A folder that only this user may enter. Its lock tells that the program still runs."""
 
-    def __init__(self, place: str | None = None) -> None:
-        """Make it in the system's folder for temporary files, or in `place`."""
-        parent = Path(place or tempfile.gettempdir())
-        _remove_abandoned(parent)
+    def __init__(self, parent: str) -> None:
+        """Make it in a folder, such as that of the system for temporary files."""
+        _remove_abandoned(Path(parent))
         self.path = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
         self._lock = SessionLock(self.path)
-        try:
+        with suppress(SessionError):  # a disk without room: then only this program removes the folder
             self._lock.acquire()
-        except SessionError:  # a disk without room: the folder is then removed by this program alone
-            pass
 
-    def remove(self) -> None:
+    def close(self) -> None:
         """Delete it with its content."""
         self._lock.release()
         shutil.rmtree(self.path, ignore_errors=True)

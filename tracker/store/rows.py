@@ -50,7 +50,7 @@ class _Summary(msgspec.Struct):
     status: _Status
     cost_px: Number | None
     keyframe: _Flag
-    views_px: bytes | None
+    view_costs_px: bytes | None
     remark: str | None
     reviewed: _Flag | None
     others: _Flag
@@ -68,8 +68,8 @@ class _Pose(msgspec.Struct):
     author: str
     time: str
     program: str
-    views_px: bytes | None
-    parts_px: bytes | None
+    view_costs_px: bytes | None
+    part_costs_px: bytes | None
     remark: str | None
     reviewed: _Flag | None
     limbs: bytes | None
@@ -79,7 +79,7 @@ class _FramePose(msgspec.Struct):
     frame: _Frame
     numbers: _Numbers
     cost_px: Number | None
-    views_px: bytes | None
+    view_costs_px: bytes | None
     model_revision: _Id
 
 
@@ -170,7 +170,7 @@ def row_to_record(row: Sequence[Any], where: object) -> PoseRecord:
     return PoseRecord(
         values, sources, found.model_revision, bool(found.keyframe), found.status, found.cost_px,
         check(decoded_json(found.settings, where), dict[str, Any], f"{where}, settings", DamagedStoreError),
-        found.author, found.time, found.program, _costs(found.views_px, where), _costs(found.parts_px, where),
+        found.author, found.time, found.program, _costs(found.view_costs_px, where), _costs(found.part_costs_px, where),
         found.remark or "", bool(found.reviewed), _numbers(found.limbs, where),
     )  # fmt: skip
 
@@ -180,7 +180,7 @@ def row_to_frame_row(row: Sequence[Any], where: object) -> FrameRow:
     found: _Summary = _checked(row, _Summary, where)
     return FrameRow(
         found.frame, SOURCES[min(_known(found.sources, where))], found.status, found.cost_px,
-        bool(found.keyframe), _costs(found.views_px, where), found.remark or "",
+        bool(found.keyframe), _costs(found.view_costs_px, where), found.remark or "",
         bool(found.keyframe or found.reviewed), bool(found.others and not found.keyframe),
         _numbers(found.limbs, where),
     )  # fmt: skip
@@ -189,7 +189,7 @@ def row_to_frame_row(row: Sequence[Any], where: object) -> FrameRow:
 def row_to_frame_pose(row: Sequence[Any], where: object) -> FramePose:
     """Convert a row of `FRAME_POSE_COLUMNS`."""
     found: _FramePose = _checked(row, _FramePose, where)
-    costs_px = _costs(found.views_px, where)
+    costs_px = _costs(found.view_costs_px, where)
     return FramePose(found.frame, _array(found.numbers, where), found.cost_px, costs_px, found.model_revision)
 
 
