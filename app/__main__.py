@@ -3,7 +3,9 @@
 import os
 import sys
 from collections.abc import Callable
+from contextlib import nullcontext, redirect_stdout
 from importlib import metadata
+from typing import TextIO, cast
 
 import tyro
 from rich.console import Console
@@ -29,6 +31,7 @@ from app.remedies import command_line_text
 from app.runtime import process_exit
 from app.runtime.log_limit import limit_log
 from app.runtime.malloc_trim import give_back_freed_memory
+from app.runtime.plain_output import PlainOutput, printable
 from tracker.errors import TrackerError
 
 _COMMANDS: dict[str, Callable[..., None]] = {
@@ -72,19 +75,25 @@ def main() -> None:
         return
     if not words or (words[0] not in _COMMANDS and words[0] not in _HELP):
         words = ["open", *words]
+    # Help has colours, and shows nothing of a file.
+    out = nullcontext() if set(words) & {*_HELP} else redirect_stdout(cast(TextIO, PlainOutput(sys.stdout)))
     try:
-        _command_line(words).cli(
-            prog="quadrille", description=_ABOUT, args=words, config=(tyro.conf.FlagCreatePairsOff,)
-        )
-        sys.stdout.flush()
+        with out:
+            _command_line(words).cli(
+                prog="quadrille", description=_ABOUT, args=words, config=(tyro.conf.FlagCreatePairsOff,)
+            )
+            sys.stdout.flush()
     except TrackerError as error:
         Console(stderr=True).print(
-            f"quadrille: {command_line_text(error)}", style="bold red", markup=False, highlight=False, soft_wrap=True
+            printable(f"quadrille: {command_line_text(error)}"),
+            style="bold red",
+            markup=False,
+            highlight=False,
+            soft_wrap=True,
         )
         sys.exit(1)
     except KeyboardInterrupt as stopped:
-        is_terminated = isinstance(stopped, process_exit.TerminationError)
-        sys.exit(process_exit.TERMINATED if is_terminated else process_exit.INTERRUPTED)
+        sys.exit(stopped.status if isinstance(stopped, process_exit.TerminationError) else process_exit.INTERRUPTED)
     except BrokenPipeError:  # as in `quadrille evaluate S | head -1`: the reader has closed the pipe
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # discard what is still buffered
         sys.exit(141)

@@ -1,9 +1,5 @@
 """Read text files within limits, with errors that name the file and the place.
 
-Text is UTF-8, or UTF-16 or UTF-32 with a byte order mark. Bytes of another encoding, such as Latin-1, become U+FFFD
-(`LOST`): comments and paths may hold them, names may not (`refuse_lost`).
-"""
-
 import codecs
 import os
 import re
@@ -11,7 +7,7 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from io import TextIOWrapper
+from io import BufferedReader, TextIOWrapper
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -19,6 +15,7 @@ from typing import Any
 import msgspec
 
 from tracker.errors import TrackerError
+from tracker.files import IrregularFileError, open_regular
 
 MAX_NESTING = 32
 """Deepest nesting of brackets and longest dotted key of a TOML file."""
@@ -35,6 +32,9 @@ _MARKS = (
 )
 _MAX_LINE = 1_000_000
 """Longest line of a table, characters."""
+
+
+_PIPE_OF_SHELL = re.compile(r"/dev/fd/\d+|/proc/self/fd/\d+")
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,9 @@ def read_text(path: Path, kind: TextKind) -> str:
     Raises:
         TrackerError: of the kind's type; the file is missing, too large, or not text.
     """
-    with _reading(path, kind), path.open("rb") as file:
+    with _reading(path, kind), _open(path) as file:
         _check_size(os.fstat(file.fileno()).st_size, path, kind)
-        data = file.read(kind.max_bytes + 1)  # a pipe or device does not know its size
+        data = file.read(kind.max_bytes + 1)  # a pipe does not know its size
         _check_size(len(data), path, kind)
         encoding = _encoding_of(data)
         try:
@@ -79,7 +79,7 @@ def read_lines(path: Path, kind: TextKind) -> Iterator[str]:
     Raises:
         TrackerError: of the kind's type; the file is missing, too large, or not text, or a line is too long.
     """
-    with _reading(path, kind), path.open("rb") as data:
+    with _reading(path, kind), _open(path) as data:
         _check_size(os.fstat(data.fileno()).st_size, path, kind)
         encoding = _encoding_of(data.peek(4))
         file = TextIOWrapper(data, encoding, errors="replace" if encoding == "utf-8-sig" else "strict")
@@ -189,6 +189,15 @@ def _encoding_of(start: bytes) -> str:
     return "utf-8-sig"
 
 
+def _open(path: Path) -> BufferedReader:
+    """Open a regular file, or a pipe that a shell has opened, as in `--calibration <(command)`: that one has a writer.
+
+    Raises:
+        OSError: it is neither, or cannot be read.
+    """
+    return path.open("rb") if _PIPE_OF_SHELL.fullmatch(str(path)) else open_regular(path)
+
+
 @contextmanager
 def _reading(path: Path, kind: TextKind) -> Iterator[None]:
     """Raise the kind's error for what goes wrong while a file is read."""
@@ -196,6 +205,8 @@ def _reading(path: Path, kind: TextKind) -> Iterator[None]:
         yield
     except FileNotFoundError as error:
         raise kind.error(f"{kind.name} {path} not found; check the path") from error
+    except IrregularFileError as error:
+        raise kind.error(f"{kind.name} {path} cannot be read: {error.strerror}; {kind.remedy}") from error
     except (OSError, ValueError) as error:  # a null byte in a path is a ValueError, wrong UTF-8 too
         raise kind.error(
             f"{kind.name} {path} cannot be read: expected UTF-8 text, found: {error}; {kind.remedy}"

@@ -3,21 +3,29 @@
 import atexit
 import os
 import signal
+import stat
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
-INTERRUPTED, TERMINATED = 130, 143
-"""Status after SIGINT and SIGTERM, as shells report them."""
+INTERRUPTED = 130
+"""Status after SIGINT, as shells report it: 128 and the number of the signal."""
 
 
 class TerminationError(KeyboardInterrupt):
-    """SIGTERM arrived: work stops and cleans up as after Ctrl+C."""
+    """SIGTERM or SIGHUP arrived: work stops and cleans up as after Ctrl+C."""
+
+    def __init__(self, number: int) -> None:
+        """Note the signal."""
+        super().__init__()
+        self.status = 128 + number
 
 
 def run(main: Callable[[], None]) -> None:
-    """Run the program, and end the process with its status when all is closed. SIGTERM raises `TerminationError`.
+    """Run the program, and end the process with its status when all is closed. SIGTERM, and the end of the terminal,
+    raise `TerminationError`.
 
     Views work in daemon threads. If one is inside OpenCV while Python finalizes, the process aborts instead of
     ending with its status.
@@ -30,6 +38,8 @@ def run(main: Callable[[], None]) -> None:
         os._exit(status)
 
     signal.signal(signal.SIGTERM, _terminate)
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+        signal.signal(signal.SIGHUP, _terminate)
     atexit.register(end)  # the first function registered is called last
     try:
         main()
@@ -41,4 +51,16 @@ def run(main: Callable[[], None]) -> None:
 
 def _terminate(number: int, frame: FrameType | None) -> NoReturn:
     signal.signal(number, signal.SIG_DFL)  # a second one ends the process at once
-    raise TerminationError
+    if number != signal.SIGTERM:
+        _drop_terminal()
+    raise TerminationError(number)
+
+
+def _drop_terminal() -> None:
+    """Discard further output to a terminal that has gone: what saves and cleans up may print."""
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    for number in (1, 2):
+        with suppress(OSError):
+            if stat.S_ISCHR(os.fstat(number).st_mode):  # one that has gone is no terminal to `isatty`
+                os.dup2(nothing, number)
+    os.close(nothing)

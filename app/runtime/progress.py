@@ -8,6 +8,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TextColumn
 from rich.text import Text
 
+from app.runtime.plain_output import printable
+
 _OUTLIER, _COMPILING_S = 8.0, 1.0
 """An item compiled kernels, or waited for a disk, if it takes longer than this many times the upper quartile of all,
 and longer than this many seconds. Items come in bursts, so that many take almost no time."""
@@ -50,16 +52,16 @@ class Reporter:
     def say(self, line: str) -> None:
         """Show a line."""
         if not self._silent:
-            self._console.print(line, soft_wrap=True, highlight=False)
+            self._console.print(printable(line), soft_wrap=True, highlight=False, markup=False)
 
     @contextmanager
     def over(self, total: int, what: str) -> Iterator[Callable[[], None]]:
         """Yield a function to call after each of `total` items."""
-        pace = Pace()
+        pace, what = Pace(), printable(what)
         if self._silent:
             yield lambda: None
         elif self._console.is_terminal:
-            columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), _PaceColumn(pace))
+            columns = (TextColumn(what, markup=False), BarColumn(), MofNCompleteColumn(), _PaceColumn(pace))
             with Progress(*columns, console=self._console) as bar:
                 task = bar.add_task(what, total=total)
 
@@ -76,7 +78,8 @@ class Reporter:
                 done += 1
                 pace.tick()
                 if done % max(1, total // 10) == 0 or done == total:
-                    self._console.print(f"{what}: {done} of {total}{pace_text(pace, total - done)}", highlight=False)
+                    line = f"{what}: {done} of {total}{pace_text(pace, total - done)}"
+                    self._console.print(line, highlight=False, markup=False)
 
             yield tick
 

@@ -9,6 +9,7 @@ import logging
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -17,6 +18,7 @@ from aiohttp import web
 
 from app.export.formats import FORMATS, OPTIONS, ExportFormat
 from app.remedies import page_text
+from app.runtime.temporary_folder import TemporaryFolder
 from app.server import connections
 from tracker.errors import TrackerError
 
@@ -67,9 +69,9 @@ class ExportRoutes:
             raise web.HTTPConflict(text="Another export is in progress; wait for it to finish.")
         async with self._busy:
             connections.keep_open(request)
-            with tempfile.TemporaryDirectory(prefix="quadrille-export-") as folder:
+            with closing(TemporaryFolder(tempfile.gettempdir())) as folder:
                 try:
-                    made = await asyncio.to_thread(self._make, chosen, request, Path(folder))
+                    made = await asyncio.to_thread(self._make, chosen, request, folder.path)
                 except TrackerError as error:
                     raise web.HTTPBadRequest(text=page_text(error)) from error
                 except _StoppedError:

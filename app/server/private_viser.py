@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import shutil
 import socket
 import tempfile
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from typing import Any
 import viser
 import websockets.asyncio.server
 
+from app.runtime.temporary_folder import TemporaryFolder
 from tracker.errors import TrackerError
 
 _MAX_PATH_BYTES = 100  # the kernel's limit for the path of a Unix socket is 104 to 108 bytes
@@ -34,7 +34,7 @@ class PrivateViser:
             TrackerError: viser did not use the socket; nothing listens then.
         """
         self._folder = _private_folder()
-        self.socket_path = self._folder / "viser"
+        self.socket_path = self._folder.path / "viser"
         """The socket; only this user may open it."""
         try:
             # viser prints its own address even with verbose=False; the page's address is the only one to open.
@@ -48,23 +48,23 @@ class PrivateViser:
                     "install the version of viser that constraints.txt names"
                 )
         except BaseException:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder.close()
             raise
         self.server.gui.configure_theme(show_share_button=False, show_logo=False)
 
     def stop(self) -> None:
         """Stop the server and remove its socket."""
         self.server.stop()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.close()
 
 
-def _private_folder() -> Path:
+def _private_folder() -> TemporaryFolder:
     """Make a folder that only this user may enter, with a path short enough for a socket."""
-    folder = Path(tempfile.mkdtemp(prefix="quadrille-"))
-    if len(bytes(folder / "viser")) <= _MAX_PATH_BYTES:
+    folder = TemporaryFolder(tempfile.gettempdir())
+    if len(bytes(folder.path / "viser")) <= _MAX_PATH_BYTES:
         return folder
-    folder.rmdir()
-    return Path(tempfile.mkdtemp(prefix="quadrille-", dir="/tmp"))
+    folder.close()
+    return TemporaryFolder("/tmp")
 
 
 @contextlib.contextmanager

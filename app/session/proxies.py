@@ -1,9 +1,11 @@
 """Make intra-frame proxies of a session's videos, so that any frame is shown at once (`quadrille index`)."""
 
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 from app.runtime.progress import Reporter
+from tracker.errors import RecordingError
 from tracker.files import refuse_links
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_folder import ImageFolder
@@ -25,10 +27,16 @@ def index(session: Session, progress: Reporter) -> dict[str, Any]:
         RecordingError: footage cannot be read, or a proxy cannot be written.
         SessionError: another program is making them.
     """
-    folder = session.folder / FOLDER
+    folder: Path = session.folder / FOLDER
     refuse_links(session.folder, FOLDER)
-    folder.mkdir(exist_ok=True)
-    refuse_links(folder, *(path.name for path in folder.iterdir()))
+    try:
+        folder.mkdir(exist_ok=True)
+        refuse_links(folder, *(path.name for path in folder.iterdir()))
+    except OSError as error:
+        raise RecordingError(
+            f"cannot write the proxies into {folder}: {error.strerror}; make the session's folder writable, or "
+            "copy the session to where you may write"
+        ) from error
     made: dict[str, int] = {}
     stopped = False
     with SessionLock(folder):

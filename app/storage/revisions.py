@@ -20,13 +20,16 @@ class ModelRevisions:
         """
         self._store = store
         self._bodies: dict[int, BodyModel] = {}
+        self._value_counts = store.value_counts()
         self.set_body_models(session)
 
     def set_body_models(self, session: Session) -> None:
         """Store the bodies of a session's people as revisions: new poses belong to them."""
         self._people = session.people
         self._current = [self._store.add_model_revision(p.name, format_model(p.model)) for p in session.people]
-        self._bodies |= dict(zip(self._current, (p.model for p in session.people), strict=True))
+        for revision, person in zip(self._current, session.people, strict=True):
+            self._store.require_fit(revision, len(person.model.value_names), self._value_counts)
+            self._bodies[revision] = person.model
 
     def current(self, person: int) -> int:
         """Return the revision of a person's present body, which new poses belong to."""
@@ -36,7 +39,9 @@ class ModelRevisions:
         """Return the body model of a revision: always the same object, so that its cached values are kept."""
         if revision not in self._bodies:
             text = self._store.model_revision(revision).toml
-            self._bodies[revision] = parse_model(text, f"of the store, revision {revision}")
+            body = parse_model(text, f"of the store, revision {revision}")
+            self._store.require_fit(revision, len(body.value_names), self._value_counts)
+            self._bodies[revision] = body
         return self._bodies[revision]
 
     def former_body(self, person: int) -> BodyModel | None:

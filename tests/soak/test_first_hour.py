@@ -22,8 +22,6 @@ from stranger import Errors, Stranger, table
 
 from tracker.evaluation.metrics import evaluate_joints
 from tracker.evaluation.references import read_joints
-from tracker.formats.joint_maps import joints_of
-from tracker.formats.trc import read_trc
 from tracker.simulate import Simulation, simulate
 
 RECORDINGS = {

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import socket
 import threading
 import time
 import tomllib
@@ -36,20 +37,32 @@ def test_a_file_of_many_megabytes_is_refused_unread(tmp_path, read):
     assert peak < 200_000
 
 
-@pytest.mark.parametrize("read", [read_text, all_lines])
-def test_a_device_without_end_is_refused(read):
-    with pytest.raises(SessionError, match=r"/dev/zero.*at most 1"):
-        read(Path("/dev/zero"), KIND)
+@pytest.mark.parametrize("read", [read_text, read_toml, read_json, all_lines])
+@pytest.mark.parametrize("kind", ["pipe", "link to a pipe", "device", "socket"])
+def test_what_is_no_regular_file_is_refused_without_waiting(tmp_path, monkeypatch, read, kind):
+    path = tmp_path / "odd"
+    if kind == "device":
+        path.symlink_to("/dev/zero")
+    elif kind == "socket":
+        monkeypatch.chdir(tmp_path)  # the name of a socket must be short
+        socket.socket(socket.AF_UNIX).bind("odd")
+    else:
+        os.mkfifo(tmp_path / "pipe")
+        path.symlink_to("pipe") if "link" in kind else path.hardlink_to(tmp_path / "pipe")
+    with pytest.raises(
+        SessionError, match=r"odd file .*odd cannot be read: expected a regular file, found a.*; mend it"
+    ):
+        read(path, KIND)
 
 
-def test_a_pipe_is_read(tmp_path):
+def test_a_pipe_that_a_shell_has_opened_is_read():
     """As in `--calibration <(command)`."""
-    path = tmp_path / "pipe"
-    os.mkfifo(path)
-    writer = threading.Thread(target=path.write_text, args=("a = 1",))
+    reading, writing = os.pipe()
+    writer = threading.Thread(target=lambda: (time.sleep(0.2), os.write(writing, b"a = 1"), os.close(writing)))
     writer.start()
-    assert read_toml(path, KIND) == {"a": 1}
+    assert read_toml(Path(f"/dev/fd/{reading}"), KIND) == {"a": 1}
     writer.join()
+    os.close(reading)
 
 
 def test_a_byte_order_mark_is_no_text(tmp_path):

@@ -22,7 +22,7 @@ import msgspec
 import numpy as np
 
 from tracker.errors import RecordingError
-from tracker.files import write_text_atomic
+from tracker.files import check_regular, open_regular, read_regular, write_text_atomic
 from tracker.footage.frame_index import stamp_of
 from tracker.footage.image_file import decode_image
 from tracker.footage.video import Footage
@@ -101,7 +101,7 @@ class Proxy:
         if begin == end:
             return None
         try:
-            with self._pictures.open("rb") as file:
+            with open_regular(self._pictures) as file:
                 file.seek(begin)
                 data = file.read(end - begin)
         except OSError as error:
@@ -133,6 +133,7 @@ class Proxy:
             ends = self._read_ends()
             done, at = len(ends), int(ends[-1]) if len(ends) else 0
             yield done
+            check_regular(self._pictures, self._index)
             with ExitStack() as files:
                 pictures = files.enter_context(self._pictures.open("ab"))
                 index = files.enter_context(self._index.open("ab"))
@@ -164,7 +165,8 @@ class Proxy:
     def _read_ends(self) -> Any:
         """Read the ends of the frames that are complete."""
         try:
-            ends = np.frombuffer(self._index.read_bytes()[: self.n_frames * _END.itemsize], _END)
+            n_bytes = self.n_frames * _END.itemsize
+            ends = np.frombuffer(read_regular(self._index, n_bytes)[:n_bytes], _END)
             return ends[: int(np.searchsorted(ends, self._pictures.stat().st_size, side="right"))]
         except OSError:
             return np.empty(0, _END)

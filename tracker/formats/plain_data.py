@@ -4,7 +4,7 @@ A matrix of OpenCV's FileStorage becomes a list of rows in all three.
 """
 
 import re
-from typing import Any, TypeGuard
+from typing import Any, ClassVar, TypeGuard
 from xml.etree import ElementTree
 
 import msgspec
@@ -21,13 +21,23 @@ _FLOAT = re.compile(
 """With the numbers such as 1e-5 that YAML 1.1 takes for text."""
 
 
+_INT = re.compile(r"^[-+]?(?:0b[01_]+|0x[0-9a-fA-F_]+|0[0-7_]+|(?:0|[1-9][0-9_]*))$")
+"""Without numbers to the base 60 of YAML 1.1 such as 1:30:00: thousands of digits take seconds, and none means one."""
+
+
 class _Loader(yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader):  # type: ignore[misc]
     """Plain YAML, with OpenCV's tag."""
+
+    yaml_implicit_resolvers: ClassVar[dict[str, list[tuple[str, re.Pattern[str]]]]] = {
+        first: [(tag, pattern) for tag, pattern in rules if not tag.endswith((":int", ":float"))]
+        for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
 
 
 for _tag in ("opencv-matrix", "opencv-nd-matrix"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_tag}", lambda loader, node: loader.construct_mapping(node, deep=True))
 _Loader.add_implicit_resolver("tag:yaml.org,2002:float", _FLOAT, list("-+0123456789."))
+_Loader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+0123456789"))
 
 
 def parse_yaml(text: str, source: str, kind: TextKind) -> Any:

@@ -22,7 +22,7 @@ import tomli_w
 
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
-from tracker.files import refuse_links, write_text_atomic
+from tracker.files import check_regular, refuse_links, write_text_atomic
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
@@ -341,7 +341,7 @@ def _relative(path: Path, folder: Path) -> str:
 def _resolve(text: str, folder: Path) -> Path:
     path = tidy_path(folder / text)
     try:
-        path.exists()
+        check_regular(path)
     except OSError as error:
         raise SessionError(
             f"session {folder}: expected the path of a file or folder, found {quoted(text)}, where the system says: "

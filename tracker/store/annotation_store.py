@@ -6,10 +6,10 @@ state and head are changed in place.
 
 import json
 import secrets
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from tracker.errors import SessionError
 from tracker.store import edit_tree, rows
@@ -26,6 +26,8 @@ from tracker.store.records import (
     Pin,
     PoseRecord,
 )
+
+T = TypeVar("T")
 
 _ID = "store_id"
 """Setting of a store: a random text that rescue files name it by."""
@@ -73,13 +75,13 @@ class AnnotationStore:
 
     def poses(self, person: str, frames: range) -> dict[int, PoseRecord]:
         """Return the poses of a person in a range of frames, by frame, ascending."""
-        found = self._connection.all(
+        return self._records(
             f"SELECT p.frame, {rows.RECORD_COLUMNS} {rows.CURRENT_POSES} JOIN edits e ON e.id = c.edit "
             "LEFT JOIN program_settings t ON t.id = c.program_settings "
             "WHERE p.person = ? AND p.frame BETWEEN ? AND ? ORDER BY p.frame",
-            (person, frames.start, frames.stop - 1),
+            person,
+            frames,
         )
-        return {frame: rows.row_to_record(row) for frame, *row in found}
 
     def former_poses(self, person: str, frames: range) -> dict[int, PoseRecord]:
         """Return the poses that the present ones of a range of frames replaced, by frame, ascending.
@@ -87,7 +89,7 @@ class AnnotationStore:
         Edits that changed only marks do not count, nor do steps within the edit that made the present pose. A pose
         that was set after the frame was cleared has replaced none.
         """
-        found = self._connection.all(
+        return self._records(
             "WITH RECURSIVE f (frame, numbers, edit, change) AS ("
             f"SELECT p.frame, c.numbers, c.edit, c.previous {rows.CURRENT_POSES} "
             "WHERE p.person = ? AND p.frame BETWEEN ? AND ? UNION ALL "
@@ -97,9 +99,9 @@ class AnnotationStore:
             f"SELECT f.frame, {rows.RECORD_COLUMNS} FROM f JOIN pose_changes c ON c.id = f.change "
             "JOIN edits e ON e.id = c.edit LEFT JOIN program_settings t ON t.id = c.program_settings "
             "WHERE c.numbers IS NOT f.numbers AND c.edit != f.edit AND c.numbers IS NOT NULL ORDER BY f.frame",
-            (person, frames.start, frames.stop - 1),
+            person,
+            frames,
         )
-        return {frame: rows.row_to_record(row) for frame, *row in found}
 
     def alternatives(self, person: str, frame: int) -> tuple[Alternative, ...]:
         """Return the alternatives to a person's pose in a frame, best first."""
@@ -107,25 +109,26 @@ class AnnotationStore:
             f"SELECT {rows.ALTERNATIVE_COLUMNS} FROM poses p JOIN alternatives a ON a.change = p.change "
             "WHERE p.person = ? AND p.frame = ? ORDER BY a.rank",
             (person, frame),
+            lambda row: rows.row_to_alternative(row, f"an alternative to {rows.PoseLabel(person, frame)}"),
         )
-        return tuple(rows.row_to_alternative(row) for row in found)
+        return tuple(found)
 
     def frames(self, person: str, within: range = range(1 << 31)) -> list[FrameRow]:
         """Summarize the frames of a range in which the person has a pose, ascending; all frames by default."""
-        return [rows.row_to_frame_row(row) for row in self._within(rows.FRAME_ROW_COLUMNS, person, within)]
+        return self._within(rows.FRAME_ROW_COLUMNS, person, within, rows.row_to_frame_row)
 
     def frame_poses(self, person: str, frames: range) -> list[FramePose]:
         """Return the poses and costs of a person in the frames of a range that have a pose, ascending."""
-        return [rows.row_to_frame_pose(row) for row in self._within(rows.FRAME_POSE_COLUMNS, person, frames)]
+        return self._within(rows.FRAME_POSE_COLUMNS, person, frames, rows.row_to_frame_pose)
 
     def pins(self, person: str, frame: int) -> list[Pin]:
         """Return the pins of a person in a frame, by point and camera."""
-        found = self._connection.all(
+        return self._connection.all(
             "SELECT c.point, c.camera, c.u, c.v FROM pins p JOIN pin_changes c ON c.id = p.change "
             "WHERE p.person = ? AND p.frame = ? ORDER BY p.point, p.camera",
             (person, frame),
+            lambda row: rows.row_to_pin(row, f"a pin of {person!r} in frame {frame}"),
         )
-        return [Pin(point, camera, (u, v)) for point, camera, u, v in found]
 
     def commit(self, label: str, changes: Sequence[Change], author: str = "", by_program: bool = False) -> Committed:
         """Make changes as one edit, which one undo reverts.
@@ -190,26 +193,78 @@ class AnnotationStore:
     def model_revisions(self, person: str) -> list[ModelRevision]:
         """Return all body models that a person has had, oldest first."""
         sql = "SELECT id, person, toml, time FROM model_revisions WHERE person = ? ORDER BY id"
-        return [ModelRevision(*r) for r in self._connection.all(sql, (person,))]
+        return self._connection.all(sql, (person,), rows.row_to_revision)
 
     def model_revision(self, revision: int) -> ModelRevision:
-        """Return the body model with the id that a pose refers to."""
+        """Return the body model with the id that a pose refers to.
+
+        Raises:
+            DamagedStoreError: there is none.
+        """
         sql = "SELECT id, person, toml, time FROM model_revisions WHERE id = ?"
-        row = self._connection.one(sql, (revision,))
-        assert row is not None, f"no model revision {revision}"
-        return ModelRevision(*row)
+        found = self._connection.one(sql, (revision,), rows.row_to_revision)
+        if found is None:
+            raise self._connection.damaged(f"a pose refers to model revision {revision}, which is missing")
+        return found
+
+    def value_counts(self) -> dict[int, dict[int, tuple[str, int]]]:
+        """Return for each model revision the numbers of values of its poses, each with a person and frame that has it.
+
+        Poses of a body all have the same number.
+        """
+        pose = "SELECT id, person, frame, model_revision, numbers FROM pose_changes WHERE numbers IS NOT NULL"
+        others = f"SELECT c.id, person, frame, a.model_revision, a.numbers {rows.ALTERNATIVES}"
+        sql = f"SELECT model_revision, length(numbers), person, frame FROM ({pose} UNION ALL {others}) GROUP BY 1, 2"
+        counts: dict[int, dict[int, tuple[str, int]]] = {}
+        for revision, n_bytes, *of in self._connection.all(sql, (), tuple):
+            counts.setdefault(revision, {})[(n_bytes or 0) // 8] = (str(of[0]), of[1])
+        return counts
+
+    def require_fit(self, revision: int, n_values: int, counts: dict[int, dict[int, tuple[str, int]]]) -> None:
+        """Check that the poses of a body have as many values as it.
+
+        Args:
+            revision: of the body model.
+            n_values: number of its values.
+            counts: of `value_counts`.
+
+        Raises:
+            DamagedStoreError: one has not.
+        """
+        for n, (person, frame) in counts.get(revision, {}).items():
+            if n != n_values:
+                raise self._connection.damaged(
+                    f"{rows.PoseLabel(person, frame)}: expected {n_values} values as its body has, found {n}"
+                )
 
     def setting(self, key: str, default: Any = None) -> Any:
         """Return a setting of the session, any JSON value."""
-        row = self._connection.one("SELECT value FROM settings WHERE key = ?", (key,))
-        return default if row is None else json.loads(row[0])
+        found = self._connection.one(
+            "SELECT value FROM settings WHERE key = ?",
+            (key,),
+            lambda row: (rows.decoded_json(row[0], f"setting '{key}'"),),
+        )
+        return default if found is None else found[0]
 
     def set_setting(self, key: str, value: Any) -> None:
         """Store a setting of the session. Settings are not part of the history."""
         with self._connection.transaction() as db:
             db.execute("INSERT OR REPLACE INTO settings (key, value) VALUES (?, ?)", (key, json.dumps(value)))
 
-    def _within(self, columns: str, person: str, frames: range) -> list[Any]:
-        """Select columns of the poses of a person within a range of frames, ascending."""
+    def _records(self, sql: str, person: str, frames: range) -> dict[int, PoseRecord]:
+        """Read frames and poses of a person, by frame."""
+
+        def convert(row: Sequence[Any]) -> tuple[int, PoseRecord]:
+            where = rows.PoseLabel(person, row[0])
+            return rows.frame_number(row[0], where), rows.row_to_record(row[1:], where)
+
+        return dict(self._connection.all(sql, (person, frames.start, frames.stop - 1), convert))
+
+    def _within(
+        self, columns: str, person: str, frames: range, convert: Callable[[Sequence[Any], object], T]
+    ) -> list[T]:
+        """Select columns of the poses of a person within a range of frames, ascending; the first one is the frame."""
         sql = f"SELECT {columns} {rows.CURRENT_POSES} WHERE p.person = ? AND p.frame BETWEEN ? AND ? ORDER BY p.frame"
-        return self._connection.all(sql, (person, frames.start, frames.stop - 1))
+        return self._connection.all(
+            sql, (person, frames.start, frames.stop - 1), lambda row: convert(row, rows.PoseLabel(person, row[0]))
+        )

@@ -12,10 +12,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from tracker.errors import SessionError
+from tracker.errors import DamagedStoreError, SessionError
 from tracker.files import sync_folder
 from tracker.store import checksums, verification
-from tracker.store.recovery import JOURNALS
+from tracker.store.recovery import JOURNALS, check_files
 
 FOLDER = "backups"
 """Folder of the backups, beside the store."""
@@ -33,7 +33,7 @@ class Restored(NamedTuple):
 def backups_of(path: Path) -> list[Path]:
     """List the backups of a store, newest first. Those of older programs, without a counter, are the oldest."""
     found = (path.parent / FOLDER).glob(f"{path.stem}-*{path.suffix}")
-    return sorted(found, key=lambda backup: (_counter(backup), backup.name), reverse=True)
+    return sorted(filter(Path.is_file, found), key=lambda backup: (_counter(backup), backup.name), reverse=True)
 
 
 def _counter(backup: Path) -> int:
@@ -134,7 +134,7 @@ def _damage(backup: Path) -> str | None:
     try:
         with closing(_reader(backup)) as db:
             return verification.damage(db)
-    except (sqlite3.Error, *verification.UNDECODABLE) as error:
+    except (sqlite3.Error, OSError, DamagedStoreError, *verification.UNDECODABLE) as error:
         return f"{type(error).__name__}: {error}"
 
 
@@ -143,12 +143,13 @@ def _is_copy(backup: Path, db: sqlite3.Connection) -> bool:
     try:
         with closing(_reader(backup)) as other:
             return checksums.contents(other) == checksums.contents(db)
-    except (sqlite3.Error, *verification.UNDECODABLE):  # an older version, or damaged
+    except (sqlite3.Error, OSError, DamagedStoreError, *verification.UNDECODABLE):  # an older version, or damaged
         return False
 
 
 def _reader(backup: Path) -> sqlite3.Connection:
     """Open a backup, which stays as it is."""
+    check_files(backup)
     return sqlite3.connect(f"{backup.absolute().as_uri()}?mode=ro", uri=True)
 
 

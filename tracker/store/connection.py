@@ -7,11 +7,14 @@ import threading
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.files import IrregularFileError, refuse_links, sync_folder
 from tracker.store import backups, checksums, recovery, schema, verification
+from tracker.store.query_limit import EndlessQueryError, limited
+
+T = TypeVar("T")
 
 _OF_THE_FILE = (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
 """Primary codes of errors after which the file is opened again: its drive or folder may have gone away."""
@@ -43,7 +46,7 @@ class Connection:
                 refuse_links(self._path.parent, name, *(name + ending for ending in recovery.JOURNALS), "backups")
                 if not self._path.exists():
                     if backups.backups_of(self._path):
-                        raise self._damaged("expected the poses of the session, found no such file")
+                        raise self.damaged("expected the poses of the session, found no such file")
                     _create(self._path)
             self.db = self._open()
             try:
@@ -84,18 +87,29 @@ class Connection:
             finally:
                 self.db.execute(f"PRAGMA busy_timeout = {_TIMEOUT_S * 1000:.0f}")
 
-    def one(self, sql: str, parameters: Sequence[Any]) -> Any:
-        """Return the first row of a query, or None."""
-        return self._read(lambda: self.db.execute(sql, parameters).fetchone())
+    def one(self, sql: str, parameters: Sequence[Any], convert: Callable[[Any], T]) -> T | None:
+        """Return the first row of a query, converted; None if there is none."""
 
-    def all(self, sql: str, parameters: Sequence[Any]) -> list[Any]:
-        """Return all rows of a query."""
-        return self._read(lambda: self.db.execute(sql, parameters).fetchall())
+        def query() -> T | None:
+            row = self.db.execute(sql, parameters).fetchone()
+            return None if row is None else convert(row)
 
-    def _read(self, query: Callable[[], Any]) -> Any:
+        return self._read(query)
+
+    def all(self, sql: str, parameters: Sequence[Any], convert: Callable[[Any], T]) -> list[T]:
+        """Return all rows of a query, converted.
+
+        Raises:
+            DamagedStoreError: a row is not one that the program writes, as `convert` finds, or the query has no end.
+            SessionError: the file cannot be read.
+        """
+        return self._read(lambda: [convert(row) for row in self.db.execute(sql, parameters).fetchall()])
+
+    def _read(self, query: Callable[[], T]) -> T:
         with self._lock, self._errors():
             self._reopen_moved(for_writing=False)
-            return query()
+            with limited(self.db, lambda: self._path.stat().st_size):
+                return query()
 
     def _open(self) -> sqlite3.Connection:
         """Open the file and check it.
@@ -109,12 +123,12 @@ class Connection:
         if not self._path.is_file():
             raise SessionError(f"annotations {self._path} not found; check the session folder")
         if self._path.stat().st_size == 0:
-            raise self._damaged("expected the poses of the session, found an empty file of 0 bytes")
+            raise self.damaged("expected the poses of the session, found an empty file of 0 bytes")
         db = recovery.open_reader(self._path, _connect) if self._read_only else _connect(self._path, "rw")
         try:
             found = verification.damage(db)
             if found is not None:
-                raise self._damaged(found)
+                raise self.damaged(found)
             version = schema.version(db)
             if version > schema.VERSION:
                 raise SessionError(
@@ -177,7 +191,8 @@ class Connection:
         self._note()
         self._is_suspect = False
 
-    def _damaged(self, found: str) -> DamagedStoreError:
+    def damaged(self, found: str) -> DamagedStoreError:
+        """Return the error that names what is wrong with the store, and the backup to go back to."""
         known = backups.backups_of(self._path)
         advice = (
             f"run 'quadrille restore {self._path.parent}' to go back to the backup of {backups.time_of(known[0])}, "
@@ -191,18 +206,24 @@ class Connection:
     def _errors(self) -> Generator[None, None, None]:
         try:
             yield
+        except DamagedStoreError as error:
+            if str(self._path) in str(error):
+                raise
+            raise self.damaged(str(error).removesuffix("; correct it")) from error
+        except EndlessQueryError as error:
+            raise self.damaged(str(error)) from error
         except sqlite3.Error as error:
             code = verification.primary_code(error)
             if code in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB):
-                raise self._damaged(f"SQLite reports: {error}") from error
+                raise self.damaged(f"SQLite reports: {error}") from error
             self._is_suspect |= code in _OF_THE_FILE
             raise SessionError(
                 f"annotations {self._path} cannot be read or written: {error}; check the disk and who has the file open"
             ) from error
         except verification.UNDECODABLE as error:
-            raise self._damaged(f"its definitions or rows cannot be decoded ({type(error).__name__})") from error
+            raise self.damaged(f"its definitions or rows cannot be decoded ({type(error).__name__})") from error
         except IrregularFileError as error:
-            raise self._damaged(f"{error.strerror} at {error.filename}") from error
+            raise self.damaged(f"{error.strerror} at {error.filename}") from error
         except OSError as error:
             raise SessionError(
                 f"annotations {self._path} cannot be read or written: {error.strerror}; check the disk and your rights"

@@ -12,6 +12,7 @@ from importlib import metadata
 from typing import Any
 
 from tracker.errors import SessionError
+from tracker.store import rows
 from tracker.store.connection import Connection
 from tracker.store.records import HistoryEntry
 
@@ -86,16 +87,14 @@ class EditTree:
         """List the edits that redo and undo can reach, latest first, at most `limit` of each."""
         undone = self._entries(_YOUNGEST.format("(SELECT edit FROM head)"), _YOUNGEST.format("line.id"), limit)
         done = self._entries("(SELECT edit FROM head)", "line.parent", limit)
-        return [HistoryEntry(e, label, author, time, undone=True) for e, label, author, time in reversed(undone)] + [
-            HistoryEntry(e, label, author, time, undone=False) for e, label, author, time in done
-        ]
+        return [entry._replace(undone=True) for entry in reversed(undone)] + done
 
     def frames_of(self, edit: int) -> list[int]:
         """List the frames whose poses or pins an edit changes, ascending."""
         sql = "SELECT frame FROM pose_changes WHERE edit = ?1 UNION SELECT frame FROM pin_changes WHERE edit = ?1"
-        return sorted(frame for (frame,) in self._connection.all(sql, (edit,)))
+        return sorted(self._connection.all(sql, (edit,), lambda row: rows.frame_number(row[0], f"edit {edit}")))
 
-    def _entries(self, start: str, onward: str, limit: int) -> list[Any]:
+    def _entries(self, start: str, onward: str, limit: int) -> list[HistoryEntry]:
         """Follow the tree from edit to edit; `start` and `onward` are SQL for their ids."""
         columns = "edits.id, edits.parent, edits.label, edits.author, edits.time"
         return self._connection.all(
@@ -103,6 +102,7 @@ class EditTree:
             f"WHERE id = {start} UNION ALL SELECT {columns}, n + 1 FROM line JOIN edits ON edits.id = {onward} "
             "WHERE n < ?) SELECT id, label, author, time FROM line",
             (limit,),
+            rows.row_to_entry,
         )
 
 

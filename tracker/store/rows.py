@@ -1,18 +1,119 @@
-"""Convert records to rows of the store, and back."""
+"""Convert records to rows of the store, and back. Rows are checked: a file from elsewhere may hold anything."""
 
 import json
 from collections.abc import Sequence
 from math import isfinite
 from struct import iter_unpack
-from typing import Any
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
+from tracker.errors import DamagedStoreError
 from tracker.geometry.arrays import Array
-from tracker.store.records import SOURCES, STATUSES, Alternative, FramePose, FrameRow, PoseRecord
+from tracker.store.records import (
+    SOURCES,
+    STATUSES,
+    Alternative,
+    FramePose,
+    FrameRow,
+    HistoryEntry,
+    ModelRevision,
+    Pin,
+    PoseRecord,
+)
+from tracker.validation import MAX_FRAMES, Number, check
+
+_Flag: TypeAlias = Annotated[int, Meta(ge=0, le=1, description="0 or 1")]
+_Frame: TypeAlias = Annotated[int, Meta(ge=0, lt=MAX_FRAMES, description=f"a frame from 0 to {MAX_FRAMES - 1}")]
+_Id: TypeAlias = Annotated[int, Meta(ge=1, description="the number of a row")]
+_Status: TypeAlias = Literal["", "good", "doubtful", "lost"]
+_Numbers: TypeAlias = Annotated[bytes, Meta(min_length=8, description="the bytes of numbers")]
+
+
+class PoseLabel(NamedTuple):
+    """Names a pose in messages."""
+
+    person: str
+    frame: Any
+
+    def __str__(self) -> str:
+        return f"the pose of {self.person!r:.60} in frame {self.frame!r:.20}"
+
+
+class _Summary(msgspec.Struct):
+    """What rows of poses have in common, by the names of their columns."""
+
+    frame: _Frame
+    sources: Annotated[bytes, Meta(min_length=1)]
+    status: _Status
+    cost_px: Number | None
+    keyframe: _Flag
+    view_costs_px: bytes | None
+    remark: str | None
+    reviewed: _Flag | None
+    others: _Flag
+    limbs: bytes | None
+
+
+class _Pose(msgspec.Struct):
+    numbers: _Numbers
+    sources: Annotated[bytes, Meta(min_length=1)]
+    model_revision: _Id
+    keyframe: _Flag
+    status: _Status
+    cost_px: Number | None
+    settings: str
+    author: str
+    time: str
+    program: str
+    view_costs_px: bytes | None
+    part_costs_px: bytes | None
+    remark: str | None
+    reviewed: _Flag | None
+    limbs: bytes | None
+
+
+class _FramePose(msgspec.Struct):
+    frame: _Frame
+    numbers: _Numbers
+    cost_px: Number | None
+    view_costs_px: bytes | None
+    model_revision: _Id
+
+
+class _Alternative(msgspec.Struct):
+    numbers: _Numbers
+    model_revision: _Id
+    cost_px: Number | None
+
+
+class _Pin(msgspec.Struct):
+    point: str
+    camera: str
+    u: Number
+    v: Number
+
+
+class _Edit(msgspec.Struct):
+    edit: _Id
+    label: str
+    author: str
+    time: str
+
+
+class _Revision(msgspec.Struct):
+    id: _Id
+    person: str
+    toml: str
+    time: str
+
 
 CURRENT_POSES = "FROM poses p JOIN pose_changes c ON c.id = p.change"
 """The current poses: their changes `c` with their keys `p`."""
+ALTERNATIVES = "FROM alternatives a JOIN pose_changes c ON c.id = a.change"
+"""All alternatives `a` with the changes `c` that they belong to."""
 
 RECORD_COLUMNS = (
     "c.numbers, c.sources, c.model_revision, c.keyframe, c.status, c.cost_px, coalesce(t.settings, c.settings), "
@@ -52,36 +153,100 @@ def is_readable(numbers: Any, sources: Any) -> bool:
     )
 
 
-def row_to_record(row: Sequence[Any]) -> PoseRecord:
-    """Convert a row of `RECORD_COLUMNS`; the inverse of `record_to_row`."""
-    numbers, sources, revision, keyframe, status, cost, settings, *rest = row
-    author, time, program, views, parts, remark, seen, limbs = rest
+def row_to_record(row: Sequence[Any], where: object) -> PoseRecord:
+    """Convert a row of `RECORD_COLUMNS`; the inverse of `record_to_row`. Raises as all of these do.
+
+    Args:
+        row: of the store.
+        where: names the row in messages, as text that is made when it is needed.
+
+    Raises:
+        DamagedStoreError: a value is impossible.
+    """
+    found: _Pose = _checked(row, _Pose, where)
+    values, sources = _array(found.numbers, where), _sources(found.sources, where)
+    if len(sources) != len(values):
+        raise DamagedStoreError(f"{where}: expected a source for each of {len(values)} values, found {len(sources)}")
     return PoseRecord(
-        _array(numbers), tuple(SOURCES[i] for i in sources), revision, bool(keyframe), status, cost,
-        json.loads(settings), author, time, program, _costs(views), _costs(parts), remark or "", bool(seen),
-        _numbers(limbs),
+        values, sources, found.model_revision, bool(found.keyframe), found.status, found.cost_px,
+        check(decoded_json(found.settings, where), dict[str, Any], f"{where}, settings", DamagedStoreError),
+        found.author, found.time, found.program, _costs(found.view_costs_px, where), _costs(found.part_costs_px, where),
+        found.remark or "", bool(found.reviewed), _numbers(found.limbs, where),
     )  # fmt: skip
 
 
-def row_to_frame_row(row: Sequence[Any]) -> FrameRow:
+def row_to_frame_row(row: Sequence[Any], where: object) -> FrameRow:
     """Convert a row of `FRAME_ROW_COLUMNS`."""
-    frame, sources, status, cost, keyframe, views, remark, seen, others, limbs = row
+    found: _Summary = _checked(row, _Summary, where)
     return FrameRow(
-        frame, SOURCES[min(sources)], status, cost, bool(keyframe), _costs(views), remark or "", bool(keyframe or seen),
-        bool(others and not keyframe), _numbers(limbs),
+        found.frame, SOURCES[min(_known(found.sources, where))], found.status, found.cost_px,
+        bool(found.keyframe), _costs(found.view_costs_px, where), found.remark or "",
+        bool(found.keyframe or found.reviewed), bool(found.others and not found.keyframe),
+        _numbers(found.limbs, where),
     )  # fmt: skip
 
 
-def row_to_frame_pose(row: Sequence[Any]) -> FramePose:
+def row_to_frame_pose(row: Sequence[Any], where: object) -> FramePose:
     """Convert a row of `FRAME_POSE_COLUMNS`."""
-    frame, numbers, cost, views, revision = row
-    return FramePose(frame, _array(numbers), cost, _costs(views), revision)
+    found: _FramePose = _checked(row, _FramePose, where)
+    costs_px = _costs(found.view_costs_px, where)
+    return FramePose(found.frame, _array(found.numbers, where), found.cost_px, costs_px, found.model_revision)
 
 
-def row_to_alternative(row: Sequence[Any]) -> Alternative:
+def row_to_alternative(row: Sequence[Any], where: object) -> Alternative:
     """Convert a row of `ALTERNATIVE_COLUMNS`; the inverse of `alternative_to_row`."""
-    numbers, revision, cost = row
-    return Alternative(_array(numbers), revision, cost)
+    found: _Alternative = _checked(row, _Alternative, where)
+    return Alternative(_array(found.numbers, where), found.model_revision, found.cost_px)
+
+
+def row_to_pin(row: Sequence[Any], where: object) -> Pin:
+    """Convert the columns point, camera, u and v."""
+    found: _Pin = _checked(row, _Pin, where)
+    return Pin(found.point, found.camera, (found.u, found.v))
+
+
+def row_to_entry(row: Sequence[Any]) -> HistoryEntry:
+    """Convert the columns id, label, author and time of an edit that is not undone."""
+    found: _Edit = _checked(row, _Edit, f"edit {row[0]!r:.40}")
+    return HistoryEntry(found.edit, found.label, found.author, found.time, undone=False)
+
+
+def row_to_revision(row: Sequence[Any]) -> ModelRevision:
+    """Convert the columns id, person, toml and time."""
+    found: _Revision = _checked(row, _Revision, f"model revision {row[0]!r:.40}")
+    return ModelRevision(found.id, found.person, found.toml, found.time)
+
+
+def frame_number(value: Any, where: object) -> int:
+    """Return a frame, checked."""
+    return int(check(value, _Frame, f"{where}, frame", DamagedStoreError))
+
+
+def decoded_json(text: Any, where: object) -> Any:
+    """Decode JSON text of a row."""
+    try:
+        return json.loads(text)
+    except (ValueError, TypeError, RecursionError) as error:
+        raise DamagedStoreError(f"{where}: expected JSON text, found {text!r:.60}") from error
+
+
+def _checked(row: Sequence[Any], declaration: Any, where: object) -> Any:
+    named = dict(zip(declaration.__struct_fields__, row, strict=True))
+    try:
+        return msgspec.convert(named, declaration)
+    except msgspec.ValidationError:
+        return check(named, declaration, str(where), DamagedStoreError)
+
+
+def _sources(blob: bytes, where: object) -> tuple[str, ...]:
+    return tuple(SOURCES[i] for i in _known(blob, where))
+
+
+def _known(blob: bytes, where: object) -> bytes:
+    """Return indices of sources, checked."""
+    if max(blob) >= len(SOURCES):
+        raise DamagedStoreError(f"{where}: expected sources from 0 to {len(SOURCES) - 1}, found {max(blob)}")
+    return blob
 
 
 def alternative_to_row(pose: Alternative) -> tuple[Any, ...]:
@@ -110,11 +275,19 @@ def record_to_row(pose: PoseRecord) -> tuple[Any, ...]:
     )
 
 
-def _array(blob: bytes) -> Array:
-    """Decode a read-only array."""
-    values = np.frombuffer(blob, dtype="<f8").astype(np.float64)
+def _array(blob: bytes, where: object) -> Array:
+    """Decode a read-only array of finite numbers."""
+    values = np.frombuffer(_whole(blob, where), dtype="<f8").astype(np.float64)
+    if not np.isfinite(values).all():
+        raise DamagedStoreError(f"{where}: expected finite values, found {values[~np.isfinite(values)][0]}")
     values.setflags(write=False)
     return values
+
+
+def _whole(blob: bytes, where: object) -> bytes:
+    if len(blob) % 8:
+        raise DamagedStoreError(f"{where}: expected numbers of 8 bytes, found {len(blob)} bytes")
+    return blob
 
 
 def _blob(costs_px: Sequence[float | None]) -> bytes | None:
@@ -122,11 +295,15 @@ def _blob(costs_px: Sequence[float | None]) -> bytes | None:
     return np.array([np.nan if c is None else c for c in costs_px], dtype="<f8").tobytes() if costs_px else None
 
 
-def _numbers(blob: bytes | None) -> tuple[float, ...]:
+def _numbers(blob: bytes | None, where: object) -> tuple[float, ...]:
     """Decode numbers; the inverse of `_blob` where all are known."""
-    return () if blob is None else tuple(number for (number,) in iter_unpack("<d", blob))
+    found = () if blob is None else tuple(number for (number,) in iter_unpack("<d", _whole(blob, where)))
+    if not all(map(isfinite, found)):
+        raise DamagedStoreError(f"{where}: expected finite numbers, found {found!r:.60}")
+    return found
 
 
-def _costs(blob: bytes | None) -> tuple[float | None, ...]:
+def _costs(blob: bytes | None, where: object) -> tuple[float | None, ...]:
     """Decode costs; the inverse of `_blob`."""
-    return () if blob is None else tuple(c if isfinite(c) else None for (c,) in iter_unpack("<d", blob))
+    found = () if blob is None else iter_unpack("<d", _whole(blob, where))
+    return tuple(c if isfinite(c) else None for (c,) in found)

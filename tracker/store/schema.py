@@ -96,6 +96,8 @@ _UPGRADES = {
     6: ("ALTER TABLE pose_changes ADD COLUMN limbs BLOB",),
 }
 """Statements that upgrade a store from each older version to the next."""
+STATEMENTS = (*_SCHEMA.split(";\n"), *checksums.ADDED, *(text for texts in _UPGRADES.values() for text in texts))
+"""All statements that define tables and indices, of this version and older ones."""
 _FORMER_SETTINGS = "told"
 """Name of the table and the column of settings in stores of versions 3 to 5."""
 _RENAMED_SETTINGS = f"{_FORMER_SETTINGS} AS program_settings"

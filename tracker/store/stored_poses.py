@@ -38,17 +38,21 @@ def read_stored_poses(
 
     Raises:
         SessionError: the annotations cannot be read.
+        ModelError: a stored body model is malformed.
     """
     if not path.exists():
         return {}
     with closing(AnnotationStore(path, read_only=True)) as store:
         records = store.poses(person, frames)
         tomls = {r: store.model_revision(r).toml for r in {record.model_revision for record in records.values()}}
-    present = format_model(model)
-    models = {
-        revision: model if toml == present else parse_model(toml, f"of '{person}', revision {revision}")
-        for revision, toml in tomls.items()
-    }
+        present = format_model(model)
+        models = {
+            revision: model if toml == present else parse_model(toml, f"of '{person}', revision {revision}")
+            for revision, toml in tomls.items()
+        }
+        counts = store.value_counts()
+        for revision, body in models.items():
+            store.require_fit(revision, len(body.value_names), counts)
     return {
         frame: StoredPose(PosedBody(models[record.model_revision], record.values), record)
         for frame, record in records.items()

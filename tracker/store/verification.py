@@ -3,6 +3,8 @@
 import sqlite3
 
 from tracker.store import checksums, rows, schema
+from tracker.store.definitions import foreign_definition
+from tracker.store.query_limit import EndlessQueryError, limited
 
 _BROKEN = (
     sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_MISMATCH, sqlite3.SQLITE_TOOBIG,
@@ -26,9 +28,13 @@ def damage(db: sqlite3.Connection) -> str | None:
     try:
         db.execute("BEGIN")  # one state: another program may write meanwhile
         try:
-            return _damage(db)
+            n_bytes = _size(db)
+            with limited(db, lambda: n_bytes):
+                return _damage(db)
         finally:
             db.rollback()
+    except EndlessQueryError as error:
+        return str(error)
     except UNDECODABLE as error:
         return f"its definitions or rows cannot be decoded ({type(error).__name__})"
     except sqlite3.Error as error:
@@ -42,20 +48,37 @@ def primary_code(error: sqlite3.Error) -> int:
     return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
 
 
+def _size(db: sqlite3.Connection) -> int:
+    (n_pages,), (page_bytes,) = (db.execute(f"PRAGMA {name}").fetchone() for name in ("page_count", "page_size"))
+    return int(n_pages * page_bytes)
+
+
 def _damage(db: sqlite3.Connection) -> str | None:
+    version = schema.version(db)
+    # Before all else: checks of SQLite run expressions of foreign definitions.
+    if version <= schema.VERSION and (foreign := foreign_definition(db)) is not None:
+        return foreign
     problems = [text for (text,) in db.execute("PRAGMA integrity_check(3)")]
     if problems != ["ok"]:
         return f"SQLite reports: {'; '.join(str(p).strip() for p in problems)}"
-    version = schema.version(db)
     if version > schema.VERSION:
         return None  # a newer program knows
     if version >= checksums.OLDEST_VERSION:
-        return "; ".join(checksums.differences(db, version)) or None
+        return "; ".join(checksums.differences(db, version)) or _out_of_order(db)
     if db.execute("SELECT count(*) FROM sqlite_master WHERE name = 'contents'").fetchone() != (0,):
         return f"expected version {schema.VERSION}, found {version}"
     if version == 0:
         return "expected tables of annotations, found a file without a version"
-    return _unreadable(db)
+    return _unreadable(db) or _out_of_order(db)
+
+
+def _out_of_order(db: sqlite3.Connection) -> str | None:
+    """Return a change or edit that does not follow an earlier one: such a chain might have no end."""
+    for table, column in (("edits", "parent"), ("pose_changes", "previous"), ("pin_changes", "previous")):
+        row = db.execute(f"SELECT id FROM {table} WHERE {column} >= id LIMIT 1").fetchone()
+        if row is not None:
+            return f"row {row[0]} of '{table}' follows a later one"
+    return None
 
 
 def _unreadable(db: sqlite3.Connection) -> str | None:

@@ -1,5 +1,6 @@
 """How the program ends as a process, while OpenCV is at work in a thread that nobody waits for."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -61,10 +62,47 @@ program.program()
 """
 
 
-def test_termination_cleans_up_as_an_interrupt_does(tmp_path):
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_termination_cleans_up_as_an_interrupt_does(tmp_path, number, status):
     with subprocess.Popen([sys.executable, "-c", EXPORTING, str(tmp_path)], stdout=subprocess.PIPE) as process:
         assert process.stdout.readline() == b"at work\n"
         assert list(tmp_path.iterdir())
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(60) == 143
+        process.send_signal(number)
+        assert process.wait(60) == status
     assert not list(tmp_path.iterdir())
+
+
+OF_A_TERMINAL = """
+import os, sys, time
+from app.runtime import process_exit
+
+def main():
+    try:
+        print("at work", flush=True)
+        time.sleep(60)
+    except process_exit.TerminationError as error:
+        sys.exit(error.status)
+    finally:
+        print("saving " * 1000, flush=True)  # on a terminal that has gone
+        open(sys.argv[1], "w").close()
+
+process_exit.run(main)
+"""
+
+
+def test_the_end_of_the_terminal_does_not_keep_work_from_being_saved(tmp_path):
+    ours, theirs = os.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-c", OF_A_TERMINAL, str(tmp_path / "saved")],
+        stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True, preexec_fn=lambda: os.login_tty(theirs),
+    )  # fmt: skip
+    os.close(theirs)
+    assert b"at work" in os.read(ours, 100)
+    os.close(ours)  # which sends SIGHUP
+    assert process.wait(60) == 129
+    assert (tmp_path / "saved").exists()
+
+
+def test_a_program_of_nohup_goes_on_without_a_terminal():
+    program = "import signal; from app.runtime import process_exit; process_exit.run(lambda: signal.raise_signal(1))"
+    assert subprocess.run(["nohup", sys.executable, "-c", program], capture_output=True, timeout=60).returncode == 0

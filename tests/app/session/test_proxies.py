@@ -1,7 +1,11 @@
 """`quadrille index`: what it makes, how it goes on, and that the page looks at it."""
 
+import errno
+import os
+
 import numpy as np
 import pytest
+from command_line import assert_refused
 from gestures import wait_for
 
 from app.session import proxies
@@ -20,6 +24,24 @@ def test_index_makes_a_proxy_of_every_camera(run, session):
     status, out, _ = run("index", session, "--json")
     assert status == 0
     assert '"stopped": false' in out
+
+
+def test_on_a_system_that_is_read_only(run, session, monkeypatch):
+    def refused(path, *_, **__):
+        raise OSError(errno.EROFS, "Read-only file system", str(path))
+
+    monkeypatch.setattr(proxies.Path, "mkdir", refused)
+    assert_refused(run("index", session), ["cannot write the proxies into", "Read-only file system; make the session"])
+
+
+@pytest.mark.parametrize("name", ["lock.json", "FRONT.json", "FRONT.index", "FRONT.mjpeg"])
+def test_a_named_pipe_in_place_of_a_proxy_does_not_hang_the_program(run, session, name):
+    (session / "proxies").mkdir()
+    os.mkfifo(session / "proxies" / name)
+    assert proxies.proxies(load_session(session)) == [None] * 4
+    status, _, err = run("index", session)
+    assert status in (0, 1)  # an old proxy is replaced
+    assert "Traceback" not in err
 
 
 @pytest.mark.slow
