@@ -283,8 +283,8 @@ def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
 
 def _found(state: State, bodies: Sequence[PosedBody], camera: Camera, index: int, view: View) -> list[Path]:
     """Draw the people who were found on the shown frame so far, while the search for people goes on."""
-    candidates = state.finding.candidates
-    if not candidates or state.finding.tried != state.frame or "contours" not in view.layers:
+    candidates = state.finding.candidates.get(state.frame)
+    if not candidates or "contours" not in view.layers:
         return []
     return _some(candidates, [candidates.get(i, b) for i, b in enumerate(bodies)], camera, index, "candidate")
 

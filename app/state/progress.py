@@ -55,8 +55,8 @@ class FindState:
     """Whether it ended with an error."""
     tried: int | None = None
     """Frame that is being tried; after a failure the one that the message is about. None otherwise."""
-    candidates: Mapping[int, PosedBody] = field(default_factory=dict)
-    """By index of the person, the first poses found on that frame so far."""
+    candidates: Mapping[int, Mapping[int, PosedBody]] = field(default_factory=dict)
+    """By frame and index of the person, the first poses found so far; empty when the search has ended."""
     frame: int | None = None
     """Frame on which people were found; None before."""
     axes: Mapping[str, tuple[tuple[Line, ...], ...]] = field(default_factory=dict)

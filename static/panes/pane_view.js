@@ -11,8 +11,9 @@ const MAX_ZOOM = 40;
 /** Size of what is framed with its margin, in sizes of its box: joints lie within the body. */
 const FRAME_MARGIN = 1.4;
 const MAX_FRAME_ZOOM = 8;
-/** A framed box that moves keeps its zoom while it takes this share of the pane: less is small, more is nearly cut off. */
-const [MIN_FRAMED, MAX_FRAMED] = [0.5, 0.92];
+/** A framed box that moves keeps its zoom while it takes this share of the pane: less is small, more cuts
+ * off heads and feet, which reach beyond the joints. */
+const [MIN_FRAMED, MAX_FRAMED] = [0.5, 0.8];
 
 /** @typedef {{left: number, top: number, right: number, bottom: number}} ImageBox image positions */
 

@@ -1,6 +1,8 @@
 /** Commands of the palette: keys, buttons, layers, cameras, people, joints and frames. */
 
+import { REVIEWED, STATUSES } from "../model/cells.js";
 import { LAYERS } from "../model/layers.js";
+import { hasSearch, hasTrack } from "../model/selectors.js";
 import { displayName } from "../widgets/text.js";
 
 /**
@@ -23,6 +25,9 @@ import { displayName } from "../widgets/text.js";
  * @property {import("../inspector/inspector.js").Inspector} inspector
  * @property {() => string | null} away why all commands are unavailable while disconnected
  */
+
+/** Number of commands that are suggested: they are read at a glance. */
+const MAX_SUITING = 6;
 
 const BUTTONS =
   ".top-bar button, .top-bar input, #joint-bar button, .transport button, .transport input, #range-bar button, .drawer-bar label";
@@ -130,6 +135,33 @@ export function contextCommands({ store, navigation, grid, posing, layers, actio
  */
 export function settingCommands({ inspector, away }) {
   return inspector.commands().map(({ area, label, words, run }) => ({ id: `${area} ${label}`, area, label, keys: [], words, why: away, run }));
+}
+
+/**
+ * Labels of the commands that suit the state, the most fitting first.
+ *
+ * @param {import("../model/store.js").Facts} facts
+ * @returns {string[]}
+ */
+export function suitingLabels(facts) {
+  const { state, range, finding, timeline } = facts;
+  if (!state) return [];
+  const isPlaced = state.people.some(({ source }) => source !== null) || timeline.size > 0;
+  const hasDoubts = timeline.statuses.some((status, frame) => STATUSES[status] !== "" && STATUSES[status] !== "good" && !(timeline.marks[frame] & REVIEWED));
+  /** @type {[boolean, string[]][]} */
+  const cases = [
+    [hasTrack(state), ["Pause or continue tracking", "Follow the tracker (toggle)"]],
+    [hasSearch(state), ["Search: this frame", "Search: one step", "Search panel"]],
+    [!isPlaced && !finding?.running, ["Find people", "New session from videos and a calibration"]],
+    [range !== null, ["Interpolate the marked range", "Track forward"]],
+    [state.compared !== null, ["Show the pose before the last fit or search, or its result"]],
+    [(state.people[state.person]?.alternatives ?? 0) > 0, ["Switch to the alternative pose, or back"]],
+    [state.status === "doubtful" || state.status === "lost", ["Search: this frame", "Accept the doubtful or lost poses here: mark them as reviewed"]],
+    [state.point !== null, ["Fit to pins and edges", "Pin the selected joint by clicks (toggle)"]],
+    [hasDoubts, ["Next doubtful or lost pose by severity", "Doubtful and lost poses, most severe first"]],
+    [isPlaced, ["Fit to pins and edges", "Track forward", "Zoom all views to the people"]],
+  ];
+  return [...new Set(cases.flatMap(([holds, labels]) => (holds ? labels : [])))].slice(0, MAX_SUITING);
 }
 
 /** @param {HTMLElement} control */

@@ -22,7 +22,7 @@ export class KeyList {
   setBindings(table) {
     /** @type {Map<string, HTMLElement>} */
     const areas = new Map();
-    for (const { keys, label, area = "More" } of table.filter((binding) => binding.keys.length > 0)) {
+    for (const { keys, label, labels, area } of merged(table.filter((binding) => binding.keys.length > 0))) {
       let section = areas.get(area);
       if (!section) {
         section = document.createElement("section");
@@ -35,6 +35,7 @@ export class KeyList {
       const [term, description] = [document.createElement("dt"), document.createElement("dd")];
       term.append(keyCaps(keys));
       description.textContent = label;
+      description.dataset.labels = JSON.stringify(labels);
       row.append(term, description);
       section.querySelector("dl")?.append(row);
     }
@@ -61,4 +62,51 @@ export class KeyList {
     }
     this.#none.hidden = [this.#list, this.#marks].some((one) => one.querySelector("section:not([hidden])") !== null);
   }
+}
+
+/**
+ * Merge neighbours that differ in one word, such as *Next keyframe* and *Previous keyframe*, so that the list fits the screen.
+ *
+ * @param {import("../widgets/key_matching.js").Binding[]} bindings
+ * @returns {{keys: string[], label: string, labels: string[], area: string}[]}
+ */
+function merged(bindings) {
+  /** @type {{keys: string[], labels: string[], area: string, at: number | null}[]} at: position of the word that differs */
+  const rows = [];
+  for (const { keys, label, area = "More" } of bindings) {
+    const row = rows.at(-1);
+    const at = row && row.area === area ? differingWord(row.labels[0], label) : null;
+    if (row && at !== null && (row.at === null || row.at === at)) {
+      row.at = at;
+      row.labels.push(label);
+      row.keys.push(...keys);
+    } else rows.push({ keys: [...keys], labels: [label], area, at: null });
+  }
+  return rows.map(({ keys, labels, area, at }) => ({ keys, labels, area, label: at === null ? labels[0] : joined(labels, at) }));
+}
+
+/**
+ * Position of the only word in which two labels differ; null if there is none.
+ *
+ * @param {string} one
+ * @param {string} other
+ */
+function differingWord(one, other) {
+  const [words, others] = [one.split(" "), other.split(" ")];
+  if (words.length !== others.length || words.length < 2) return null;
+  const differing = words.flatMap((word, index) => (word === others[index] ? [] : [index]));
+  return differing.length === 1 ? differing[0] : null;
+}
+
+/**
+ * @param {string[]} labels
+ * @param {number} at position of the word that differs
+ */
+function joined(labels, at) {
+  const words = labels.map((label) => label.split(" ")[at]).map((word, index) => (index > 0 && at === 0 ? word.toLowerCase() : word));
+  const all = `${words.slice(0, -1).join(", ")} or ${words.at(-1)}`;
+  return labels[0]
+    .split(" ")
+    .map((word, index) => (index === at ? all : word))
+    .join(" ");
 }

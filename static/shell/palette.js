@@ -1,14 +1,16 @@
 /** Command palette: find commands by a few letters, run them with Enter. */
 
-import { buttonCommands, contextCommands, keyCommands, settingCommands } from "./commands.js";
+import { buttonCommands, contextCommands, keyCommands, settingCommands, suitingLabels } from "./commands.js";
 import { byId, keyCaps } from "../widgets/elements.js";
 import { fitness } from "../widgets/fuzzy.js";
 
 const RECENT = "quadrille.palette.recent";
 const MAX_RECENT = 12;
 const MAX_SHOWN = 60;
-/** Bonus of recent commands, which ranks them before equal matches. */
-const RECENT_BONUS = 6;
+/** Bonus of recent commands, and of those that suit the state, which ranks them before equal matches. */
+const [RECENT_BONUS, SUITING_BONUS] = [6, 3];
+/** Factor of a bonus without a query, when nothing else ranks commands. */
+const ALONE = 1000;
 
 /** @typedef {import("./commands.js").Command} Command */
 
@@ -55,7 +57,8 @@ export class Palette {
 
   #search() {
     const query = this.#input.value;
-    const recent = recentIds();
+    const isAsked = query.trim() !== "";
+    const [recent, suiting] = [recentIds(), suitingLabels(this.#context.store.facts)];
     const commands = [
       ...contextCommands(this.#context, query),
       ...keyCommands(this.#table),
@@ -67,17 +70,20 @@ export class Palette {
       if (found === null) return [];
       const inLabel = fitness(query, command.label) ?? 0;
       const lately = recent.indexOf(command.id);
-      const bonus = lately < 0 ? 0 : RECENT_BONUS * (query.trim() ? 1 : 1000) * (1 - lately / MAX_RECENT);
-      return [{ command, isRecent: lately >= 0 && !query.trim(), score: found + inLabel + bonus }];
+      const fits = command.why() === null ? suiting.indexOf(command.label) : -1;
+      const recency = lately < 0 ? 0 : RECENT_BONUS * (1 - lately / MAX_RECENT);
+      const bonus = recency || (fits < 0 ? 0 : SUITING_BONUS * (1 - fits / suiting.length));
+      const mark = isAsked ? "" : lately >= 0 ? ", recent" : fits >= 0 ? ", suits now" : "";
+      return [{ command, mark, score: found + inLabel + (isAsked ? 1 : ALONE) * bonus }];
     });
-    // Without a query: recent commands first, then the order of the table.
-    scored.sort((a, b) => (query.trim() || a.isRecent || b.isRecent ? b.score - a.score : 0));
+    // Without a query: recent commands, those that suit the state, then the order of the table.
+    scored.sort((a, b) => (isAsked || a.mark || b.mark ? b.score - a.score : 0));
     const shown = scored.slice(0, MAX_SHOWN);
     this.#found = shown.map(({ command }) => command);
-    this.#list.replaceChildren(...shown.map(({ command, isRecent }, index) => option(command, isRecent, index)));
+    this.#list.replaceChildren(...shown.map(({ command, mark }, index) => option(command, mark, index)));
     this.#list.scrollTop = 0;
     // Enter by itself must not change a pose: without a query nothing is chosen yet.
-    this.#show(query.trim() ? 0 : -1);
+    this.#show(isAsked ? 0 : -1);
     if (!shown.length) this.#why.textContent = `No results for “${query}”. Enter a number to go to that frame.`;
   }
 
@@ -132,10 +138,10 @@ export class Palette {
 
 /**
  * @param {Command} command
- * @param {boolean} isRecent
+ * @param {string} mark why it comes first
  * @param {number} index
  */
-function option({ area, label, keys, why }, isRecent, index) {
+function option({ area, label, keys, why }, mark, index) {
   const item = document.createElement("li");
   item.id = `palette-option-${index}`;
   item.setAttribute("role", "option");
@@ -148,7 +154,7 @@ function option({ area, label, keys, why }, isRecent, index) {
   const text = document.createElement("span");
   text.textContent = label;
   const where = document.createElement("small");
-  where.textContent = isRecent ? `${area}, recent` : area;
+  where.textContent = `${area}${mark}`;
   item.append(text, where, keyCaps(keys));
   return item;
 }

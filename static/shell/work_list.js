@@ -125,7 +125,7 @@ export class WorkList {
     const name = session?.people[acquisition?.person ?? 0]?.name ?? "";
     const stopFinding = () => this.#send({ type: "find_people", action: "stop" });
     const run = hasTrack(state) ? trackWork(track, finding?.running ? stopFinding : () => this.#actions.stopTracking()) : null;
-    const search = finding?.running && !run && { id: "find", text: `Finding people: ${finding.stage}`, ...shareOf(finding.share), stop: stopFinding };
+    const search = finding?.running && !run && { id: "find", text: `Find people: ${finding.stage}`, ...shareOf(finding.share), stop: stopFinding };
     const sizes = acquisition?.running && {
       id: "sizes",
       text: `Acquiring sizes of ${name}: ${acquisition.stage}`,

@@ -1,7 +1,10 @@
 /** Estimate how long work still takes from how its share grew lately. */
 
-/** Growth is measured over this time, s: long enough for steps of many seconds, short enough to follow a change of pace. */
-const WINDOW_S = 60;
+/**
+ * Growth is measured over this time, s, and over this number of steps: steps can take minutes and differ much, but work of
+ * many quick ones must follow a change of pace.
+ */
+const [WINDOW_S, STEPS] = [60, 10];
 /** Nothing is said before this time, s: the first step often compiles or reads ahead. */
 const FIRST_S = 2;
 
@@ -24,7 +27,7 @@ export class TimeLeft {
     if (share === null || this.#samples.at(-1)?.share === share) return;
     this.#samples.push({ share, time });
     // One sample before the window stays: its growth reaches into it.
-    while (this.#samples.length > 2 && time - this.#samples[1].time > WINDOW_S) this.#samples.shift();
+    while (this.#samples.length > STEPS && time - this.#samples[1].time > WINDOW_S) this.#samples.shift();
   }
 
   /**

@@ -12,7 +12,14 @@ from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.pipeline.body_acquisition import SIZES_EDITS, PosedFrames, acquire_body, with_sizes_changed
-from tracker.pipeline.first_pose import FirstPose, FirstPoses, Show, find_first_poses_anywhere
+from tracker.pipeline.first_pose import (
+    AXIS_FRAMES,
+    ENOUGH_FRAMES,
+    FirstPose,
+    FirstPoses,
+    Show,
+    find_first_poses_anywhere,
+)  # fmt: skip
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
@@ -80,6 +87,18 @@ def frames_to_try(frames: range, first: int | None) -> list[int]:
     return order[:_FRAMES]
 
 
+def expected_steps(n_frames: int, done: int, good: int) -> int:
+    """Return how many frames and methods will have been tried if all that follow are good.
+
+    Args:
+        n_frames: frames that may be tried.
+        done: number of frames and methods that were tried.
+        good: number of them that gave good first poses.
+    """
+    voxels = min(n_frames, done + max(0, ENOUGH_FRAMES - good))
+    return max(done, voxels + AXIS_FRAMES)
+
+
 def find_people(
     session: Session, observer: Observer, people: Sequence[int], frames: range, settings: FindSettings,
     report: Report = lambda stage, share, text: None, show: Show = lambda frame, found: None,
@@ -99,15 +118,21 @@ def find_people(
         TrackerError: no frame shows the people well enough.
     """
     tried = frames_to_try(frames, settings.frame)
-    end, done = _STARTING if settings.acquire else 1.0, 0
+    end, done, good, share = _STARTING if settings.acquire else 1.0, 0, 0, 0.0
+
+    def count(frame: int, found: FirstPoses | None) -> None:
+        nonlocal good
+        good += found is not None and found.is_good
+        show(frame, found)
 
     def say(text: str) -> None:
-        nonlocal done
+        nonlocal done, share
         done += 1
-        report("finding first poses", end * min(0.95, done / (len(tried) + 2)), text)
+        share = max(share, min(0.95, done / expected_steps(len(tried), done, good)))
+        report("finding first poses", end * share, text)
 
     report("finding first poses", 0.0, "")
-    first = find_first_poses_anywhere(session, observer, people, tried, say=say, show=show)
+    first = find_first_poses_anywhere(session, observer, people, tried, say=say, show=count)
     bodies = {i: p.model for i, p in first.poses.items()}
     poses = {i: p.fitted.pose for i, p in first.poses.items()}
     acquired: dict[int, Acquisition] = {}

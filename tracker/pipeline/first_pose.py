@@ -37,7 +37,7 @@ VOXEL_M = 0.025
 """Edge of a voxel, metres."""
 _MOTION_FRAMES = 6
 """Frames over which the motion of a figure is measured."""
-_ENOUGH_FRAMES, _AXIS_FRAMES = 5, 2
+ENOUGH_FRAMES, AXIS_FRAMES = 5, 2
 """Number of frames with good starts from voxels, and with starts on the axis, among which `auto` chooses."""
 _SURE_RATIO = 1.05
 """Ratio of the cost of the cheapest track that faces the other way above which left and right are known."""
@@ -127,10 +127,10 @@ def find_first_poses_anywhere(
     """
     with _Trial(session, observer, people, size_m, say, show) as trial:
         for frame in frames:
-            if sum(f.is_good for f in trial.found) < _ENOUGH_FRAMES:
+            if sum(f.is_good for f in trial.found) < ENOUGH_FRAMES:
                 trial.add(frame, ("voxels",))
         by_cost = sorted(trial.found, key=lambda f: f.cost_px)
-        chosen = [f.frame for f in by_cost[:_AXIS_FRAMES]] or list(frames)[:_ENOUGH_FRAMES]
+        chosen = [f.frame for f in by_cost[:AXIS_FRAMES]] or list(frames)[:ENOUGH_FRAMES]
         for frame in chosen:
             trial.add(frame, ("axis",))
         for frame in chosen:

@@ -124,7 +124,7 @@ class FindingPeople:
                 _LOG.exception("a search for people failed")
             text = page_text(error)
             message = f"{text[:1].upper()}{text[1:]}."
-            self._set(running=False, message=message, failed=True, tried=self._first_tried, candidates={})
+            self._show_failure(message)
 
     def _report(self, stage: str, share: float, text: str) -> None:
         if self._stopping.is_set():
@@ -136,18 +136,41 @@ class FindingPeople:
             self._set(stage=stage, share=share, notes=notes)
 
     def _show(self, frame: int, found: FirstPoses | None) -> None:
-        """Draw the first poses of a frame that is tried. Go there unless the user looks or works elsewhere."""
+        """Draw the first poses of a frame that was tried. Go there unless the user looks or works elsewhere.
+
+        What was found stays in sight while the next frames are tried.
+        """
         session_state = self._session_state
         self._first_tried = frame if self._first_tried is None else self._first_tried
-        bodies = {} if found is None else {i: PosedBody(p.model, p.fitted.pose) for i, p in found.poses.items()}
         with session_state.lock:
             state = session_state.state
-            finding = replace(state.finding, tried=frame, candidates=bodies)
-            if state.frame == self._shown != frame and state.drag is None and not state.search.running:
+            candidates = dict(state.finding.candidates)
+            if found is not None:
+                candidates[frame] = {i: PosedBody(p.model, p.fitted.pose) for i, p in found.poses.items()}
+            finding = replace(state.finding, tried=frame, candidates=candidates)
+            is_news = found is not None or not candidates
+            if is_news and self._is_watched() and state.frame != frame:
                 self._shown = frame
                 session_state.show_frame(frame, finding=finding)
             else:
                 session_state.set(finding=finding)
+
+    def _show_failure(self, message: str) -> None:
+        """End with a message, and go to the frame that it is about if the user still watches."""
+        session_state, frame = self._session_state, self._first_tried
+        with session_state.lock:
+            finding = replace(
+                session_state.state.finding, running=False, message=message, failed=True, tried=frame, candidates={}
+            )
+            if frame is not None and self._is_watched() and frame != self._shown:
+                session_state.show_frame(frame, finding=finding)
+            else:
+                session_state.set(finding=finding)
+
+    def _is_watched(self) -> bool:
+        """Return whether the user has stayed where the search shows what it does, and is not at work there."""
+        state = self._session_state.state
+        return state.frame == self._shown and state.drag is None and not state.search.running
 
     def _set(self, **changes: Any) -> None:
         with self._session_state.lock:

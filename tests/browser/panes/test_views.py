@@ -46,12 +46,13 @@ async def test_a_zoomed_view_follows_the_person_from_frame_to_frame(page, endpoi
         await page.keyboard.press("Enter")
         await shows(page, STEPPED.format(target))
     assert await place_in_pane(page, 0, "head") == pytest.approx(before, abs=0.01)
+    endpoint.walk_m = 0.02  # a slow machine skips frames, and the person must not leave the image meanwhile
     await page.keyboard.press("Space")
     await shows(page, "quadrille.state.overlay.frame > 16")
-    assert await place_in_pane(page, 0, "head") == pytest.approx(before, abs=0.02)
     await page.keyboard.press("Space")
+    await shows(page, "!quadrille.state.playing && quadrille.state.overlay.frame === quadrille.state.target")
+    assert await place_in_pane(page, 0, "head") == pytest.approx(before, abs=0.01)
     # On request it stays.
-    await shows(page, "quadrille.state.overlay.frame === quadrille.state.target")
     await page.keyboard.press("Alt+v")
     frame = (await state_of(page))["target"]
     origin = (await state_of(page))["views"][0]["origin"]

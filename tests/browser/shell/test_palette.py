@@ -77,12 +77,63 @@ async def test_what_was_used_lately_comes_first_and_enter_alone_does_nothing(pag
     assert again[1:5] == first[:4]
 
 
+SUITING = "[...document.querySelectorAll('#palette-list li')].filter((li) => li.innerText.includes('suits now'))"
+
+
+async def test_what_suits_the_state_comes_next(page, endpoint):
+    async def suiting():
+        await open_palette(page)
+        rows = await page.evaluate(f"{SUITING}.map((li) => li.querySelector('span').textContent)")
+        first = (await found(page))[: len(rows)]
+        await page.keyboard.press("Escape")
+        assert rows == first  # before all others
+        return rows
+
+    assert (await suiting())[0] == "Next doubtful or lost pose by severity"
+    endpoint.state["people"][0]["source"] = None
+    await endpoint.broadcast(endpoint.state)
+    await endpoint.broadcast({"type": "timeline", "person": None, "cells": {}, "replace": True})
+    await shows(page, "Object.keys(quadrille.state.timeline).length === 0")
+    assert await suiting() == ["Find people", "New session from videos and a calibration"]
+    track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 15, "done": 4, "total": 18}
+    await endpoint.broadcast(endpoint.state | {"track": track})
+    await shows(page, "quadrille.state.state.track.running")
+    assert (await suiting())[:2] == ["Pause or continue tracking", "Follow the tracker (toggle)"]
+    # What cannot be done now is not suggested, and what was used last comes before.
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("messages")
+    await page.keyboard.press("Enter")
+    await page.keyboard.press("Escape")
+    await open_palette(page)
+    assert (await found(page))[:2] == ["Messages", "Pause or continue tracking"]
+
+
+async def test_every_suggestion_is_a_command(page):
+    known = await page.evaluate(
+        """async () => {
+          const text = await (await fetch("/static/shell/commands.js")).text();
+          const body = text.slice(text.indexOf("const cases"), text.indexOf("new Set(cases"));
+          document.querySelector("#show-palette").click();
+          const query = document.querySelector("#palette-query");
+          const labels = [...body.matchAll(/"([A-Z][^"]+)"/g)].map(([, label]) => label);
+          return labels.map((label) => {
+            query.value = label.replace(/[^a-zA-Z0-9 ]/g, " ");
+            query.dispatchEvent(new Event("input"));
+            const rows = [...document.querySelectorAll("#palette-list li > span:first-child")];
+            return [label, rows.some((row) => row.textContent === label)];
+          });
+        }"""
+    )
+    assert len(known) > 15
+    assert [label for label, is_there in known if not is_there] == []
+
+
 async def test_every_key_and_button_is_in_it(page):
     await open_palette(page)
     await page.evaluate("document.querySelector('#palette').close()")
     missing = await page.evaluate(
         """async () => {
-          const rows = [...document.querySelectorAll('#key-areas dd')].map((d) => d.textContent);
+          const rows = [...document.querySelectorAll('#key-areas dd')].flatMap((d) => JSON.parse(d.dataset.labels));
           document.querySelector('#show-palette').click();
           const query = document.querySelector('#palette-query');
           const missing = [];
@@ -112,10 +163,11 @@ async def test_the_list_of_keys_is_searched_and_fits(page):
     assert box["y"] + box["height"] <= 720
     scroller = page.locator("#key-list .scroller")
     assert await scroller.evaluate("(element) => element.scrollWidth <= element.clientWidth")
+    assert await scroller.evaluate("(element) => element.scrollHeight <= element.clientHeight")  # nothing is below
     assert "More" not in await page.locator("#key-list h3").all_inner_texts()  # every key is about something
     await page.keyboard.type("previous doubt")
     assert await page.locator("#key-list dd:visible").all_inner_texts() == [
-        "Previous doubtful or lost frame", "Previous doubtful or lost pose by severity",
+        "Next or previous doubtful or lost frame", "Next or previous doubtful or lost pose by severity",
     ]  # fmt: skip
     await page.locator("#key-query").fill("interpolated between")  # the marks are listed too
     assert await page.locator("#key-list dd:visible").all_inner_texts() == ["interpolated between poses"]

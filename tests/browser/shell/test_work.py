@@ -91,7 +91,7 @@ async def test_people_are_searched_while_one_looks_around(page, endpoint):
         await endpoint.broadcast(FINDING | {"share": share, "tried": 12})
         await page.wait_for_timeout(1100)
     row = work(page, "find")
-    assert await row.locator("b").inner_text() == "Finding people: finding first poses"
+    assert await row.locator("b").inner_text() == "Find people: finding first poses"
     assert (await row.locator("output").inner_text()).startswith("20 %, ")
     assert (await row.locator("output").inner_text()).endswith(" left")
     await page.keyboard.press("Period")

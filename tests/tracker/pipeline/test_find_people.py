@@ -17,7 +17,7 @@ from tracker.initialization.candidates import StartCandidate
 from tracker.initialization.start_fit import FittedStart
 from tracker.pipeline import first_pose, own_figure
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_sizes_changed
-from tracker.pipeline.find_people import AXES, FoundPeople, frames_to_try, store_found
+from tracker.pipeline.find_people import AXES, FoundPeople, expected_steps, frames_to_try, store_found
 from tracker.pipeline.first_pose import FirstPose, FirstPoses, find_first_poses
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
@@ -76,6 +76,13 @@ def test_frames_are_tried_far_from_one_another():
     assert len(tried) == len(set(tried)) == 12
     assert frames_to_try(range(10, 14), 12) == [12, 10, 11, 13]
     assert set(frames_to_try(range(0, 60, 3), None)) <= set(range(0, 60, 3))
+
+
+def test_the_share_that_is_done_counts_the_frames_that_will_be_tried():
+    """Five good frames are enough of twelve, so that the first good one is a seventh of the work, not a fourteenth."""
+    assert [expected_steps(12, done, done) for done in range(6)] == [7, 7, 7, 7, 7, 7]
+    assert [expected_steps(12, done, 0) for done in (0, 4, 12, 14)] == [7, 11, 14, 14]
+    assert expected_steps(2, 2, 1) == 4
 
 
 def test_nobody_in_the_silhouettes(session, silhouettes):

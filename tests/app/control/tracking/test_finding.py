@@ -139,6 +139,7 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
         poses = {0: FirstPose(2, candidate, FittedStart(model.neutral(), "good", 1.0), True, ())}
         for frame, event in zip((2, 3, 5), go, strict=True):
             show(frame, None)
+            assert frame == 2 or controller.state.frame != frame  # what was found stays in sight meanwhile
             show(frame, FirstPoses(frame, poses))
             assert event.wait(10)
         raise TrackerError("expected a body that fills the silhouettes, found none")
@@ -155,6 +156,7 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
     assert all(len(p.segments_px) > 0 for p in drawn)
     go[0].set()
     wait_for(lambda: controller.state.frame == 3)
+    assert set(controller.state.finding.candidates) == {2, 3}
     controller.navigation.seek(1)  # the user looks around
     go[1].set()
     wait_for(lambda: controller.state.finding.tried == 5)
@@ -169,7 +171,10 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
 
 
 def test_an_error_is_one_sentence(opened, monkeypatch):
-    def fail(*_):
+    def fail(session, observer, people, frames, settings, report, show):
+        for frame in (2, 4):
+            show(frame, None)
+            wait_for(lambda: controller.state.frame == frame)  # noqa: B023
         raise TrackerError("expected somebody in the silhouettes, found none")
 
     monkeypatch.setattr(finding, "find_people", fail)
@@ -178,3 +183,4 @@ def test_an_error_is_one_sentence(opened, monkeypatch):
     wait_for(lambda: not controller.state.finding.running)
     assert controller.state.finding.message == "Expected somebody in the silhouettes, found none."
     assert controller.state.finding.failed
+    assert (controller.state.frame, controller.state.finding.tried) == (2, 2)  # the message is about the first frame
