@@ -1,5 +1,9 @@
 """Read text files within limits, with errors that name the file and the place.
 
+Text is UTF-8, or UTF-16 or UTF-32 with a byte order mark. Bytes of another encoding, such as Latin-1, become U+FFFD
+(`LOST`): comments and paths may hold them, names may not (`refuse_lost`).
+"""
+
 import codecs
 import os
 import re
