@@ -25,6 +25,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
+from app.remedies import command_line_text
 from app.runtime import process_exit
 from app.runtime.malloc_trim import give_back_freed_memory
 from tracker.errors import TrackerError
@@ -77,7 +78,7 @@ def main() -> None:
         sys.stdout.flush()
     except TrackerError as error:
         Console(stderr=True).print(
-            f"quadrille: {error}", style="bold red", markup=False, highlight=False, soft_wrap=True
+            f"quadrille: {command_line_text(error)}", style="bold red", markup=False, highlight=False, soft_wrap=True
         )
         sys.exit(1)
     except KeyboardInterrupt as stopped:

@@ -1,12 +1,50 @@
 """The errors that the library raises for unusable input of users and files.
 
-Internal mistakes are asserted instead. Every message states what was expected, what was found, and what to do. The
-command line prints the message and exits with status 1; the page shows it as a notice.
+Internal mistakes are asserted instead. Every message states what was expected, what was found, and what to do. A remedy
+that differs between programs is a `Remedy`, a code with fields; the message then ends before it. The command line and
+the page phrase it each in their own words (`app.remedies`), so that no message here names an option or a button. The
+command line prints message and remedy and exits with status 1; the page shows them as a notice.
 """
 
 
+class Remedy:
+    """What a user can do about an error or a warning, for a program to phrase."""
+
+    def __init__(self, code: str, /, **fields: object) -> None:
+        """Name a remedy.
+
+        Args:
+            code: one of `app.remedies`, such as `another_frame`.
+            fields: what its phrases mention, such as `condition="all stand apart"`.
+        """
+        self.code = code
+        self.fields = fields
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether code and fields are equal."""
+        return isinstance(other, Remedy) and (self.code, self.fields) == (other.code, other.fields)
+
+    def __hash__(self) -> int:
+        """Return a hash of the code; fields may be of any kind."""
+        return hash(self.code)
+
+    def __repr__(self) -> str:
+        """Return the call that makes it."""
+        return f"Remedy({', '.join([repr(self.code), *(f'{k}={v!r}' for k, v in self.fields.items())])})"
+
+
 class TrackerError(Exception):
-    """Input of a user or a file cannot be used; the message states what to do."""
+    """Input of a user or a file cannot be used; the message, with the remedy if there is one, states what to do."""
+
+    def __init__(self, message: str, remedy: Remedy | None = None) -> None:
+        """State what was expected and found.
+
+        Args:
+            message: one sentence. It ends with what to do, unless `remedy` is given.
+            remedy: what to do, where the command line and the page offer different ways.
+        """
+        super().__init__(message)
+        self.remedy = remedy
 
 
 class CalibrationError(TrackerError):

@@ -1,11 +1,57 @@
-"""Write files: text atomically, nothing through links, names on the disk."""
+"""Read regular files alone, and write files: text atomically, nothing through links, names on the disk."""
 
 import contextlib
 import os
 import secrets
+import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from tracker.errors import SessionError
+
+
+class IrregularFileError(OSError):
+    """A path names a pipe, a device or a socket; reading one may wait for ever."""
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a file to read its bytes, without waiting for a writer.
+
+    Raises:
+        IrregularFileError: it is a named pipe, a device or a socket.
+        OSError: it is missing, a folder, or cannot be read.
+    """
+    check_regular(path)  # opening a device may have effects
+    number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    try:
+        _check_mode(os.fstat(number).st_mode, path)  # another file may have taken its place
+        return os.fdopen(number, "rb")
+    except BaseException:
+        os.close(number)
+        raise
+
+
+def read_regular(path: Path, max_bytes: int) -> bytes:
+    """Read a file, at most `max_bytes` and one more. Raises as `open_regular` does."""
+    with open_regular(path) as file:
+        return file.read(max_bytes + 1)
+
+
+def check_regular(*paths: Path) -> None:
+    """Check paths before another library opens them. Files that are missing pass, and folders.
+
+    Raises:
+        IrregularFileError: one is a named pipe, a device or a socket.
+    """
+    for path in paths:
+        with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+            _check_mode(os.stat(path).st_mode, path)
+
+
+def _check_mode(mode: int, path: Path) -> None:
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        kind = "a named pipe" if stat.S_ISFIFO(mode) else "a socket" if stat.S_ISSOCK(mode) else "a device"
+        raise IrregularFileError(0, f"expected a regular file, found {kind}", str(path))
 
 
 def write_text_atomic(path: Path, text: str, mode: int = 0o666) -> None:

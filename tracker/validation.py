@@ -5,6 +5,7 @@ message says was expected.
 """
 
 import re
+import unicodedata
 from typing import Annotated, Any, NamedTuple, TypeAlias, TypeVar
 
 import msgspec
@@ -19,26 +20,42 @@ MAX_FRAMES = 10_000_000
 MAX_SIDE_PX = 32_767
 """Largest width and height of a camera's image; OpenCV resamples no larger ones."""
 
+UNPRINTABLE = r"\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff"
+"""Characters that names cannot hold, for a regular expression: controls, which terminals obey, line ends, marks that
+turn the direction of writing (Unicode's Bidi_Control), the byte order mark and halves of characters."""
+
 Number: TypeAlias = Annotated[float, Meta(ge=-1e9, le=1e9, description="a finite number within 1e9")]
 Vector: TypeAlias = Annotated[tuple[Number, Number, Number], Meta(description="3 finite numbers")]
 Name: TypeAlias = Annotated[
-    str, Meta(pattern=r"^[^\x00-\x1f\x7f]{1,200}\Z", description="a name of 1 to 200 characters on one line")
+    str,
+    Meta(
+        pattern=rf"^[^{UNPRINTABLE}]{{1,200}}\Z",
+        description="a name of 1 to 200 characters on one line, without control or direction characters",
+    ),
 ]
 FileStem: TypeAlias = Annotated[
     str,
     Meta(
-        pattern=r"^(?!\.{1,2}\Z)[^\x00-\x1f\x7f/\\]{1,100}\Z",
-        description="a name of 1 to 100 characters on one line, without slashes",
+        pattern=rf"^(?!\.{{1,2}}\Z)[^{UNPRINTABLE}/\\]{{1,100}}\Z",
+        description="a name of 1 to 100 characters on one line, without slashes, control or direction characters",
     ),
 ]
 """A name after which files are named too; it must not lead out of their folder."""
 FilePath: TypeAlias = Annotated[
-    str, Meta(pattern=r"^[^\x00-\x1f\x7f]{1,1000}\Z", description="the path of a file or folder")
+    str, Meta(pattern=r"^[^\x00-\x1f\x7f-\x9f]{1,1000}\Z", description="the path of a file or folder")
 ]
 Color: TypeAlias = Annotated[str, Meta(pattern=r"^#[0-9a-fA-F]{6}\Z", description="a colour such as #f2a33a")]
 FrameRate: TypeAlias = Annotated[
     float, Meta(ge=1e-3, le=1e5, description="a frame rate above 0, from 0.001 to 100000 per second")
 ]
+
+
+def same_form(name: str) -> str:
+    """Return a name in the one Unicode form in which names are compared (NFC).
+
+    A Mac stores a letter and its accent apart, so that a file's name differs from the same name typed.
+    """
+    return unicodedata.normalize("NFC", name)
 
 
 def check(value: Any, declaration: Any, where: str, error_type: type[TrackerError]) -> Any:
@@ -98,7 +115,8 @@ def explain(error: msgspec.ValidationError, value: Any, declaration: Any) -> tup
             break
         step = outer if outer.description else step
     found = "a number out of range" if what == "Number out of range" else quoted(step.value)
-    return (step.description or _expectation(what, at.declared)) + _of(" as", step.key), found
+    name = next((s.title for s in reversed(trail) if s.title), step.key)
+    return (step.description or _expectation(what, at.declared)) + _of(" as", name), found
 
 
 def quoted(value: Any) -> str:
@@ -120,13 +138,15 @@ class _Step(NamedTuple):
     """Its type, of `msgspec.inspect`."""
     description: str
     """What it is expected to be; empty if the declaration does not describe it."""
+    title: str
+    """Name of the field in which a user enters it; empty for what a file holds, whose keys the user sees."""
 
 
 def _trail(declared: Any, value: Any, path: str) -> list[_Step]:
     """Follow a path such as `.joints[3].axes[0].name` through data and their declaration, as far as both go."""
     trail = [_Step("", value, *_resolve(declared, value))]
     for name, index in re.findall(r"\.([^.\[\]]+)|\[(\d+)\]", path):
-        key, value, declared, _ = trail[-1]
+        key, value, declared, *_ = trail[-1]
         inner = _inner(declared, name, int(index or 0))
         try:
             value = value[name or int(index)]
@@ -141,18 +161,19 @@ def _trail(declared: Any, value: Any, path: str) -> list[_Step]:
     return trail
 
 
-def _resolve(declared: Any, value: Any) -> tuple[Any, str]:
-    """Return a type without its wrappers, of a union the member that looks like the value; and its description."""
-    description = ""
+def _resolve(declared: Any, value: Any) -> tuple[Any, str, str]:
+    """Return a type without its wrappers (of a union the member that looks like the value), description and title."""
+    description = title = ""
     while isinstance(declared, msgspec.inspect.Metadata):
-        description = (declared.extra_json_schema or {}).get("description", description)
+        schema = declared.extra_json_schema or {}
+        description, title = schema.get("description", description), schema.get("title", title)
         declared = declared.type
     if isinstance(declared, msgspec.inspect.UnionType):
         members = [_resolve(member, value) for member in declared.types]
         like = [m for m in members if isinstance(m[0], _LISTS) == isinstance(value, list)]
-        declared, described = next((m for m in like if not isinstance(m[0], msgspec.inspect.NoneType)), members[0])
-        description = description or described
-    return declared, description
+        chosen = next((m for m in like if not isinstance(m[0], msgspec.inspect.NoneType)), members[0])
+        declared, description, title = chosen[0], description or chosen[1], title or chosen[2]
+    return declared, description, title
 
 
 def _inner(declared: Any, name: str, index: int) -> Any:

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import OptionalName, OptionalPath, OptionalRange, OptionalWhole, SessionArg
+from app.cli.arguments import OptionalClock, OptionalName, OptionalPath, OptionalRange, OptionalWhole, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import Target, check_stride, load_target, parse_frames
-from tracker.errors import SessionError
+from app.remedies import command_line_text
+from tracker.errors import SessionError, TrackerError
 
 if TYPE_CHECKING:
     from tracker.evaluation.metrics import Alignment
@@ -35,6 +36,11 @@ class EvaluateArguments:
     """TOML file with a line such as left_shoulder = "LSHO" for each joint, if the file has other names."""
     axes: str = "x,y,z"
     """the file's axes in the session's order, such as x,-z,y."""
+    first_frame: OptionalWhole = None
+    """frame of the session, from 0, at which the first row of the TRC file lies; by default what the file says."""
+    clock: OptionalClock = None
+    """frames: each Frame# of the TRC file is a frame of the session; time: rows lie at their Time. By default DataRate
+    and Time tell, and a contradiction is an error."""
     align: Literal["none", "rigid-all"] = "none"
     """rigid-all moves the whole reference onto the estimate first."""
     json: bool = False
@@ -47,10 +53,13 @@ def command(arguments: Annotated[EvaluateArguments, tyro.conf.arg(name="")]) -> 
     Joints and parts are compared by name, so that the reference may be of another body model. The second column is the
     error without each joint's constant offset. The offset is printed in the frame of the part above the joint.
     """
-    from tracker.evaluation.references import read_reference
+    from tracker.evaluation.references import placement, read_reference
 
     at = load_target(arguments.session, arguments.person, several=False)
-    reference = read_reference(arguments.reference, at.session, at.people[0], arguments.joint_map, arguments.axes)
+    path, known = arguments.reference, placement(at.session, arguments.first_frame, arguments.clock)
+    if path.suffix.lower() != ".trc" and (known.first_frame is not None or known.clock is not None):
+        raise TrackerError(f"expected --first-frame and --clock with a TRC file, found '{path}'; leave them out")
+    reference = read_reference(path, at.session, at.people[0], arguments.joint_map, arguments.axes, known)
     found = evaluate(at, reference, arguments.frames, arguments.align, arguments.axes, arguments.stride)
     print(format_json(found) if arguments.json else _format(found))
 
@@ -95,7 +104,8 @@ def evaluate(
     if reference.motion is not None:
         result = evaluate_poses(result, motion, reference.motion, wanted)
     apart = distance_note(joints, reference.joints, wanted, axes) if align == "none" else None
-    notes = [note for note in (length_note(session.n_frames, reference.n_frames), apart) if note is not None]
+    checks = length_note(session.n_frames, reference.n_frames), None if apart is None else command_line_text(*apart)
+    notes = [*reference.joints.notes, *(note for note in checks if note is not None)]
     return {"person": person.name, **asdict(result), "notes": notes}
 
 
@@ -109,6 +119,8 @@ def _format(found: dict[str, Any]) -> str:
     if found["acceleration_error_m_s2"] is not None:
         rate = f"at {found['fps']:g} frames per second"
         lines.append(f"  acceleration error {found['acceleration_error_m_s2']:.1f} m/s2 {rate}")
+    if found["lost_frame_numbers"]:
+        lines.append(f"  lost: frames {_lost(found)}")
     lines.append(f"  {'':16}    raw      without offset  offset: forward, left, up")
     for joint, error in found["per_joint_mm"].items():
         rest, offset = found["per_joint_without_offsets_mm"][joint], found["offsets_mm"][joint]
@@ -122,3 +134,17 @@ def _format(found: dict[str, Any]) -> str:
         lines += [f"  {part.replace('_', ' '):16} {error:6.2f} deg" for part, error in errors]
     lines += [f"note: {note}" for note in found["notes"]]
     return "\n".join(lines)
+
+
+def _lost(found: dict[str, Any]) -> str:
+    """List the lost frames as ranges, with the joint that is off most in them."""
+    from tracker.evaluation.clocks import listed_frames
+
+    lost = set(found["lost_frame_numbers"])
+    measured = [e for e in found["per_frame"] if e.frame in lost and e.worst_mm is not None]
+    listed = listed_frames(found["lost_frame_numbers"])
+    if not measured:
+        return f"{listed}, none of which has a pose"
+    worst = max(measured, key=lambda e: e.worst_mm)
+    joint = worst.worst_joint.replace("_", " ")
+    return f"{listed}; the worst is {worst.frame}, where the {joint} is off by {worst.worst_mm:.0f} mm"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import OptionalName, OptionalPath, SessionArg
+from app.cli.arguments import OptionalClock, OptionalName, OptionalPath, OptionalWhole, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import Target, load_target
 from app.runtime.progress import Reporter
@@ -51,13 +51,18 @@ class InitArguments:
     """TOML file with a line such as left_shoulder = "LSHO" for each joint, if the file has other names."""
     axes: str = "x,y,z"
     """the file's axes in the session's order, such as x,-z,y."""
+    first_frame: OptionalWhole = None
+    """frame of the session, from 0, at which the first row of the TRC file lies; by default what the file says."""
+    clock: OptionalClock = None
+    """frames: each Frame# of the TRC file is a frame of the session; time: rows lie at their Time. By default DataRate
+    and Time tell, and a contradiction is an error."""
     json: bool = False
     """print one JSON object."""
 
 
 def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None:
     """Set a first pose."""
-    from tracker.evaluation.references import read_joints
+    from tracker.evaluation.references import placement, read_joints
     from tracker.formats.pose_csv import read_pose_table
 
     method, frame = arguments.method, arguments.frame
@@ -76,7 +81,8 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
         found = init_from_poses(at, frame, read_pose_table(path))
         text = f"{found['person']}, frame {frame}: set from {path}"
     else:
-        joints = read_joints(path, at.session.fps, arguments.joint_map, arguments.axes)
+        known = placement(at.session, arguments.first_frame, arguments.clock)
+        joints = read_joints(path, at.session.fps, arguments.joint_map, arguments.axes, known)
         found = init_from_joints(at, frame, joints, arguments.fit_sizes)
         residual = f"{found['mean_mm']:.1f} mm from {len(found['residual_mm'])} joints on average"
         text = f"{found['person']}, {found['height_m']:.2f} m tall, frame {frame}: {residual}"
@@ -87,6 +93,7 @@ def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None
                 f"\nnote: these joints fit no body of {height_m:.2f} m: check the Units of the file and the names of "
             )
             text += "its joints, or say --fit-sizes"
+        text += "".join(f"\nnote: {note}" for note in found["notes"])
     lines = [text, *(f"  view {name}: {view['text']}" for name, view in found["views"].items())]
     seeing = [name for name, view in found["views"].items() if view["n_inside"]]
     if len(seeing) == 1 < len(found["views"]):
@@ -135,7 +142,7 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     person = session.people[index]
     row = np.flatnonzero(joints.frames == frame)
     if not len(row):
-        raise TrackerError(f"expected joints of frame {frame}, found frames 0 to {joints.frames[-1]} in the file")
+        raise TrackerError(_no_row(frame, joints))
     points = dict(zip(joints.names, joints.points[row[0]], strict=True))
     # Conventions disagree about neck and head; the limbs alone determine the trunk too.
     limbs = {n: p for n, p in points.items() if n in LIMB_JOINTS and np.all(np.isfinite(p))}
@@ -159,8 +166,21 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     mean = float(np.mean(list(residuals.values())))
     return {
         "person": person.name, "frame": frame, "height_m": person.model.height_m, "residual_mm": residuals,
-        "mean_mm": mean, "sizes": note, **where,
+        "mean_mm": mean, "sizes": note, "notes": joints.notes, **where,
     }  # fmt: skip
+
+
+def _no_row(frame: int, joints: "MarkerTable") -> str:
+    """Say which frames a file has, and the gap that a frame is in."""
+    frames = joints.frames.tolist()
+    if frames[0] < frame < frames[-1]:
+        before, after = max(f for f in frames if f < frame), min(f for f in frames if f > frame)
+        return f"no row for frame {frame}: the file lacks frames {before + 1} to {after - 1}; choose another --frame"
+    placed = f" ({joints.notes[0]})" if joints.notes else ""
+    return (
+        f"expected a row of frame {frame}, found frames {frames[0]} to {frames[-1]} in the file{placed}; "
+        "choose another --frame"
+    )
 
 
 def _check_height(height_m: float) -> None:

@@ -19,6 +19,7 @@ from app.cli.arguments import (
     parse_common_or_pairs,
     parse_pairs,
 )
+from tracker.calibrations.convention_names import PoseConvention
 from tracker.errors import TrackerError
 
 
@@ -28,8 +29,8 @@ class NewArguments:
 
     session: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help="folder to make")]
     """folder to make."""
-    calibration: Path
-    """file of the cameras: TOML of anipose, Pose2Sim or Caliscope, or JSON, YAML or XML with K, R and t of each."""
+    calibration: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE ...")]
+    """file of all cameras, a folder, or a file for each camera, of a layout that docs/recordings.md lists."""
     videos: Paths = ()
     """video files or image folders, each named after its camera; images are paired by their numbers."""
     camera: NamedPaths = ()
@@ -50,18 +51,27 @@ class NewArguments:
     """.toml file of the person's body from an earlier session, where there is only one person."""
     height: CommonOrNamed = ()
     """body height in metres of all people, or NAME=METRES."""
+    common_frames: bool = False
+    """leave out frames that some cameras lack: those at the end, of numbered images at both ends."""
     fps: OptionalNumber = None
-    """rate at which the cameras filmed, if the videos declare another one (high-speed) or all footage is images."""
+    """rate at which the cameras filmed, if the videos declare another one (high-speed), if their time stamps jitter, or
+    if all footage is images."""
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     """world axis that points up."""
     units: Annotated[Literal["m", "cm", "mm"] | None, tyro.conf.arg(metavar="{m,cm,mm}", help_behavior_hint="")] = None
     """unit of the calibration's translations; by default the one that its layout fixes, else metres."""
+    poses: Annotated[PoseConvention | None, tyro.conf.arg(metavar="CONVENTION", help_behavior_hint="")] = None
+    """convention of the calibration's poses, where the cameras contradict its layout: world-to-camera,
+    camera-to-world, row-vectors or camera-position, each also with -opengl at its end."""
+    rescale: bool = False
+    """scale a calibration at a whole multiple of the footage's size to it: the same field of view in fewer pixels."""
 
 
 def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
     """Make a session from videos and a calibration."""
     from app.session.camera_check import exchange_note
     from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble, unfilmed_cameras
+    from tracker.session.rig_summary import summarize_rig
 
     request = NewSession(
         arguments.session,
@@ -75,17 +85,26 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         people=arguments.people,
         models=_models(arguments) or DEFAULT_MODEL,
         heights=parse_common_or_pairs(arguments.height, "--height", float),
+        common_frames=arguments.common_frames,
         fps=arguments.fps,
         up=arguments.up,
         units=arguments.units,
+        poses=arguments.poses,
+        rescale=arguments.rescale,
     )
-    made = assemble(request)
+    notes: list[str] = []
+    made = assemble(request, note=notes.append)
     print(f"made {made.folder}: {len(made.cameras)} cameras, {made.n_frames} frames at {made.fps:g} per second")
+    print(summarize_rig([c.camera for c in made.cameras], made.up).sentence)
+    for sentence in notes:
+        print(f"note: {sentence}", file=sys.stderr)
     if not request.cameras and (without := unfilmed_cameras(request)):
         used = ", ".join(c.camera.name for c in made.cameras)
         print(f"used: {used}; calibrated cameras without footage are left out: {', '.join(without)}")
     if declared := {f"{c.declared_fps:g}" for c in made.cameras if c.declared_fps is not None}:
         print(f"the videos declare {' or '.join(sorted(declared))} frames per second")
+    for note in notes:
+        print(f"note: {note}")
     if note := exchange_note(made):
         print(f"warning: {note}", file=sys.stderr)
 

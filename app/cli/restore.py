@@ -5,42 +5,49 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.arguments import OptionalName, SessionArg
+from app.cli.arguments import OptionalName, OptionalPath, SessionArg
 from app.cli.json_output import format_json
+from app.remedies import command_line_text
 from tracker.errors import DamagedStoreError, SessionError
 
 if TYPE_CHECKING:
     from tracker.store.backups import Restored
 
 
-def command(session: SessionArg, /, backup: OptionalName = None, json: bool = False) -> None:
+def command(
+    session: SessionArg, /, backup: OptionalName = None, rescue: OptionalPath = None, json: bool = False
+) -> None:
     """Go back to a backup of damaged annotations, and write edits that could not be written when the program ended.
 
     Each opening that finds the annotations as they were written keeps a backup of them in the folder `backups` of the
     session, the last three of them. The damaged file is kept beside the restored one. Edits that could not be written
-    are in a rescue file, whose path the program has printed; each becomes an entry of the history.
+    are in a rescue file, whose path the program has printed; each becomes an entry of the history, and the file is
+    deleted. Edits that were made in another folder, of which this session may be a copy, are only listed.
 
     Args:
         session: session folder.
         backup: name of a file in `backups`, to go back to it even from annotations that are not damaged; by default
             the newest one that is not damaged itself.
+        rescue: rescue file to write into this session, also where its edits were made in another folder; then the file
+            stays.
         json: print one JSON object.
     """
-    found = restore(session, backup)
+    found = restore(session, backup, rescue)
     print(format_json(found) if json else _format(found))
 
 
-def restore(folder: Path, backup: str | None) -> dict[str, Any]:
+def restore(folder: Path, backup: str | None, rescue: Path | None = None) -> dict[str, Any]:
     """Restore what a session has lost.
 
     Args:
         folder: of the session.
         backup: name of the backup to go back to, even if the store is not damaged.
+        rescue: the rescue file to write, even if its edits were made in another folder; by default all of this one.
 
     Returns:
         A summary. `backup` is the path of the backup that was restored, None if there was no need; `kept` is the path
         of the file that it replaced; `backups` are the paths of all backups, newest first; `rescued` is the number of
-        edits that were written from rescue files.
+        edits that were written from rescue files; `offers` describe those of other folders.
 
     Raises:
         SessionError: there is no session, no such backup, or none that is not damaged.
@@ -61,28 +68,35 @@ def restore(folder: Path, backup: str | None) -> dict[str, Any]:
             restored = backups.restore(path, path.parent / backups.FOLDER / Path(backup).name)
         elif damage is not None:
             restored = backups.restore(path)
-        rescued = _replayed(folder, path)
+        rescued, offers = _replayed(folder, path, rescue)
     return {
         "folder": str(folder),
         "damage": damage,
         "backup": None if restored is None else str(restored.backup),
         "kept": None if restored is None or restored.kept is None else str(restored.kept),
         "rescued": rescued,
+        "offers": offers,
         "backups": [str(path) for path in backups.backups_of(path)],
     }
 
 
-def _replayed(folder: Path, path: Path) -> int:
-    """Write the edits of all rescue files of a session, oldest first; returns their number."""
+def _replayed(folder: Path, path: Path, chosen: Path | None) -> tuple[int, list[str]]:
+    """Write the edits of a rescue file, or of all that were made in a session, oldest first.
+
+    Returns:
+        The number of edits, and what is offered of other folders.
+    """
     from app.storage import rescue
     from tracker.store.annotation_store import AnnotationStore
 
     with closing(AnnotationStore(path, read_only=True)) as store:
         files = rescue.find(folder, store.id)
-    if not files:
-        return 0
+    own = [found.path for found in files if not found.origin] if chosen is None else [chosen]
+    offers = [found.offer for found in files if found.origin and found.path not in own]
+    if not own:
+        return 0, offers
     with closing(AnnotationStore(path)) as store:
-        return sum(rescue.replay(found.path, store) for found in files)
+        return sum(rescue.replay(each, folder, store) for each in own), offers
 
 
 def _damage(path: Path) -> str | None:
@@ -94,7 +108,7 @@ def _damage(path: Path) -> str | None:
     try:
         AnnotationStore(path, read_only=True).close()
     except DamagedStoreError as error:
-        return str(error)
+        return command_line_text(error)
     return None
 
 
@@ -108,6 +122,7 @@ def _format(found: dict[str, Any]) -> str:
         lines.append(f"{found['folder']}: wrote {found['rescued']} rescued edits, the last entries of its history")
     if found["kept"] is not None:
         lines.append(f"the file that it replaces is kept as {found['kept']}")
+    lines += found["offers"]
     if found["backups"]:
         lines.append("backups, newest first: " + ", ".join(Path(b).name for b in found["backups"]))
     return "\n".join(lines)

@@ -115,7 +115,9 @@ class Controller:
         """Shows, hides and dims people."""
         self.view_3d = View3dSettings(session_state)
         """Chooses what the 3-D view shows."""
-        self._inconsistent_frames = InconsistentFrames(session_state)
+        self.inconsistent_frames = InconsistentFrames(session_state)
+        """Finds frames and keyframes that disagree with those around them."""
+        self.tracking.after_run = self.comparing_runs.compare_run
         self._footage_scan = FootageScan(session_state)
         self._save_retry = SaveRetry(session_state)
         self._compiling = None if compiler is None else KernelWarmup(session_state, compiler)
@@ -161,7 +163,7 @@ class Controller:
         with self.activities.editing():
             self.history.save()
         self.dragging.close()
-        self._inconsistent_frames.close()
+        self.inconsistent_frames.close()
         self.comparing_runs.close()
         self._footage_scan.close()
         if self._compiling is not None:

@@ -23,6 +23,7 @@ KIND_COLORS = {
     "preview": PROPOSAL,
     "alternative": PROPOSAL,
     "new_sizes": PROPOSAL,
+    "former": NEUTRAL,
     "part_edge": PART_EDGE,
     "epipolar": MARK,
     "floor": MARK,

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.export.formats import ExportFormat
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions
 from tracker.formats.file_names import identifiers
@@ -99,8 +99,9 @@ def export(
     paths = [out.with_name(name) for files in groups for name in files.names]
     if any(path.is_dir() for path in paths) or (not overwrite and any(path.exists() for path in paths)):
         found = next(path for path in paths if path.exists())
-        advice = "choose another --out" if found.is_dir() else "choose another --out, or add --overwrite"
-        raise TrackerError(f"expected {found} not to exist, found a {'folder' if found.is_dir() else 'file'}; {advice}")
+        if found.is_dir():
+            raise TrackerError(f"expected {found} not to exist, found a folder", Remedy("another_file"))
+        raise TrackerError(f"expected {found} not to exist, found a file", Remedy("another_file_or_overwrite"))
     try:
         with _moved_at_end(paths) as folder:
             for files in groups:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 
 if TYPE_CHECKING:
     from tracker.export.motion import ExportedMotion
@@ -34,6 +34,8 @@ class ExportFormat:
     """Axes by default, as programs that read it expect them."""
     gaps: str = "left empty"
     """What happens to frames without a pose."""
+    counts_from_1: bool = False
+    """Whether its frame numbers are the session's plus 1."""
     one_body: bool = False
     """Whether all poses of a person are of one body; those of earlier sizes are refitted."""
 
@@ -64,7 +66,15 @@ _PLACE = frozenset(("axes", "units"))
 FORMATS: Mapping[str, ExportFormat] = {
     f.name: f
     for f in (
-        ExportFormat("trc", "joint centers (TRC)", (".trc",), _by_writer("write_person_trc"), _PLACE, one_person=True),
+        ExportFormat(
+            "trc",
+            "joint centers (TRC)",
+            (".trc",),
+            _by_writer("write_person_trc"),
+            _PLACE,
+            one_person=True,
+            counts_from_1=True,
+        ),
         ExportFormat(
             "csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _by_writer("write_tables"), _PLACE
         ),
@@ -123,4 +133,4 @@ def find_format(name: str | None, out: Path) -> ExportFormat:
     if name is None and by_suffix is not None:
         return by_suffix
     found = f"'{name}'" if name is not None else f"none, and no known suffix in '{out.name}'"
-    raise TrackerError(f"expected --format to be one of {', '.join(FORMATS)}, found {found}")
+    raise TrackerError(f"expected a format among {', '.join(FORMATS)}, found {found}", Remedy("name_format"))

@@ -24,7 +24,7 @@ from app.page.inspector_messages import (
     SetView3d,
 )
 from app.page.message_types import Command, Frame, Index, Name, Number
-from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins
+from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack
 from app.page.search_messages import (
     CompareRun,
     PreviewCandidate,
@@ -178,6 +178,13 @@ class ToggleMark(Command, frozen=True, tag="mark"):
     toggle: Literal["keyframe", "reviewed"]
 
 
+class ConfirmKeyframe(Command, frozen=True, tag="confirm_keyframe"):
+    """Keep a doubted keyframe as it is: it is not doubted again until its pose changes. No entry of the history."""
+
+    person: Index
+    frame: Frame
+
+
 class FollowTracking(Command, frozen=True, tag="follow"):
     """Show each frame as it is tracked, or stay at the shown frame."""
 
@@ -228,10 +235,11 @@ class Save(Command, frozen=True, tag="save"):
 
 ClientMessage: TypeAlias = Union[  # noqa: UP007
     Seek, Select, SetView, ShowPerson, Solo, ShowBefore, ShowCurves, WatchTab, ShowHistory, LookThrough, Pause3d,
-    Drag, PoseEdit, DragPin, RemovePins, FitPose,
+    Drag, PoseEdit, DragPin, RemovePins, FitPose, TakeLimbBack,
     RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
     TakeCandidate, ShowLandscape, SetLandscapeDof,
-    StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, FollowTracking,
+    StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
+    FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, DraftSizes,
     AcquireSizes, FindPeople,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,

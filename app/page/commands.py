@@ -9,7 +9,7 @@ from app.page import pose_messages as pose_wire
 from app.page.inspector_commands import INSPECTOR_COMMANDS
 from app.page.message_parsing import MessageError
 from app.page.message_types import Command
-from app.page.pose_commands import POSE_COMMANDS
+from app.page.pose_commands import POSE_COMMANDS, check_point
 from app.page.search_commands import SEARCH_COMMANDS
 
 
@@ -73,6 +73,12 @@ def _unpin(controller: Controller, _: int, message: pose_wire.RemovePins) -> Non
     controller.pinning.remove(message.frame, message.person, message.point, message.camera)
 
 
+def _fit(controller: Controller, _: int, message: pose_wire.FitPose) -> None:
+    if message.person is not None:
+        check_point(controller, message.person, message.point)
+    controller.pinning.fit(message.frame, message.person, message.point)
+
+
 def _control_tracking(controller: Controller, _: int, message: wire.ControlTracking) -> None:
     actions: dict[str, Callable[[], None]] = {
         "pause": controller.tracking.pause,
@@ -134,13 +140,15 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     pose_wire.Drag: _drag,
     pose_wire.DragPin: _pin,
     pose_wire.RemovePins: _unpin,
-    pose_wire.FitPose: lambda controller, _, m: controller.pinning.fit(m.frame, m.person),
+    pose_wire.FitPose: _fit,
+    pose_wire.TakeLimbBack: lambda controller, _, m: controller.pinning.take_limb_back(m.frame),
     wire.StartTracking: lambda controller, _, m: controller.tracking.start(m.action == "backward", m.until),
     wire.ControlTracking: _control_tracking,
     wire.EditRange: _range,
     wire.CompareRange: _compare_range,
     wire.StopRange: lambda controller, _, __: controller.ranges.stop(),
     wire.ToggleMark: _mark,
+    wire.ConfirmKeyframe: lambda controller, _, m: controller.inconsistent_frames.confirm(m.person, m.frame),
     wire.FollowTracking: lambda controller, _, m: controller.tracking.follow(m.follow),
     wire.EditFloor: _floor,
     wire.MarkFloor: lambda controller, _, m: controller.floor.mark(m.camera, (m.u, m.v)),

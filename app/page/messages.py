@@ -10,13 +10,15 @@ import numpy as np
 from app.drawing import dof_labels, overlays, part_outlines, pin_marks
 from app.drawing.curves import CurveGroup, plots_of, samples
 from app.drawing.floor_lines import floor_lines
-from app.page import search_messages
+from app.drawing.former_limbs import former_limb_lines
+from app.page import check_messages, search_messages
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
 from app.page.encoding import encode_binary
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import Picking
 from app.state.page_view import View
+from app.state.people import DepthNote
 from app.state.progress import TrackState
 from app.state.search import PreviewState, ReplayState, SearchState
 from app.state.state import State
@@ -98,6 +100,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
         compared_run=state.search_view.compared_run,
         preview=_preview(state.search_view.preview),
         compared=_compared(state.compared),
+        unseen_depth=_unseen_depth(state.unseen_depth),
         track=_track(state.track),
         range=wire.RangeWork(
             state.ranges.running, state.ranges.what, state.ranges.done, state.ranges.total, state.ranges.message
@@ -130,6 +133,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         *overlays.paths(session, state, view, views),
         *pin_marks.pin_lines(session, state, view),
         *floor_lines(session, state),
+        *former_limb_lines(session, state, view),
     ]:
         count = len(path.segments_px)
         rows.append(Path(path.camera, path.person, path.kind, path.color, path.side, first, count))
@@ -277,8 +281,16 @@ def _compared(last: PoseComparison | None) -> wire.Compared | None:
         before_view_costs_px=last.before_view_costs_px,
         after_view_costs_px=last.after_view_costs_px,
         warning=last.warning,
+        moved=tuple(
+            check_messages.MovedLimb(person, limb_display_name(move.limb.name), round(100 * move.distance_m, 1))
+            for person, move in last.moved
+        ),
         is_before_shown=last.is_before_shown,
     )
+
+
+def _unseen_depth(note: DepthNote | None) -> check_messages.UnseenDepth | None:
+    return None if note is None else check_messages.UnseenDepth(note.person, note.unseen.points, note.unseen.camera)
 
 
 def _track(track: TrackState) -> wire.Track:
@@ -297,8 +309,24 @@ def _track(track: TrackState) -> wire.Track:
     )
 
 
+def inconsistent(state: State) -> check_messages.InconsistentMessage:
+    """List the frames and keyframes that disagree with the motion around them or with views."""
+    doubts = tuple(
+        check_messages.KeyframeDoubt(
+            doubt.person, doubt.frame, None if doubt.distance_m is None else round(100 * doubt.distance_m, 1),
+            doubt.point,
+            tuple(
+                check_messages.RaisedViewCost(view.camera, round(view.cost_px, 2), round(view.usual_px, 2))
+                for view in doubt.views
+            ),
+        )
+        for doubt in state.keyframe_doubts
+    )  # fmt: skip
+    return check_messages.InconsistentMessage(state.inconsistent_frames, doubts)
+
+
 def range_comparison(found: RangeComparison | None) -> search_messages.RangeComparisonMessage:
     """Describe the poses of a range against those that they replaced."""
     if found is None:
-        return search_messages.RangeComparisonMessage(None, None, ())
-    return search_messages.RangeComparisonMessage(found.first, found.last, found.frames)
+        return search_messages.RangeComparisonMessage(None, None, (), (), None)
+    return search_messages.RangeComparisonMessage(found.first, found.last, found.frames, found.stretches, found.run)

@@ -21,7 +21,7 @@ def _turn(controller: Controller, _: int, message: wire.TurnDof) -> None:
 
 
 def _nudge(controller: Controller, _: int, message: wire.Nudge) -> None:
-    _check_point(controller, message.person, message.point)
+    check_point(controller, message.person, message.point)
     right_m, up_m = message.right / 100, message.up / 100
     controller.pose_edits.nudge(message.person, message.point, message.camera, right_m, up_m, message.frame)
 
@@ -33,7 +33,7 @@ def _copy_person(controller: Controller, _: int, message: wire.CopyPerson) -> No
 
 
 def _reset(controller: Controller, _: int, message: wire.ResetLimb) -> None:
-    _check_point(controller, message.person, message.point)
+    check_point(controller, message.person, message.point)
     controller.pose_edits.reset(message.person, message.point, message.frame)
 
 
@@ -44,7 +44,7 @@ def _lock(controller: Controller, _: int, message: wire.LockDofs) -> None:
 
 
 def _hold(controller: Controller, _: int, message: wire.HoldPoint) -> None:
-    _check_point(controller, message.person, message.point)
+    check_point(controller, message.person, message.point)
     controller.held_points.set(message.person, message.point, message.held, message.frame)
 
 
@@ -70,7 +70,8 @@ def _display_factor(controller: Controller, person: int, dof: int) -> float:
     return float(dof_labels.factors(model)[dof])
 
 
-def _check_point(controller: Controller, person: int, point: str | None) -> None:
+def check_point(controller: Controller, person: int, point: str | None) -> None:
+    """Raise a `MessageError` unless the person has a point of this name, or none is named."""
     model = controller.models[person]
     if point is not None and point not in model.point_names:
         raise MessageError(f"a point of {model.name}", f"'{point}'")

@@ -159,3 +159,11 @@ class FitPose(Command, frozen=True, tag="fit"):
     frame: Frame
     person: Index | None = None
     """Null for the person worked on and everybody who is placed or pinned on the frame."""
+    point: Name | None = None
+    """A point of this person whose limb alone is fitted; null for the whole body."""
+
+
+class TakeLimbBack(Command, frozen=True, tag="limb_back"):
+    """Put the limb back that the last fit moved farthest although nobody had touched it; all else stays."""
+
+    frame: Frame

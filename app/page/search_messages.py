@@ -7,7 +7,7 @@ from msgspec import UNSET, Meta, UnsetType
 
 from app.control.search.search_settings import SearchLeaf
 from app.page.message_types import MAX_INT, Command, Index, Message, Name, Number, Part
-from app.state.comparison import ComparedPose
+from app.state.comparison import ComparedPose, Stretch
 
 OutlierMode: TypeAlias = Literal["truncated", "paper"]
 RunState: TypeAlias = Literal["running", "paused", "over"]
@@ -202,3 +202,7 @@ class RangeComparisonMessage(Message, frozen=True, tag="range_comparison"):
     last: int | None
     people: tuple[tuple[ComparedPose, ...], ...]
     """By person; frames whose pose replaced none are left out."""
+    stretches: tuple[Stretch, ...]
+    """Frames on which the present poses are better or worse, by person; of a run as they were at its end."""
+    run: int | None
+    """Number of the tracking run that has just replaced the poses; null for another range."""

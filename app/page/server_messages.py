@@ -6,6 +6,7 @@ make them, `protocol_docs` writes the page's types and docs/protocol.md from the
 
 from typing import Literal, TypeAlias, Union, get_args
 
+from app.page.check_messages import InconsistentMessage, MovedLimb, UnseenDepth
 from app.page.inspector_messages import (
     AcquisitionMessage,
     BodySizesMessage,
@@ -203,6 +204,8 @@ class Compared(Part, frozen=True):
     after_view_costs_px: tuple[float | None, ...]
     warning: str
     """Where the edges and the user's placement disagree by much, as a sentence; empty if nowhere."""
+    moved: tuple[MovedLimb, ...]
+    """Limbs that a fit moved although nobody had touched them, farthest first; their former places are drawn."""
     is_before_shown: bool
     """Whether the views show the poses before. The costs are theirs then, and the overlay has no handles."""
 
@@ -271,6 +274,8 @@ class StateMessage(Message, frozen=True, tag="state"):
     preview: PreviewedCandidate | None
     compared: Compared | None
     """Null where there is no such result, or it has changed."""
+    unseen_depth: UnseenDepth | None
+    """Null where the views have shown the depth of the last placed point, or the pose has changed since."""
     track: Track
     range: RangeWork
     follow: bool
@@ -348,13 +353,6 @@ class TimelineMessage(Message, frozen=True, tag="timeline"):
     cells: dict[str, Cell | None]
     replace: bool
     """Whether all other frames have no pose."""
-
-
-class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
-    """Frames whose pose does not agree with the motion around it (`tracker/motion/consistency.py`)."""
-
-    frames: tuple[int, ...]
-    """All of them, ascending."""
 
 
 class DofObservability(Part, frozen=True):

@@ -21,7 +21,8 @@ from app.page.message_types import Message
 from app.page.observability_feed import ObservabilityFeed
 from app.page.search_feed import SearchFeed
 from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
-from app.page.server_messages import HistoryMessage, InconsistentMessage, NoticeMessage, StateMessage
+from app.page.server_messages import HistoryMessage, NoticeMessage, StateMessage
+from app.remedies import page_text
 from app.state import page_view
 from app.state.identity import Identity
 from app.state.page_view import View
@@ -138,7 +139,7 @@ class PageConnection:
                 raise MessageError("a text message", f"a binary one of {len(received.data)} bytes")
             message = parse(received.data)
         except MessageError as error:
-            await self._notice(str(error))
+            await self._notice(page_text(error))
             return
         last = self._waiting[-1] if self._waiting else None
         if last is not None and type(last) is type(message) and (_is_move(last, message) or type(last) in _COALESCED):
@@ -155,7 +156,7 @@ class PageConnection:
                 try:
                     await asyncio.to_thread(self._carry_out, message)
                 except TrackerError as error:
-                    await self._notice(str(error))
+                    await self._notice(page_text(error))
                 except Exception as error:
                     _LOG.exception("a message of a page failed: %s", message)
                     await self._notice(f"expected to carry out '{type(message).__name__}', found a fault: {error!r}")
@@ -211,7 +212,7 @@ class PageConnection:
                 if state.track.failed and (sent is None or sent.track is not state.track):
                     await self._notice(state.track.message)
             except TrackerError as error:
-                await self._notice(str(error))
+                await self._notice(page_text(error))
             if state.search.running:
                 await asyncio.sleep(max(0.0, began + _WATCHABLE_S - self._loop.time()))
 
@@ -300,8 +301,9 @@ class PageConnection:
 
     async def _send_checks(self, sent: State | None, state: State) -> None:
         """Send what was found about frames other than the shown one, if it changed."""
-        if sent is None or sent.inconsistent_frames != state.inconsistent_frames:
-            await self._send(InconsistentMessage(state.inconsistent_frames))
+        checked = (state.inconsistent_frames, state.keyframe_doubts)
+        if sent is None or (sent.inconsistent_frames, sent.keyframe_doubts) != checked:
+            await self._send(messages.inconsistent(state))
         if sent is None or sent.range_comparison is not state.range_comparison:
             await self._send(messages.range_comparison(state.range_comparison))
 
@@ -360,6 +362,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.search_view,
         state.range_comparison,
         state.compared if not state.is_stored_drawn else None,
+        () if state.compared is None else state.compared.moved,
         state.drag,
         state.drag_seqs,
         state.visibility.hidden,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from app.control.controller import Controller
 from app.drawing.overlay_colors import rgb
+from app.remedies import page_text
 from app.runtime.jobs import LatestWinsWorker
 from app.state.identity import Identity
 from app.state.state import State
@@ -56,7 +57,7 @@ class VoxelLayer:
         try:
             points = self._carved(state.frame)
         except TrackerError as error:  # of an empty scene, a camera that has moved, unreadable footage
-            self._draw(np.zeros((0, 3)), np.zeros((0, 3), np.uint8), f"No voxels: {error}")
+            self._draw(np.zeros((0, 3)), np.zeros((0, 3), np.uint8), f"No voxels: {page_text(error)}")
             return
         self._draw(points, part_colors(points, state.models, state.poses), "")
 

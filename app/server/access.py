@@ -53,7 +53,7 @@ class Access:
         if called is None or not (is_loopback(called["name"]) or called["name"].lower() in self.hosts):
             return (
                 f"expected to be called by a name of this machine, found Host '{host or ''}'; "
-                "open the address printed at the start, or start again with --allow-host and this name"
+                "open the address printed at the start, or allow this name when the program is started"
             )
         if origin is not None and not _same(origin, called):
             return f"expected a request of this page, found one of '{origin}'; open the page itself"

@@ -16,6 +16,7 @@ from urllib.parse import quote
 from aiohttp import web
 
 from app.export.formats import FORMATS, OPTIONS, ExportFormat
+from app.remedies import page_text
 from app.server import connections
 from tracker.errors import TrackerError
 
@@ -70,7 +71,7 @@ class ExportRoutes:
                 try:
                     made = await asyncio.to_thread(self._make, chosen, request, Path(folder))
                 except TrackerError as error:
-                    raise web.HTTPBadRequest(text=str(error)) from error
+                    raise web.HTTPBadRequest(text=page_text(error)) from error
                 except _StoppedError:
                     raise web.HTTPServiceUnavailable(text="The export was stopped.") from None
                 finally:

@@ -1,4 +1,4 @@
-"""Open another session from the page, or make one of videos and a calibration.
+"""Open another session from the page (`NewSessionRoutes`: make one).
 
 A page names folders of this machine, as the user could on the command line. So these requests are answered only where
 nobody but the user can send them: the server listens on loopback under no other name, and asks for the token.
@@ -7,27 +7,22 @@ nobody but the user can send them: the server listens on loopback under no other
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
 
 import msgspec
 from aiohttp import web
-from msgspec import Meta
 
-from app.server import connections
-from app.session.camera_check import exchange_note
-from app.session.new_session import NewSessionForm, make_session
-from app.session.path_choice import completions, typed_path
+from app.remedies import page_text
+from app.server.new_session_routes import NewSessionRoutes
+from app.server.page_requests import read_body, require_page
+from app.session.path_choice import TypedPath, completions, typed_path
 from app.session.recent_sessions import recent_sessions
 from tracker.errors import SessionError, TrackerError
-from tracker.validation import check
-
-_Path = Annotated[str, Meta(min_length=1, max_length=4096, description="a path")]
 
 
 class _OpenRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A session to open."""
 
-    folder: _Path
+    folder: TypedPath
 
 
 class SessionRoutes:
@@ -46,7 +41,6 @@ class SessionRoutes:
         """
         self._folder, self._state_folder = folder.resolve(), state_folder
         self._refusal, self._unsaved = refusal, unsaved
-        self._making = asyncio.Lock()
         self.chosen: Path | None = None
         """The session to open next."""
         self.is_chosen = asyncio.Event()
@@ -58,7 +52,7 @@ class SessionRoutes:
         app.router.add_get("/sessions", self._list)
         app.router.add_get("/sessions/paths", self._complete)
         app.router.add_post("/sessions/open", self._open)
-        app.router.add_post("/sessions/new", self._make)
+        NewSessionRoutes(self._refusal).add_to(app)
 
     async def _started(self, _: web.Request) -> web.Response:
         """Answer a page that waits for the program, as `Doorway` does before: no step is left."""
@@ -77,44 +71,21 @@ class SessionRoutes:
         return web.json_response({"refusal": None, "folder": str(self._folder), "recent": recent})
 
     async def _complete(self, request: web.Request) -> web.Response:
-        self._check(request)
+        require_page(request, self._refusal)
         found = await asyncio.to_thread(completions, request.query.get("text", "")[:4096])
         return web.json_response([{"path": path, "is_session": is_session} for path, is_session in found])
 
     async def _open(self, request: web.Request) -> web.Response:
-        body = await self._body(request, _OpenRequest)
+        body = await read_body(request, _OpenRequest, self._refusal)
         if self.is_chosen.is_set():
             raise web.HTTPConflict(text="Another session is being opened; wait for it.")
         try:
             folder = await asyncio.to_thread(self._checked, body.folder)
         except TrackerError as error:
-            raise web.HTTPBadRequest(text=str(error)) from error
+            raise web.HTTPBadRequest(text=page_text(error)) from error
         self.chosen = folder
         self.is_chosen.set()
         return web.json_response({"name": folder.name})
-
-    async def _make(self, request: web.Request) -> web.StreamResponse:
-        """Make a session. The answer has one JSON object per line: each check that has passed, then the outcome."""
-        form = await self._body(request, NewSessionForm)
-        if self._making.locked():
-            raise web.HTTPConflict(text="Another session is being made; wait for it.")
-        async with self._making:
-            connections.keep_open(request)
-            response = web.StreamResponse(headers={"Content-Type": "application/x-ndjson"})
-            await response.prepare(request)
-            lines: asyncio.Queue[dict[str, str] | None] = asyncio.Queue()
-            loop = asyncio.get_running_loop()
-
-            def report(kind: str, text: str) -> None:
-                loop.call_soon_threadsafe(lines.put_nowait, {kind: text})
-
-            work = asyncio.ensure_future(asyncio.to_thread(_made, form, report))
-            work.add_done_callback(lambda _: lines.put_nowait(None))
-            while (line := await lines.get()) is not None:
-                await response.write(msgspec.json.encode(line) + b"\n")
-            await work
-            await response.write_eof()
-            return response
 
     def _checked(self, text: str) -> Path:
         """Return the folder of a session that can be opened in place of the present one.
@@ -137,40 +108,6 @@ class SessionRoutes:
             raise SessionError(f"expected all edits to be saved, found some that are not: {why}; retry saving first")
         return folder
 
-    def _check(self, request: web.Request) -> None:
-        if self._refusal is not None:
-            raise web.HTTPForbidden(text=self._refusal)
-        if request.headers.get("Sec-Fetch-Site", "same-origin") != "same-origin":
-            raise web.HTTPForbidden(text="Expected a request of this page, found one of another site.")
-
-    async def _body(self, request: web.Request, declaration: Any) -> Any:
-        """Return the body of a request of the page, checked against its declaration."""
-        self._check(request)
-        # A foreign page can send a form without asking, JSON it cannot. The guard has seen the Origin.
-        if request.content_type != "application/json" or "Origin" not in request.headers:
-            raise web.HTTPForbidden(text="Expected a request of this page, found another.")
-        data = await request.read()
-        try:
-            return check(msgspec.json.decode(data), declaration, "request", SessionError)
-        except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
-            raise web.HTTPBadRequest(text=f"Expected a request in JSON, found other data ({error}).") from error
-        except SessionError as error:
-            raise web.HTTPBadRequest(text=str(error)) from error
-
-
-def _made(form: NewSessionForm, report: Callable[[str, str], None]) -> None:
-    """Make a session, and report the checks that pass, what went wrong or seems wrong, and its folder."""
-    try:
-        session = make_session(form, lambda text: report("passed", text))
-    except TrackerError as error:
-        report("failed", str(error))
-        return
-    if note := exchange_note(session):
-        report("warning", note)
-    else:
-        report("passed", "No two cameras seem to be exchanged.")
-    report("made", str(session.folder))
-
 
 def refusal(host_is_private: bool, has_token: bool) -> str | None:
     """Return why the page of a server may not choose sessions; None if it may.
@@ -181,7 +118,7 @@ def refusal(host_is_private: bool, has_token: bool) -> str | None:
     """
     if host_is_private and has_token:
         return None
-    found = "--no-token" if host_is_private else "one that other machines can reach"
+    found = "one without a token" if host_is_private else "one that other machines can reach"
     return (
         f"expected a page that only its user can open, found {found}; open other sessions on the command line, "
         "with 'quadrille SESSION'"

@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from aiohttp import web
 
+from app.remedies import page_text
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
@@ -65,7 +66,7 @@ class ThumbnailRoutes:
             made = await asyncio.get_running_loop().run_in_executor(self._pool, work)
         except TrackerError as error:
             _LOG.debug("no thumbnail of frame %d: %s", frame, error)
-            raise web.HTTPServiceUnavailable(text=str(error)) from error
+            raise web.HTTPServiceUnavailable(text=page_text(error)) from error
         finally:
             self._n_waiting -= 1
         if made is None:

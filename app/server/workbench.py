@@ -13,6 +13,7 @@ from platformdirs import user_state_path
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
 from app.page.thumbnails import Thumbnails
+from app.remedies import command_line_text
 from app.runtime.kernel_compiler import KernelCompiler
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.scene import SceneView
@@ -132,7 +133,7 @@ def _keep_unsaved(saver: Saver, folder: Path) -> str | None:
     try:
         path = saver.rescue()
     except TrackerError as error:
-        return f"edits are lost: {saver.error}; {error}"
+        return f"edits are lost: {saver.error}; {command_line_text(error)}"
     return f"edits are not saved: {saver.error}; they are kept in {path}, and 'quadrille restore {folder}' writes them"
 
 

@@ -11,6 +11,7 @@ from functools import lru_cache
 import cv2
 
 from app.drawing import pictures
+from app.remedies import page_text
 from app.runtime.byte_bounded_cache import ByteBoundedCache
 from tracker.errors import RecordingError
 from tracker.evidence.observer import Observer
@@ -89,7 +90,7 @@ class FrameCache:
             try:
                 read()
             except RecordingError as error:
-                errors[str(error)] = None
+                errors[page_text(error)] = None
                 continue
             with self._failed_lock:
                 if self._failed.get(what) is read:

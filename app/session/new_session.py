@@ -1,69 +1,140 @@
 """Make a session of what a user has entered in the page."""
 
 from collections.abc import Callable
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
 
-from app.session.path_choice import typed_path
-from tracker.errors import SessionError
-from tracker.session.assemble import DEFAULT_MODEL, NewSession, assemble, footage_in
-from tracker.session.session import Session
+from app.remedies import page_text
+from app.session.camera_check import exchange_of
+from app.session.path_choice import TypedPath, typed_path
+from tracker.errors import SessionError, TrackerError
+from tracker.formats.camera_section import Units
+from tracker.session.assemble import DEFAULT_MODEL, NewSession, SessionParts, check_parts, footage_in
 from tracker.validation import FrameRate, Name
 
-_Path = Annotated[str, Meta(min_length=1, max_length=4096, description="a path")]
-_Height = Annotated[float, Meta(ge=0.3, le=3, description="a height of 0.3 to 3 metres")]
+Up = Literal["x", "y", "z", "-x", "-y", "-z"]
+MAX_CAMERAS = 1000
+Report = Callable[[str, Any], None]
+"""Takes the kind of a line, and its text or data."""
+
+_Height = Annotated[float, Meta(ge=30, le=300, title="Height", description="a height of 30 to 300 centimetres")]
+_Offset = Annotated[int, Meta(ge=-10_000_000, le=10_000_000, title="Offset", description="a whole number of frames")]
+
+
+class CameraChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a user has chosen for one calibrated camera."""
+
+    name: Name
+    footage: TypedPath
+    """Its video or folder of images."""
+    side_name: Name | None = None
+    """Name after which its background and masks are filed; null for its own."""
+    offset: _Offset = 0
+    """Frame k of the session is frame k + offset of the camera."""
 
 
 class NewSessionForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What makes a session, as a user types it."""
 
-    folder: _Path
+    folder: TypedPath
     """Folder to make."""
-    calibration: _Path
+    calibration: TypedPath
     """File of the cameras."""
-    footage: _Path
-    """Folder with a video or a folder of images for each camera, named after it."""
-    people: Annotated[list[Name], Meta(min_length=1, max_length=20)]
-    heights_m: Annotated[list[_Height], Meta(max_length=20)] = []
+    footage: TypedPath
+    """Folder with a video or a folder of images for each camera."""
+    people: Annotated[list[Name], Meta(min_length=1, max_length=20, title="People", description="1 to 20 names")]
+    cameras: Annotated[list[CameraChoice], Meta(max_length=MAX_CAMERAS)] = []
+    """Cameras to use, with their footage; empty to match the footage to the cameras by its names."""
+    heights_cm: Annotated[list[_Height], Meta(max_length=20, title="Height", description="at most 20 heights")] = []
     """Body heights: one for all people, or one for each in their order; empty for that of the body model."""
-    up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
+    models: Annotated[
+        list[TypedPath], Meta(max_length=20, title="Body model", description="at most 20 body models")
+    ] = []
+    """Presets or .toml files of bodies: one for all people, or one for each in their order; empty for the default."""
+    up: Up = "z"
     """World axis that points up."""
-    units: Literal["m", "cm", "mm"] | None = None
+    units: Units | None = None
     """Unit of the calibration's translations; null for the one that its layout fixes, else metres."""
-    fps: FrameRate | None = None
+    fps: Annotated[FrameRate, Meta(title="Frame rate")] | None = None
     """Rate at which the cameras filmed, if the videos declare another one or all footage is images."""
-    background: _Path | None = None
+    background: TypedPath | None = None
     """Folder with an image or video of the empty scene for each camera."""
+    masks: TypedPath | None = None
+    """Folder with a folder of masks for each camera."""
+    keep_assignment: bool = False
+    """Whether the footage stays as assigned even if two cameras seem to be exchanged."""
 
 
-def make_session(form: NewSessionForm, report: Callable[[str], None]) -> Session:
-    """Make a session folder. Nothing is written unless all of it fits.
+def make_session(form: NewSessionForm, report: Report) -> None:
+    """Make a session folder. Nothing is written unless all of it fits and no two cameras seem to be exchanged.
 
     Args:
         form: what to make it of.
-        report: called with a sentence after each check that has passed.
-
-    Raises:
-        TrackerError: something is missing or does not fit.
+        report: called with `passed` or `warning` and a sentence; at the end with `failed` and a sentence, `exchanged`
+            and two cameras that seem to be, or `made` and the folder.
     """
-    if len(form.heights_m) not in (0, 1, len(form.people)):
-        raise SessionError(
-            f"expected one height for all, or one for each of {len(form.people)} people, found {len(form.heights_m)}; "
-            "separate them by commas, in the order of the names"
-        )
-    each = dict(zip(form.people, form.heights_m, strict=False))
-    request = NewSession(
+    try:
+        parts = check_parts(_request(form), lambda text: report("passed", text), lambda text: report("warning", text))
+        if _is_refused(form, parts, report):
+            return
+        made = parts.make()
+    except TrackerError as error:
+        report("failed", page_text(error))
+        return
+    report("made", str(made.folder))
+
+
+def _is_refused(form: NewSessionForm, parts: SessionParts, report: Report) -> bool:
+    """Check that no two cameras are exchanged; report it. Returns whether the user has to decide first."""
+    found = exchange_of(parts.cameras)
+    if found is None:
+        report("passed", "No two cameras seem to be exchanged.")
+        return False
+    if form.keep_assignment:
+        report("warning", found.text)
+        return False
+    report("exchanged", {"cameras": found.cameras, "with_backgrounds": found.with_backgrounds, "text": found.text})
+    return True
+
+
+def _request(form: NewSessionForm) -> NewSession:
+    cameras = {c.name: typed_path(c.footage) for c in form.cameras}
+    return NewSession(
         typed_path(form.folder),
         calibration=typed_path(form.calibration),
-        videos=footage_in(typed_path(form.footage)),
+        videos=() if cameras else footage_in(typed_path(form.footage)),
+        camera_paths=cameras,
+        cameras=tuple(c.name for c in form.cameras),
         background=None if form.background is None else typed_path(form.background),
+        masks=None if form.masks is None else typed_path(form.masks),
+        side_names={c.name: c.side_name for c in form.cameras if c.side_name is not None},
+        offsets={c.name: c.offset for c in form.cameras if c.offset},
         people=tuple(form.people),
-        models=DEFAULT_MODEL,
-        heights=each if len(form.heights_m) > 1 else next(iter(form.heights_m), None),
+        models=_of_each(form, "body model", [_model(m) for m in form.models]) or DEFAULT_MODEL,
+        heights=_of_each(form, "height", [h / 100 for h in form.heights_cm]),
         fps=form.fps,
         up=form.up,
         units=form.units,
     )
-    return assemble(request, report)
+
+
+def _model(text: str) -> str:
+    return str(typed_path(text)) if text.endswith(".toml") else text
+
+
+def _of_each(form: NewSessionForm, what: str, values: list[Any]) -> Any:
+    """Return the value for all people, or those of each by name; None without any.
+
+    Raises:
+        SessionError: there are several, but not one for each.
+    """
+    if len(values) not in (0, 1, len(form.people)):
+        raise SessionError(
+            f"expected one {what} for all, or one for each of {len(form.people)} people, found {len(values)}; "
+            "separate them by commas, in the order of the names"
+        )
+    if len(values) > 1:
+        return dict(zip(form.people, values, strict=True))
+    return values[0] if values else None

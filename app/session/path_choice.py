@@ -1,13 +1,19 @@
-"""Paths that a user types in the page: check them, and complete them."""
+"""Paths that a user types or chooses in the page: check them, complete them, list what is in a folder."""
 
 import os
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
+from typing import Annotated, NamedTuple
+
+from msgspec import Meta
 
 from app.session.recent_sessions import is_session
 from tracker.errors import SessionError
+from tracker.session.assemble import VIDEO_SUFFIXES
 
+TypedPath = Annotated[str, Meta(min_length=1, max_length=4096, description="a path")]
+"""A path as it comes from the page; `typed_path` checks it."""
 _MAX_READ = 5000
 """Largest number of entries of a folder that are looked at."""
 _MAX_SHOWN = 40
@@ -29,6 +35,68 @@ def typed_path(text: str) -> Path:
     if not path.is_absolute():
         raise SessionError(f"expected a path from the root or from ~, found '{text}'; type the whole path")
     return path
+
+
+class Entry(NamedTuple):
+    """A folder or file that a user can choose."""
+
+    name: str
+    path: str
+    kind: str
+    """`folder`, `session`, `video` or `file`."""
+
+
+class FolderContents(NamedTuple):
+    """What is in a folder."""
+
+    folder: str
+    parent: str | None
+    """Its parent; None at the root."""
+    entries: list[Entry]
+    """Folders first; neither hidden ones, nor what is no regular file."""
+    is_cut_off: bool
+    """Whether there are more than `_MAX_READ` entries."""
+
+
+def folder_contents(text: str) -> FolderContents:
+    """Return the folders and regular files in the folder that a user has chosen, or that holds the file.
+
+    Args:
+        text: a path; empty for the user's home.
+
+    Raises:
+        SessionError: it is no path, or its folder cannot be read.
+    """
+    folder = typed_path(text or "~")
+    if not folder.is_dir():
+        folder = folder.parent
+    folder = Path(os.path.abspath(folder))  # without `..`
+    try:
+        with os.scandir(folder) as found:
+            read = list(islice(found, _MAX_READ + 1))
+    except (OSError, ValueError) as error:
+        raise SessionError(f"expected a folder that can be read, found {folder} ({_reason(error)})") from error
+    kinds = ((e, _kind(e)) for e in read[:_MAX_READ] if not e.name.startswith("."))
+    entries = [Entry(e.name, e.path, kind) for e, kind in kinds if kind is not None]
+    entries.sort(key=lambda e: (e.kind not in ("folder", "session"), e.name.casefold()))
+    parent = None if folder.parent == folder else str(folder.parent)
+    return FolderContents(str(folder), parent, entries, len(read) > _MAX_READ)
+
+
+def _reason(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error)
+
+
+def _kind(entry: "os.DirEntry[str]") -> str | None:
+    """Return the kind of an entry; None for what can be neither opened nor read: pipes, sockets, broken links."""
+    if _is_folder(entry):
+        return "session" if is_session(Path(entry.path)) else "folder"
+    try:
+        if not entry.is_file():
+            return None
+    except OSError:
+        return None
+    return "video" if Path(entry.name).suffix.lower() in VIDEO_SUFFIXES else "file"
 
 
 def completions(text: str) -> list[tuple[str, bool]]:

@@ -6,6 +6,7 @@ from typing import Literal
 
 from app.state.people import ShownPose
 from tracker.geometry.arrays import Array
+from tracker.posing.limb_moves import LimbMove
 
 ComparedWork = Literal["fit", "search"]
 
@@ -32,6 +33,8 @@ class PoseComparison:
     after_view_costs_px: tuple[float | None, ...]
     warning: str = ""
     """Where edges and the user's placement disagree by much: a sentence for the user, or empty."""
+    moved: tuple[tuple[int, LimbMove], ...] = ()
+    """Limbs that a fit moved although nobody had touched them, each after the index of its person; farthest first."""
     is_before_shown: bool = False
     """Whether the views show the poses before."""
 
@@ -57,6 +60,23 @@ class ComparedPose:
     """Name of that joint, for display."""
 
 
+Verdict = Literal["better", "worse", "same"]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Frames on which the present poses of a person are better or worse than those that they replaced."""
+
+    person: int
+    """Index of the person."""
+    first: int
+    last: int
+    """Included."""
+    frames: int
+    """Number of frames that are better or worse; on the others neither is."""
+    verdict: Verdict
+
+
 @dataclass(frozen=True, eq=False)
 class RangeComparison:
     """The poses of a range of frames against those that they replaced."""
@@ -68,3 +88,7 @@ class RangeComparison:
     """By person; frames whose pose replaced none are left out."""
     others: Mapping[int, Mapping[int, Array]]
     """The replaced poses, (n_values,), in the present body, by frame and index of the person."""
+    stretches: tuple[Stretch, ...] = ()
+    """Stretches on which the present poses are better or worse, by person; of a run as they were at its end."""
+    run: int | None = None
+    """Number of the tracking run that has just replaced the poses, counted since the start; None for another range."""

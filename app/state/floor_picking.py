@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from app.remedies import page_text
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
@@ -91,5 +92,5 @@ def _solved(picking: Picking, cameras: Sequence[Camera]) -> Picking:
     try:
         plane = floor_through(np.array(points), np.array([c.center_world for c in cameras]))
     except TrackerError as error:
-        return replace(picking, plane=None, why=str(error))
+        return replace(picking, plane=None, why=page_text(error))
     return replace(picking, plane=plane, why="")

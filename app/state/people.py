@@ -7,6 +7,8 @@ from typing import NamedTuple
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.motion.keyframe_doubts import RaisedView
+from tracker.posing.placed_depth import UnseenDepth
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +70,32 @@ class HeldPoint(NamedTuple):
     """Name of the point."""
     camera: int | None
     """Index of a view in which it was placed; None where it was held by command."""
+
+
+@dataclass(frozen=True, eq=False)
+class DepthNote:
+    """Points placed in opposite or neighbouring views alone. It holds as long as the pose is shown unchanged."""
+
+    frame: int
+    person: int
+    """Index of the person."""
+    values: Array
+    """The pose, (n_values,)."""
+    unseen: UnseenDepth
+
+
+class KeyframeDoubt(NamedTuple):
+    """A keyframe that its neighbours or views contradict."""
+
+    person: int
+    """Index of the person."""
+    frame: int
+    distance_m: float | None
+    """Distance from the motion of its neighbours, metres; None if they agree with it."""
+    point: str
+    """Name of the farthest point, for display; empty if they agree."""
+    views: tuple[RaisedView, ...]
+    """Views whose cost is raised, most raised first."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,16 @@ import numpy as np
 
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import FloorState
-from app.state.people import AcquisitionState, DragState, HeldPoint, ShownPose, SizeDraft, Visibility
+from app.state.people import (
+    AcquisitionState,
+    DepthNote,
+    DragState,
+    HeldPoint,
+    KeyframeDoubt,
+    ShownPose,
+    SizeDraft,
+    Visibility,
+)
 from app.state.progress import FindState, FootageState, RangeState, TrackState
 from app.state.run_choices import RunChoices
 from app.state.search import CostLandscape, SearchState, SearchView
@@ -66,12 +75,16 @@ class State:
     ranges: RangeState = field(default_factory=RangeState)
     inconsistent_frames: tuple[int, ...] = ()
     """Frames whose poses disagree with their neighbours, ascending (see `tracker.motion.consistency`)."""
+    keyframe_doubts: tuple[KeyframeDoubt, ...] = ()
+    """Keyframes that their neighbours or views contradict, by person and frame."""
     pins: tuple[tuple[PointObservation, ...], ...] = ()
     """The pins of each person on the frame, by point and camera."""
     is_pin_held: bool = False
     """Whether a pin is being dragged."""
     held: frozenset[HeldPoint] = frozenset()
     """Points that stay in place during drags, on all frames; until the program ends or they are released."""
+    depth_note: DepthNote | None = None
+    """The last placement whose depth no view has shown; see `unseen_depth`."""
     drag: DragState | None = None
     drag_seqs: tuple[tuple[int, int], ...] = ()
     """For each page that drags: its number, and the sequence number of its last applied drag message."""
@@ -128,6 +141,14 @@ class State:
             return None
         pairs = zip(self.people, last.after, strict=True)
         return last if all(p.values is v or np.array_equal(p.values, v) for p, v in pairs) else None
+
+    @property
+    def unseen_depth(self) -> DepthNote | None:
+        """The last placement whose depth no view has shown, if its pose is shown unchanged; None otherwise."""
+        last = self.depth_note
+        if last is None or last.frame != self.frame or self.is_dragging:
+            return None
+        return last if self.people[last.person].values is last.values else None
 
     @property
     def drawn(self) -> "State":
@@ -204,9 +225,11 @@ class StateChanges(TypedDict, total=False):
     locked: tuple[frozenset[int], ...]
     ranges: RangeState
     inconsistent_frames: tuple[int, ...]
+    keyframe_doubts: tuple[KeyframeDoubt, ...]
     pins: tuple[tuple[PointObservation, ...], ...]
     is_pin_held: bool
     held: frozenset[HeldPoint]
+    depth_note: DepthNote | None
     drag: DragState | None
     drag_seqs: tuple[tuple[int, int], ...]
     pages_pausing_3d: frozenset[int]

@@ -1,72 +1,27 @@
 """Rescue files: edits that could not be written when the program ended, kept outside of the session.
 
-A file holds its own checksum, the edits in order, and the body models of their poses. `quadrille restore` writes the
-edits into the session, as entries of its history, and deletes the file.
+`quadrille restore` writes the edits into the session, as entries of its history, and deletes the file. Copies of a
+session have its id, so edits that were made in another folder are only offered; their file stays.
 """
 
-import hashlib
 import os
 import secrets
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import msgspec
-import numpy as np
 from platformdirs import user_data_path
 
+from app.remedies import page_text
+from app.storage.rescue_file import Model, Rescue, UnsavedEdit, read_rescue, write_rescue
 from tracker.errors import SessionError, TrackerError
+from tracker.session.folder import SESSION_FILE
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Change, MarkChange, PinChange, PoseChange, PoseRecord
-
-_VERSION = 1
-_KINDS: dict[str, type[Change]] = {"pose": PoseChange, "mark": MarkChange, "pin": PinChange}
-_NAMES = {kind: name for name, kind in _KINDS.items()}
-
-
-class UnsavedEdit(NamedTuple):
-    """An edit, or an addition to one, that is not on disk."""
-
-    label: str
-    changes: Sequence[Change]
-    amend: int | None
-    """The edit on disk to add to; None makes a new one."""
-    by_program: bool
-
-
-class _Change(msgspec.Struct):
-    kind: str
-    of: msgspec.Raw
-
-
-class _Edit(msgspec.Struct):
-    label: str
-    changes: list[_Change]
-    amend: int | None
-    by_program: bool
-
-
-class _Model(msgspec.Struct):
-    person: str
-    toml: str
-
-
-class _Rescue(msgspec.Struct):
-    version: int
-    session: str
-    """Path of the session's folder."""
-    store: str
-    """Id of the store."""
-    author: str
-    time: str
-    why: str
-    models: dict[int, _Model]
-    """The body models of the poses, by revision."""
-    edits: list[_Edit]
+from tracker.store.records import Change, PoseChange, PoseRecord
 
 
 class RescueFile(NamedTuple):
@@ -77,6 +32,8 @@ class RescueFile(NamedTuple):
     time: str
     damage: str = ""
     """Why it cannot be read."""
+    origin: str = ""
+    """The other folder in which the edits were made; empty if it is the session's."""
 
     @property
     def offer(self) -> str:
@@ -84,6 +41,12 @@ class RescueFile(NamedTuple):
         if self.damage:
             return self.damage
         edits, are = ("1 edit", "is") if self.n_edits == 1 else (f"{self.n_edits} edits", "are")
+        if self.origin:
+            return (
+                f"{edits} of {self.time} could not be written into {self.origin}, of which this session may be a copy, "
+                f"and {are} kept in {self.path}: to write them here, end the program and run 'quadrille restore' on "
+                f"the session with --rescue {self.path}"
+            )
         return (
             f"{edits} of {self.time} could not be written and {are} kept in {self.path}: "
             "end the program and run 'quadrille restore' on the session to write them"
@@ -110,19 +73,18 @@ def write(
         SessionError: it cannot be written anywhere.
     """
     edits = list(edits)
-    people = revisions_of(edits)
     now = datetime.now(UTC)
-    data = _Rescue(
-        _VERSION, str(folder), store.id, author, now.strftime("%Y-%m-%d %H:%M:%S UTC"), why,
-        {r: _Model(person, models[r]) for r, person in people.items()},
-        [_Edit(e.label, [_encoded(c) for c in e.changes], e.amend, e.by_program) for e in edits],
+    people = revisions_of(edits)
+    data = Rescue(
+        str(folder), store.id, author, now.strftime("%Y-%m-%d %H:%M:%S UTC"), why,
+        {r: Model(person, models[r]) for r, person in people.items()}, edits,
     )  # fmt: skip
     problems = []
     for place in _places(folder):
         path = place / f"{_prefix(store.id)}{now.strftime('%Y%m%dT%H%M%S')}-{secrets.token_hex(3)}.json"
         try:
             place.mkdir(parents=True, exist_ok=True)
-            _write(path, data)
+            write_rescue(path, data)
         except OSError as error:
             problems.append(f"{place}: {error.strerror}")
         else:
@@ -146,31 +108,42 @@ def find(folder: Path, store_id: str) -> list[RescueFile]:
     found = []
     for path in _files(folder, store_id):
         try:
-            data = _read(path)
+            data = read_rescue(path)
         except TrackerError as error:
-            found.append(RescueFile(path, 0, "", str(error)))
+            found.append(RescueFile(path, 0, "", page_text(error)))
             continue
-        # A copy of the session has the same id: its edits are those of the folder that they were made in.
-        if data.session == str(folder) or not Path(data.session).exists():
-            found.append(RescueFile(path, len(data.edits), data.time))
+        is_own = data.session == str(folder)
+        if is_own or not os.path.isfile(os.path.join(data.session, SESSION_FILE)):  # which offers them itself
+            found.append(RescueFile(path, len(data.edits), data.time, origin="" if is_own else data.session))
     return found
 
 
-def replay(path: Path, store: AnnotationStore) -> int:
-    """Write the edits of a rescue file into a store, each as an entry of the history, and delete the file.
+def replay(path: Path, folder: Path, store: AnnotationStore) -> int:
+    """Write the edits of a rescue file into a store, each as an entry of the history.
+
+    The file is deleted if the edits were made in this folder.
+
+    Args:
+        path: of the file.
+        folder: of the session.
+        store: its annotations.
 
     Returns:
-        Their number.
+        The number of edits.
 
     Raises:
-        SessionError: the file is damaged or the store cannot be written; what is left stays in the file.
+        SessionError: the file is damaged or of another session, or the store cannot be written; what is left stays in
+            the file.
     """
-    data = _read(path)
-    n_edits = len(data.edits)
+    data = read_rescue(path)
+    if data.store != store.id:
+        raise SessionError(
+            f"rescue file {path} holds edits of another session, made in {data.session}; restore them there"
+        )
+    is_own = data.session == str(folder)
     revisions = {r: store.add_model_revision(m.person, m.toml) for r, m in data.models.items()}
-    while data.edits:
-        edit = data.edits[0]
-        changes = [_with_revisions(_decoded(c), revisions) for c in edit.changes]
+    for done, edit in enumerate(data.edits):
+        changes = [_with_revisions(c, revisions) for c in edit.changes]
         last = next((e.edit for e in store.history(1) if not e.undone), None)
         try:
             if edit.amend is not None and edit.amend == last:
@@ -178,13 +151,13 @@ def replay(path: Path, store: AnnotationStore) -> int:
             else:
                 store.commit(edit.label, changes, data.author, edit.by_program)
         except SessionError:
-            if len(data.edits) < n_edits:
-                path.unlink()
-                _write(path, data)
+            if done and is_own:
+                with suppress(OSError):  # otherwise the edits that were written are written again
+                    write_rescue(path, data._replace(edits=data.edits[done:]))
             raise
-        data.edits.pop(0)
-    path.unlink(missing_ok=True)
-    return n_edits
+    if is_own:
+        path.unlink(missing_ok=True)
+    return len(data.edits)
 
 
 def _prefix(store_id: str) -> str:
@@ -204,55 +177,6 @@ def _files(folder: Path, store_id: str) -> list[Path]:
     files = [p for place in dict.fromkeys(_places(folder)) for p in place.glob(f"{_prefix(store_id)}*.json")]
     own = [p for p in files if not hasattr(os, "getuid") or p.lstat().st_uid == os.getuid()]
     return sorted((p for p in own if p.is_file() and not p.is_symlink()), key=lambda p: p.name)
-
-
-def _write(path: Path, data: _Rescue) -> None:
-    """Write a new file that only this user may read."""
-    text = msgspec.json.encode(data)
-    number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
-    try:
-        with open(number, "wb") as file:
-            file.write(hashlib.sha256(text).hexdigest().encode() + b"\n" + text + b"\n")
-            file.flush()
-            os.fsync(file.fileno())
-    except BaseException:
-        path.unlink(missing_ok=True)
-        raise
-
-
-def _read(path: Path) -> _Rescue:
-    """Read a rescue file.
-
-    Raises:
-        SessionError: it cannot be read, is not as it was written, or is of a newer program.
-    """
-    try:
-        checksum, _, text = path.read_bytes().partition(b"\n")
-    except OSError as error:
-        raise SessionError(f"rescue file {path} cannot be read: {error.strerror}; check your rights") from error
-    if hashlib.sha256(text.removesuffix(b"\n")).hexdigest().encode() != checksum:
-        raise SessionError(f"rescue file {path} is not as it was written: its checksum differs; delete or move it")
-    version = msgspec.json.decode(text).get("version")
-    if version != _VERSION:
-        raise SessionError(f"rescue file {path} has version {version}, expected {_VERSION}; upgrade quadrille")
-    return msgspec.json.decode(text, type=_Rescue)
-
-
-def _encoded(change: Change) -> _Change:
-    return _Change(_NAMES[type(change)], msgspec.Raw(msgspec.json.encode(change, enc_hook=_listed)))
-
-
-def _decoded(change: _Change) -> Change:
-    return msgspec.json.decode(change.of, type=_KINDS[change.kind], dec_hook=_array)
-
-
-def _listed(values: Any) -> Any:
-    """Encode an array of numbers exactly; numbers and text of numpy as those of Python."""
-    return values.tolist()
-
-
-def _array(_: type, values: Any) -> Any:
-    return np.array(values, dtype=np.float64)
 
 
 def _revisions(change: PoseChange) -> set[int]:

@@ -7,7 +7,8 @@ and are written with the next edit or on request.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.storage.rescue import UnsavedEdit
+from app.remedies import page_text
+from app.storage.rescue_file import UnsavedEdit
 from tracker.errors import TrackerError
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Change, PinChange, PoseChange
@@ -100,7 +101,7 @@ class RetryQueue:
                     self._store.amend(first.amend, first.changes, first.by_program)
                     edit = first.amend
             except TrackerError as error:
-                self.error = str(error)
+                self.error = page_text(error)
                 break
             self._edits[first.ticket] = edit
             frames.update(change.frame for change in first.changes)

@@ -99,6 +99,15 @@ export class Actions {
     this.#send({ type: "range", action: "reviewed", first, last, person });
   }
 
+  /**
+   * Keep a doubted keyframe as it is.
+   *
+   * @param {{person: number, frame: number}} keyframe
+   */
+  confirmKeyframe({ person, frame }) {
+    this.#send({ type: "confirm_keyframe", person, frame });
+  }
+
   /** @param {boolean} on whether to compare the marked range, or to end the comparison */
   compareRange(on) {
     const { range } = this.#store.facts;
@@ -106,12 +115,15 @@ export class Actions {
     else if (range) this.#send({ type: "compare_range", first: range.first, last: range.last });
   }
 
-  /** Take the replaced poses of the compared range. */
-  takeReplaced() {
-    const { rangeComparison } = this.#store.facts;
-    if (!rangeComparison || rangeComparison.first === null || rangeComparison.last === null) return;
-    const { first, last } = rangeComparison;
-    this.#send({ type: "range", action: "take_replaced", first, last, person: null });
+  /**
+   * Take the replaced poses of the compared range, or of a stretch of one person.
+   *
+   * @param {{person: number | null, first: number, last: number}} [stretch] `last` is included
+   */
+  takeReplaced(stretch) {
+    const { first, last } = this.#store.facts.rangeComparison ?? { first: null, last: null };
+    if (stretch) this.#send({ type: "range", action: "take_replaced", first: stretch.first, last: stretch.last, person: stretch.person });
+    else if (first !== null && last !== null) this.#send({ type: "range", action: "take_replaced", first, last, person: null });
   }
 
   stopRange() {
@@ -149,9 +161,12 @@ export class Actions {
     this.#send({ type: "curves", group });
   }
 
-  /** @param {number} person */
-  selectPerson(person) {
-    this.#send({ type: "select", person, point: null });
+  /**
+   * @param {number} person
+   * @param {string | null} point
+   */
+  selectPerson(person, point = null) {
+    this.#send({ type: "select", person, point });
   }
 
   /**

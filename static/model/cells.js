@@ -18,6 +18,7 @@ export const SOURCES = [
 ];
 /** Statuses of a pose, the worst last. */
 export const STATUSES = /** @type {const} */ (["", "good", "doubtful", "lost"]);
+const GOOD = STATUSES.indexOf("good");
 /** Instead of a source: the frame has no pose. */
 export const NO_POSE = 255;
 export const KEYFRAME = 1;
@@ -164,4 +165,27 @@ export function framesWith(cells, mark) {
 /** @param {Cells} cells */
 export function keyframesOf(cells) {
   return framesWith(cells, KEYFRAME);
+}
+
+/** Fewer good frames give no range of usual costs: a tenth of them must be a frame. */
+const MIN_GOOD = 10;
+/** So many cells are looked at, since a tracker changes cells twice a second. */
+const MAX_LOOKED_AT = 2000;
+
+/**
+ * Costs between which the good frames lie, but for a tenth at each end.
+ *
+ * @param {Cells} cells
+ * @returns {[number, number] | null} pixels; null before enough frames are good
+ */
+export function usualCosts(cells) {
+  const costs = [];
+  const step = Math.max(1, Math.floor(cells.frames / MAX_LOOKED_AT));
+  for (let frame = 0; frame < cells.frames; frame += step) {
+    if (cells.statuses[frame] === GOOD && Number.isFinite(cells.costs[frame])) costs.push(cells.costs[frame]);
+  }
+  if (costs.length < MIN_GOOD) return null;
+  costs.sort((a, b) => a - b);
+  const tenth = Math.floor(costs.length / 10);
+  return [costs[tenth], costs[costs.length - 1 - tenth]];
 }

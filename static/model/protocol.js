@@ -12,8 +12,8 @@
  * @typedef {"move" | "turn" | "push" | "bend"} DragMode
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
  * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |
- *   "new_sizes" | "result" | "residual" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" | "floor_sight"}
- *   PathKind
+ *   "new_sizes" | "former" | "result" | "residual" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" |
+ *   "floor_sight"} PathKind
  * @typedef {"running" | "paused" | "over"} RunState
  * @typedef {"left" | "right" | ""} Side
  * @typedef {{type: "seek", frame: number}} Seek
@@ -44,7 +44,8 @@
  * @typedef {{type: "pin", phase: GesturePhase, frame: number, camera: number, person: number, point: string, u: number,
  *   v: number, live: boolean}} DragPin
  * @typedef {{type: "unpin", frame: number, person: number, point: string | null, camera: number | null}} RemovePins
- * @typedef {{type: "fit", frame: number, person?: number | null}} FitPose
+ * @typedef {{type: "fit", frame: number, person?: number | null, point?: string | null}} FitPose
+ * @typedef {{type: "limb_back", frame: number}} TakeLimbBack
  * @typedef {{type: "search", action: "step" | "stage" | "frame" | "contours" | "chains" | "stop", person?: number |
  *   null}} RunSearch
  * @typedef {{type: "search", action: "again", run?: number | null, person?: number | null}} RepeatSearch
@@ -67,6 +68,7 @@
  * @typedef {{type: "compare_range", first: number | null, last: number | null}} CompareRange
  * @typedef {{type: "stop_range"}} StopRange
  * @typedef {{type: "mark", toggle: "keyframe" | "reviewed"}} ToggleMark
+ * @typedef {{type: "confirm_keyframe", person: number, frame: number}} ConfirmKeyframe
  * @typedef {{type: "follow", follow: boolean}} FollowTracking
  * @typedef {{method?: "chamfer" | "contour" | "voxel", stride?: number, cameras?: string[], estimate?: "refine" |
  *   "search", order?: number, past_poses?: number, recover?: boolean, backward_pass?: boolean, smooth?: boolean}}
@@ -104,9 +106,11 @@
  *   per_second: number, best_px: number | null, message: string}} Job
  * @typedef {{run: number, step: number, steps: number, stage: string | null}} ReplayedStep
  * @typedef {{run: number, candidate: number}} PreviewedCandidate
+ * @typedef {{person: number, limb: string, distance_cm: number}} MovedLimb
  * @typedef {{number: number, work: "fit" | "search", before_px: number | null, after_px: number | null,
- *   before_view_costs_px: (number | null)[], after_view_costs_px: (number | null)[], warning: string, is_before_shown:
- *   boolean}} Compared
+ *   before_view_costs_px: (number | null)[], after_view_costs_px: (number | null)[], warning: string, moved:
+ *   MovedLimb[], is_before_shown: boolean}} Compared
+ * @typedef {{person: number, points: string[], camera: number}} UnseenDepth
  * @typedef {{running: boolean, first: number | null, last: number | null, at: number | null, done: number, total:
  *   number, per_second: number, doubtful: number, lost: number, back: boolean, message: string}} Track
  * @typedef {{running: boolean, what: string, done: number, total: number, message: string}} RangeWork
@@ -117,9 +121,9 @@
  *   cost_px: number | null, view_costs_px: (number | null)[], source: string | null, status: Status, remark: string,
  *   part_costs_px: (number | null)[], dofs: number[], locked: number[], other_sizes: boolean, job: Job, replay:
  *   ReplayedStep | null, compared_run: number | null, preview: PreviewedCandidate | null, compared: Compared | null,
- *   track: Track, range: RangeWork, follow: boolean, snapped: number | null, floor: FloorPicking | null, footage:
- *   FootageProgress, compiling: string | null, undo: string | null, redo: string | null, saved: boolean, save_error:
- *   string | null}} StateMessage
+ *   unseen_depth: UnseenDepth | null, track: Track, range: RangeWork, follow: boolean, snapped: number | null, floor:
+ *   FloorPicking | null, footage: FootageProgress, compiling: string | null, undo: string | null, redo: string | null,
+ *   saved: boolean, save_error: string | null}} StateMessage
  * @typedef {{edit: number, label: string, author: string, time: string, undone: boolean}} HistoryEntry
  * @typedef {{type: "history", entries: HistoryEntry[], later: boolean, earlier: boolean}} HistoryMessage
  * @typedef {{type: "notice", level: "error" | "info", text: string}} NoticeMessage
@@ -127,11 +131,16 @@
  *   boolean, ambiguous: boolean, limbs_lost: number[]}} Cell
  * @typedef {{type: "timeline", person: number | null, cells: Record<string, Cell | null>, replace: boolean}}
  *   TimelineMessage
- * @typedef {{type: "inconsistent", frames: number[]}} InconsistentMessage
+ * @typedef {{camera: number, cost_px: number, usual_px: number}} RaisedViewCost
+ * @typedef {{person: number, frame: number, distance_cm: number | null, point: string, views: RaisedViewCost[]}}
+ *   KeyframeDoubt
+ * @typedef {{type: "inconsistent", frames: number[], keyframes: KeyframeDoubt[]}} InconsistentMessage
  * @typedef {{frame: number, method: string, other_method: string, cost_px: number | null, other_cost_px: number | null,
  *   status: string, other_status: string, apart_mm: number, farthest_mm: number, farthest: string}} ComparedPose
- * @typedef {{type: "range_comparison", first: number | null, last: number | null, people: ComparedPose[][]}}
- *   RangeComparisonMessage
+ * @typedef {{person: number, first: number, last: number, frames: number, verdict: "better" | "worse" | "same"}}
+ *   Stretch
+ * @typedef {{type: "range_comparison", first: number | null, last: number | null, people: ComparedPose[][], stretches:
+ *   Stretch[], run: number | null}} RangeComparisonMessage
  * @typedef {{level: "known" | "weak" | "unknown", sigma: number, sentence: string}} DofObservability
  * @typedef {{type: "observability", frame: number, person: number, dofs: DofObservability[]}} ObservabilityMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null, bound_m:
@@ -201,11 +210,12 @@
  *   HoldPoint} PoseEdit
  * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowBefore | ShowCurves | WatchTab | ShowHistory |
  *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
- *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | RunSearch | RepeatSearch | SetSearchSpeed |
- *   SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape | SetLandscapeDof |
- *   StartTracking | ControlTracking | EditRange | CompareRange | StopRange | ToggleMark | FollowTracking |
- *   SetTrackSettings | SetView3d | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes |
- *   AcquireSizes | FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | TakeLimbBack | RunSearch | RepeatSearch |
+ *   SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape |
+ *   SetLandscapeDof | StartTracking | ControlTracking | EditRange | CompareRange | StopRange | ToggleMark |
+ *   ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d | SetHeight | SetPartSizes | SetGirdleWidth |
+ *   CoupleSides | ApplySizes | DraftSizes | AcquireSizes | FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo |
+ *   Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
  *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage} TextMessage

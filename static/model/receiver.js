@@ -82,7 +82,7 @@ export class Receiver {
         this.#store.set({ rangeComparison: message.first === null ? null : message });
         break;
       case "inconsistent":
-        this.#store.set({ disagreeing: message.frames });
+        this.#store.set({ disagreeing: message.frames, keyframeDoubts: message.keyframes });
         break;
       case "history":
         this.#store.set({ history: message });

@@ -24,6 +24,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("./cells.js").Cells} timeline cells of all people together
  * @property {import("./cells.js").Cells[]} lanes cells of each person, if there are several
  * @property {number[]} disagreeing frames whose pose is inconsistent with its neighbours, ascending
+ * @property {import("./protocol.js").KeyframeDoubt[]} keyframeDoubts keyframes that their neighbours or views contradict
  * @property {import("./protocol.js").ObservabilityMessage | null} observability of the selected person
  * @property {import("./protocol.js").RangeComparisonMessage | null} rangeComparison poses of a range and those that they replaced
  * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
@@ -84,6 +85,7 @@ export class Store {
     observability: null,
     rangeComparison: null,
     disagreeing: [],
+    keyframeDoubts: [],
     visible: null,
     curves: null,
     drawer: null,

@@ -47,6 +47,7 @@ export const LINE_STYLES = {
   result: { width: 2, dash: [0.5, 4.5], layer: null, hasOutline: true, ofPerson: true },
   alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: null, hasOutline: true, ofPerson: true },
   new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: null, hasOutline: true, ofPerson: true },
+  former: { width: 1.5, dash: [9, 4, 2, 4], layer: null, hasOutline: true, ofPerson: true },
   residual: { width: 1, dash: [], layer: null, hasOutline: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasOutline: true },
   epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasOutline: true },

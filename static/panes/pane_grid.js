@@ -5,6 +5,7 @@ import { keep, kept, keptByName } from "../layout/kept_views.js";
 import { followView, keepLink, keptLink } from "./linked_views.js";
 import { Pane } from "./pane.js";
 import { PaneBorders } from "../layout/pane_borders.js";
+import { isInSight } from "../model/selectors.js";
 import { PaneShares } from "../layout/pane_shares.js";
 
 /** Two digits within this time form one number. */
@@ -35,6 +36,8 @@ export class PaneGrid {
   #isOpening = false;
   /** Panes whose view changes with that of another, or of all. @type {Set<number>} */
   #following = new Set();
+  /** Cameras of the views that were zoomed to joints last. @type {Set<number>} */
+  #zoomedToJoints = new Set();
 
   /**
    * @param {HTMLElement} element
@@ -157,6 +160,32 @@ export class PaneGrid {
     });
   }
 
+  /**
+   * Zoom the views that show some joints of a person to them; those in which they are occluded only if no view shows them.
+   * The other views stay, but those that an earlier call had zoomed show the whole person again.
+   *
+   * @param {number} person
+   * @param {string[]} points
+   */
+  frameJoints(person, points) {
+    const { overlay, session, state } = this.#store.facts;
+    const handles = (overlay?.handles ?? []).filter((one) => one.person === person);
+    const inside = handles.filter(({ camera, u, v }) => {
+      const { width, height } = session?.cameras[camera] ?? { width: 0, height: 0 };
+      return u >= 0 && v >= 0 && u < width && v < height;
+    });
+    const meant = inside.filter(({ point }) => points.includes(point));
+    const seen = meant.filter((one) => isInSight(state, one));
+    const cameras = new Set((seen.length ? seen : meant).map(({ camera }) => camera));
+    const moved = [...new Set([...cameras, ...this.#zoomedToJoints])];
+    this.#following = new Set(moved);
+    for (const camera of moved) {
+      const [ofBody, own] = [inside, meant].map((joints) => joints.filter((one) => one.camera === camera));
+      this.panes[camera].frame(cameras.has(camera) ? withMargin(own, extentOf(ofBody)) : ofBody);
+    }
+    this.#zoomedToJoints = cameras;
+  }
+
   /** Whether panes have other sizes than the automatic ones. */
   get isResized() {
     return this.#shares.isChosen;
@@ -216,6 +245,7 @@ export class PaneGrid {
     const described = JSON.stringify([name, cameras]);
     if (described === this.#built) return;
     this.#built = described;
+    this.#zoomedToJoints.clear();
     this.#shares.open(name);
     const views = keptByName("views", name);
     this.#isOpening = views === null;
@@ -299,4 +329,33 @@ export class PaneGrid {
   #ask(reductions) {
     if (reductions.join() !== this.#store.facts.reductions.join()) this.#store.set({ reductions });
   }
+}
+
+/** Smallest size of what is framed, in that of the body: a limb is judged by what it hangs on. */
+const MIN_SHARE = 0.4;
+
+/** @typedef {{u: number, v: number}} Place */
+
+/**
+ * The longer side of the box around places, px.
+ *
+ * @param {Place[]} places
+ */
+function extentOf(places) {
+  const span = (/** @type {number[]} */ values) => Math.max(...values) - Math.min(...values);
+  return Math.max(span(places.map(({ u }) => u)), span(places.map(({ v }) => v)));
+}
+
+/**
+ * Places whose box surrounds others, and is at least a share of the body wide and high.
+ *
+ * @param {Place[]} places
+ * @param {number} body size of the body, px
+ * @returns {Place[]}
+ */
+function withMargin(places, body) {
+  const mean = (/** @type {number[]} */ values) => (Math.max(...values) + Math.min(...values)) / 2;
+  const middle = { u: mean(places.map(({ u }) => u)), v: mean(places.map(({ v }) => v)) };
+  const half = (MIN_SHARE * body) / 2;
+  return [...places, { u: middle.u - half, v: middle.v - half }, { u: middle.u + half, v: middle.v + half }];
 }

@@ -19,6 +19,7 @@ const NAMES = {
   alternative: () => "alternative pose",
   result: ({ compared }) => `result of the ${compared?.work}`,
   new_sizes: () => "new body sizes",
+  former: () => "limb before the fit",
 };
 
 export class PoseLegend {

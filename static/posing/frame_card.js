@@ -1,5 +1,6 @@
 /** Card with the status of the current frame, which opens to the cost of each body part. */
 
+import { contradictions, keyframeDoubt } from "../model/keyframe_doubts.js";
 import { button, byId } from "../widgets/elements.js";
 import { displayName, px } from "../widgets/text.js";
 
@@ -28,7 +29,7 @@ export class FrameCard {
       this.#show();
     });
     store.subscribe((changed) => {
-      if (changed.has("state")) this.#show();
+      if (changed.has("state") || changed.has("keyframeDoubts")) this.#show();
     });
   }
 
@@ -37,10 +38,13 @@ export class FrameCard {
     if (!state || !session) return;
     const { status, remark, part_costs_px, person, people } = state;
     this.#other.hidden = !people.some(({ alternatives, shown }) => alternatives > 0 && shown);
-    this.#card.hidden = status === "" && part_costs_px.length === 0;
-    this.#badge.className = `status-badge is-${status}`;
-    this.#badge.textContent = status || "not assessed";
-    this.#remark.textContent = remark;
+    const doubt = keyframeDoubt(this.#store.facts, state.frame, person);
+    this.#card.hidden = !doubt && status === "" && part_costs_px.length === 0;
+    this.#badge.className = `status-badge is-${doubt ? "doubtful" : status}`;
+    this.#badge.textContent = doubt ? "check" : status || "not assessed";
+    this.#remark.textContent = doubt
+      ? `This keyframe disagrees ${contradictions(doubt, session).join("; ")}. Correct it, or keep it (Alt+Enter).`
+      : remark;
     if (this.#card.hidden || !this.#card.open) return;
     const names = session.people[person].parts;
     const cells = leftBesideRight(names).flatMap((part) => (part === null ? gap() : row(names[part], part_costs_px[part] ?? null)));

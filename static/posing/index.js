@@ -7,10 +7,11 @@
 import { byId } from "../widgets/elements.js";
 import { FrameCard } from "./frame_card.js";
 import { JointBar } from "./joint_bar.js";
+import { PoseNotes } from "./pose_notes.js";
 import { PinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
-import { pinBindings, posingBindings } from "./posing_keys.js";
+import { noteBindings, pinBindings, posingBindings } from "./posing_keys.js";
 
 /** @typedef {ReturnType<typeof mount>} PosingRoom */
 
@@ -20,13 +21,14 @@ import { pinBindings, posingBindings } from "./posing_keys.js";
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
  */
-export function mount({ store, send, notify, reasons }, { grid }) {
+export function mount({ store, send, notify, reasons, actions }, { grid }) {
   const pinning = new Pinning(store, send, notify);
   grid.addPointerTarget(pinning);
   const posing = new Posing(store, send);
   const jointBar = new JointBar(byId("joint-bar", HTMLElement), store, posing, notify);
   new FrameCard(store, posing);
   new PinBar(store, pinning);
-  const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away)];
+  const notes = new PoseNotes({ store, actions, pinning, grid });
+  const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...noteBindings(notes, reasons.away)];
   return { posing, pinning, bindings };
 }

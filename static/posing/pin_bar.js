@@ -1,13 +1,16 @@
 /** Pins of the selected joint: their number, error and actions. */
 
 import { button, byId } from "../widgets/elements.js";
+import { Menu } from "../widgets/menu.js";
 import { displayName } from "../widgets/text.js";
 
 export class PinBar {
   #store;
+  #pinning;
   #mode;
   #fit;
   #clear;
+  #choices = byId("fit-choices", HTMLButtonElement);
   #figures = byId("pin-figures", HTMLOutputElement);
   #live = byId("pin-live", HTMLInputElement);
   #hint = byId("pin-hint", HTMLElement);
@@ -19,9 +22,11 @@ export class PinBar {
    */
   constructor(store, pinning) {
     this.#store = store;
+    this.#pinning = pinning;
     this.#mode = button("pin-mode", () => pinning.toggle());
     this.#fit = button("pin-fit", () => pinning.fit());
     this.#clear = button("pin-clear", () => pinning.clear());
+    new Menu(this.#choices, byId("fit-menu", HTMLElement), () => ({ items: this.#fits() }));
     this.#live.addEventListener("change", () => {
       pinning.toggleLive();
       this.#live.blur();
@@ -36,7 +41,7 @@ export class PinBar {
     const joint = state?.point ? displayName(state.point) : null;
     const pins = overlay?.pins ?? [];
     const ofPerson = pins.filter(({ person }) => person === state?.person).length;
-    this.#mode.disabled = this.#fit.disabled = this.#live.disabled = !connected || !state;
+    this.#mode.disabled = this.#fit.disabled = this.#choices.disabled = this.#live.disabled = !connected || !state;
     this.#clear.disabled = !connected || ofPerson === 0;
     this.#mode.setAttribute("aria-pressed", String(pinning));
     this.#live.checked = livePins;
@@ -51,6 +56,27 @@ export class PinBar {
     this.#hint.hidden = !pinning || joint === null;
     if (!this.#hint.hidden) this.#hint.textContent = `Pin ${joint}: click its position in each view. Esc to finish.`;
     this.#panes.classList.toggle("is-pinning", pinning);
+  }
+
+  /** Whom or what a fit may move. */
+  #fits() {
+    const { state, session } = this.#store.facts;
+    if (!state || !session) return [];
+    const { limb } = this.#pinning;
+    const name = session.people[state.person].name;
+    const isOne = this.#store.facts.scope === "one" || session.people.length < 2;
+    const everybody = { text: "All placed people", note: isOne ? "" : "G", title: "Fit everybody who is placed on this frame", run: () => this.#pinning.fit(null) };
+    return [
+      ...(session.people.length > 1 ? [everybody] : []),
+      { text: `Only ${name}`, note: isOne ? "G" : "", title: `Fit ${name} to pins and edges; the others stay`, run: () => this.#pinning.fit(state.person) },
+      {
+        text: limb ? `Only the ${limb}` : "Only a limb",
+        note: limb ? "Alt+G" : "select a joint",
+        title: limb ? `Fit the ${limb} to pins and edges; the rest of the body stays` : "Select a joint of the limb first",
+        isDisabled: limb === null,
+        run: () => this.#pinning.fitLimb(),
+      },
+    ];
   }
 
   /**

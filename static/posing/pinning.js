@@ -81,10 +81,36 @@ export class Pinning {
     else this.#say("This person has no pins on this frame.");
   }
 
-  /** Fit all placed people, or only the active person, to pins and edges. */
-  fit() {
-    const { facts } = this.#store;
-    if (facts.state) this.#send({ type: "fit", frame: facts.state.frame, person: scopePerson(facts) });
+  /**
+   * Fit all placed people, or only the active person, to pins and edges.
+   *
+   * @param {number | null} person null for all placed people
+   */
+  fit(person = scopePerson(this.#store.facts)) {
+    const { state } = this.#store.facts;
+    if (state) this.#send({ type: "fit", frame: state.frame, person });
+  }
+
+  /** Display name of the limb of the selected joint; null where no joint of a limb is selected. */
+  get limb() {
+    const { state, session } = this.#store.facts;
+    const person = state && session?.people[state.person];
+    const limb = state?.point ? person?.point_limbs[state.point] : undefined;
+    return limb && limb.dofs.length > 0 && state?.point !== person?.points[0] ? limb.name : null;
+  }
+
+  /** Fit only the limb of the selected joint to pins and edges. */
+  fitLimb() {
+    const { state } = this.#store.facts;
+    if (state && this.limb !== null) this.#send({ type: "fit", frame: state.frame, person: state.person, point: state.point });
+    else this.#say("Select a joint of the limb first: click it in a view, then press Alt+G.");
+  }
+
+  /** Put the limb back that the last fit moved farthest although nobody had touched it. */
+  takeLimbBack() {
+    const { state } = this.#store.facts;
+    if (state?.compared?.moved.length) this.#send({ type: "limb_back", frame: state.frame });
+    else this.#say("The last fit moved no limb that nobody had touched. Ctrl+Z takes the whole fit back.");
   }
 
   /**

@@ -75,6 +75,19 @@ export function pinBindings(pinning, why) {
     { keys: ["X"], label: "Pin the selected joint by clicks (toggle)", matches: plain("x"), run: () => pinning.toggle() },
     { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },
     {
+      keys: ["Alt G"],
+      label: "Fit only the limb of the selected joint",
+      words: "arm leg part",
+      matches: alt("KeyG", false),
+      run: () => pinning.fitLimb(),
+    },
+    {
+      keys: ["Alt B"],
+      label: "Take back the limb that the last fit moved although nobody had touched it",
+      matches: alt("KeyB", false),
+      run: () => pinning.takeLimbBack(),
+    },
+    {
       keys: ["Shift G"],
       label: "Update the body while a pin is dragged (toggle)",
       matches: shift("g"),
@@ -94,4 +107,21 @@ export function pinBindings(pinning, why) {
     },
   ];
   return inArea("Pins", bindings, why);
+}
+
+/**
+ * @param {import("./pose_notes.js").PoseNotes} notes
+ * @param {() => string | null} away
+ */
+export function noteBindings(notes, away) {
+  return inArea("Posing", [
+    {
+      keys: ["Alt V"],
+      label: "Fill the grid with the view that looks across the last placed joint",
+      words: "depth opposite side",
+      matches: alt("KeyV", false),
+      why: () => away() ?? notes.whyNotAcross,
+      run: () => notes.showAcross(),
+    },
+  ]);
 }

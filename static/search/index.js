@@ -15,10 +15,11 @@ import { SearchPanel } from "./search_panel.js";
  * Build the tabs of the drawer that show searches.
  *
  * @param {import("../model/index.js").Context} context
+ * @param {import("../timeline/index.js").TimelineRoom} timeline
  */
-export function mount({ store, send, actions, navigation, reasons }) {
+export function mount({ store, send, actions, navigation, reasons }, { drawer }) {
   new SearchPanel(store, actions, send);
   new CostLandscape(store, send);
-  new RunComparison(store, navigation, actions);
+  new RunComparison(store, navigation, actions, () => drawer.open("runs"));
   return { bindings: searchBindings(store, actions, reasons) };
 }

@@ -1,9 +1,12 @@
 /** Tab of the drawer that compares the poses of a range with those that they replaced, such as those of another tracker. */
 
 import { button, byId } from "../widgets/elements.js";
-import { count, displayName } from "../widgets/text.js";
+import { capital, count, displayName } from "../widgets/text.js";
 
-/** @typedef {import("../model/protocol.js").ComparedPose} ComparedPose */
+/**
+ * @typedef {import("../model/protocol.js").ComparedPose} ComparedPose
+ * @typedef {import("../model/protocol.js").Stretch} Stretch
+ */
 
 /** Smallest difference of costs that counts, px: as much as is displayed. */
 const LEAST_PX = 0.005;
@@ -11,6 +14,8 @@ const LEAST_PX = 0.005;
 export class RunComparison {
   #store;
   #navigation;
+  #actions;
+  #open;
   #panel = byId("run-comparison", HTMLElement);
   #controls = byId("run-comparison-controls", HTMLElement);
   #text = byId("run-comparison-text", HTMLElement);
@@ -20,24 +25,44 @@ export class RunComparison {
   #heads = [byId("run-comparison-now", HTMLElement), byId("run-comparison-other", HTMLElement)];
   #take;
   #end;
+  #stretches = byId("run-stretches", HTMLElement);
+  /** Stretches of the last run that the user has kept, by person and first frame. @type {Set<string>} */
+  #kept = new Set();
+  /** @type {number | null | undefined} the last run; undefined before the first message */
+  #run;
 
   /**
    * @param {import("../model/store.js").Store} store
    * @param {import("../model/navigation.js").Navigation} navigation
    * @param {import("../model/actions.js").Actions} actions
+   * @param {() => void} open opens the tab
    */
-  constructor(store, navigation, actions) {
+  constructor(store, navigation, actions, open) {
     this.#store = store;
+    this.#actions = actions;
+    this.#open = open;
     this.#navigation = navigation;
     this.#take = button("run-comparison-take", () => actions.takeReplaced());
     this.#end = button("run-comparison-end", () => actions.compareRange(false));
     store.subscribe((changed) => {
+      if (changed.has("rangeComparison")) this.#followRun();
       const isOpen = store.facts.drawer === "runs";
       this.#panel.hidden = this.#controls.hidden = !isOpen;
       if (!isOpen) return;
       if (["drawer", "rangeComparison", "state", "connected"].some((fact) => changed.has(/** @type {"drawer"} */ (fact)))) this.#show();
       if (changed.has("drawer") || changed.has("rangeComparison") || changed.has("target")) this.#mark();
     });
+  }
+
+  /** Open the tab when a run has replaced poses by better or worse ones. */
+  #followRun() {
+    const run = this.#store.facts.rangeComparison?.run ?? null;
+    const isFirst = this.#run === undefined; // the page was opened after the run
+    if (run === this.#run) return;
+    this.#run = run;
+    if (isFirst || run === null) return;
+    this.#kept.clear();
+    this.#open();
   }
 
   #show() {
@@ -53,12 +78,40 @@ export class RunComparison {
     this.#empty.textContent = rangeComparison
       ? `No pose${name} in this range replaced another.`
       : "Track a range by one method, then by the other. Mark the range in the timeline and press Compare.";
-    this.#text.textContent = poses.length > 0 ? summary(poses, name) : "";
+    const stretches = (rangeComparison?.stretches ?? []).filter((one) => one.person === person);
+    const isRun = (rangeComparison?.run ?? null) !== null;
+    this.#text.textContent = poses.length > 0 ? (isRun ? gain(stretches, poses.length, name) : summary(poses, name)) : "";
+    const open = stretches.filter((one) => !this.#kept.has(keyOf(one)));
+    this.#stretches.hidden = !isRun || open.length === 0;
+    this.#stretches.replaceChildren(...open.map((one) => this.#stretch(one, isBusy)));
     this.#heads[0].textContent = `Present: ${methods(poses.map(({ method }) => method))}, cost in px and status`;
     this.#heads[1].textContent = `Replaced: ${methods(poses.map(({ other_method }) => other_method))}, cost in px and status`;
     const largest = Math.max(1, ...poses.map(({ apart_mm }) => apart_mm));
     this.#rows.replaceChildren(...poses.map((pose) => this.#row(pose, largest)));
     this.#mark();
+  }
+
+  /**
+   * @param {Stretch} stretch
+   * @param {boolean} isBusy
+   */
+  #stretch(stretch, isBusy) {
+    const { first, last, person, verdict, frames } = stretch;
+    const item = document.createElement("li");
+    item.className = `is-${verdict}`;
+    const named = first === last ? `frame ${first}` : `frames ${first}–${last}`;
+    const go = small(capital(named), `Go to frame ${first}`, () => this.#navigation.goTo(first));
+    const text = Object.assign(document.createElement("span"), { textContent: `${verdict} on ${count(frames)}` });
+    const keep = small("Keep", `Keep the new poses of ${named}`, () => {
+      this.#kept.add(keyOf(stretch));
+      this.#show();
+    });
+    const back = small("Take back", `Put the replaced poses of ${named} back; keyframes stay. Again takes the new ones`, () =>
+      this.#actions.takeReplaced({ person, first, last }),
+    );
+    back.disabled = isBusy;
+    item.append(go, text, keep, back);
+    return item;
   }
 
   /**
@@ -115,6 +168,35 @@ function summary(poses, name) {
   const lost = [poses.filter(({ status: s }) => s === "lost").length, poses.filter(({ other_status: s }) => s === "lost").length];
   const frames = `${count(poses.length)} frame${poses.length === 1 ? "" : "s"}`;
   return `${frames}${name}: ${mean.toFixed(1)} mm apart, present pose cheaper on ${count(better)}, lost ${lost[0]} against ${lost[1]}`;
+}
+
+/**
+ * Gain and harm of a run, as in "Tracked again 60 frames: better on 40, worse on 3".
+ *
+ * @param {Stretch[]} stretches
+ * @param {number} replaced number of frames that replaced a pose
+ * @param {string} name
+ */
+function gain(stretches, replaced, name) {
+  const on = (/** @type {Stretch["verdict"]} */ kind) =>
+    count(stretches.filter(({ verdict }) => verdict === kind).reduce((sum, { frames }) => sum + frames, 0));
+  return `Tracked again${name}, ${count(replaced)} frame${replaced === 1 ? "" : "s"}: better on ${on("better")}, worse on ${on("worse")}`;
+}
+
+/** @param {Stretch} stretch */
+function keyOf({ person, first }) {
+  return `${person} ${first}`;
+}
+
+/**
+ * @param {string} text
+ * @param {string} title
+ * @param {() => void} run
+ */
+function small(text, title, run) {
+  const one = Object.assign(document.createElement("button"), { type: "button", textContent: text, title });
+  one.addEventListener("click", run);
+  return one;
 }
 
 /** @param {string[]} all */

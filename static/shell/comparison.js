@@ -1,6 +1,5 @@
 /** Before and after of the last fit or search: costs in the top bar and for each view, and a switch between the poses. */
 
-import { hasSearch } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 import { px } from "../widgets/text.js";
@@ -10,7 +9,6 @@ const LEAST_PX = 0.005;
 
 export class Comparison {
   #store;
-  #notify;
   #before = byId("show-comparison", HTMLButtonElement);
   #toggle;
   #toggleHere;
@@ -20,17 +18,13 @@ export class Comparison {
   #title = byId("comparison-title", HTMLElement);
   #views = byId("comparison-views", HTMLElement);
   #warning = byId("comparison-warning", HTMLElement);
-  /** @type {number | null} the result whose warning was shown or is not new; null before the first state */
-  #known = null;
 
   /**
    * @param {import("../model/store.js").Store} store
    * @param {import("../model/actions.js").Actions} actions
-   * @param {(notice: import("../model/protocol.js").NoticeMessage) => void} notify
    */
-  constructor(store, actions, notify) {
+  constructor(store, actions) {
     this.#store = store;
-    this.#notify = notify;
     this.#toggle = button("toggle-before", () => actions.toggleBefore());
     this.#toggleHere = button("toggle-before-here", () => actions.toggleBefore());
     opensPopover(this.#panel, this.#before, () => togglePopover(this.#panel, this.#cost));
@@ -49,7 +43,6 @@ export class Comparison {
     this.#badge.hidden = !isBefore;
     if (!state || !last) {
       if (this.#panel.matches(":popover-open")) this.#panel.hidePopover();
-      this.#known ??= state ? -1 : null;
       return;
     }
     const was = last.before_px?.toFixed(2) ?? "–";
@@ -62,7 +55,6 @@ export class Comparison {
     this.#toggleHere.textContent = isBefore ? "Show result" : "Show before";
     this.#toggle.setAttribute("aria-label", label);
     this.#list(last);
-    this.#warn(last);
   }
 
   /** @param {import("../model/protocol.js").Compared} last */
@@ -76,18 +68,6 @@ export class Comparison {
     );
     this.#warning.hidden = last.warning === "";
     this.#warning.textContent = last.warning;
-  }
-
-  /**
-   * Show a warning once, when its search has ended.
-   *
-   * @param {import("../model/protocol.js").Compared} last
-   */
-  #warn({ number, warning }) {
-    if (this.#known === null) this.#known = number; // found when the page was opened
-    if (number === this.#known || hasSearch(this.#store.facts.state)) return;
-    this.#known = number;
-    if (warning) this.#notify({ type: "notice", level: "info", text: warning });
   }
 }
 

@@ -1,12 +1,14 @@
 /**
- * First steps: the shortest way from a new session to a tracked one. Shown until the user closes them or tracks for the
- * first time; the palette shows them again.
+ * First steps: the shortest way from a new session to a tracked one. Shown in each session until the user closes them
+ * there or it has tracked poses; the palette shows them again.
  */
 
+import { NO_POSE, SOURCES } from "../model/cells.js";
 import { hasTrack } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
 
-const STORED = "quadrille.first_steps";
+const STORED = "quadrille.first_steps.";
+const BY_A_RUN = ["tracked", "smoothed"].map((source) => SOURCES.indexOf(source));
 /** A body that nobody has placed, with a higher cost, stands too far from the person to be found by a search, px. */
 const FAR_PX = 10;
 
@@ -17,6 +19,8 @@ export class FirstSteps {
   #search = byId("first-search", HTMLElement);
   #fit = byId("first-fit", HTMLElement);
   #track = byId("first-track", HTMLElement);
+  /** Whether the user has asked for the first steps. */
+  #isAsked = false;
   /** Whether the last state had a tracking run; null before the first state. */
   #wasTracking = /** @type {boolean | null} */ (null);
 
@@ -32,11 +36,13 @@ export class FirstSteps {
     store.subscribe((changed) => {
       if (changed.has("session")) this.#begin();
       if (changed.has("state")) this.#follow();
+      if (changed.has("timeline") && !this.#isAsked && this.#isTracked()) this.#row.hidden = true;
     });
   }
 
   /** Show the first steps and focus their button. */
   show() {
+    this.#isAsked = true;
     this.#row.hidden = false;
     byId("close-first-steps", HTMLButtonElement).focus();
   }
@@ -46,7 +52,14 @@ export class FirstSteps {
     byId("first-body", HTMLElement).hidden = !isOne;
     byId("first-each", HTMLElement).hidden = isOne;
     this.#showPlace(!isOne);
-    if (localStorage.getItem(STORED) !== "seen") this.#row.hidden = false;
+    this.#isAsked = false;
+    this.#row.hidden = localStorage.getItem(STORED + this.#store.facts.session?.name) === "seen";
+  }
+
+  /** Whether the session has a pose of a tracking run. */
+  #isTracked() {
+    const { sources } = this.#store.facts.timeline;
+    return sources.some((source) => source !== NO_POSE && BY_A_RUN.includes(source));
   }
 
   /** @param {boolean} isShown whether the first step is to place the people */
@@ -70,7 +83,7 @@ export class FirstSteps {
   }
 
   #close() {
-    localStorage.setItem(STORED, "seen");
+    localStorage.setItem(STORED + this.#store.facts.session?.name, "seen");
     this.#row.hidden = true;
   }
 }

@@ -19,7 +19,6 @@ import { People } from "./people.js";
 import { peopleBindings } from "./people_keys.js";
 import { showProgressMarks } from "./progress_marks.js";
 import { SavedMark } from "./saved_mark.js";
-import { Sessions } from "./sessions.js";
 import { escapeBinding, helpBindings } from "./shell_keys.js";
 import { TopBar } from "./top_bar.js";
 import { Workspace } from "./workspace.js";
@@ -32,6 +31,7 @@ import { Workspace } from "./workspace.js";
  * @property {import("../search/index.js").SearchRoom} search
  * @property {import("../scene/index.js").SceneRoom} scene
  * @property {import("../inspector/index.js").InspectorRoom} inspector
+ * @property {import("../sessions/index.js").SessionsRoom} sessions
  */
 
 /**
@@ -47,7 +47,7 @@ export function mount(context, rooms) {
   const notices = new Notices();
   context.onNotice((notice) => notices.show(notice));
   new TopBar(store, actions);
-  new Comparison(store, actions, context.notify);
+  new Comparison(store, actions);
   const people = new People(store, actions, posing);
   showProgressMarks(store);
   watchConnection(byId("banner", HTMLElement), store);
@@ -55,7 +55,6 @@ export function mount(context, rooms) {
   const history = new HistoryList(store, send);
   new ExportPanel(store, context.notify);
   new SavedMark(store, send);
-  const sessions = new Sessions(store, context.notify);
   new Announcer(byId("announcer", HTMLElement), store);
   const firstSteps = new FirstSteps(store);
   const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: rooms.inspector.inspector, away: reasons.away });
@@ -63,7 +62,8 @@ export function mount(context, rooms) {
   button("show-palette", () => palette.toggle());
 
   const own = [
-    ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, sessions, reasons }),
+    ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }),
+    ...rooms.sessions.bindings,
     escapeBinding({ store, actions, notices, grid, gestures, pinning, floor: rooms.scene.floor }),
     ...peopleBindings({ actions, posing, people, reasons }),
     ...workspace.bindings,

@@ -9,10 +9,10 @@ import { closePopover } from "../widgets/popovers.js";
 /**
  * @param {{actions: import("../model/actions.js").Actions, history: import("./history_list.js").HistoryList,
  *   notices: import("./notices.js").Notices, palette: import("./palette.js").Palette,
- *   sessions: import("./sessions.js").Sessions, keyList: import("./key_list.js").KeyList, firstSteps: import("./first_steps.js").FirstSteps,
+ *   keyList: import("./key_list.js").KeyList, firstSteps: import("./first_steps.js").FirstSteps,
  *   reasons: import("../model/unavailable_reasons.js").Reasons}} parts
  */
-export function helpBindings({ actions, history, notices, palette, keyList, firstSteps, sessions, reasons }) {
+export function helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }) {
   const shift = (/** @type {string} */ key) => plain(key, undefined, true);
   return inArea("History and help", [
     { keys: ["Ctrl K"], label: "Commands", matches: control("k", false), anywhere: true, run: () => palette.toggle() },
@@ -36,21 +36,6 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
     { keys: ["Shift H"], label: "Messages", matches: shift("h"), run: () => notices.toggleLog() },
     { keys: ["Shift Esc"], label: "Dismiss all messages", matches: shift("escape"), run: () => notices.dismissAll() },
     { keys: ["?"], label: "Keyboard shortcuts", matches: (event) => event.key === "?", run: () => keyList.show() },
-    {
-      keys: ["Ctrl O"],
-      label: "Open another session",
-      words: "recent sessions folder recording file load switch",
-      matches: control("o", false),
-      anywhere: true,
-      run: () => sessions.toggle(),
-    },
-    {
-      keys: [],
-      label: "New session from videos and a calibration",
-      words: "create recording footage form",
-      matches: () => false,
-      run: () => sessions.showNew(),
-    },
     {
       keys: [],
       label: "First steps with a new recording",

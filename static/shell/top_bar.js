@@ -1,6 +1,7 @@
 /** Top bar: session, search or tracking progress, cost, undo and redo. */
 
-import { hasSearch, hasTrack, stopTitle } from "../model/selectors.js";
+import { usualCosts } from "../model/cells.js";
+import { hasSearch, hasTrack, personCells, stopTitle } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
 import { count, displayName, px } from "../widgets/text.js";
 
@@ -8,6 +9,7 @@ export class TopBar {
   #store;
   #session = byId("session-name", HTMLElement);
   #cost = byId("cost", HTMLElement);
+  #usual = byId("usual-cost", HTMLOutputElement);
   #stage = byId("search-stage", HTMLElement);
   #stages = byId("search-stages", HTMLElement);
   #figures = byId("search-figures", HTMLElement);
@@ -31,6 +33,7 @@ export class TopBar {
     store.subscribe((changed) => {
       if (changed.has("session")) this.#showSession();
       if (changed.has("state") || changed.has("connected") || changed.has("session")) this.#showState();
+      if (["timeline", "lanes", "session", "state"].some((fact) => changed.has(/** @type {"state"} */ (fact)))) this.#showUsual();
     });
   }
 
@@ -59,6 +62,12 @@ export class TopBar {
     else this.#showJob(state.job);
     const isToBegin = (state.track.running && state.track.done === 0) || (isRunning && state.job.evaluations === 0);
     if (state.compiling && isToBegin) this.#figures.textContent = "waiting for compilation";
+  }
+
+  /** Say beside the cost which costs the good frames of this recording have. */
+  #showUsual() {
+    const usual = usualCosts(personCells(this.#store.facts));
+    this.#usual.textContent = usual === null ? "" : `usual here ${usual.map((cost) => cost.toFixed(1)).join("–")}`;
   }
 
   /** @param {import("../model/protocol.js").Job} job */

@@ -113,15 +113,16 @@ export function hatch(context, color, stripes, isCrossed) {
  * @param {number} x
  * @param {number} y
  * @param {number} radius
+ * @param {string} fill
  */
-export function drawDiamond(context, x, y, radius) {
+export function drawDiamond(context, x, y, radius, fill = "#fff") {
   context.beginPath();
   context.moveTo(x, y - radius);
   context.lineTo(x + radius, y);
   context.lineTo(x, y + radius);
   context.lineTo(x - radius, y);
   context.closePath();
-  context.fillStyle = "#fff";
+  context.fillStyle = fill;
   context.strokeStyle = DARK_INK;
   context.lineWidth = 1;
   context.fill();

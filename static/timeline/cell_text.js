@@ -1,5 +1,6 @@
 /** Describe cells of the timeline in words. */
 
+import { contradictions, keyframeDoubt } from "../model/keyframe_doubts.js";
 import { percent, px } from "../widgets/text.js";
 
 /**
@@ -26,7 +27,7 @@ export function doubtfulLimbs({ limbs_lost }, { limbs }, { doubtful_from, lost_f
 }
 
 /**
- * As in "left arm: lost (97 %); others tracked". Empty where the limbs were not assessed.
+ * As in "left arm: lost (97 % chance that it is lost); others tracked". Empty where the limbs were not assessed.
  *
  * @param {Cell} cell of one person
  * @param {PersonInfo} person
@@ -36,7 +37,7 @@ export function describeLimbs(cell, person, session) {
   if (cell.limbs_lost.length !== person.limbs.length || person.limbs.length === 0) return "";
   const found = doubtfulLimbs(cell, person, session);
   if (found.length === 0) return "all limbs tracked";
-  const parts = found.map(({ name, lost, status }) => `${name}: ${status} (${percent(lost)})`);
+  const parts = found.map(({ name, lost, status }, rank) => `${name}: ${status} (${percent(lost)}${rank > 0 ? "" : " chance that it is lost"})`);
   return [...parts, ...(found.length < person.limbs.length ? ["others tracked"] : [])].join("; ");
 }
 
@@ -48,16 +49,24 @@ export function describeLimbs(cell, person, session) {
  * @param {number | null} person of several people, the only one to describe; null for all
  * @returns {string[]} lines
  */
-export function describeFrame(frame, { timeline, lanes, session, disagreeing }, person = null) {
+export function describeFrame(frame, facts, person = null) {
+  const { timeline, lanes, session, disagreeing } = facts;
   const cell = timeline.get(frame);
   if (!cell || !session) return [`Frame ${frame}: no pose`];
-  const jumps = disagreeing.includes(frame) ? ["inconsistent with its neighbours"] : [];
-  if (lanes.length === 0) return [`Frame ${frame}: ${summary(cell)}`, ...details(cell, session.people[0], session), ...jumps];
+  const doubts = (/** @type {number} */ one) => {
+    const doubt = keyframeDoubt(facts, frame, one);
+    return doubt ? contradictions(doubt, session).map((words) => `this keyframe disagrees ${words}`) : [];
+  };
+  const isNamed = session.people.some((_, one) => (keyframeDoubt(facts, frame, one)?.distance_cm ?? null) !== null);
+  const jumps = disagreeing.includes(frame) && !isNamed ? ["inconsistent with its neighbours"] : [];
+  if (lanes.length === 0) {
+    return [`Frame ${frame}: ${summary(cell)}`, ...details(cell, session.people[0], session), ...doubts(0), ...jumps];
+  }
   const shown = person === null ? [...lanes.keys()] : [person];
   const lines = shown.flatMap((one) => {
     const own = lanes[one]?.get(frame);
     const info = session.people[one];
-    return [`${info.name}: ${own ? summary(own) : "no pose"}`, ...(own ? details(own, info, session) : [])];
+    return [`${info.name}: ${own ? summary(own) : "no pose"}`, ...(own ? details(own, info, session) : []), ...doubts(one)];
   });
   return [person === null ? `Frame ${frame}: ${summary(cell)}` : `Frame ${frame}`, ...lines, ...jumps];
 }

@@ -1,11 +1,13 @@
-/** Tab of the drawer that lists doubtful and lost poses with thumbnails, the most severe first. */
+/** Tab of the drawer that lists doubtful and lost poses and doubted keyframes with thumbnails, the most severe first. */
 
 import { byId, iconButton } from "../widgets/elements.js";
 import { count, displayName, percent } from "../widgets/text.js";
+import { contradictions } from "../model/keyframe_doubts.js";
 import { countDoubts } from "./doubts.js";
 import { ThumbnailLoader } from "./thumbnail_loader.js";
 
-/** Largest number of entries that are listed. The others follow as these are resolved. */
+/** Entries that are listed at first, and after "more". The others follow as these are resolved. */
+const FEW_LISTED = 10;
 const MAX_LISTED = 200;
 const TICK = "m3 8.5 3.5 3.5L13 4.5";
 
@@ -22,6 +24,9 @@ export class DoubtList {
   #loader = new ThumbnailLoader(this.#panel);
   /** @type {Map<string, HTMLLIElement>} rows by what they show */
   #rows = new Map();
+  #limit = FEW_LISTED;
+  #more = document.createElement("li");
+  #moreButton = document.createElement("button");
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -31,11 +36,22 @@ export class DoubtList {
     this.#store = store;
     this.#queue = queue;
     /** @type {(keyof import("../model/store.js").Facts)[]} */
-    const listed = ["drawer", "timeline", "lanes", "session"];
+    const listed = ["drawer", "timeline", "lanes", "session", "keyframeDoubts"];
+    this.#moreButton.type = "button";
+    this.#moreButton.className = "doubt-more";
+    this.#moreButton.addEventListener("click", () => {
+      this.#limit = MAX_LISTED;
+      this.#show();
+      this.#list.children[FEW_LISTED]?.querySelector("button")?.focus();
+    });
+    this.#more.append(this.#moreButton);
     store.subscribe((changed) => {
       const isOpen = store.facts.drawer === "doubts";
       this.#panel.hidden = this.#controls.hidden = !isOpen;
-      if (!isOpen) return;
+      if (!isOpen) {
+        this.#limit = FEW_LISTED;
+        return;
+      }
       if (listed.some((fact) => changed.has(fact))) this.#show();
       if (listed.some((fact) => changed.has(fact)) || changed.has("target") || changed.has("state")) this.#mark();
     });
@@ -43,14 +59,17 @@ export class DoubtList {
 
   #show() {
     const { doubts } = this.#queue;
-    const shown = doubts.slice(0, MAX_LISTED);
+    const shown = doubts.slice(0, this.#limit);
     const known = this.#rows;
     this.#rows = new Map(shown.map((doubt) => [this.#key(doubt), known.get(this.#key(doubt)) ?? this.#row(doubt)]));
     for (const [key, row] of known) {
       const image = row.querySelector("img");
       if (!this.#rows.has(key) && image) this.#loader.forget(image);
     }
-    const rows = [...this.#rows.values()];
+    const hidden = doubts.length - shown.length;
+    this.#moreButton.textContent = `${count(hidden)} more`;
+    this.#moreButton.title = "List less severe entries too";
+    const rows = [...this.#rows.values(), ...(hidden > 0 && this.#limit < MAX_LISTED ? [this.#more] : [])];
     if (rows.length !== this.#list.children.length || rows.some((row, i) => row !== this.#list.children[i])) {
       const focused = this.#list.contains(document.activeElement) ? document.activeElement : null;
       const at = focused ? [...this.#list.children].findIndex((row) => row.contains(focused)) : -1;
@@ -58,9 +77,8 @@ export class DoubtList {
       // Where the focused entry was resolved, the next one takes its place.
       if (at >= 0) (focused?.isConnected ? /** @type {HTMLElement} */ (focused) : rows[Math.min(at, rows.length - 1)]?.querySelector("button"))?.focus();
     }
-    const hidden = doubts.length - shown.length;
-    this.#tabCount.textContent =
-      doubts.length === 0 ? "" : `${count(doubts.length)} to check${hidden > 0 ? `, the ${count(MAX_LISTED)} most severe are listed` : ", most severe first"}`;
+    const listed = hidden > 0 ? `, the ${count(shown.length)} most severe are listed` : ", most severe first";
+    this.#tabCount.textContent = doubts.length === 0 ? "" : `${count(doubts.length)} to check${listed}`;
     this.#empty.hidden = doubts.length > 0;
     if (doubts.length === 0) this.#empty.textContent = this.#emptyText();
   }
@@ -87,9 +105,9 @@ export class DoubtList {
   }
 
   /** @param {Doubt} doubt */
-  #key({ person, first, last, worst, status, limbs }) {
+  #key({ person, spans, worst, status, limbs, keyframe }) {
     const cost = this.#cellsOf(person)?.costs[worst];
-    return [person, first, last, worst, status, cost, ...limbs.map(({ name, lost }) => `${name} ${lost}`)].join("|");
+    return JSON.stringify([person, spans, worst, status, cost, limbs, keyframe]);
   }
 
   /** @param {number} person */
@@ -104,7 +122,7 @@ export class DoubtList {
    */
   #row(doubt) {
     const { session } = this.#store.facts;
-    const { person, first, last, worst, status, limbs, limb } = doubt;
+    const { person, first, last, spans, worst, status, limbs, limb, keyframe } = doubt;
     const info = session?.people[person];
     const row = document.createElement("li");
     const go = document.createElement("button");
@@ -118,26 +136,40 @@ export class DoubtList {
     this.#loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}`);
     const text = document.createElement("span");
     text.className = "doubt-text";
-    const frames = first === last ? `frame ${first}` : `frames ${first}–${last}`;
+    const frames = `${first === last ? `frame ${first}` : `frames ${first}–${last}`}${spans.length > 1 ? `, in ${spans.length} stretches` : ""}`;
     const remark = this.#cellsOf(person)?.get(worst)?.remark ?? "";
-    const why = limbs.length ? limbs.slice(0, 2).map(({ name, lost }) => `${name} ${percent(lost)}`) : [displayName(remark) || "pose uncertain"];
+    const why =
+      keyframe && session ? contradictions(keyframe, session).map((one) => `disagrees ${one}`)
+      : limbs.length ? limbs.slice(0, 2).map(chanceOf)
+      : [displayName(remark) || "pose uncertain"];
     text.append(
-      line("status-badge", status, `is-${status}`),
+      line("status-badge", keyframe ? "keyframe" : status, keyframe ? "is-doubtful" : `is-${status}`),
       ...((session?.people.length ?? 1) > 1 && info ? [named(info)] : []),
       ...why.map((words) => line("doubt-limb", words)),
       line("quiet", frames),
     );
     go.append(image, text);
-    go.title = `Go to frame ${worst}, the worst of ${frames}`;
+    go.title = `Go to frame ${worst}, the worst of ${frames}: ${why.join("; ")}`;
     go.addEventListener("click", (event) => {
       if (event.detail > 0) go.blur();
       this.#queue.visit(doubt);
     });
-    const accept = iconButton(TICK, `Accept: mark ${frames} as reviewed (Alt+Enter)`, () => this.#queue.accept(doubt));
+    const accepts = keyframe ? "this keyframe is right" : `mark ${frames} as reviewed`;
+    const accept = iconButton(TICK, `Accept: ${accepts} (Alt+Enter)`, () => this.#queue.accept(doubt));
     accept.classList.add("doubt-accept");
     row.append(go, accept);
     return row;
   }
+}
+
+/**
+ * The chance of a limb; only the likeliest one needs the whole phrase.
+ *
+ * @param {import("./cell_text.js").DoubtfulLimb} limb
+ * @param {number} rank
+ */
+function chanceOf({ name, lost }, rank) {
+  return rank > 0 ? `${name}: ${percent(lost)}` : `${name}: ${percent(lost)} chance that it is lost`;
 }
 
 /**

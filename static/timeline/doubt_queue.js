@@ -1,11 +1,15 @@
-/** Walk through the doubtful and lost poses by severity, and accept those that are right. */
+/** Walk through doubtful and lost poses and doubted keyframes by severity, and accept those that are right. */
 
+import { displayName } from "../widgets/text.js";
 import { listDoubts } from "./doubts.js";
 
 export class DoubtQueue {
   #store;
   #navigation;
   #actions;
+  #grid;
+  /** @type {{person: number, frame: number, points: string[]} | null} the joints to zoom to once their frame is drawn */
+  #zoom = null;
   /** @type {import("./doubts.js").Doubt[] | null} null if it must be listed again */
   #listed = null;
   /** Rank of the entry that was visited last. When it is resolved, the next one takes its place. */
@@ -15,13 +19,16 @@ export class DoubtQueue {
    * @param {import("../model/store.js").Store} store
    * @param {import("../model/navigation.js").Navigation} navigation
    * @param {import("../model/actions.js").Actions} actions
+   * @param {import("../panes/pane_grid.js").PaneGrid} grid
    */
-  constructor(store, navigation, actions) {
+  constructor(store, navigation, actions, grid) {
     this.#store = store;
     this.#navigation = navigation;
     this.#actions = actions;
+    this.#grid = grid;
     store.subscribe((changed) => {
-      if (changed.has("timeline") || changed.has("lanes") || changed.has("session")) this.#listed = null;
+      if (["timeline", "lanes", "session", "keyframeDoubts"].some((fact) => changed.has(/** @type {"lanes"} */ (fact)))) this.#listed = null;
+      if (changed.has("overlay") || changed.has("target")) this.#zoomNow();
     });
   }
 
@@ -52,8 +59,44 @@ export class DoubtQueue {
   visit(doubt) {
     this.#rank = this.doubts.indexOf(doubt);
     this.#navigation.pause();
-    if (doubt.person !== this.#store.facts.state?.person) this.#actions.selectPerson(doubt.person);
     this.#navigation.goTo(doubt.worst);
+    this.#select(doubt, doubt.worst);
+  }
+
+  /**
+   * Select the limb in doubt on a frame that was just requested, and zoom to it; of the active person if possible.
+   *
+   * @param {number} frame
+   */
+  arriveAt(frame) {
+    const here = this.doubts.filter(({ first, last }) => frame >= first && frame <= last);
+    const doubt = here.find(({ person }) => person === this.#store.facts.state?.person) ?? here[0];
+    if (doubt) this.#select(doubt, frame);
+  }
+
+  /**
+   * @param {import("./doubts.js").Doubt} doubt
+   * @param {number} frame
+   */
+  #select({ person, limb, keyframe }, frame) {
+    const info = this.#store.facts.session?.people[person];
+    if (!info) return;
+    const far = info.points.find((point) => keyframe && displayName(point) === keyframe.point);
+    const name = far ? info.point_limbs[far]?.name : limb === null ? null : info.limbs[limb];
+    const points = info.points.filter((point) => info.point_limbs[point]?.name === name);
+    const point = far ?? points.at(-1) ?? null;
+    const { state } = this.#store.facts;
+    if (state?.person !== person || state.point !== point) this.#actions.selectPerson(person, point);
+    this.#zoom = points.length ? { person, frame, points } : null;
+    this.#zoomNow();
+  }
+
+  #zoomNow() {
+    const { overlay, shown, target } = this.#store.facts;
+    if (this.#zoom && target !== this.#zoom.frame) this.#zoom = null;
+    if (!this.#zoom || overlay?.frame !== this.#zoom.frame || shown?.frame !== this.#zoom.frame) return;
+    this.#grid.frameJoints(this.#zoom.person, this.#zoom.points);
+    this.#zoom = null;
   }
 
   /**
@@ -70,13 +113,14 @@ export class DoubtQueue {
   }
 
   /**
-   * Mark all poses of an entry as reviewed, so that it leaves the queue.
+   * Mark all poses of an entry as reviewed and confirm its keyframe, so that it leaves the queue.
    *
    * @param {import("./doubts.js").Doubt | null} doubt
    */
   accept(doubt) {
     if (!doubt || !this.#store.facts.connected) return;
     this.#rank = this.doubts.indexOf(doubt);
-    this.#actions.review(doubt);
+    for (const span of doubt.spans) this.#actions.review({ person: doubt.person, ...span });
+    if (doubt.keyframe) this.#actions.confirmKeyframe(doubt.keyframe);
   }
 }

@@ -1,6 +1,7 @@
 /**
- * Queue of doubtful and lost poses: stretches of frames of one person, the most severe first. A pose that a person has
- * confirmed or reviewed is resolved.
+ * Queue of doubtful and lost poses and of doubted keyframes, the most severe first. Doubts of one cause are one entry: the same
+ * limb of a person within a second, or the neighbours of a keyframe that they contradict. A pose that a person has confirmed
+ * or reviewed is resolved.
  */
 
 import { NO_POSE, REVIEWED, STATUSES } from "../model/cells.js";
@@ -8,34 +9,36 @@ import { doubtfulLimbs } from "./cell_text.js";
 
 /**
  * @typedef {import("../model/cells.js").Cells} Cells
- * @typedef {object} Doubt a stretch of doubtful or lost poses of one person
+ * @typedef {import("../model/protocol.js").KeyframeDoubt} KeyframeDoubt
+ * @typedef {{first: number, last: number}} Span frames, `last` included
+ * @typedef {object} Doubt doubtful or lost poses of one person that have one cause
  * @property {number} person
  * @property {number} first
  * @property {number} last
+ * @property {Span[]} spans stretches of poses in doubt
  * @property {number} worst the frame to look at first
- * @property {"doubtful" | "lost"} status the worst status
+ * @property {"doubtful" | "lost" | "keyframe"} status the worst status
  * @property {import("./cell_text.js").DoubtfulLimb[]} limbs of the worst frame, the likeliest lost first
  * @property {number | null} limb index of the limb that is likeliest lost in the worst frame
- * @property {number} severity the status first, then the probability of a lost limb
+ * @property {KeyframeDoubt | null} keyframe the keyframe that is the cause
+ * @property {number} severity the status first, then the probability of a lost limb; a keyframe comes before all
  */
 
-/** Number of frames without doubt within a stretch. More of them end it. */
+/** Number of frames without doubt within a stretch, and beside a keyframe. More of them end it. */
 const GAP = 3;
 const DOUBT = STATUSES.indexOf("doubtful");
 
 /**
- * List the unresolved doubts, the most severe first. A long stretch is listed in pieces of about a second around its worst
- * frames, because a correction helps that far.
+ * List the unresolved doubts, the most severe first.
  *
  * @param {import("../model/store.js").Facts} facts
  * @returns {Doubt[]}
  */
-export function listDoubts({ timeline, lanes, session }) {
+export function listDoubts({ timeline, lanes, session, keyframeDoubts }) {
   if (!session) return [];
-  const reach = Math.max(1, Math.round(session.fps / 2));
   const people = lanes.length > 0 ? lanes : [timeline];
   const found = people.flatMap((cells, person) =>
-    cells ? stretches(cells).flatMap((span) => pieces(cells, span, reach)).map((span) => doubt(cells, person, span, session)) : [],
+    cells ? doubtsOf(cells, person, session, keyframeDoubts.filter((one) => one.person === person)) : [],
   );
   return found.sort((a, b) => b.severity - a.severity || b.last - b.first - (a.last - a.first) || a.worst - b.worst);
 }
@@ -67,78 +70,72 @@ function isDoubt({ sources, statuses, marks }, frame) {
 
 /**
  * @param {Cells} cells
- * @param {number} frame
+ * @param {number} person
+ * @param {import("../model/protocol.js").SessionMessage} session
+ * @param {KeyframeDoubt[]} keyframes
+ * @returns {Doubt[]}
  */
-function severityOf(cells, frame) {
-  return isDoubt(cells, frame) ? cells.statuses[frame] + cells.worstLimb(frame) : 0;
-}
-
-/**
- * @param {Cells} cells
- * @returns {[number, number][]} first and last frame
- */
-function stretches(cells) {
-  /** @type {[number, number][]} */
-  const found = [];
+function doubtsOf(cells, person, session, keyframes) {
+  const found = keyframes.map((keyframe) => ofKeyframe(keyframe));
+  /** @type {Map<string, Doubt>} the last entry of each cause */
+  const open = new Map();
   for (let frame = 0; frame < cells.frames; frame += 1) {
     if (!isDoubt(cells, frame)) continue;
-    const last = found.at(-1);
-    if (last && frame - last[1] <= GAP + 1) last[1] = frame;
-    else found.push([frame, frame]);
+    const cell = /** @type {import("../model/protocol.js").Cell} */ (cells.get(frame));
+    const limbs = doubtfulLimbs(cell, session.people[person], session);
+    const severity = cells.statuses[frame] + cells.worstLimb(frame);
+    const cause = limbs[0]?.name ?? cell.remark;
+    const beside = found.find(({ keyframe }) => keyframe !== null && keyframe.distance_cm !== null && Math.abs(keyframe.frame - frame) <= GAP);
+    const last = beside ?? open.get(cause);
+    if (last && (beside || frame - last.last <= Math.max(session.fps, GAP + 1))) {
+      addFrame(last, frame);
+      if (severity <= last.severity) continue;
+      Object.assign(last, { worst: frame, severity, limbs, limb: limbOf(limbs, person, session), status: statusOf(cell) });
+      continue;
+    }
+    const limb = limbOf(limbs, person, session);
+    const spans = [{ first: frame, last: frame }];
+    const doubt = { person, first: frame, last: frame, spans, worst: frame, status: statusOf(cell), limbs, limb, keyframe: null, severity };
+    open.set(cause, doubt);
+    found.push(doubt);
   }
   return found;
 }
 
 /**
- * Cut a stretch into pieces, each around its worst frame. A short rest stays with its neighbour.
- *
- * @param {Cells} cells
- * @param {[number, number]} span
- * @param {number} reach frames on either side of the worst one
- * @returns {[number, number][]}
- */
-function pieces(cells, [first, last], reach) {
-  const found = /** @type {[number, number][]} */ ([]);
-  const waiting = [[first, last]];
-  for (let span = waiting.pop(); span; span = waiting.pop()) {
-    let [from, to] = span;
-    while (from <= to && !isDoubt(cells, from)) from += 1;
-    while (to >= from && !isDoubt(cells, to)) to -= 1;
-    if (from > to) continue;
-    const worst = worstOf(cells, from, to);
-    const left = worst - reach - from >= reach ? worst - reach : from;
-    const right = to - worst - reach >= reach ? worst + reach : to;
-    found.push([left, right]);
-    waiting.push([from, left - 1], [right + 1, to]);
-  }
-  return found;
-}
-
-/**
- * @param {Cells} cells
- * @param {number} first
- * @param {number} last
- */
-function worstOf(cells, first, last) {
-  let worst = first;
-  for (let frame = first + 1; frame <= last; frame += 1) {
-    if (severityOf(cells, frame) > severityOf(cells, worst)) worst = frame;
-  }
-  return worst;
-}
-
-/**
- * @param {Cells} cells
- * @param {number} person
- * @param {[number, number]} span
- * @param {import("../model/protocol.js").SessionMessage} session
+ * @param {KeyframeDoubt} keyframe
  * @returns {Doubt}
  */
-function doubt(cells, person, [first, last], session) {
-  const worst = worstOf(cells, first, last);
-  const cell = /** @type {import("../model/protocol.js").Cell} */ (cells.get(worst));
-  const limbs = doubtfulLimbs(cell, session.people[person], session);
-  const status = cell.status === "lost" ? "lost" : "doubtful";
-  const limb = limbs.length ? session.people[person].limbs.indexOf(limbs[0].name) : null;
-  return { person, first, last, worst, status, limbs, limb, severity: severityOf(cells, worst) };
+function ofKeyframe(keyframe) {
+  const { person, frame } = keyframe;
+  return { person, first: frame, last: frame, spans: [], worst: frame, status: "keyframe", limbs: [], limb: null, keyframe, severity: Infinity };
+}
+
+/**
+ * @param {Doubt} doubt
+ * @param {number} frame
+ */
+function addFrame(doubt, frame) {
+  const span = doubt.spans.at(-1);
+  if (span && frame - span.last <= GAP + 1) span.last = frame;
+  else doubt.spans.push({ first: frame, last: frame });
+  doubt.first = Math.min(doubt.first, frame);
+  doubt.last = Math.max(doubt.last, frame);
+}
+
+/**
+ * @param {import("./cell_text.js").DoubtfulLimb[]} limbs
+ * @param {number} person
+ * @param {import("../model/protocol.js").SessionMessage} session
+ */
+function limbOf(limbs, person, session) {
+  return limbs.length ? session.people[person].limbs.indexOf(limbs[0].name) : null;
+}
+
+/**
+ * @param {import("../model/protocol.js").Cell} cell
+ * @returns {"lost" | "doubtful"}
+ */
+function statusOf(cell) {
+  return cell.status === "lost" ? "lost" : "doubtful";
 }

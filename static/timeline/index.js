@@ -25,17 +25,18 @@ import { Transport } from "./transport.js";
  * Build the bars below the views, the drawer and the timeline.
  *
  * @param {import("../model/index.js").Context} context
+ * @param {import("../panes/index.js").Panes} panes
  */
-export function mount({ store, actions, navigation, reasons }) {
+export function mount({ store, actions, navigation, reasons }, { grid }) {
   const playback = new Playback(store, navigation);
-  const jumps = new Jumps(store, navigation);
+  const queue = new DoubtQueue(store, navigation, actions, grid);
+  const jumps = new Jumps(store, navigation, (frame) => queue.arriveAt(frame));
   const frameWindow = new FrameWindow(store);
   new Transport(store, navigation, playback, actions);
   new TrackBar(store, actions);
   const drawer = new Drawer(store);
   new RangeBar(store, actions, () => drawer.open("runs"));
   new JumpMenu(store, jumps, () => drawer.open("doubts"));
-  const queue = new DoubtQueue(store, navigation, actions);
   new DoubtList(store, queue);
   new Curves(store, navigation, actions, frameWindow);
   new Timeline(byId("timeline", HTMLElement), { store, navigation, jumps, frameWindow });
@@ -46,5 +47,5 @@ export function mount({ store, actions, navigation, reasons }) {
     ...drawerBindings(drawer),
     ...queueBindings(queue, reasons.away),
   ];
-  return { bindings };
+  return { bindings, drawer };
 }

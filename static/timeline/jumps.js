@@ -43,14 +43,17 @@ const DOUBT = STATUSES.indexOf("doubtful");
 export class Jumps {
   #store;
   #navigation;
+  #arriveAtDoubt;
 
   /**
    * @param {import("../model/store.js").Store} store
    * @param {import("../model/navigation.js").Navigation} navigation
+   * @param {(frame: number) => void} arriveAtDoubt called with a doubtful frame after it was requested
    */
-  constructor(store, navigation) {
+  constructor(store, navigation, arriveAtDoubt) {
     this.#store = store;
     this.#navigation = navigation;
+    this.#arriveAtDoubt = arriveAtDoubt;
   }
 
   /** @param {Kind} kind */
@@ -76,7 +79,10 @@ export class Jumps {
     const is = kind === "disagreeing" ? (/** @type {number} */ frame) => among?.has(frame) : tests(timeline)[kind];
     this.#navigation.pause();
     for (let frame = target + way; frame >= 0 && frame < timeline.frames; frame += way) {
-      if (is(frame)) return this.#navigation.goTo(frame);
+      if (!is(frame)) continue;
+      this.#navigation.goTo(frame);
+      if (kind === "doubt") this.#arriveAtDoubt(frame);
+      return;
     }
   }
 

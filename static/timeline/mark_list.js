@@ -25,6 +25,7 @@ const LINES = [
   ["preview", "proposal", "candidate: click takes it"],
   ["alternative", "proposal", "alternative pose: Shift+X takes it"],
   ["new_sizes", "proposal", "new body sizes: Apply takes them"],
+  ["former", "neutral", "limb before the fit: Alt+B takes it back"],
   ["epipolar", "mark", "line of sight of a pin or drag"],
 ];
 
@@ -37,7 +38,7 @@ export function markSection() {
   const list = document.createElement("dl");
   list.append(
     ...STATUSES.map((status) => row(statusSwatch(status), STATUS_MEANINGS[status])),
-    row(diamondSwatch(), "keyframe"),
+    row(diamondSwatch(), "keyframe; larger with an exclamation mark: check it"),
     ...SOURCES.map((source) => row(sourceSwatch(source), SOURCE_MEANINGS[source])),
     ...LINES.map(([kind, color, meaning]) => row(sampleOf(kind, `var(--image-${color})`), meaning)),
   );

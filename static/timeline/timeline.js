@@ -49,9 +49,9 @@ export class Timeline {
     store.subscribe((changed) => {
       const has = (/** @type {(keyof import("../model/store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
       if (has("session")) element.style.height = `${this.#layout.height}px`;
-      if (has("timeline", "lanes", "session", "visible")) this.#drawCells();
+      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts")) this.#drawCells();
       if (has("target", "session", "range", "visible")) this.#drawCursor();
-      if (has("target", "timeline", "lanes", "session")) this.#describe();
+      if (has("target", "timeline", "lanes", "session", "keyframeDoubts")) this.#describe();
     });
     new ResizeObserver(() => this.#drawAll()).observe(element);
     store.subscribe((changed) => changed.has("theme") && this.#drawAll());
@@ -180,7 +180,7 @@ export class Timeline {
   #drawCells() {
     const { clientWidth, clientHeight } = this.#element;
     const context = prepare(this.#cells, clientWidth, clientHeight, true);
-    const { timeline, lanes, session } = this.#store.facts;
+    const { timeline, lanes, session, keyframeDoubts } = this.#store.facts;
     if (!session) return;
     const style = getComputedStyle(this.#element);
     const axis = this.#axis;
@@ -196,6 +196,8 @@ export class Timeline {
       if (bands.length > 1) drawing.drawPerson(context, axis, cells, style, band, session.people[lane].color);
       else drawing.drawSources(context, axis, cells, style, band);
       drawing.drawKeyframes(context, axis, keyframesOf(cells), band);
+      const doubted = keyframeDoubts.filter(({ person }) => bands.length === 1 || person === lane).map(({ frame }) => frame);
+      drawing.drawDoubtedKeyframes(context, axis, doubted, style, band);
       drawing.drawAmbiguous(context, axis, framesWith(cells, AMBIGUOUS), band);
     }
     drawing.drawReviewed(context, axis, timeline, style, review);

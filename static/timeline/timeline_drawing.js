@@ -178,6 +178,25 @@ export function drawKeyframes(context, axis, keyframes, { top, bottom }) {
 }
 
 /**
+ * Draw a larger diamond with an exclamation mark at keyframes in doubt.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Iterable<number>} frames
+ * @param {CSSStyleDeclaration} style
+ * @param {Band} lane
+ */
+export function drawDoubtedKeyframes(context, axis, frames, style, { top, bottom }) {
+  const y = (top + bottom) / 2;
+  for (const x of markPositions(frames, axis)) {
+    drawDiamond(context, x, y, 7, style.getPropertyValue("--warning"));
+    context.fillStyle = style.getPropertyValue("--chrome");
+    context.fillRect(x - 0.75, y - 3.5, 1.5, 4.5);
+    context.fillRect(x - 0.75, y + 2, 1.5, 1.5);
+  }
+}
+
+/**
  * Draw two rings at ambiguous frames.
  *
  * @param {CanvasRenderingContext2D} context

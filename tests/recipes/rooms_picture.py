@@ -11,7 +11,7 @@ HOUSE = {
     "static/  the page": [
         ["main.js"],
         ["shell"],
-        ["inspector"],
+        ["inspector", "sessions"],
         ["search", "scene"],
         ["posing", "timeline"],
         ["panes"],
@@ -43,7 +43,8 @@ HOUSE = {
         ["evidence"],
         ["contours", "images"],
         ["session", "store"],
-        ["footage", "formats", "motion"],
+        ["footage", "calibrations", "motion"],
+        ["formats"],
         ["body"],
         ["geometry"],
         ["compute", "errors, files"],

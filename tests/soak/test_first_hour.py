@@ -11,7 +11,6 @@ of each stage.
 
 import random
 import time
-from dataclasses import replace
 
 import pytest
 from chromium import FLAGS, chromium_path
@@ -23,8 +22,6 @@ from stranger import Errors, Stranger, table
 
 from tracker.evaluation.metrics import evaluate_joints
 from tracker.evaluation.references import read_joints
-from tracker.formats.joint_maps import joints_of
-from tracker.formats.trc import read_trc
 from tracker.simulate import Simulation, simulate
 
 RECORDINGS = {
@@ -314,8 +311,7 @@ async def export(hour):
             path = hour.folder.parent / (await download.value).suggested_filename
             assert not path.exists()
             await (await download.value).save_as(path)
-            exported = joints_of(read_trc(path), str(path))  # counts frames from the first row
-            exported = replace(exported, frames=exported.frames + hour.frames[0])
+            exported = read_joints(path, hour.session.fps)
             truth = read_joints(hour.truths[person], hour.session.fps)
             errors.append(evaluate_joints(exported, truth, hour.frames).mpjpe_mm)
         await hour.picture("exported")

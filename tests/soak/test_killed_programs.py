@@ -8,8 +8,10 @@ import re
 import resource
 import shutil
 import signal
+import sqlite3
 import subprocess
 import sys
+import time
 from contextlib import asynccontextmanager, closing, suppress
 
 import aiohttp
@@ -65,8 +67,8 @@ class Seen:
 
 
 def stored_edits(session):
-    """The number of the edit that each frame holds."""
-    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+    """The number of the edit that each frame holds, read as `quadrille info` and `export` do."""
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
         return {
             row.frame: round(store.pose("person", row.frame).values[0] * 100 / STEP_CM)
             for row in store.frames("person")
@@ -142,3 +144,50 @@ async def test_edits_on_a_full_disk_survive_the_end_of_the_program(tmp_path, cas
     report(f"{n} programs ended with a full disk, {len(odd)} without a rescue file, {len(lost)} frames lost")
     assert odd == []
     assert lost == []
+
+
+WRITER = """
+import sys
+from dataclasses import replace
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange
+
+store = AnnotationStore(sys.argv[1])
+print("open", flush=True)
+pose = store.pose("ann", 3)
+for n in range(1, 100_000):
+    store.commit(f"n {n}", [PoseChange("ann", f, replace(pose, values=pose.values * 0 + n)) for f in range(400)])
+"""
+
+
+@pytest.mark.parametrize("when", ["while it commits", "while it upgrades an older store"])
+def test_what_a_kill_leaves_is_read_as_commands_read_it(tmp_path, cases, report, when):
+    """A store is read after each kill without being opened for writing, and holds one edit on all frames."""
+    script = (ROOT / "tests" / "tracker" / "store" / "store_version_3.sql").read_text("utf-8")
+    rng, n, path, hot, odd = random.Random(SEED), cases(200), tmp_path / "annotations.sqlite", 0, []
+    for case in range(n):
+        if case == 0 or "upgrades" in when:
+            path.unlink(missing_ok=True)
+            with closing(sqlite3.connect(path)) as db:
+                db.executescript(script)
+                db.executemany("INSERT INTO moves (kind, edit, time) VALUES (?, 1, ?)", [("undo", "x" * 1000)] * 20_000)
+                db.commit()
+        writer = subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, cwd=ROOT)
+        if "commits" in when:
+            writer.stdout.readline()
+            time.sleep(rng.uniform(0, 0.3))
+        else:
+            journal = path.with_name("annotations.sqlite-journal")
+            while not journal.exists() and writer.poll() is None:
+                time.sleep(0.001)
+            time.sleep(rng.uniform(0, 0.2))
+        writer.kill()
+        writer.wait()
+        hot += path.with_name("annotations.sqlite-journal").exists()
+        with closing(AnnotationStore(path, read_only=True)) as store:
+            poses = store.poses("ann", range(400))
+            values = {pose.values[0] for pose in poses.values()}
+            odd += [(case, values)] if len(values) != 1 and "commits" in when and len(poses) == 400 else []
+            odd += [(case, len(poses))] if not poses else []
+    report(f"{n} kills {when}, {hot} left a journal, {len(odd)} stores were not as a commit left them")
+    assert odd == []

@@ -8,16 +8,19 @@ import tomllib
 import traceback
 import warnings
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from calibration_files import WRITERS, easymocap, vicon
 from memory import memory_mb
 from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
+from rigs import cameras, looking
 
+from tracker.calibrations.reading import read_cameras
 from tracker.errors import TrackerError
-from tracker.evaluation.metrics import at_rate
+from tracker.evaluation.clocks import place_rows
 from tracker.formats.anipose import read_calibration
-from tracker.formats.calibration import read_cameras
 from tracker.formats.joint_maps import guess_joint_map, read_joint_map
 from tracker.formats.model_toml import format_model, load_model, parse_model
 from tracker.formats.pose_csv import read_pose_table
@@ -40,34 +43,19 @@ LOCK = {
 }  # fmt: skip
 
 
-CAMERA = {
-    "name": "a", "size": [640, 480], "K": [[500.0, 0.0, 320.0], [0.0, 500.0, 240.0], [0.0, 0.0, 1.0]],
-    "dist": [-0.3, 0.1, 0.0, 0.0, 0.0], "R": [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]], "t": [0.1, 1.0, 4.0],
-}  # fmt: skip
-CHAIN = """%YAML:1.0
----
-cam0:
-  camera_model: pinhole
-  intrinsics: [500.0, 500.0, 320.0, 240.0]
-  distortion_coeffs: [-0.3, 0.1, 0.0, 0.0]
-  resolution: [640, 480]
-cam1:
-  T_cn_cnm1:
-  - [1.0, 0.0, 0.0, 0.1]
-  - [0.0, 1.0, 0.0, 0.0]
-  - [0.0, 0.0, 1.0, 1.0e-3]
-  - [0.0, 0.0, 0.0, 1.0]
-  camera_model: pinhole
-  intrinsics: [500.0, 500.0, 320.0, 240.0]
-  distortion_coeffs: [-0.3, 0.1, 0.0, 0.0]
-  resolution: [640, 480]
-"""
-STORAGE = """<?xml version="1.0"?>
-<opencv_storage><K_1 type_id="opencv-matrix"><rows>3</rows><cols>3</cols><dt>d</dt>
-<data>500. 0. 320. 0. 500. 240. 0. 0. 1.</data></K_1><W_1>640</W_1><H_1>480</H_1>
-<R_1 type_id="opencv-matrix"><rows>3</rows><cols>1</cols><dt>d</dt><data>0.1 0.2 0.3</data></R_1>
-<T_1 type_id="opencv-matrix"><rows>3</rows><cols>1</cols><dt>d</dt><data>0. 0. 4.</data></T_1></opencv_storage>
-"""
+RIG = cameras([looking(place) for place in ([4.0, 0.3, 1.5], [0.2, 3.5, 2.0])], (-0.3, 0.1, 0.001, 0.0))
+PINHOLES = cameras([c.T_world_camera for c in RIG])
+
+
+def written(write):
+    """Name and bytes of a file in which a program keeps cameras; EasyMocap's pair in one."""
+    with TemporaryDirectory() as folder:
+        path = write(Path(folder), PINHOLES if write is vicon else RIG)
+        files = sorted(path.iterdir()) if path.is_dir() else [path]
+        data = files[0].read_bytes()
+        if write is easymocap:
+            data = (path.parent / "intri.yml").read_bytes() + data.partition(b"---")[2]
+        return f"cameras{files[0].suffix}", [data]
 
 
 def shown_camera(camera):
@@ -105,7 +93,7 @@ def read_own_cameras(path):
 
 
 def read_foreign(path):
-    for entry in read_cameras(path):
+    for entry in read_cameras(path).entries:
         shown_camera(entry.camera((640, 480)))
 
 
@@ -115,7 +103,7 @@ def read_model(path):
 
 def read_markers(path):
     table = read_trc(path)
-    at_rate(table, 25.0)
+    place_rows(table, f"TRC file {path}", 25.0)
     guess_joint_map(table.names, path.name)
 
 
@@ -131,9 +119,7 @@ def sources(pattern, *folders):
 KINDS = {
     "session": ("session.toml", sources("*/session.toml", SAMPLES), read_session, 4000),
     "calibration": ("calibration.toml", sources("*/calibration.toml", SAMPLES), read_own_cameras, 4000),
-    "JSON cameras": ("cameras.json", [json_bytes({"cameras": [CAMERA]})], read_foreign, 2000),
-    "YAML cameras": ("cameras.yml", [CHAIN.encode()], read_foreign, 2000),
-    "XML cameras": ("cameras.xml", [STORAGE.encode()], read_foreign, 2000),
+    **{f"calibration of {name}": (*written(write), read_foreign, 500) for name, write in WRITERS.items()},
     "model": ("person.toml", sources("*.toml", MODELS, SAMPLES / "tango" / "models"), read_model, 4000),
     "TRC": ("truth.trc", sources("*/*.trc", SAMPLES), read_markers, 4000),
     "lock": ("lock.json", [json_bytes(LOCK)], read_lock, 4000),

@@ -1,5 +1,6 @@
 """Small videos and image folders in which every frame encodes its number."""
 
+from fractions import Fraction
 from pathlib import Path
 
 import av
@@ -36,6 +37,7 @@ def encode(
     container_options=None,
     rotation=None,
     start=0,
+    matrix=None,
 ):
     with av.open(str(path), "w", options=container_options or {}) as container:
         stream = container.add_stream(codec, rate=rate, options=options or {})
@@ -44,9 +46,27 @@ def encode(
         stream.codec_context.max_b_frames = bframes
         if rotation is not None:
             stream.set_display_rotation(rotation)
+        if matrix is not None:  # a, b, c, d: (x, y) goes to (a x + c y, b x + d y)
+            a, b, c, d = (round(v * 2**16) for v in matrix)
+            stream.set_display_matrix([a, b, 0, c, d, 0, 0, 0, 2**30])
         for i in range(n):
             frame = av.VideoFrame.from_ndarray(picture(i), format="rgb24")
             frame.pts = start + (i if times is None else times[i])
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return path
+
+
+def encode_stamped(path, stamps):
+    """A video with given time stamps, in 1/90000 s."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=30)
+        stream.width, stream.height, stream.pix_fmt, stream.time_base = *SIZE, "yuv420p", Fraction(1, 90000)
+        stream.codec_context.max_b_frames = 0
+        stream.codec_context.time_base = Fraction(1, 90000)
+        for i, pts in enumerate(stamps):
+            frame = av.VideoFrame.from_ndarray(picture(i), format="rgb24")
+            frame.pts, frame.time_base = pts, Fraction(1, 90000)
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return path

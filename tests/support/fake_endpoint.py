@@ -57,7 +57,7 @@ NO_RANGE = {"running": False, "what": "", "done": 0, "total": 0, "message": ""}
 STAGES = ["torso_head", "arms", "legs"]
 SOURCES = ["manual", "searched", "searched", "tracked", "tracked", "tracked", "interpolated", "smoothed"]
 LIMBS = ["left arm", "right arm", "left leg", "right leg", "head"]
-LIMBS_LOST = {"doubtful": [0.31, 0.01, 0.0, 0.02, 0.0], "lost": [0.97, 0.04, 0.0, 0.0, 0.01]}
+LIMBS_LOST = {"doubtful": [0.01, 0.31, 0.0, 0.02, 0.0], "lost": [0.97, 0.04, 0.0, 0.0, 0.01]}
 """Probabilities of the limbs of a frame by its status."""
 PARTS = ["torso", "left_arm", "left_leg", "head", "right_leg", "right_arm", "pelvis"]
 DOFS = [{"joint": "torso", "name": name, "unit": "cm", "low": None, "high": None} for name in ("x", "y", "z")] + [
@@ -110,6 +110,14 @@ def status_of(frame):
     return "doubtful" if frame in (31, 32) else "lost" if frame == 50 else "good"
 
 
+def limb_of(point):
+    """Display name of the limb of a point."""
+    side, _, joint = point.partition("_")
+    if not joint:
+        return "head" if point == "head" else "body"
+    return f"{SIDES[side + '_']} {'leg' if joint in ('hip', 'knee') else 'arm'}"
+
+
 def curve(index, frame):
     """Value of a curve: twists wrap at half a turn, the gap from frame 60 to 64 has none."""
     value = 90.0 + 60 * np.sin(frame / 9 + index) if index % 4 != 2 else (7.0 * frame + 180) % 360 - 180
@@ -152,6 +160,10 @@ class FakeEndpoint:
     """Addresses of the thumbnails that the pages requested."""
     start: str = "first"
     """Identifies the start of the pretended program."""
+    name: str = "elbow_rotation"
+    """Of the session."""
+    sources: tuple = tuple(SOURCES)
+    """Of the poses, in turn each ten frames."""
 
     def __post_init__(self):
         self.pose = {(p, name): np.add(at, (0.9 * p, 0, 0)) for p in range(self.n_people) for name, at in REST.items()}
@@ -170,7 +182,7 @@ class FakeEndpoint:
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
             "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
-            "compared": None, "compared_run": None, "preview": None,
+            "compared": None, "unseen_depth": None, "compared_run": None, "preview": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
             "dofs": [1.0, 2.0, 90.0, 30.0, 4.0, 5.0, 6.0], "locked": [], "other_sizes": False, "solo": False,
@@ -424,14 +436,12 @@ class FakeEndpoint:
                 "limbs": LIMBS,
                 "dofs": DOFS,
                 "point_dofs": {name: [0, 1, 2, 4, 5, 6] if name == "torso" else [3] for name in REST},
-                "point_limbs": {
-                    name: {"name": "body" if name == "torso" else "left arm", "dofs": [3]} for name in REST
-                },
+                "point_limbs": {name: {"name": limb_of(name), "dofs": [3]} for name in REST},
             }
             for p in range(self.n_people)
         ]
         await socket.send_str(encoded({
-            "type": "session", "name": "elbow_rotation", "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
+            "type": "session", "name": self.name, "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
             "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start,
         }))  # fmt: skip
         for message in (self.state, self.settings, self.view_3d, self.body_sizes):
@@ -440,7 +450,7 @@ class FakeEndpoint:
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
             told = {"type": "timeline", "person": person, "cells": cells, "replace": True}
             await socket.send_str(encoded(told))
-        await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING}))
+        await socket.send_str(encoded({"type": "inconsistent", "frames": DISAGREEING, "keyframes": []}))
         if self.views:
             await self.send_frame([socket])
 
@@ -452,7 +462,7 @@ class FakeEndpoint:
 
     def cell(self, frame):
         return {
-            "source": SOURCES[frame // 10 % 8],
+            "source": self.sources[frame // 10 % len(self.sources)],
             "cost_px": 1 + 0.5 * np.sin(frame / 7) + (frame == 50) * 9,
             "keyframe": frame % 20 == 0,
             "status": "" if frame < 10 else status_of(frame),

@@ -44,8 +44,8 @@ def with_wheel(**fields):
         (with_wheel(size=float("nan")), "a size above 0 as 'wheels[0].size', found nan"),
         (with_wheel(size=10**5000), "a size above 0 as 'wheels[0].size', found a number out of range"),
         (with_wheel(size=13.0), "cart: expected a lucky 'size' in 'wheels[0]', found 13; choose another"),
-        (with_wheel(name=4), "a name of 1 to 200 characters on one line as 'wheels[0].name', found 4"),
-        (with_wheel(name="a\nb"), "on one line as 'wheels[0].name', found 'a\\nb'"),
+        (with_wheel(name=4), "on one line, without control or direction characters as 'wheels[0].name', found 4"),
+        (with_wheel(name="a\nb"), "characters as 'wheels[0].name', found 'a\\nb'"),
         (with_wheel(spokes=[1, 2.5]), "a whole number as 'wheels[0].spokes[1]', found 2.5"),
         ({"wheels": [], "wheel": 1}, "only wheels, kind, place, load, note, by_name as keys, found 'wheel'"),
         ({"wheels": [], "a` - at `$.b`": 1}, "as keys, found 'a` - at `$.b`'"),
@@ -71,6 +71,14 @@ def test_the_first_wrong_value_is_explained(data, expected):
 def test_names_that_could_lead_out_of_a_folder(name):
     with pytest.raises(FormatError, match="without slashes"):
         check(name, FileStem, "camera", FormatError)
+
+
+@pytest.mark.parametrize("declaration", [Name, FileStem])
+@pytest.mark.parametrize("char", "\x1b\x7f\x85\x9b\u061c\u200e\u200f\u2028\u2029\u202a\u202e\u2066\u2069\ufeff")
+def test_names_without_control_and_direction_characters(declaration, char):
+    with pytest.raises(FormatError, match=r"control or direction characters, found 'a.*b'") as caught:
+        check(f"a{char}b", declaration, "camera", FormatError)
+    assert str(caught.value).isprintable()
 
 
 @pytest.mark.parametrize("name", ["cam01", "b 2", "a.1", "..a", "ü", "正面", "it's"])

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.fitting.gauss_newton import PointTargets, fit_to_points
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
@@ -72,7 +72,8 @@ def height_from_joints(model: BodyModel, joints: MarkerTable) -> float:
         if not _CREDIBLE[0] <= ratio <= _CREDIBLE[1]:
             raise TrackerError(
                 f"fitting sizes: {name} came out {ratio:.2f} times as long as in a body of these joints' size; "
-                f"expected {_CREDIBLE[0]} to {_CREDIBLE[1]}; check --joint-map"
+                f"expected {_CREDIBLE[0]} to {_CREDIBLE[1]}",
+                Remedy("check_joint_map"),
             )
     return model.height_m * float(np.exp(np.mean(list(logs.values()))))
 

@@ -18,7 +18,7 @@ from tracker.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.body.model import PosedBody, parts_of
 from tracker.contours import occluding_contours
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.cameras import Camera
 from tracker.tracking.view_regions import read_views
@@ -138,7 +138,8 @@ def choose_views(
         but = "too few views" if not found else f"{np.degrees(best):.0f} degrees at best"
         raise TrackerError(
             f"expected a frame on which {where} show the person from the front and from the side within "
-            f"{np.degrees(MAX_OFF_RAD):.0f} degrees, found {but}; add poses of such a frame, or leave out --paper"
+            f"{np.degrees(MAX_OFF_RAD):.0f} degrees, found {but}",
+            Remedy("without_paper"),
         )
     alike = [f for f in found if f.off_rad <= min(best + _ALIKE_RAD, MAX_OFF_RAD)]
     return min(alike, key=lambda f: sum(_occluded(bodies[f.frame], person, cameras[i]) for i in (f.front, f.side)))

@@ -5,6 +5,7 @@ from itertools import permutations, product
 
 import numpy as np
 
+from tracker.errors import Remedy
 from tracker.evaluation.metrics import axes_matrix, best_rigid, gather_joints
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
@@ -31,7 +32,7 @@ def length_note(n_session: int, n_reference: int | None) -> str | None:
 
 def distance_note(
     estimated: MarkerTable, reference: MarkerTable, frames: Sequence[int], axes: str = "x,y,z"
-) -> str | None:
+) -> tuple[str, Remedy] | None:
     """Say that a reference lies metres from the estimate, and what would bring it near.
 
     Args:
@@ -47,23 +48,23 @@ def distance_note(
     estimate, truth = estimate[both], truth[both]
     if not len(truth) or (apart := _median_m(estimate, truth)) <= APART_M:
         return None
-    said = f"the reference lies {apart:.2f} m from the poses (median over the joints)"
-    return f"{said}: {_explanation(estimate, truth, axes)}"
+    why, remedy = _explanation(estimate, truth, axes)
+    return f"the reference lies {apart:.2f} m from the poses (median over the joints){why}", remedy
 
 
-def _explanation(estimate: Array, truth: Array, axes: str) -> str:
+def _explanation(estimate: Array, truth: Array, axes: str) -> tuple[str, Remedy]:
     """Say which change of the reference, (n, 3), brings it near the estimate, (n, 3)."""
     file_axes = truth @ axes_matrix(axes)  # the inverse of a rotation is its transpose
     found, words = min((_median_m(estimate, file_axes @ axes_matrix(w).T), w) for w in _axes())
     if found < _NEAR_M:
-        return f"with --axes {words} it would be {found:.2f} m"
+        return "", Remedy("reference_axes", axes=words, distance_m=found)
     ratio = _spread_m(truth) / max(_spread_m(estimate), 1e-9)
     for factor, name in ((1000.0, "1000 times as large"), (0.001, "1000 times smaller")):
         if 0.5 < ratio / factor < 2:
-            return f"it is {name}: correct the Units of the file"
+            return f": it is {name}", Remedy("reference_units")
     if len(truth) >= 3 and _median_m(rigid.apply(best_rigid(truth, estimate), truth), estimate) < _NEAR_M:
-        return "it is of the same motion in a world with another origin or direction: say --align rigid-all"
-    return "check that it is of this recording and person, --axes, and the units"
+        return ": it is of the same motion in a world with another origin or direction", Remedy("align_reference")
+    return "", Remedy("check_reference")
 
 
 def _axes() -> Iterator[str]:

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.errors import FormatError
+from tracker.errors import FormatError, Remedy
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
-from tracker.formats.number_rows import MAX_VALUES
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -21,9 +20,6 @@ BENT_RAD = float(np.radians(20.0))
 """An elbow or knee bent by less does not determine the twist of its limb."""
 
 Alignment = Literal["none", "rigid-all"]
-
-_BLOCK = 10_000  # frames resampled together; all at once would take several times the memory of the result
-_RATE_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -38,6 +34,8 @@ class Evaluation:
     """Number of positions of limb joints that the reference lacks in these frames; skipped."""
     lost_frames: int
     """Number of frames without an estimate, or with a limb joint off by more than 150 mm."""
+    lost_frame_numbers: tuple[int, ...]
+    """These frames, ascending."""
     mpjpe_mm: float
     """Mean distance over frames and limb joints."""
     pa_mpjpe_mm: float | None
@@ -157,6 +155,7 @@ def evaluate_joints(
         missing_frames=int(missing.sum()),
         missing_reference_values=int(np.isnan(truth[:, is_limb]).any(axis=-1).sum()),
         lost_frames=int(lost.sum()),
+        lost_frame_numbers=tuple(frame for frame, is_lost in zip(frames, lost.tolist(), strict=True) if is_lost),
         mpjpe_mm=float(limb_mm.mean()),
         pa_mpjpe_mm=float(aligned.mean()) * 1000 if len(aligned) else None,
         median_mm=float(np.median(limb_mm)),
@@ -188,8 +187,8 @@ def joint_errors(
     both: NDArray[np.bool_] = np.all(np.isfinite(estimate) & np.isfinite(truth), axis=-1)  # (n, m)
     if not both[:, is_limb].any():
         raise FormatError(
-            "the estimate and the reference have no limb joint of the same frame in common; "
-            "check --frames, --person and the reference's frame numbers"
+            "the estimate and the reference have no limb joint of the same frame in common",
+            Remedy("check_reference_frames"),
         )
     R_align = np.eye(3)
     if align == "rigid-all":
@@ -235,7 +234,7 @@ def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: 
     """
     common = [f for f in frames if f in estimated.poses and f in true.poses]
     if not common:
-        raise FormatError("the estimate and the reference have no frame in common; check --frames and --person")
+        raise FormatError("the estimate and the reference have no frame in common", Remedy("check_reference_frames"))
     parts = [p.name for p in true.model.parts if p.name in estimated.model.part_index]
     if not parts:
         raise FormatError(
@@ -284,7 +283,7 @@ def remap_axes(table: MarkerTable, axes: str) -> MarkerTable:
     """
     matrix = axes_matrix(axes)
     if np.linalg.det(matrix) < 0:
-        raise FormatError(f"--axes {axes} would mirror the world, left to right; turn one sign, e.g. x,-z,y")
+        raise FormatError(f"the axes {axes} would mirror the world, left to right", Remedy("turn_axis"))
     return replace(table, points=table.points @ matrix.T)
 
 
@@ -300,42 +299,8 @@ def axes_matrix(axes: str) -> Array:
         if word.lstrip("+-") in ("x", "y", "z"):
             matrix[row, "xyz".index(word[-1])] = -1.0 if word.startswith("-") else 1.0
     if len(words) != 3 or abs(np.linalg.det(matrix)) != 1:
-        raise FormatError(f"--axes expected three different axes such as x,-z,y, found '{axes}'")
+        raise FormatError(f"expected three different axes such as x,-z,y, found '{axes}'", Remedy("name_axes"))
     return matrix
-
-
-def at_rate(table: MarkerTable, fps: float) -> MarkerTable:
-    """Resample a file to the frames of a session, linearly by time, if its rate differs.
-
-    A position is missing if it is missing in either of the two rows around it.
-
-    Raises:
-        FormatError: the resampled table would be too large.
-    """
-    if abs(table.rate / fps - 1) < _RATE_TOLERANCE:
-        return table
-    rows = np.asarray(table.frames * (fps / table.rate), np.float64)  # fractional frame of the session of each row
-    n_frames = int(np.floor(rows[-1] + 1e-6)) + 1
-    if n_frames * table.points[0].size > MAX_VALUES:
-        raise FormatError(
-            f"expected at most {MAX_VALUES} values at {fps:g} frames per second, found {n_frames} frames of "
-            f"{len(table.names)} points; correct the file's DataRate, or cut it to the frames to compare"
-        )
-    frames, points = np.arange(n_frames), np.empty((n_frames, *table.points.shape[1:]))
-    for start in range(0, n_frames, _BLOCK):
-        block = slice(start, start + _BLOCK)
-        points[block] = _interpolated(rows, table.points, frames[block])
-    return MarkerTable(table.names, frames, frames / fps, points, fps)
-
-
-def _interpolated(rows: Array, points: Array, frames: NDArray[np.int64]) -> Array:
-    """Interpolate points, (n, m, 3), that belong to fractional frames `rows`, (n,), to whole frames, (k, m, 3)."""
-    after = np.clip(np.searchsorted(rows, frames - 1e-6), 1, len(rows) - 1) if len(rows) > 1 else np.zeros_like(frames)
-    before = np.maximum(after - 1, 0)
-    span = np.maximum(rows[after] - rows[before], 1e-12)
-    weight = np.clip((frames - rows[before]) / span, 0.0, 1.0)[:, None, None]
-    first, second = points[before], points[after]
-    return np.where(weight < 1e-6, first, np.where(weight > 1 - 1e-6, second, first + weight * (second - first)))
 
 
 def best_rigid(source: Array, target: Array) -> Array:

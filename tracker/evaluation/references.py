@@ -9,7 +9,8 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError, SessionError
-from tracker.evaluation.metrics import Motion, at_rate, joints_of_poses, remap_axes
+from tracker.evaluation.clocks import Clock, Placement, place_rows
+from tracker.evaluation.metrics import Motion, joints_of_poses, remap_axes
 from tracker.formats.joint_maps import joints_of, read_joint_map
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.formats.pose_csv import PoseTable, read_pose_table
@@ -33,7 +34,9 @@ class Reference(NamedTuple):
     """Status of stored poses by frame, `keyframe` for those that a person set."""
 
 
-def read_joints(path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z") -> MarkerTable:
+def read_joints(
+    path: Path, fps: float, joint_map: Path | None = None, axes: str = "x,y,z", known: Placement | None = None
+) -> MarkerTable:
     """Read the joints of a TRC file under the project's names, in a session's frames and axes, metres.
 
     Args:
@@ -41,20 +44,29 @@ def read_joints(path: Path, fps: float, joint_map: Path | None = None, axes: str
         fps: frame rate of the session, 1/s.
         joint_map: TOML file with its naming convention; guessed by default.
         axes: which of its axes are the session's x, y, z.
+        known: facts of the session and choices of the user that place the rows; see `placement`.
 
     Raises:
-        FormatError: the file or the map is malformed, or no convention fits.
+        FormatError: the file or the map is malformed, no convention fits, or rows may lie at several frames.
     """
-    return _joints(read_trc(path), path, fps, joint_map, axes)
-
-
-def _joints(markers: MarkerTable, path: Path, fps: float, joint_map: Path | None, axes: str) -> MarkerTable:
     mapping = read_joint_map(joint_map) if joint_map is not None else None
-    return joints_of(at_rate(remap_axes(markers, axes), fps), str(path), mapping)
+    placed = place_rows(remap_axes(read_trc(path), axes), f"TRC file {path}", fps, known)
+    return joints_of(placed, str(path), mapping)
+
+
+def placement(session: Session, first_frame: int | None = None, clock: Clock | None = None) -> Placement:
+    """Return the facts of a session that place the rows of a file, with the user's choices; see `Placement`."""
+    declared = tuple({c.declared_fps for c in session.cameras if c.declared_fps is not None})
+    return Placement(session.n_frames, declared, first_frame, clock)
 
 
 def read_reference(
-    path: Path, session: Session, person: int, joint_map: Path | None = None, axes: str = "x,y,z"
+    path: Path,
+    session: Session,
+    person: int,
+    joint_map: Path | None = None,
+    axes: str = "x,y,z",
+    known: Placement | None = None,
 ) -> Reference:
     """Read a reference of any kind: a TRC file, a pose table (CSV), or a session folder.
 
@@ -62,8 +74,11 @@ def read_reference(
     Without that file they belong to the preset that the table names, at its height. Otherwise the person's own model is
     used, and only the angles are reliable.
 
+    The rows of a TRC file are placed by `known`, by default with the session's facts alone.
+
     Raises:
-        FormatError: the file is malformed or of an unknown kind, or the body of its poses is unknown.
+        FormatError: the file is malformed or of an unknown kind, the body of its poses is unknown, or the rows of a TRC
+            file may lie at several frames.
         SessionError: the reference session has no such person.
     """
     model = session.people[person].model
@@ -74,9 +89,9 @@ def read_reference(
         return Reference(joints_of_poses(*motion, session.fps), motion, max(motion.poses) + 1)
     if path.suffix.lower() != ".trc":
         raise FormatError(f"expected a reference as .trc, .csv or session folder, found '{path}'")
-    markers = read_trc(path)
-    n_frames = round((int(markers.frames[-1]) + 1) * session.fps / markers.rate)
-    return Reference(_joints(markers, path, session.fps, joint_map, axes), None, n_frames)
+    joints = read_joints(path, session.fps, joint_map, axes, known or placement(session))
+    begins_later = joints.frames[0] > 0 and joints.frames[-1] < session.n_frames
+    return Reference(joints, None, None if begins_later else int(joints.frames[-1]) + 1)
 
 
 def stored_motion(session: Session, person: int) -> Reference:

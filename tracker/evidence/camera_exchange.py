@@ -51,6 +51,8 @@ class CameraExchange(NamedTuple):
     """Share of the foreground that the hull covers, 0 to 1."""
     exchanged_coverage: float
     """The same with the footage of the two exchanged."""
+    with_backgrounds: bool
+    """Whether the backgrounds go with the footage: the calibration, not the footage, has the two names exchanged."""
 
     @property
     def text(self) -> str:
@@ -82,14 +84,15 @@ def find_exchange(cameras: Sequence[CameraSource], recording: Recording) -> Came
     found = []
     for i, j in combinations(sorted(candidates), 2):
         if cameras[i].camera.size == cameras[j].camera.size:
-            for of_i, of_j in _exchanged((views[i], footage[i]), (views[j], footage[j])):
+            exchanges = _exchanged((views[i], footage[i]), (views[j], footage[j]))
+            for n_stay, (of_i, of_j) in enumerate(exchanges):
                 exchanged = [of_i if k == i else of_j if k == j else foregrounds[k] for k in order]
-                found.append((float(_coverage(room, exchanged).mean()), i, j))
+                found.append((float(_coverage(room, exchanged).mean()), n_stay == 0, i, j))
     before = float(coverage.mean())
-    best, i, j = max(found, default=(0.0, 0, 0))
+    best, with_backgrounds, i, j = max(found, default=(0.0, False, 0, 0))
     if best < max(before + _MIN_GAIN, _MIN_COVERAGE):
         return None
-    return CameraExchange((cameras[i].camera.name, cameras[j].camera.name), before, best)
+    return CameraExchange((cameras[i].camera.name, cameras[j].camera.name), before, best, with_backgrounds)
 
 
 def find_body_exchange(

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import cv2
 import numpy as np
 
-from tracker.errors import RecordingError
+from tracker.errors import RecordingError, Remedy
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording, background_frames, read_mask
 from tracker.geometry.arrays import FloatArray, Image
@@ -146,6 +146,7 @@ class SilhouetteFinder:
         if not images:
             raise RecordingError(
                 f"camera '{self.cameras[i].camera.name}': no frame of {self.cameras[i].footage} can be decoded to "
-                "learn the background; give one with --background"
+                "learn the background",
+                Remedy("give_background"),
             )
         return background_of_recording(images)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.errors import SessionError
+from tracker.errors import Remedy, SessionError
 from tracker.geometry.arrays import Array
 from tracker.motion.interpolation import interpolate_pose
 from tracker.posing.retarget import retarget_pose
@@ -50,7 +50,8 @@ class PersonMotion:
         if other is not None:
             raise SessionError(
                 f"expected poses of '{self.person.name}' with the degrees of freedom of '{self.model.name}', found "
-                f"some of '{other.name}'; give frames of one body as --frames, or another format"
+                f"some of '{other.name}'",
+                Remedy("frames_of_one_body"),
             )
         return {f: retarget_pose(p.body.values, p.body.model, self.model) for f, p in self.poses.items()}
 
@@ -134,8 +135,8 @@ def read_motion(
         names = " and ".join(f"'{session.people[i].name}'" for i in chosen)
         where = "" if frames is None else f" in frames {frames.start}:{frames.stop}"
         raise SessionError(
-            f"expected poses of {names}{where}, found none{' that is not lost' if n_lost else ''}; "
-            "place the body in the page, or use quadrille init and track"
+            f"expected poses of {names}{where}, found none{' that is not lost' if n_lost else ''}",
+            Remedy("place_body"),
         )
     if frames is None:
         found = [frame for i in having for frame in people[i].poses]

@@ -48,9 +48,7 @@ def write_person_trc(motion: ExportedMotion, options: ExportOptions, paths: Sequ
                 T_file_world, body.joint_centers_world
             )
         tick()
-    write_trc(
-        paths[0], names, points, motion.session.fps, frames=motion.frames, units=options.units, from_frame_0=False
-    )
+    write_trc(paths[0], names, points, motion.session.fps, frames=motion.frames, units=options.units)
 
 
 def write_tables(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:

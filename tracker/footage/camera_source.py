@@ -21,3 +21,5 @@ class CameraSource:
     """Frame k of the session is frame k + offset of the footage; not negative."""
     declared_fps: float | None = None
     """Frame rate that the video declares where it is not the session's, as for high-speed footage, 1/s."""
+    footage_frames: int | None = None
+    """Number of frames of the footage where frames at its end are left out because other cameras lack them."""

@@ -25,9 +25,12 @@ class ImageFolder:
     """The images, in order."""
     numbers: tuple[int, ...] | None
     """Number of each image according to its name; None if the names are not numbered in equal steps."""
+    is_mirrored: bool = False
     fps: None = None
     """Images have no frame rate."""
     has_constant_rate: bool = True
+    stamps: None = None
+    """Images have no time stamps."""
     listed_share: None = None
     version: int = 0
     """Images are read again each time; a folder has one version."""

@@ -34,6 +34,18 @@ class PacketScan(NamedTuple):
     """Share of the file that has been read, 0 to 1."""
 
 
+class TimeStamps(NamedTuple):
+    """Start and regularity of the time stamps of a video."""
+
+    start_s: float
+    """Stamp of the first frame, s."""
+    jitter: float
+    """Largest distance of a stamp from the straight line through all, as a share of the interval between frames; 0
+    where it is below a tick."""
+    n_gaps: int
+    """Number of intervals in which a frame may be missing: those longer than 1.5 usual ones."""
+
+
 def list_frames(container: InputContainer, where: str, report: Callable[[PacketScan], None] | None = None) -> Index:
     """List the frames of the first video stream.
 
@@ -124,6 +136,19 @@ def rate_of(index: Index, declared: float, tick_s: float) -> tuple[float, bool]:
     constant = bool(np.all(np.abs(intervals - usual) <= max(_RATE_JITTER * usual, 1)))
     # The header's rate is exact; the mean over a short clip is rounded to ticks.
     return (declared if constant and abs(declared / mean - 1) < 0.005 else mean), constant
+
+
+def time_stamps_of(index: Index, tick_s: float) -> TimeStamps:
+    """Return start and regularity of the time stamps of a video; `tick_s` is their unit, s."""
+    start_s, intervals = float(index.pts[0]) * tick_s, np.diff(index.pts)
+    if len(intervals) < 2:
+        return TimeStamps(start_s, 0.0, 0)
+    ticks, k = (index.pts - index.pts[0]).astype(np.float64), np.arange(len(index.pts))
+    slope, ahead = np.polyfit(k, ticks, 1)
+    apart = float(np.abs(ticks - (slope * k + ahead)).max())
+    usual = max(np.median(intervals), intervals.mean())  # of intervals that alternate, the median is the shorter
+    n_gaps = int((intervals > 1.5 * usual).sum())
+    return TimeStamps(start_s, apart / slope if apart > 1 else 0.0, n_gaps)
 
 
 def _sorted(shown: list[int], keys: list[int], position: dict[int, int], before: int | None) -> Index:

@@ -1,8 +1,8 @@
 """The footage of one camera: a video file or a folder of images, with random access to frame k.
 
 Frame k is the k-th frame that decoding from the start would show. All video is decoded here, because two decoders
-disagree on rotation, colour and frame numbers. Videos are rotated by their display rotation and images by their EXIF
-orientation, as OpenCV and therefore calibration tools read them.
+disagree on rotation, colour and frame numbers. Videos are turned by their display matrix and images by their EXIF
+orientation, as OpenCV and therefore calibration tools read them. Mirrored matrices are applied as players apply them.
 """
 
 import threading
@@ -17,16 +17,15 @@ from av.video.reformatter import VideoReformatter
 
 from tracker.errors import RecordingError
 from tracker.footage import frame_index, packet_scan
+from tracker.footage.display import display_turn, displayed_size
 from tracker.footage.frame_index import FileVersion, Index
 from tracker.footage.image_folder import ImageFolder
-from tracker.footage.packet_scan import PacketScan
+from tracker.footage.packet_scan import PacketScan, TimeStamps
 from tracker.footage.video_decoder import VideoDecoder
 from tracker.geometry.arrays import Image
 
-# As the number of the next frame that the decoder gives: unknown, so that the next read seeks.
-_NOWHERE = 2**62
-# A frame is read again if the file was replaced meanwhile.
-_ATTEMPTS = 2
+_NOWHERE = 2**62  # as the number of the next frame that the decoder gives: unknown, so that the next read seeks
+_ATTEMPTS = 2  # a frame is read again if the file was replaced meanwhile
 
 
 class VideoFile:
@@ -38,10 +37,14 @@ class VideoFile:
     path: Path
     size: tuple[int, int]
     """Width and height as displayed, px."""
+    is_mirrored: bool
+    """Whether the display matrix exchanges left and right."""
     fps: float
     """Mean frame rate, 1/s; the header's rate while frames are being listed."""
     has_constant_rate: bool
     """Whether all intervals between frames are equal; true while frames are being listed."""
+    stamps: TimeStamps | None
+    """Start and regularity of the time stamps; None while frames are being listed."""
     version: int
     """Number of times that the file was opened again because it had changed."""
 
@@ -87,9 +90,9 @@ class VideoFile:
             raise self._unreadable(error) from error
         if first is None:
             raise RecordingError(f"{self._where} has no frames; record or convert it again")
-        self.size = _displayed_size(first)
+        self.size, self.is_mirrored = displayed_size(first), display_turn(first).is_mirror
         if not self._is_listed:
-            self.fps, self.has_constant_rate = declared_rate or 1.0, True
+            self.fps, self.has_constant_rate, self.stamps = declared_rate or 1.0, True, None
             rates = (declared_rate, decoder.tick_s)
             threading.Thread(target=self._list_in_background, args=rates, name="list frames", daemon=True).start()
 
@@ -221,7 +224,7 @@ class VideoFile:
                     f"the {len(before)} frames of before",
                     f"{len(index.pts)}{'' if is_same else ' with other time stamps'}",
                 )
-            size = _displayed_size(self._first_frame(index, decoder))
+            size = displayed_size(self._first_frame(index, decoder))
             if size != self.size:
                 raise self._changed(f"{self.size[0]}x{self.size[1]} pixels as before", f"{size[0]}x{size[1]}")
             declared_rate = float(decoder.stream.average_rate or 0)
@@ -264,8 +267,7 @@ class VideoFile:
     def _to_rgb(self, frame: VideoFrame) -> Image:
         # One converter for all frames: preparing one takes longer than a conversion.
         image = self._converter.reformat(frame, format="rgb24").to_ndarray()
-        # The display rotation is counter-clockwise, like that of rot90.
-        return np.ascontiguousarray(np.rot90(image, frame.rotation // 90))
+        return display_turn(frame).apply(image)
 
     def _decode_frame(self, k: int) -> VideoFrame | None:
         """Decode frame k; None if it is damaged."""
@@ -357,6 +359,7 @@ class VideoFile:
     def _finish(self, index: Index, declared_rate: float, tick_s: float) -> None:
         with self._grown:
             self.fps, self.has_constant_rate = packet_scan.rate_of(index, declared_rate, tick_s)
+            self.stamps = packet_scan.time_stamps_of(index, tick_s)
             self._listed, self._is_listed, self._failure = PacketScan(index, 1.0), True, None
             self._grown.notify_all()
 
@@ -379,11 +382,6 @@ class VideoFile:
 
     def _first_frame(self, index: Index, decoder: VideoDecoder) -> VideoFrame:
         return packet_scan.check_order(index, decoder, self._where)
-
-
-def _displayed_size(frame: VideoFrame) -> tuple[int, int]:
-    """Return width and height of a frame after its rotation, px."""
-    return (frame.width, frame.height) if frame.rotation % 180 == 0 else (frame.height, frame.width)
 
 
 Footage = VideoFile | ImageFolder

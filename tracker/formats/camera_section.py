@@ -1,6 +1,6 @@
 """One camera of a calibration, as data of the anipose layout, and the checks of what it says.
 
-Other layouts are rewritten to this one (`camera_layouts`), so that all are checked by one declaration.
+Other layouts are rewritten to this one (`tracker.calibrations`), so that all are checked by one declaration.
 """
 
 from collections.abc import Sequence
@@ -22,10 +22,6 @@ Units = Literal["m", "cm", "mm"]
 METRES: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres per unit."""
 
-MAX_STUDIO_M = 100.0
-"""A camera read as metres and farther from the origin than this has translations in millimetres."""
-MIN_STUDIO_M = 0.05
-"""Cameras read as millimetres that are all nearer to the origin than this have translations in metres."""
 _ROTATION_TOLERANCE = 1e-3  # a rotation matrix printed with four digits still passes
 _CENTRAL = 0.25
 """Share of the picture at each side in which no principal point lies."""
@@ -83,6 +79,10 @@ class CameraEntry:
     fisheye: bool = False
     """As in `Camera`."""
 
+    def eccentricity(self, size: tuple[int, int]) -> float:
+        """Return how far the principal point lies from the middle of pictures of a size, as a share of their sides."""
+        return float(np.abs((self.K[:2, 2] + 0.5) / np.array(size) - 0.5).max())
+
     def camera(self, footage_size: tuple[int, int] | None = None) -> Camera:
         """Return the camera; its size is that of the footage if the file does not state one.
 
@@ -95,14 +95,12 @@ class CameraEntry:
                 f"camera '{self.name}': expected the key 'size' in the calibration, found none; add the width and "
                 "height of the pictures"
             )
-        if self.size is None:
-            share = self.K[:2, 2] / np.array(size)
-            if np.any((share < _CENTRAL) | (share > 1 - _CENTRAL)):
-                raise CalibrationError(
-                    f"camera '{self.name}': the calibration states no image size, and its principal point "
-                    f"{self.K[0, 2]:.0f}, {self.K[1, 2]:.0f} is not that of footage of {size[0]}x{size[1]} pixels; "
-                    "calibrate at the size of the footage"
-                )
+        if self.size is None and self.eccentricity(size) > 0.5 - _CENTRAL:
+            raise CalibrationError(
+                f"camera '{self.name}': the calibration states no image size, and its principal point "
+                f"{self.K[0, 2]:.0f}, {self.K[1, 2]:.0f} is not that of footage of {size[0]}x{size[1]} pixels; "
+                "calibrate at the size of the footage"
+            )
         return Camera(self.name, size, self.K, self.distortion, self.T_world_camera, self.fisheye)
 
 
@@ -148,28 +146,12 @@ def _rotation(value: list[Any], where: str) -> Array:
     return U @ V
 
 
-def check_names_and_units(entries: Sequence[CameraEntry], where: str, units: Units) -> None:
-    """Check that each camera has a name of its own, and that the translations can have the unit.
+def check_names(entries: Sequence[CameraEntry], where: str) -> None:
+    """Check that each camera has a name of its own.
 
     Raises:
-        CalibrationError: two have one name, or the unit is another.
+        CalibrationError: two have one name.
     """
     names = [c.name for c in entries]
-    twice = sorted({n for n in names if names.count(n) > 1})
-    if twice:
+    if twice := sorted({n for n in names if names.count(n) > 1}):
         raise CalibrationError(f"{where}: two cameras are named '{twice[0]}'; give each its own name")
-    distances = [float(np.linalg.norm(c.T_world_camera[:3, 3])) for c in entries]
-    farthest = max(distances)
-    if units == "m" and farthest > MAX_STUDIO_M:
-        name = names[distances.index(farthest)]
-        raise CalibrationError(
-            f"{where}: camera '{name}' would stand {farthest:.0f} m from the origin, so its translations "
-            "look like millimetres and metres were expected; say --units mm"
-        )
-    # All at the origin is one camera that defines the world, which has no scale to check.
-    if units != "m" and 0 < farthest < MIN_STUDIO_M * METRES[units] * 1000:
-        word = {"cm": "centimetres", "mm": "millimetres"}[units]
-        raise CalibrationError(
-            f"{where}: read as {word} all cameras would stand within {farthest * 1000:.2g} mm of the "
-            f"origin, so its translations look like metres; leave out --units {units}"
-        )

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from tracker.errors import FormatError
+from tracker.errors import FormatError, Remedy
 from tracker.formats.trc import MarkerTable
 from tracker.text_files import TextKind, read_toml
 from tracker.validation import Name, check
@@ -95,8 +95,8 @@ def guess_joint_map(markers: Sequence[str], source: str) -> JointMap:
     if max(present) < _MIN_JOINTS:
         raise FormatError(
             f"the markers of {source} follow no known convention (our own, COCO, CMU, BODY_25): found "
-            f"{', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}; give a --joint-map FILE.toml with a line "
-            f"such as left_shoulder = {_quoted(markers[0])} for each joint (docs/recordings.md has an example)"
+            f"{', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}",
+            Remedy("give_joint_map", marker=_quoted(markers[0])),
         )
     return KNOWN[present.index(max(present))]
 

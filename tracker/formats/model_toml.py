@@ -23,7 +23,7 @@ from tracker.body.model import BodyModel
 from tracker.body.parts import Axis, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
 from tracker.text_files import TextKind, parse_toml, read_text
-from tracker.validation import Color, Name, Vector, check, check_version
+from tracker.validation import UNPRINTABLE, Color, Name, Vector, check, check_version
 
 VERSION = 1
 DEFAULT_HEIGHT_M = 1.75
@@ -51,10 +51,10 @@ _TAPERS: dict[str, Any] = {
 """Type of the taper by shape. A union would be one declaration, but msgspec 0.22 crashes on it."""
 _Parent: TypeAlias = Annotated[
     str,
-    Meta(pattern=r"^[^\x00-\x1f\x7f]{0,200}\Z", description="the name of the parent part, or none for the root,"),
+    Meta(pattern=rf"^[^{UNPRINTABLE}]{{0,200}}\Z", description="the name of the parent part, or none for the root,"),
 ]
 _Source: TypeAlias = Annotated[
-    str, Meta(pattern=r"^[^\x00-\x1f\x7f]{0,500}\Z", description="a source of at most 500 characters,")
+    str, Meta(pattern=rf"^[^{UNPRINTABLE}]{{0,500}}\Z", description="a source of at most 500 characters,")
 ]
 _Turn: TypeAlias = Annotated[float, Meta(ge=0, le=180, description="an angle of 0 to 180 degrees")]
 

@@ -49,7 +49,7 @@ def parse_yaml(text: str, source: str, kind: TextKind) -> Any:
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         mark = getattr(error, "problem_mark", None)
         place = "" if mark is None else f" at line {mark.line + 1}"
-        problem = getattr(error, "problem", None) or str(error).splitlines()[0]
+        problem = (getattr(error, "problem", None) or str(error).splitlines()[0])[:200]
         raise kind.error(f"{where} is not valid YAML: {problem}{place}; {kind.remedy}") from error
 
 

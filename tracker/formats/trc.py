@@ -19,9 +19,20 @@ from tracker.files import write_text_atomic
 from tracker.formats.number_rows import NumberRows
 from tracker.geometry.arrays import Array
 from tracker.text_files import TextKind, read_lines
-from tracker.validation import FrameRate, check, quoted
+from tracker.validation import MAX_FRAMES, FrameRate, check, quoted
 
-_METRES = {"m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001, "millimeters": 0.001}
+_METRES = {
+    word: metres
+    for words, metres in (
+        ("m meter meters metre metres", 1.0),
+        ("cm centimeter centimeters centimetre centimetres", 0.01),
+        ("mm millimeter millimeters millimetre millimetres", 0.001),
+        ("in inch inches", 0.0254),
+        ("ft foot feet", 0.3048),
+    )
+    for word in words.split()
+}
+"""Metres per unit, by the words that OpenSim (`Units`) and others write, in any case."""
 _KIND = TextKind("TRC file", 1_000_000_000, FormatError, "export it again")
 _MAX_POINTS = 1000
 _MAX_COORDINATE = 1e9
@@ -35,13 +46,17 @@ class MarkerTable:
     names: tuple[str, ...]
     """Names of the points, (m,)."""
     frames: NDArray[np.int64]
-    """Frame of each row, relative to the first row, (n,)."""
+    """Frame of each row, (n,): Frame# as `read_trc` finds it, frames of a session once the rows are placed."""
     times: Array
     """Time of each row, s, (n,)."""
     points: Array
     """Positions, (n, m, 3), metres; NaN where missing."""
     rate: float
     """Rows per second according to the header."""
+    origin: int | None = None
+    """OrigDataStartFrame of a file; None if it has none."""
+    notes: tuple[str, ...] = ()
+    """Sentences on how the rows of a file were placed at frames of a session."""
 
     def __post_init__(self) -> None:
         n, m = len(self.frames), len(self.names)
@@ -78,7 +93,7 @@ def read_trc(path: str | Path) -> MarkerTable:
     points = values[:, 1:].reshape(len(frames), len(names), 3)
     # A point with a missing coordinate is missing.
     points[np.isnan(points).any(axis=-1)] = np.nan
-    return MarkerTable(names, frames - frames[0], values[:, 0], points, rate)
+    return MarkerTable(names, frames, values[:, 0], points, rate, _whole(header.get("OrigDataStartFrame")))
 
 
 def write_trc(
@@ -89,9 +104,10 @@ def write_trc(
     *,
     frames: Sequence[int] | NDArray[np.int64] | None = None,
     units: Literal["m", "mm"] = "m",
-    from_frame_0: bool = True,
 ) -> None:
     """Write a TRC file, exact to a tenth of a micrometre; `read_trc` reads it back.
+
+    Frame# counts from 1 as in OpenSim, Time from 0, so that both together tell the frame.
 
     Args:
         path: the file.
@@ -100,15 +116,10 @@ def write_trc(
         rate: frames per second.
         frames: frame of each row, from 0, ascending; by default every frame from 0. Frame# is one more.
         units: of the lengths in the file.
-        from_frame_0: whether a blank row for frame 0 comes first if the first frame is not 0. Readers that count from
-            the first row, such as `read_trc`, then find the frames; others want rows at one rate.
     """
     path = Path(path)
     frames = np.arange(len(points)) if frames is None else np.asarray(frames)
     assert points.shape == (len(frames), len(names), 3)
-    if from_frame_0 and len(frames) and frames[0] != 0:
-        frames = np.concatenate([[0], frames])
-        points = np.concatenate([np.full((1, len(names), 3), np.nan), points])
     first = int(frames[0]) + 1 if len(frames) else 1
     scale, digits = (1.0, 7) if units == "m" else (1000.0, 4)
     lines = [
@@ -131,9 +142,17 @@ def _scale(header: dict[str, str], where: str) -> float:
     units = header.get("Units", "").strip()
     if units.lower() not in _METRES:
         raise FormatError(
-            f"{where}, line 3: expected Units to be one of {', '.join(_METRES)}, found {quoted(units)}; correct it"
+            f"{where}, line 3: expected Units to be m, cm, mm, in, ft or a whole word such as millimeters, found "
+            f"{quoted(units)}; correct it"
         )
     return _METRES[units.lower()]
+
+
+def _whole(text: str | None) -> int | None:
+    """Return a header's whole number; None if it is none, or no frame number."""
+    number = _number(text)
+    is_frame = isinstance(number, float) and number.is_integer() and abs(number) <= MAX_FRAMES
+    return int(number) if is_frame and not isinstance(number, str) else None
 
 
 def _number(text: str | None) -> float | str | None:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.geometry.arrays import Array
 from tracker.initialization.silhouette_axis import MajorAxis
 
@@ -75,8 +75,8 @@ def find_body_axes(axes: Sequence[MajorAxis], up: Array, height_m: float) -> lis
                 found.append((misfit + extra, BodyAxis(sign * direction, top, misfit, used, left_out)))
     if not found:
         raise TrackerError(
-            "expected a head along the silhouettes' axis, found none; choose another --frame, on which the person "
-            "stands with the arms away from the head"
+            "expected a head along the silhouettes' axis, found none",
+            Remedy("another_frame", condition="the person stands with the arms away from the head"),
         )
     return [axis for _, axis in sorted(found, key=lambda f: f[0])]
 
@@ -98,8 +98,8 @@ def _direction(axes: Sequence[MajorAxis]) -> tuple[tuple[MajorAxis, ...], Array]
         offs = [np.inf if (common := _common_direction(rest)) is None else common[1] for rest in rests]
         used = rests[int(np.argmin(offs))]
     raise TrackerError(
-        f"expected the person in at least 2 views from different sides, found {len(used)} that agree; choose another "
-        "--frame, or add a camera from another side"
+        f"expected the person in at least 2 views from different sides, found {len(used)} that agree",
+        Remedy("another_frame_or_camera"),
     )
 
 

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
@@ -188,8 +188,7 @@ def silhouette_axes(scene: PersonScene) -> list[MajorAxis]:
     axes = [a for mask, camera in scene.clear_views if (a := major_axis(mask, camera)) is not None]
     if len(axes) < 2:
         raise TrackerError(
-            f"expected the person in at least 2 views, found {len(axes)}; choose another --frame, or check the "
-            "background"
+            f"expected the person in at least 2 views, found {len(axes)}", Remedy("another_frame_or_background")
         )
     return axes
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.geometry.arrays import Array
 from tracker.voxels.part_size import principal_axes
 from tracker.voxels.voxel_grid import Voxels
@@ -71,8 +71,8 @@ def find_torso(figure: Voxels, neck: Array, is_head: NDArray[np.bool_]) -> Torso
     girdle = others & _in_cylinder(points, neck, up, *_GIRDLE_M)
     if not girdle.any():
         raise TrackerError(
-            "expected a trunk below the head in the silhouettes, found none; choose another --frame, or place the "
-            "person in the page"
+            "expected a trunk below the head in the silhouettes, found none",
+            Remedy("another_frame_or_place"),
         )
     axes = _across(points[girdle], figure.grid.size_m, up)
     half = _grown(figure, neck, axes)

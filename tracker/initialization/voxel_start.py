@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -72,8 +72,8 @@ def possible_heads(figure: Voxels, graph: VoxelGraph, up: Array) -> list[Head]:
     heads = [head for head in (find_head(figure, graph), find_upper_head(figure, graph, up)) if head is not None]
     if not heads:
         raise TrackerError(
-            "expected a head that stands out of the silhouettes, found none; choose another --frame, on which no "
-            "arm or other person is beside the head"
+            "expected a head that stands out of the silhouettes, found none",
+            Remedy("another_frame", condition="no arm or other person is beside the head"),
         )
     is_same = np.linalg.norm(heads[0].center - heads[-1].center) < _SAME_HEAD_M
     return heads[:1] if is_same else heads

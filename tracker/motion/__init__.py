@@ -1,5 +1,5 @@
 """Poses over time, without images: prediction, interpolation, smoothing, inconsistent frames.
 
 Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose`,
-`smoothing.smooth_poses` and `consistency.inconsistent_frames`.
+`smoothing.smooth_poses`, `consistency.inconsistent_frames` and `keyframe_doubts`.
 """

@@ -11,7 +11,7 @@ from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, 
 from tracker.acquisition.from_joints import JOINT_M, place_joints
 from tracker.acquisition.two_views import TwoViewSettings, acquire_from_two_views
 from tracker.body.model import BodyModel, PosedBody
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock, pin_block
@@ -135,7 +135,8 @@ def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedF
     if not usable:
         raise TrackerError(
             f"expected a pose of '{session.people[person].name}' on a frame from {frames[0]} to {frames[-1]}, found "
-            "none that is not lost; place the body in the page, or use quadrille init"
+            "none that is not lost",
+            Remedy("place_body"),
         )
     bodies = {
         k: (

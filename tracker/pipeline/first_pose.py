@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
 from tracker.geometry.arrays import Array
@@ -282,8 +282,8 @@ def _filling(
     kept = [start for start, check in zip(tracked, checks, strict=True) if not check.is_refused]
     if not kept:
         raise TrackerError(
-            f"expected a body that fills the silhouettes, found none: {checks[0].note}; choose another --frame, or "
-            "place the person in the page"
+            f"expected a body that fills the silhouettes, found none: {checks[0].note}",
+            Remedy("another_frame_or_place"),
         )
     return kept
 

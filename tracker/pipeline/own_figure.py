@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.session.session import Session
@@ -44,23 +44,26 @@ def own_figure(session: Session, person: int, hull: VisualHull, others: Sequence
     if len(figures) > n_people:
         raise TrackerError(
             f"expected {n_people} person{'s' * (n_people > 1)} as the session has, found {len(figures)} figures that "
-            "stand apart; make the session with all --people, or give masks of the person"
+            "stand apart",
+            Remedy("name_all_people"),
         )
     free = [f for f in figures if not any(_is_in(f, body) for body in others)]
     if not free:
         raise TrackerError(
             f"expected a figure of '{session.people[person].name}', found only those of people who have a pose on this "
-            "frame; choose another --frame, on which all stand apart"
+            "frame",
+            Remedy("another_frame", condition="all stand apart"),
         )
     if (len(figures) < n_people and free[0].volume_m3 > _MAX_HULL_M3) or len(free) + len(others) < n_people:
         raise TrackerError(
-            f"expected {n_people} figures that stand apart, found {len(figures)}; choose another --frame, on which "
-            "people do not touch"
+            f"expected {n_people} figures that stand apart, found {len(figures)}",
+            Remedy("another_frame", condition="people do not touch"),
         )
     if free[0].volume_m3 > _MAX_HULL_M3:
         raise TrackerError(
             f"expected one person of at most {1000 * _MAX_HULL_M3:.0f} litres, found a figure of "
-            f"{1000 * free[0].volume_m3:.0f}; several people may touch, or views may be too few; choose another --frame"
+            f"{1000 * free[0].volume_m3:.0f}: several people may touch, or views may be too few",
+            Remedy("another_frame", condition="people do not touch"),
         )
     return free[0]
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from tracker.errors import SessionError
+from tracker.errors import Remedy, SessionError
 from tracker.evidence.observer import Observer
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model
@@ -201,6 +201,5 @@ def _start_poses(store: AnnotationStore, person: Person, frames: Sequence[int], 
         return [person.model.neutral()]
     where = "before" if step > 0 else "after"
     raise SessionError(
-        f"expected a pose of '{person.name}' at frame {first} or {where}, found none; place the body in the "
-        "page, or use quadrille init"
+        f"expected a pose of '{person.name}' at frame {first} or {where}, found none", Remedy("place_body")
     )

@@ -1,31 +1,42 @@
 """Make a session from a calibration and loose footage: match them, and check that they fit together."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
-from tracker.errors import RecordingError, SessionError
+from tracker.calibrations.convention_names import PoseConvention
+from tracker.calibrations.reading import CalibratedCameras, read_cameras
+from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.frame_rates import same_rate
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
 from tracker.footage.video import Footage, open_footage
-from tracker.formats.calibration import read_cameras
-from tracker.formats.camera_section import Units
+from tracker.formats.camera_section import CameraEntry, Units
 from tracker.formats.model_toml import load_model
 from tracker.geometry.cameras import Camera
+from tracker.geometry.ground_plane import UP_ROTATIONS
 from tracker.session.matching import (
     camera_name,
     check_image_numbers,
     check_names,
     common_length,
+    common_offsets,
     common_rate,
+    find_entry,
+    footage_notes,
     match_footage,
-    same_rate,
 )
+from tracker.session.rig_summary import summarize_rig
 from tracker.session.session import PALETTE, Person, Session, create_session
+from tracker.validation import same_form
+
+T = TypeVar("T")
 
 DEFAULT_MODEL = "gavrila34"
-_VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
+VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
+"""By which files of a folder are taken for videos."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +45,8 @@ class NewSession:
 
     folder: Path
     """Where the session goes; must not exist, or be empty."""
-    calibration: Path
-    """TOML, JSON, YAML or XML file (`tracker.formats.calibration`)."""
+    calibration: Path | Sequence[Path]
+    """A file or folder, or a file for each camera (`tracker.calibrations`)."""
     videos: Sequence[Path] = ()
     """Video files or image folders, each named after its camera."""
     camera_paths: Mapping[str, Path] = field(default_factory=dict)
@@ -46,6 +57,8 @@ class NewSession:
     """Folder of CAM.png or CAM.mp4 of the empty scene."""
     masks: Path | None = None
     """Folder of CAM/%06d.png."""
+    side_names: Mapping[str, str] = field(default_factory=dict)
+    """Name after which the background and masks of a camera are filed, by camera; its own for cameras left out."""
     offsets: Mapping[str, int] = field(default_factory=dict)
     """Shift by camera name: frame k of the session is frame k + offset of the camera."""
     people: Sequence[str] = ("person",)
@@ -59,16 +72,68 @@ class NewSession:
     folders of images."""
     up: str = "z"
     """World axis that points up."""
+    common_frames: bool = False
+    """Whether frames that only some cameras have are left out: at the end, of numbered images at both ends."""
     units: Units | None = None
     """Unit of the calibration's translations; by default the one that its layout fixes, else metres."""
+    poses: PoseConvention | None = None
+    """Convention of the calibration's poses; by default that of its layout, unless the cameras contradict it."""
+    rescale: bool = False
+    """Whether a calibration at a whole multiple of the footage's size is scaled to it."""
 
 
-def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None) -> Session:
+@dataclass(frozen=True)
+class SessionParts:
+    """What a session is made of, checked: all of it fits together."""
+
+    request: NewSession
+    cameras: tuple[CameraSource, ...]
+    people: tuple[Person, ...]
+    fps: float
+    """Frames per second."""
+    n_frames: int
+
+    def make(self) -> Session:
+        """Make the session folder.
+
+        Raises:
+            SessionError: the folder is not empty, or cannot be written.
+        """
+        return create_session(
+            self.request.folder, cameras=self.cameras, people=self.people, fps=self.fps, n_frames=self.n_frames,
+            up=self.request.up,
+        )  # fmt: skip
+
+
+def assemble(
+    request: NewSession,
+    report: Callable[[str], None] = lambda _: None,
+    note: Callable[[str], None] | None = None,
+) -> Session:
     """Make a session folder of a calibration and footage. Nothing is written unless all of it fits.
 
     Args:
         request: what to make it of.
         report: called with a sentence after each check that has passed.
+        note: called with each sentence on what may be wrong, such as a camera without a pose; `report` by default.
+
+    Raises:
+        TrackerError: as `check_parts` and `SessionParts.make` do.
+    """
+    return check_parts(request, report, note).make()
+
+
+def check_parts(
+    request: NewSession,
+    report: Callable[[str], None] = lambda _: None,
+    note: Callable[[str], None] | None = None,
+) -> SessionParts:
+    """Check that a calibration and footage fit together, and write nothing.
+
+    Args:
+        request: what a session is to be made of.
+        report: called with a sentence after each check that has passed.
+        note: called with each sentence on what may be wrong; `report` by default.
 
     Raises:
         SessionError: an unknown name, a camera without footage or footage without a camera.
@@ -76,31 +141,43 @@ def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None
         CalibrationError: the calibration is malformed.
         ModelError: a body model is unknown or malformed.
     """
-    request = replace(request, videos=tuple(request.videos))
-    calibrated = {c.name: c for c in read_cameras(request.calibration, request.units)}
-    check_names(request.cameras, list(calibrated), "camera", "--cameras")
+    request = _with_compared_names(request)
+    note = note or report
+    calibration = _read_calibration(request)
+    calibrated = {c.name: c for c in calibration.entries}
+    for sentence in calibration.notes:
+        note(sentence)
+    for name in (*request.cameras, *request.camera_paths):
+        if name in calibration.left_out:
+            raise SessionError(
+                f"camera '{name}' is asked for, but {calibration.left_out[name]}; calibrate it with the others, or "
+                "leave it out"
+            )
+    check_names(request.cameras, list(calibrated), "camera", "the cameras to use")
     if twice := [n for n in request.cameras if request.cameras.count(n) > 1]:
-        raise SessionError(f"expected each camera once as --cameras, found '{twice[0]}' twice; leave one out")
+        raise SessionError(f"expected each camera to use once, found '{twice[0]}' twice; leave one out")
     without = [] if request.cameras else unfilmed_cameras(request, list(calibrated))
     names = list(request.cameras) or [n for n in calibrated if n not in without]
     report(f"The calibration has {len(calibrated)} cameras: {', '.join(calibrated)}.")
     if without:
         report(f"Cameras without footage are left out: {', '.join(without)}.")
-    unused = calibrated.keys() - set(names)
-    check_names(request.offsets, names, "camera", "--offset")
+    unused = (calibrated.keys() | calibration.left_out.keys()) - set(names)
+    check_names(request.offsets, names, "camera", "the offsets")
     paths = match_footage(names, request.videos, request.camera_paths, unused)
     report("Each camera has footage: " + ", ".join(f"{name} ({paths[name].name})" for name in names) + ".")
     footage = {name: open_footage(paths[name], name) for name in names}
     try:
-        cameras = {name: calibrated[name].camera(footage[name].size) for name in names}
-        for name in names:
-            check_size(name, footage[name].path, footage[name].size, cameras[name].size)
+        cameras = {name: _fitted(calibrated[name], footage[name], request.rescale) for name in names}
         report("All footage can be read and has the calibrated shape.")
         fps = common_rate(footage, request.fps)
-        check_image_numbers(footage, request.offsets)
-        n_frames = common_length(footage, request.offsets)
+        check_image_numbers(footage, request.offsets, request.common_frames)
+        if request.common_frames:
+            request = replace(request, offsets=common_offsets(footage, request.offsets))
+        n_frames = common_length(footage, request.offsets, request.common_frames)
         report(f"All cameras have {n_frames} frames at {fps:g} per second.")
-        sources = tuple(_source(request, cameras[name], footage[name], fps) for name in names)
+        sources = tuple(_source(request, cameras[name], footage[name], fps, n_frames) for name in names)
+        for sentence in (*_left_out(sources, n_frames), *footage_notes(footage, fps, request.offsets)):
+            note(sentence)
     finally:
         for f in footage.values():
             f.close()
@@ -108,7 +185,12 @@ def assemble(request: NewSession, report: Callable[[str], None] = lambda _: None
         check_side_files(source)
     people = _make_people(request.people, request.models, request.heights)
     report("The body models fit: " + ", ".join(f"{p.name} {p.model.height_m:.2f} m" for p in people) + ".")
-    return create_session(request.folder, cameras=sources, people=people, fps=fps, n_frames=n_frames, up=request.up)
+    if request.up in UP_ROTATIONS:
+        rig = summarize_rig(list(cameras.values()), request.up)
+        report(rig.sentence)
+        for sentence in rig.doubts:
+            note(sentence)
+    return SessionParts(request, sources, people, fps, n_frames)
 
 
 def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = None) -> list[str]:
@@ -122,20 +204,96 @@ def unfilmed_cameras(request: NewSession, calibrated: Sequence[str] | None = Non
         CalibrationError: the calibration is malformed.
     """
     if calibrated is None:
-        calibrated = [c.name for c in read_cameras(request.calibration, request.units)]
-    filmed = {*request.camera_paths, *map(camera_name, request.videos)}
+        calibrated = [c.name for c in _read_calibration(request).entries]
+    filmed = _filmed(request)
     missing = [n for n in calibrated if n not in filmed]
     return missing if len(missing) < len(calibrated) else []
 
 
-def _source(request: NewSession, camera: Camera, footage: Footage, fps: float) -> CameraSource:
+def _read_calibration(request: NewSession) -> CalibratedCameras:
+    return read_cameras(request.calibration, request.units, request.poses, _filmed(request))
+
+
+def _filmed(request: NewSession) -> set[str]:
+    """Return the names of the cameras that have footage."""
+    return {*map(same_form, request.camera_paths), *map(camera_name, request.videos)}
+
+
+def _with_compared_names(request: NewSession) -> NewSession:
+    """Return a request whose names have the Unicode form in which they are compared."""
+
+    def keys(values: Mapping[str, T]) -> dict[str, T]:
+        return {same_form(name): value for name, value in values.items()}
+
+    models, heights = request.models, request.heights
+    return replace(
+        request,
+        videos=tuple(request.videos),
+        camera_paths=keys(request.camera_paths),
+        cameras=tuple(map(same_form, request.cameras)),
+        offsets=keys(request.offsets),
+        side_names=keys(request.side_names),
+        people=tuple(map(same_form, request.people)),
+        models=keys(models) if isinstance(models, Mapping) else models,
+        heights=keys(heights) if isinstance(heights, Mapping) else heights,
+    )
+
+
+def _fitted(entry: CameraEntry, footage: Footage, rescale: bool) -> Camera:
+    """Return a camera of the size of its footage.
+
+    Raises:
+        CalibrationError: the size is unknown.
+        RecordingError: the calibration is for another size, and not to be scaled.
+    """
+    camera, size = entry.camera(footage.size), footage.size
+    ratio = max(camera.width / size[0], size[0] / camera.width)
+    is_multiple = (
+        camera.size != size
+        and ratio.is_integer()
+        and ((camera.width * size[1] == camera.height * size[0]) and ratio > 1)
+    )
+    if is_multiple and rescale:
+        return camera.scaled(size[0] / camera.width)
+    found = f"camera '{entry.name}': the calibration is for {camera.width}x{camera.height} pixels, and the footage has"
+    found += f" {size[0]}x{size[1]}"
+    if is_multiple:
+        raise RecordingError(
+            f"{found}, a ratio of {ratio:g}, which is right only if the camera shows the same view at both sizes",
+            Remedy("rescale"),
+        )
+    if camera.size != size and max(abs(camera.width - size[0]), abs(camera.height - size[1])) == 1:
+        raise RecordingError(
+            f"{found}: some programs write the index of the last pixel as size; correct 'size' in the calibration to "
+            f"{size[0]}, {size[1]}, and leave all else as it is"
+        )
+    if camera.size == size[::-1] and entry.eccentricity(size) < entry.eccentricity(camera.size) / 2:
+        raise RecordingError(
+            f"{found}; its principal point shows that its size is height and width: exchange them in the calibration"
+        )
+    check_size(entry.name, footage.path, size, camera.size)
+    return camera
+
+
+def _left_out(sources: Sequence[CameraSource], n_frames: int) -> Iterator[str]:
+    """Say which frames are left out because other cameras lack them."""
+    for source in sources:
+        if source.footage_frames is not None:
+            rest = source.footage_frames - source.offset - n_frames
+            yield f"camera '{source.camera.name}': frames that other cameras lack are left out at its end: {rest}"
+
+
+def _source(request: NewSession, camera: Camera, footage: Footage, fps: float, n_frames: int) -> CameraSource:
+    offset = request.offsets.get(camera.name, 0)
+    side_name = request.side_names.get(camera.name, camera.name)
     return CameraSource(
         camera,
         footage.path,
-        find_background(request.background, camera.name) if request.background is not None else None,
-        find_masks(request.masks, camera.name) if request.masks is not None else None,
-        request.offsets.get(camera.name, 0),
+        find_background(request.background, side_name) if request.background is not None else None,
+        find_masks(request.masks, side_name) if request.masks is not None else None,
+        offset,
         None if footage.fps is None or same_rate(footage.fps, fps) else footage.fps,
+        footage.n_frames if request.common_frames and footage.n_frames > n_frames + offset else None,
     )
 
 
@@ -148,12 +306,14 @@ def footage_in(folder: Path) -> list[Path]:
     try:
         entries = sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     except OSError as error:
-        raise SessionError(f"expected a folder of videos, found that {folder} cannot be read ({error})") from error
-    videos = [path for path in entries if path.suffix.lower() in _VIDEO_SUFFIXES and path.is_file()]
+        raise SessionError(
+            f"expected a folder of videos, found that {folder} cannot be read ({error.strerror}); check the path"
+        ) from error
+    videos = [path for path in entries if path.suffix.lower() in VIDEO_SUFFIXES and path.is_file()]
     found = videos or [path for path in entries if path.is_dir() and _has_image(path)]
     if not found:
         raise SessionError(
-            f"expected videos ({', '.join(_VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
+            f"expected videos ({', '.join(VIDEO_SUFFIXES)}) or folders of images in {folder}, found none; "
             "choose the folder that holds the footage of all cameras"
         )
     return found
@@ -169,13 +329,13 @@ def find_background(folder: Path, camera: str) -> Path:
     Raises:
         RecordingError: there is none.
     """
-    for suffix in (*IMAGE_SUFFIXES, *_VIDEO_SUFFIXES):
-        path = folder / f"{camera}{suffix}"
+    for suffix in (*IMAGE_SUFFIXES, *VIDEO_SUFFIXES):
+        path = find_entry(folder, f"{camera}{suffix}")
         if path.is_file():
             return path
     raise RecordingError(
-        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4; "
-        "add it or leave out --background"
+        f"camera '{camera}': no background in {folder}: expected {camera}.png or {camera}.mp4",
+        Remedy("give_camera_background"),
     )
 
 
@@ -185,11 +345,11 @@ def find_masks(folder: Path, camera: str) -> Path:
     Raises:
         RecordingError: there is none, or it has no masks.
     """
-    path = folder / camera
+    path = find_entry(folder, camera)
     if not any(path.glob("[0-9]" * 6 + ".png")):
         raise RecordingError(
-            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame; "
-            "add them or leave out --masks"
+            f"camera '{camera}': no masks in {path}: expected files named 000000.png and so on by video frame",
+            Remedy("give_camera_masks"),
         )
     return path
 
@@ -210,9 +370,9 @@ def _make_people(
     names: Sequence[str], models: Mapping[str, str] | str, heights: Mapping[str, float] | float | None
 ) -> tuple[Person, ...]:
     if isinstance(models, Mapping):
-        check_names(models, names, "person", "--model")
+        check_names(models, names, "person", "the body models")
     if isinstance(heights, Mapping):
-        check_names(heights, names, "person", "--height")
+        check_names(heights, names, "person", "the heights")
     people = []
     for i, name in enumerate(names):
         model = models.get(name, DEFAULT_MODEL) if isinstance(models, Mapping) else models

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from tracker.errors import SessionError
+from tracker.errors import Remedy, SessionError
 
 SESSION_FILE = "session.toml"
 
@@ -16,7 +16,7 @@ def session_folder(folder: str | Path) -> Path:
     """
     folder = tidy_path(Path(folder))
     if not os.path.isfile(folder / SESSION_FILE):  # unlike pathlib's, it is False for a name too long for the system
-        raise SessionError(f"{folder} is not a session: expected {SESSION_FILE} in it; make one with 'quadrille new'")
+        raise SessionError(f"{folder} is not a session: expected {SESSION_FILE} in it", Remedy("make_session"))
     return folder
 
 

@@ -1,35 +1,45 @@
 """The lock of a session for one writer: a file that names the holder's program, machine and time.
 
 A lock file works on network drives, where the system's own locks are unreliable. A lock left by a dead program is
-recognized on the machine on which it ran; a lock of another machine counts as held.
+recognized on the machine on which it ran; a lock of another machine or container counts as held.
 
 `filelock.SoftFileLock` would replace only the exclusive creation of the file. The holder's note, the recognition of
 reused process numbers and the safe replacement of a stale lock would remain.
 """
 
+import hashlib
 import json
 import os
 import secrets
 import socket
+import sys
 import time
+from contextlib import suppress
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from types import TracebackType
-from typing import Annotated, TypeAlias
+from typing import Annotated, NamedTuple, TypeAlias
 
 import msgspec
 from msgspec import Meta
 
 from tracker.errors import SessionError
-from tracker.files import refuse_links
-from tracker.text_files import TextKind, read_json
+from tracker.files import read_regular, refuse_links
 from tracker.validation import check
+
+if sys.platform != "win32":
+    import fcntl
 
 LOCK_FILE = "lock.json"
 
-_KIND = TextKind("lock", 10_000, SessionError)
-_WRITING_S = 0.2  # an unreadable lock file may be in the process of being written
-
+_MAX_BYTES = 10_000
+_WRITING_S = 2.0
+"""Time after which a lock file without content is one that a full disk or a power cut left, s. Its writer, where the
+file does not appear whole, takes milliseconds."""
+_LOOK_S = 0.05
+_FIRST_NAMESPACE = "pid:[4026531836]"
+"""The namespace of processes outside of any container (`PROC_PID_INIT_INO` of Linux)."""
 
 _Word: TypeAlias = Annotated[str, Meta(max_length=300)]
 
@@ -45,6 +55,22 @@ class Holder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Time at which the lock was taken, ISO 8601."""
     token: _Word
     """Identifies this lock uniquely."""
+    boot: _Word = ""
+    """Identifies the system since it was started; empty if unknown, as in locks of older programs."""
+    namespace: _Word = ""
+    """Namespace of the number of the process: each container has its own. Empty if unknown."""
+    machine: _Word = ""
+    """Identifies the installation of the system, as a hash; empty if unknown."""
+
+
+_held_here: set[str] = set()
+"""Tokens of the locks that this program holds."""
+
+
+def is_held_here(folder: Path) -> bool:
+    """Return whether this program holds the lock of a session."""
+    holder = _read(folder / LOCK_FILE)
+    return holder is not None and holder.token in _held_here
 
 
 class SessionLock:
@@ -66,18 +92,22 @@ class SessionLock:
         self.release()
 
     def acquire(self) -> None:
-        """Acquire the lock. A lock that a dead program of this machine left is replaced.
+        """Acquire the lock. A lock that a dead program of this machine left is replaced, and one without content.
 
         Raises:
             SessionError: another program holds it, or the folder cannot be written.
         """
         refuse_links(self._path.parent, LOCK_FILE)
+        here = _this_system()
         me = Holder(
-            socket.gethostname(),
+            here.host,
             os.getpid(),
             _start_of(os.getpid()),
             datetime.now(UTC).isoformat(timespec="seconds"),
             secrets.token_hex(8),
+            here.boot,
+            here.namespace,
+            here.machine,
         )
         try:
             while not self._create(me):
@@ -87,59 +117,134 @@ class SessionLock:
                 f"cannot write {self._path}: {error.strerror}; open the session where you may write"
             ) from error
         self._held = me
+        _held_here.add(me.token)
 
     def release(self) -> None:
         """Release the lock, if it is held."""
-        if self._held is not None and _read(self._path) == self._held:
-            self._path.unlink(missing_ok=True)
+        if self._held is None:
+            return
+        if _read(self._path) == self._held:
+            with suppress(OSError):  # a drive that is away; the lock then counts as left by a dead program
+                self._path.unlink()
+        _held_here.discard(self._held.token)
         self._held = None
 
     def _create(self, me: Holder) -> bool:
-        """Create the lock file; return False if there is one already."""
+        """Create the lock file; return False if there is one already. A failure leaves none."""
+        text = json.dumps(msgspec.to_builtins(me))
+        temporary = self._path.with_name(f".{LOCK_FILE}.{me.token}.tmp")
         try:
-            # Exclusive creation: of two programs at the same time, one fails. Hard links would make the content appear
-            # atomically too, but some network drives lack them.
-            with self._path.open("x", encoding="utf-8") as file:
-                json.dump(msgspec.to_builtins(me), file)
+            temporary.write_text(text, "utf-8")
+            os.link(temporary, self._path)  # it appears with its content
         except FileExistsError:
             return False
+        except OSError:  # some network drives have no hard links
+            return self._create_in_place(text)
+        finally:
+            with suppress(OSError):
+                temporary.unlink()
         return True
 
-    def _clear_stale(self) -> None:
-        """Remove the lock file if its program is dead, else raise."""
-        holder = _read(self._path)
-        if holder is None:
-            time.sleep(_WRITING_S)
-            holder = _read(self._path)
-        if holder is None and not self._path.exists():
-            return  # released in the meantime
-        if holder is None or _is_alive(holder):
-            raise SessionError(f"session {self._path.parent} is open already {_describe(holder, self._path)}")
-        # Another program may replace it at the same time: each one checks the file that it has moved away.
-        aside = self._path.with_name(f".{LOCK_FILE}.stale.{secrets.token_hex(8)}")
+    def _create_in_place(self, text: str) -> bool:
+        """Create the lock file and then write it."""
         try:
-            self._path.rename(aside)
+            file = self._path.open("x", encoding="utf-8")  # of two programs at the same time, one fails
+        except FileExistsError:
+            return False
+        try:
+            with file:
+                file.write(text)
+                file.flush()
+                return self._is_at_path(file.fileno())
+        except BaseException:
+            self._path.unlink(missing_ok=True)  # without its content it would block the session
+            raise
+
+    def _clear_stale(self) -> None:
+        """Remove the lock file if its program is dead or has left it without content, else raise."""
+        data = self._settled()
+        if data is None:
+            return  # released in the meantime
+        holder = _parse(data)
+        if not _is_blank(data) and (holder is None or _is_alive(holder)):
+            raise SessionError(f"session {self._path.parent} is open already {_describe(holder, self._path)}")
+        with suppress(FileNotFoundError), self._path.open("rb+") as file:
+            # Several programs may find the same stale lock. The one that has this file to itself removes it; to the
+            # others it is no longer the file at the path.
+            if not _have_alone(file.fileno()):
+                raise SessionError(f"session {self._path.parent} is being opened by another program; try again")
+            if self._is_at_path(file.fileno()) and file.read(_MAX_BYTES + 1) == data:
+                self._path.unlink()
+
+    def _settled(self) -> bytes | None:
+        """Read the lock file, once it has been written; None if it is missing."""
+        until = time.monotonic() + _WRITING_S
+        while True:
+            try:
+                data = read_regular(self._path, _MAX_BYTES)
+            except FileNotFoundError:
+                return None
+            except OSError as error:  # not a file, or that of another account
+                raise SessionError(
+                    f"session {self._path.parent} is open already {_describe(None, self._path)}"
+                ) from error
+            if _parse(data) is not None or time.monotonic() >= until:
+                return data
+            time.sleep(_LOOK_S)
+
+    def _is_at_path(self, number: int) -> bool:
+        """Return whether an open file is still the lock file."""
+        try:
+            return os.path.samestat(os.fstat(number), os.stat(self._path))
         except FileNotFoundError:
-            return
-        if _read(aside) == holder:
-            aside.unlink()
-        else:
-            aside.rename(self._path)
+            return False
 
 
 def _read(path: Path) -> Holder | None:
     """Read a lock; None if it is missing, incomplete or damaged."""
     try:
-        holder: Holder = check(read_json(path, _KIND), Holder, f"lock {path}", SessionError)
-    except SessionError:
+        return _parse(read_regular(path, _MAX_BYTES))
+    except OSError:
+        return None
+
+
+def _parse(data: bytes) -> Holder | None:
+    """Return the holder that a lock file names; None if it is incomplete or damaged."""
+    try:
+        holder: Holder = check(msgspec.json.decode(data[:_MAX_BYTES]), Holder, "lock", SessionError)
+    except (SessionError, ValueError, RecursionError):  # of msgspec and of texts, too
         return None
     return holder
+
+
+def _is_blank(data: bytes) -> bool:
+    """Return whether a lock file has no content: a full disk leaves it empty, a power cut perhaps as zeros."""
+    return len(data) <= _MAX_BYTES and not data.strip(b"\0")
+
+
+def _have_alone(number: int) -> bool:
+    """Keep other programs of this machine from having an open file alone, until it is closed; False if one has it."""
+    if sys.platform == "win32":
+        return True
+    until = time.monotonic() + _WRITING_S
+    while True:
+        try:
+            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= until:
+                return False
+            time.sleep(_LOOK_S)
+        except OSError:  # a drive without such locks
+            return True
+        else:
+            return True
 
 
 def _describe(holder: Holder | None, path: Path) -> str:
     if holder is None:
         return f"and its lock {path} cannot be read; close the other program, or delete that file if there is none"
-    if holder.host == socket.gethostname() and holder.process == os.getpid():
+    here = _this_system()
+    if (holder.host, holder.boot, holder.namespace) == here[:3] and holder.process == os.getpid():
         return f"in this program since {holder.since}; go on there"
     return (
         f"in process {holder.process} on {holder.host} since {holder.since}; close it there, "
@@ -149,10 +254,15 @@ def _describe(holder: Holder | None, path: Path) -> str:
 
 def _is_alive(holder: Holder) -> bool:
     """Return whether the holder may still run; only a process that is certainly gone counts as dead."""
-    if holder.host != socket.gethostname():
+    here = _this_system()
+    if holder.host != here.host or sys.platform == "win32":  # signal 0 would end the process on Windows
         return True
-    if os.name == "nt":  # signal 0 would end the process on Windows
-        return True
+    if holder.boot and holder.boot != here.boot:
+        # Machines and containers may share a name. This one was started again if it is the same installation.
+        is_known = bool(holder.machine) and holder.namespace == _FIRST_NAMESPACE
+        return not (is_known and (holder.machine, holder.namespace) == (here.machine, here.namespace))
+    if holder.boot and holder.namespace != here.namespace:
+        return True  # in another container, where the number means another process
     try:
         os.kill(holder.process, 0)
     except ProcessLookupError:
@@ -171,3 +281,31 @@ def _start_of(process: int) -> str:
         return ""
     # The program's name, in parentheses, may contain spaces. The start time is field 22, the 20th after the name.
     return stat.rpartition(")")[2].split()[19]
+
+
+class _System(NamedTuple):
+    """The system that a program runs on; see `Holder`."""
+
+    host: str
+    boot: str
+    namespace: str
+    machine: str
+
+
+@cache
+def _this_system() -> _System:
+    """Identify this system; empty words where it does not provide them."""
+    namespace = ""
+    with suppress(OSError):
+        namespace = os.readlink("/proc/self/ns/pid")
+    machine = _first_line("/etc/machine-id")
+    # The manual of machine-id asks programs to show a hash of it alone.
+    hashed = hashlib.sha256(f"quadrille {machine}".encode()).hexdigest()[:16] if machine else ""
+    return _System(socket.gethostname()[:300], _first_line("/proc/sys/kernel/random/boot_id"), namespace, hashed)
+
+
+def _first_line(path: str) -> str:
+    try:
+        return Path(path).read_text("utf-8", "replace").strip()[:300]
+    except OSError:
+        return ""

@@ -3,13 +3,15 @@
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from tracker.errors import RecordingError, SessionError
+from tracker.errors import RecordingError, Remedy, SessionError
+from tracker.footage.frame_rates import same_rate, usual_rate
 from tracker.footage.image_folder import ImageFolder, missing_numbers
 from tracker.footage.video import Footage
-from tracker.validation import FrameRate, check
+from tracker.validation import FrameRate, check, same_form
 
-RATE_TOLERANCE = 5e-4
-"""Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much."""
+_NOTED_JITTER = 0.04
+"""Share of the interval between frames from which jitter is reported. Ticks of a millisecond, as of Matroska, shift
+stamps by up to 3% at 30 frames per second."""
 
 
 def match_footage(
@@ -26,7 +28,7 @@ def match_footage(
     Raises:
         SessionError: footage without a camera, or a camera without footage or with two.
     """
-    check_names(camera_paths, names, "camera", "--camera")
+    check_names(camera_paths, names, "camera", "the footage by camera")
     paths = dict(camera_paths)
     for video in videos:
         name = camera_name(video)
@@ -34,24 +36,29 @@ def match_footage(
             continue
         if name not in names:
             raise SessionError(
-                f"video {video} belongs to no calibrated camera: expected one named {', '.join([*names, *unused])}; "
-                f"rename it, leave it out or say --camera NAME={video}"
+                f"video {video} belongs to no calibrated camera: expected one named {', '.join([*names, *unused])}",
+                Remedy("name_footage", video=video),
             )
         if name in paths:
             raise SessionError(f"camera '{name}' has two videos, {paths[name]} and {video}; leave one out")
         paths[name] = video
     missing = [n for n in names if n not in paths]
     if missing:
-        raise SessionError(
-            f"no video for camera {', '.join(missing)}; give a file named {missing[0]}.mp4, "
-            f"say --camera {missing[0]}=PATH, or choose other cameras with --cameras"
-        )
+        raise SessionError(f"no video for camera {', '.join(missing)}", Remedy("give_footage", camera=missing[0]))
     return paths
 
 
 def camera_name(video: Path) -> str:
     """Return the camera after which a video file or an image folder is named."""
-    return video.name if video.is_dir() else video.stem
+    return same_form(video.name if video.is_dir() else video.stem)
+
+
+def find_entry(folder: Path, name: str) -> Path:
+    """Return the path of a file or folder by its name, in whichever Unicode form the system stores it."""
+    path = folder / name
+    if not path.exists() and folder.is_dir():
+        return next((entry for entry in folder.iterdir() if same_form(entry.name) == same_form(name)), path)
+    return path
 
 
 def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
@@ -66,51 +73,119 @@ def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
     """
     rates = {name: f.fps for name, f in footage.items() if f.fps is not None}
     for name, f in footage.items():
-        if not f.has_constant_rate:
+        if fps is None and not f.has_constant_rate:
             raise RecordingError(
-                f"camera '{name}': {f.path} has a variable frame rate, expected a constant one; "
-                "convert it to a constant rate with frames at the times of the other cameras"
+                f"camera '{name}': {f.path} has a variable frame rate, expected a constant one: {_irregularity(f)}",
+                Remedy("give_constant_rate", fps=f"{usual_rate(rates[name]):g}"),
             )
     wanted = fps if fps is not None else next(iter(rates.values()), None)
     if wanted is None:
-        raise RecordingError("folders of images have no frame rate; give it with --fps RATE")
-    check(wanted, FrameRate, "--fps" if fps is not None else "footage", RecordingError)
+        raise RecordingError("folders of images have no frame rate", Remedy("give_rate"))
+    check(wanted, FrameRate, "the given rate" if fps is not None else "footage", RecordingError)
     if fps is None and any(not same_rate(rate, wanted) for rate in rates.values()):
         found = ", ".join(f"'{name}' {rate:.6g}" for name, rate in rates.items())
+        shaky = [f"'{name}': {_irregularity(f)}" for name, f in footage.items() if _jitter(f) > _NOTED_JITTER]
         raise RecordingError(
-            f"expected one frame rate for all cameras, found {found}; convert the videos to the same rate, or give the "
-            "rate at which all cameras filmed with --fps RATE"
+            f"expected one frame rate for all cameras, found {found}{''.join(f' ({s})' for s in shaky)}",
+            Remedy("give_common_rate", fps=f"{usual_rate(wanted):g}"),
         )
     return wanted
 
 
-def same_rate(rate: float, other: float) -> bool:
-    """Return whether two frame rates, 1/s, are equal within rounding."""
-    return abs(rate / other - 1) <= RATE_TOLERANCE
+def _jitter(footage: Footage) -> float:
+    return 0.0 if footage.stamps is None else footage.stamps.jitter
 
 
-def common_length(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -> int:
-    """Return the number of frames that all cameras have; lengths may differ by the offsets alone.
+def _irregularity(footage: Footage) -> str:
+    """Say how far the time stamps of a video are from even ones."""
+    assert footage.stamps is not None
+    jitter, n_gaps = footage.stamps.jitter, footage.stamps.n_gaps
+    text = f"its time stamps lie up to {100 * jitter:.0f}% of a frame from even ones"
+    return text + (f", with {n_gaps} gaps in which frames may be missing" if n_gaps else "")
+
+
+def footage_notes(footage: Mapping[str, Footage], fps: float, offsets: Mapping[str, int]) -> list[str]:
+    """Return sentences on what a person should check: jitter, cameras that start later, mirrored pictures.
+
+    Args:
+        footage: of each camera by name.
+        fps: frame rate of the session, 1/s.
+        offsets: shifts by camera name; with any, starts are not compared.
+    """
+    notes = []
+    for name, f in footage.items():
+        if _jitter(f) > _NOTED_JITTER:
+            notes.append(f"camera '{name}': {_irregularity(f)}; its frames are taken as they are, {fps:g} per second")
+        if f.is_mirrored:
+            notes.append(
+                f"camera '{name}': the video's display matrix mirrors the picture, which is applied, as players do; "
+                "the calibration must be of mirrored pictures too"
+            )
+    starts = {name: f.stamps.start_s for name, f in footage.items() if f.stamps is not None}
+    first = min(starts.values(), default=0.0)
+    late = {name: round((start - first) * fps) for name, start in starts.items()}
+    if len(starts) == len(footage) and any(n > 1 for n in late.values()) and not offsets:
+        listed = ", ".join(f"'{name}' {starts[name] - first:.3g} s ({n} frames)" for name, n in late.items() if n > 1)
+        last = max(late.values())
+        needed = " ".join(f"{name}={last - n}" for name, n in late.items() if last > n)
+        notes.append(
+            f"by their time stamps, some cameras start later than others: {listed}. Frames are paired by their number; "
+            f"to pair them by their stamps, make the session with the offsets {needed}"
+        )
+    return notes
+
+
+def common_length(footage: Mapping[str, Footage], offsets: Mapping[str, int], shorten: bool = False) -> int:
+    """Return the number of frames that all cameras have.
+
+    Args:
+        footage: of each camera by name.
+        offsets: shifts by camera name.
+        shorten: leave out frames at the end that some cameras lack; otherwise lengths may differ by the offsets alone.
 
     Raises:
-        RecordingError: they differ otherwise.
+        RecordingError: the lengths differ otherwise, or nothing is left.
     """
     rest = {name: f.n_frames - offsets.get(name, 0) for name, f in footage.items()}
-    if len({f.n_frames for f in footage.values()}) > 1 and len(set(rest.values())) > 1:
+    for name, n in rest.items():
+        if n < 1:
+            raise RecordingError(
+                f"camera '{name}': expected an offset below its {footage[name].n_frames} frames, found "
+                f"{offsets[name]}; check the footage and the offsets"
+            )
+    if not shorten and len({f.n_frames for f in footage.values()}) > 1 and len(set(rest.values())) > 1:
         found = ", ".join(f"'{name}' {f.n_frames}" for name, f in footage.items())
         raise RecordingError(
-            f"expected videos of the same number of frames, found {found}; "
-            "cut them to the same start and end, or say --offset CAM=N for a camera that began N frames earlier"
+            f"expected videos of the same number of frames, found {found}",
+            Remedy("give_frame_offset", n=min(rest.values())),
         )
     return min(rest.values())
 
 
-def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -> None:
+def common_offsets(footage: Mapping[str, Footage], offsets: Mapping[str, int]) -> dict[str, int]:
+    """Return the offsets at which numbered image folders begin with the first number that all have.
+
+    Given offsets, and those of other footage, stay.
+    """
+    firsts = {name: f.numbers[0] for name, f in footage.items() if isinstance(f, ImageFolder) and f.numbers is not None}
+    if offsets or len(firsts) < len(footage):
+        return dict(offsets)
+    begin = max(firsts.values())
+    found = {}
+    for name, f in footage.items():
+        assert isinstance(f, ImageFolder)
+        assert f.numbers is not None
+        found[name] = sum(n < begin for n in f.numbers)
+    return {name: n for name, n in found.items() if n}
+
+
+def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, int], shorten: bool = False) -> None:
     """Check that images with equal numbers are frames of the same instant, if the folders are numbered.
 
     Args:
         footage: of each camera by name.
         offsets: shifts by camera name, set by the user; they replace the comparison between cameras.
+        shorten: whether numbers at the ends may be missing in some folders; see `common_offsets`.
 
     Raises:
         RecordingError: a number is missing in a folder, or in the folder of one camera only.
@@ -124,27 +199,27 @@ def check_image_numbers(footage: Mapping[str, Footage], offsets: Mapping[str, in
                 f"camera '{name}': {path} has no image with number {_listed(gaps)}, expected every number from "
                 f"{numbers[0]} to {numbers[-1]}; restore it, or number the images without a gap"
             )
-    if offsets or len(numbered) < 2:
+    if offsets or shorten or len(numbered) < 2:
         return
     every = set().union(*(numbers for _, numbers in numbered.values()))
     for name, (path, numbers) in numbered.items():
         if gaps := sorted(every.difference(numbers)):
             raise RecordingError(
-                f"camera '{name}': {path} has no image with number {_listed(gaps)}, which other cameras have; images "
-                "of one instant need equal numbers: restore it, delete that number in the other folders, or say "
-                "--offset CAM=N for a camera that began N images earlier"
+                f"camera '{name}': {path} has no image with number {_listed(gaps)}, which other cameras have: images "
+                "of one instant need equal numbers",
+                Remedy("give_image_offset"),
             )
 
 
-def check_names(given: Iterable[str], known: Sequence[str], what: str, option: str) -> None:
-    """Check that names which an option gives are known.
+def check_names(given: Iterable[str], known: Sequence[str], what: str, among: str) -> None:
+    """Check that given names are known; `what` and `among` are for the message, such as "camera" and "the offsets".
 
     Raises:
         SessionError: one is not; the message lists those that are.
     """
     unknown = [n for n in given if n not in known]
     if unknown:
-        raise SessionError(f"{option} names an unknown {what} '{unknown[0]}'; expected one of {', '.join(known)}")
+        raise SessionError(f"unknown {what} '{unknown[0]}' among {among}; expected one of {', '.join(known)}")
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -10,12 +10,13 @@ from itertools import chain
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from tracker.errors import RecordingError, SessionError, TrackerError
+from tracker.errors import RecordingError, Remedy, SessionError, TrackerError
 from tracker.footage.camera_source import CameraSource
+from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size, read_background
 from tracker.footage.video import open_footage
 from tracker.session.assemble import check_side_files, find_background, find_masks
-from tracker.session.matching import check_names, same_rate
+from tracker.session.matching import check_names
 from tracker.session.session import Session, save_cameras
 
 Kind = Literal["footage", "background", "masks"]
@@ -74,8 +75,8 @@ def require_files(session: Session) -> None:
         first = missing[0]
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         raise SessionError(
-            f"camera '{first.camera}': {first.kind} {first.path}{more} not found; put it back, or run "
-            f"quadrille relink {session.folder} --search FOLDER"
+            f"camera '{first.camera}': {first.kind} {first.path}{more} not found",
+            Remedy("relink", session=session.folder),
         )
 
 
@@ -91,7 +92,7 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
         SessionError: an unknown camera, a folder that is not there, or a name that is found in several places.
         RecordingError: a file is unreadable, or not the footage that the session was made of.
     """
-    check_names(places.camera_paths, [c.camera.name for c in session.cameras], "camera", "--camera")
+    check_names(places.camera_paths, [c.camera.name for c in session.cameras], "camera", "the footage by camera")
     found = _given(session, places)
     asked = {(f.camera, f.kind) for f in found}
     missing = [m for m in missing_files(session) if (m.camera, m.kind) not in asked]
@@ -115,7 +116,9 @@ def _given(session: Session, places: Places) -> list[Relinked]:
     """Check the places that a user has given."""
     for given_kind, noun in (("background", "a background"), ("masks", "masks")):
         if getattr(places, given_kind) is not None and all(getattr(c, given_kind) is None for c in session.cameras):
-            raise SessionError(f"no camera of {session.folder} has {noun} to relink; leave out --{given_kind}")
+            raise SessionError(
+                f"no camera of {session.folder} has {noun} to relink", Remedy("relink_nothing", kind=given_kind)
+            )
     found = []
     for source in session.cameras:
         name = source.camera.name
@@ -138,7 +141,7 @@ def _files_named(names: Iterable[str], folders: Sequence[Path]) -> dict[str, lis
     wanted, found = set(names), dict[str, list[Path]]()
     for folder in folders:
         if not folder.is_dir():
-            raise SessionError(f"expected a folder as --search, found {folder}, which is none; check the path")
+            raise SessionError(f"expected a folder to search, found {folder}, which is none", Remedy("relink_search"))
         if not wanted:
             continue
         root = Path(os.path.abspath(folder))
@@ -165,10 +168,11 @@ def _choose(lost: MissingFile, candidates: Sequence[Path], check: Callable[[Path
     alike = [_common_tail(lost.path, path) for path in fitting]
     best = [path for path, n in zip(fitting, alike, strict=True) if n == max(alike)]
     if len(best) > 1:
-        option = f"--camera {lost.camera}=PATH" if lost.kind == "footage" else f"--{lost.kind} FOLDER"
         raise SessionError(
-            f"camera '{lost.camera}': the {lost.kind} may be {best[0]} or {best[1]}; search a smaller folder, or say "
-            f"{option}"
+            f"camera '{lost.camera}': the {lost.kind} may be {best[0]} or {best[1]}",
+            Remedy("relink_which_footage", camera=lost.camera)
+            if lost.kind == "footage"
+            else Remedy("relink_which_side_files", kind=lost.kind),
         )
     return best[0]
 
@@ -202,6 +206,8 @@ def _check_footage(session: Session, source: CameraSource, path: Path) -> None:
     name, offsets = source.camera.name, [c.offset for c in session.cameras]
     # Videos of one length lose frames at the end by the offsets of the others.
     lengths = {session.n_frames + source.offset, session.n_frames + max(offsets)}
+    if source.footage_frames is not None:
+        lengths = {source.footage_frames}
     expected_fps = session.fps if source.declared_fps is None else source.declared_fps
     with closing(open_footage(path, name)) as footage:
         check_size(name, path, footage.size, source.camera.size)
@@ -223,4 +229,4 @@ def _check_once(found: Sequence[Relinked]) -> None:
     path, count = Counter(f.new for f in found).most_common(1)[0] if found else (Path(), 0)
     if count > 1:
         cameras = " and ".join(f"'{f.camera}'" for f in found if f.new == path)
-        raise SessionError(f"cameras {cameras} would share {path}; give each its own with --camera NAME=PATH")
+        raise SessionError(f"cameras {cameras} would share {path}", Remedy("relink_each"))

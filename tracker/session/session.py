@@ -186,6 +186,7 @@ def _load_cameras(row: SessionFile, folder: Path) -> tuple[CameraSource, ...]:
             _resolve(c.masks, folder) if c.masks is not None else None,
             c.offset,
             c.declared_fps,
+            c.footage_frames,
         )
         for c in row.cameras
     )
@@ -298,6 +299,8 @@ def _checked_content(session: Session) -> dict[str, Any]:
         row["offset"] = c.offset
         if c.declared_fps is not None:
             row["declared_fps"] = c.declared_fps
+        if c.footage_frames is not None:
+            row["footage_frames"] = c.footage_frames
         cameras.append(row)
     data: dict[str, Any] = {
         "name": session.name,

@@ -23,9 +23,9 @@ from tracker.validation import (
     check_version,
 )
 
-VERSION = 3
+VERSION = 4
 """Newest version. A session is written in the oldest version that can describe it, so that older programs can read it:
-version 2 has a floor, version 3 a camera with a `declared_fps`."""
+version 2 has a floor, version 3 a camera with a `declared_fps`, version 4 one with `footage_frames`."""
 
 Up: TypeAlias = Literal["x", "-x", "y", "-y", "z", "-z"]
 UPS: tuple[str, ...] = get_args(Up)
@@ -66,6 +66,7 @@ class CameraRow(_Row):
         int, Meta(ge=-MAX_FRAMES, le=MAX_FRAMES, description=f"a whole number of frames, at most {MAX_FRAMES},")
     ] = 0
     declared_fps: FrameRate | None = None
+    footage_frames: _FrameCount | None = None
 
     def __post_init__(self) -> None:
         if self.offset < 0:
@@ -128,6 +129,8 @@ def read_session_file(path: Path) -> SessionFile:
 
 def needed_version(data: dict[str, Any]) -> int:
     """Return the oldest version that can describe the content of a session file."""
+    if any("footage_frames" in row for row in data["cameras"]):
+        return 4
     if any("declared_fps" in row for row in data["cameras"]):
         return 3
     return 2 if "floor" in data else 1

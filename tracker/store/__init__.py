@@ -1,5 +1,6 @@
 """The annotation database of a session: a log of edits, current poses and pins, undo, body models, settings.
 
-Imports `geometry`, `body` and `formats`. Callers use `annotation_store.AnnotationStore`, the records of `records`,
+Imports `geometry`, `body`, `formats` and the lock of `session`. Callers use `annotation_store.AnnotationStore`, the
+records of `records`,
 `stored_poses` and `backups`.
 """

@@ -1,6 +1,10 @@
-"""Backups of a store: the last few that passed their checks at opening, and going back to one of them."""
+"""Backups of a store: the last few that passed their checks at opening, and going back to one of them.
+
+Their names hold a counter, because a clock may have been ahead, and the time, for people.
+"""
 
 import os
+import re
 import secrets
 import sqlite3
 from contextlib import closing, suppress
@@ -11,12 +15,11 @@ from typing import NamedTuple
 from tracker.errors import SessionError
 from tracker.files import sync_folder
 from tracker.store import checksums, verification
+from tracker.store.recovery import JOURNALS
 
 FOLDER = "backups"
 """Folder of the backups, beside the store."""
 _N_KEPT = 3
-_JOURNALS = ("-journal", "-wal", "-shm")
-"""Endings of the files that SQLite may leave beside a store after a crash; they belong to that very file."""
 
 
 class Restored(NamedTuple):
@@ -28,8 +31,15 @@ class Restored(NamedTuple):
 
 
 def backups_of(path: Path) -> list[Path]:
-    """List the backups of a store, newest first."""
-    return sorted((path.parent / FOLDER).glob(f"{path.stem}-*{path.suffix}"), reverse=True)
+    """List the backups of a store, newest first. Those of older programs, without a counter, are the oldest."""
+    found = (path.parent / FOLDER).glob(f"{path.stem}-*{path.suffix}")
+    return sorted(found, key=lambda backup: (_counter(backup), backup.name), reverse=True)
+
+
+def _counter(backup: Path) -> int:
+    """Return the number of a backup in the order in which they were made; 0 if its name has none."""
+    numbered = re.search(r"-(\d+)-\d{8}T\d+Z$", backup.stem, re.ASCII)
+    return 0 if numbered is None else int(numbered[1])
 
 
 def time_of(backup: Path) -> str:
@@ -57,8 +67,9 @@ def back_up(db: sqlite3.Connection, path: Path) -> str | None:
             return None  # nothing to lose
         known = backups_of(path)
         if not (known and _is_copy(known[0], db)):
-            _copy(db, path.parent / FOLDER / f"{path.stem}-{_stamp()}{path.suffix}")
-            for old in backups_of(path)[_N_KEPT:]:
+            number = _counter(known[0]) + 1 if known else 1
+            _copy(db, path.parent / FOLDER / f"{path.stem}-{number:06}-{_stamp()}{path.suffix}")
+            for old in known[_N_KEPT - 1 :]:
                 old.unlink(missing_ok=True)
     except (OSError, sqlite3.Error) as error:
         return f"no backup of {path} was made: {error}; make room, or see that you may write to {path.parent / FOLDER}"
@@ -104,11 +115,11 @@ def restore(path: Path, backup: Path | None = None) -> Restored:
 def _set_aside(path: Path) -> Path | None:
     """Rename a store and its journals, which must not be applied to another file; returns its new path."""
     if not path.exists():
-        for ending in _JOURNALS:
+        for ending in JOURNALS:
             path.with_name(path.name + ending).unlink(missing_ok=True)
         return None
     kept = path.with_name(f"{path.stem}-replaced-{_stamp()}{path.suffix}")
-    for ending in _JOURNALS:  # first: a store without its journal is repaired by hand, a strange journal is not
+    for ending in JOURNALS:  # first: a store without its journal is repaired by hand, a strange journal is not
         beside = path.with_name(path.name + ending)
         if beside.exists():
             beside.rename(kept.with_name(kept.name + ending))
@@ -142,7 +153,7 @@ def _reader(backup: Path) -> sqlite3.Connection:
 
 
 def _stamp() -> str:
-    """Return the present time for the name of a file; names sort by it."""
+    """Return the present time for the name of a file."""
     return datetime.now(UTC).strftime("%Y%m%dT%H%M%S%f")[:-3] + "Z"
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from tracker.errors import DamagedStoreError, SessionError
-from tracker.files import refuse_links, sync_folder
-from tracker.store import backups, checksums, schema, verification
+from tracker.files import IrregularFileError, refuse_links, sync_folder
+from tracker.store import backups, checksums, recovery, schema, verification
 
 _OF_THE_FILE = (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY)
 """Primary codes of errors after which the file is opened again: its drive or folder may have gone away."""
@@ -40,7 +40,7 @@ class Connection:
         with self._errors():
             if not read_only:
                 name = self._path.name
-                refuse_links(self._path.parent, name, *(f"{name}-{e}" for e in ("journal", "wal", "shm")), "backups")
+                refuse_links(self._path.parent, name, *(name + ending for ending in recovery.JOURNALS), "backups")
                 if not self._path.exists():
                     if backups.backups_of(self._path):
                         raise self._damaged("expected the poses of the session, found no such file")
@@ -105,11 +105,12 @@ class Connection:
             sqlite3.Error: it cannot be read.
             OSError: it cannot be read.
         """
+        recovery.check_files(self._path)
         if not self._path.is_file():
             raise SessionError(f"annotations {self._path} not found; check the session folder")
         if self._path.stat().st_size == 0:
             raise self._damaged("expected the poses of the session, found an empty file of 0 bytes")
-        db = _connect(self._path, "ro" if self._read_only else "rw")
+        db = recovery.open_reader(self._path, _connect) if self._read_only else _connect(self._path, "rw")
         try:
             found = verification.damage(db)
             if found is not None:
@@ -200,6 +201,8 @@ class Connection:
             ) from error
         except verification.UNDECODABLE as error:
             raise self._damaged(f"its definitions or rows cannot be decoded ({type(error).__name__})") from error
+        except IrregularFileError as error:
+            raise self._damaged(f"{error.strerror} at {error.filename}") from error
         except OSError as error:
             raise SessionError(
                 f"annotations {self._path} cannot be read or written: {error.strerror}; check the disk and your rights"
@@ -215,12 +218,17 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
         check_same_thread=False,
         timeout=_TIMEOUT_S,
     )
-    # No write-ahead log: it needs shared memory, which network drives lack. EXTRA syncs the folder's entry besides what
-    # FULL syncs; without it a power cut could restore the journal and lose the last commit.
-    db.execute("PRAGMA journal_mode = DELETE")
-    db.execute("PRAGMA synchronous = EXTRA")
-    db.execute("PRAGMA foreign_keys = ON")
-    checksums.register(db)
+    try:
+        if mode != "ro":
+            # No write-ahead log: it needs shared memory, which network drives lack. EXTRA syncs the folder's entry
+            # besides what FULL syncs; without it a power cut could restore the journal and lose the last commit.
+            db.execute("PRAGMA journal_mode = DELETE")
+            db.execute("PRAGMA synchronous = EXTRA")
+        db.execute("PRAGMA foreign_keys = ON")
+        checksums.register(db)
+    except BaseException:
+        db.close()
+        raise
     return db
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from app.control.session.session_state import SessionState
 from app.drawing.body_outlines import body_outlines
+from app.remedies import page_text
 from app.state.people import AcquiredSize, AcquisitionState, SizeDraft
 from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, SizeMethod
 from tracker.acquisition.from_voxels import VoxelSizeSettings
@@ -83,7 +84,7 @@ class BodyAcquisition:
         except Exception as error:
             if not isinstance(error, TrackerError):
                 _LOG.exception("an acquisition failed")
-            text = str(error)
+            text = page_text(error)
             session_state.set(acquisition=AcquisitionState(person=person, message=f"{text[:1].upper()}{text[1:]}."))
 
     def _report(self, stage: str, share: float) -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from app.control.posing.depth_check import note_unseen_depth
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.runtime.jobs import LatestWinsWorker
@@ -164,6 +165,8 @@ class Dragging:
             session_state.show_frame(session_state.state.frame)  # moved back: the pose has its former source
         self._gesture_grab = self._mode_grab = session_state.open_edit_owner = None
         session_state.set(drag=None, **session_state.costs(session_state.state.poses))
+        if has_moved:
+            note_unseen_depth(session_state, drag.person, drag.point)
 
     def _save(self, drag: DragState, grab: Grab) -> None:
         """Save the dragged pose, and where the user put the point."""

@@ -2,19 +2,22 @@
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from app.control.posing.depth_check import note_unseen_depth
 from app.control.session.activities import Activities
 from app.control.session.comparing import note_comparison
 from app.control.session.session_state import Pins, SessionState
 from app.state.people import ShownPose
-from tracker.body.limbs import display_name
+from tracker.body.limbs import display_name, limb_display_name
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
+from tracker.posing.edits import copy_dofs, limb_of
 from tracker.posing.pinned_fit import fit_frame
 
 _CHECKPOINT_S = 1.0
@@ -136,6 +139,7 @@ class Pinning:
         self._save(drag)
         self._drag = self._session_state.open_edit_owner = None
         self._session_state.set(is_pin_held=False)
+        note_unseen_depth(self._session_state, drag.person, drag.point)
 
     def remove(self, frame: int, person: int, point: str | None = None, camera: int | None = None) -> None:
         """Remove pins of a person on a frame: of one point, in one view, or all; one entry of the history."""
@@ -154,7 +158,7 @@ class Pinning:
             what = "remove all pins" if point is None else f"remove pin {display_name(point)}{self._in(camera)}"
             self._session_state.save(what, "manual", None, person)
 
-    def fit(self, frame: int, person: int | None = None) -> None:
+    def fit(self, frame: int, person: int | None = None, point: str | None = None) -> None:
         """Fit people to pins and edges together.
 
         It vouches for those with pins on the frame; without any, for the selected person.
@@ -163,6 +167,7 @@ class Pinning:
             frame: the frame that the user saw.
             person: index of the only person to fit; by default the selected person and all who have a pose or pins on
                 the frame.
+            point: name of a point of this person whose limb alone is fitted; None fits the whole body.
 
         Raises:
             TrackerError: the frame has neither pins nor, yet, edges.
@@ -183,14 +188,50 @@ class Pinning:
                 )
             people = sorted(meant) if views is not None else pinned
             vouched = people if person is not None else pinned or [state.person]
+            limb, dofs = ("", None) if person is None or point is None else limb_of(state.models[person], point)
             costs = self._session_state.costs(state.poses)
-            self._show_fit(people, vouched, state.people, state.pins)
+            self._show_fit(people, vouched, state.people, state.pins, dofs)
             note_comparison(self._session_state, "fit", state.people, costs, people)
             evidence = " and ".join([*(["pins"] if pinned else []), *(["edges"] if views is not None else [])])
-            self._session_state.save(f"fit to {evidence}", "fitted", None, person, vouched)
+            what = f"fit {limb_display_name(limb)}" if limb else "fit"
+            self._session_state.save(f"{what} to {evidence}", "fitted", None, person, vouched)
+
+    def take_limb_back(self, frame: int) -> None:
+        """Put the limb back that the last fit moved farthest although nobody had touched it; all else stays.
+
+        Args:
+            frame: the frame that the user saw.
+
+        Raises:
+            TrackerError: the shown pose is not the result of a fit that moved such a limb.
+        """
+        with self._activities.editing():
+            session_state = self._session_state
+            session_state.go_to(frame)
+            last = session_state.state.compared
+            if last is None or not last.moved:
+                raise TrackerError(
+                    "expected a limb that the last fit moved although nobody had touched it, found none; "
+                    "undo takes back the whole fit"
+                )
+            (person, move), *rest = last.moved
+            model, former = session_state.models[person], last.before[person].values
+            session_state.show_pose(person, copy_dofs(model, session_state.state.poses[person], former, move.limb.dofs))
+            state = session_state.state
+            noted = replace(
+                last, after=state.poses, after_px=state.cost_px, after_view_costs_px=state.view_costs_px,
+                moved=tuple(rest), is_before_shown=False,
+            )  # fmt: skip
+            session_state.set(comparison=noted)
+            session_state.save(f"take back {limb_display_name(move.limb.name)}", "manual", None, person)
 
     def _show_fit(
-        self, fitted: Iterable[int], vouched: Sequence[int], start: tuple[ShownPose, ...], pins: Pins
+        self,
+        fitted: Iterable[int],
+        vouched: Sequence[int],
+        start: tuple[ShownPose, ...],
+        pins: Pins,
+        dofs: NDArray[np.bool_] | None = None,
     ) -> None:
         """Fit some people, with all others fixed, and show them.
 
@@ -199,12 +240,16 @@ class Pinning:
             vouched: indices of those whom the fit is about. Doubts about others stay.
             start: from which the fit starts, all people.
             pins: of all people.
+            dofs: the only degrees of freedom that may change, (n_dofs,); None for all that are not locked.
         """
         session_state = self._session_state
         fitted = list(fitted)
         views = session_state.frames.cached_evidence(session_state.state.frame)
         cameras = [c.camera for c in session_state.session.cameras]
         constraints = [session_state.fit_constraints(person) for person in range(len(session_state.models))]
+        if dofs is not None:
+            constraints = [replace(c, active_dofs=session_state.active_dofs(i) & dofs) if i in fitted else c
+                           for i, c in enumerate(constraints)]  # fmt: skip
         found = fit_frame(
             [PosedBody(m, p.values) for m, p in zip(session_state.models, start, strict=True)],
             pins,
@@ -217,7 +262,7 @@ class Pinning:
         people = list(start)
         for person in fitted:
             free = session_state.free_sources(person, "fitted")
-            if views is None:  # only what moved was fitted
+            if views is None or dofs is not None:  # only what moved was fitted
                 free = tuple(
                     s if moved else ""
                     for s, moved in zip(free, found.poses[person] != start[person].values, strict=True)

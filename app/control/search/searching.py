@@ -11,6 +11,7 @@ from app.control.search.search_runs import SearchRun, SearchRuns
 from app.control.session.activities import Activities
 from app.control.session.comparing import note_comparison
 from app.control.session.session_state import SessionState
+from app.remedies import page_text
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
 from app.state.search import SearchState, SearchView
@@ -254,7 +255,7 @@ class SearchRunner:
             if error is None:
                 message = f"done: {session_state.state.search.evaluations} poses scored"
             else:
-                message = str(error) if isinstance(error, TrackerError) else f"the search failed: {error}"
+                message = page_text(error) if isinstance(error, TrackerError) else f"the search failed: {error}"
             ended = replace(
                 session_state.state.search, running=False, kind=None, stage=None, candidate=None, message=message
             )

@@ -1,6 +1,6 @@
 """Compare the poses of a frame before and after a fit or a search."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,11 @@ from app.state.state import Costs
 from tracker.body.limbs import display_name
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
+from tracker.geometry.triangulation import PointObservation
+from tracker.posing.limb_moves import LimbMove, untouched_moves
 
+_Placed = Mapping[str, Sequence[PointObservation]]
+"""Points that the user has placed, with where in which views."""
 _LEFT_M = 0.06
 """Distance from its placement at which a joint counts as left, metres. Fits of the samples stay below it with bodies of
 the right size and placements off by 15 mm; with bodies an eighth too large or too small they exceed it."""
@@ -71,7 +75,7 @@ def leave_before(session_state: SessionState) -> None:
 def note_comparison(
     session_state: SessionState, work: ComparedWork, before: tuple[ShownPose, ...], costs: Costs, moved: Sequence[int]
 ) -> None:
-    """Note that the shown poses are the result of a fit or a search.
+    """Note that the shown poses are the result of a fit or a search; called before it is saved.
 
     Args:
         session_state: holds the state, with the poses and costs after the work.
@@ -94,13 +98,56 @@ def note_comparison(
         after_px=state.cost_px,
         after_view_costs_px=state.view_costs_px,
     )
-    session_state.set(comparison=replace(noted, warning=_warning(session_state, noted, moved)))
+    placed = {person: _placed_points(session_state, person, before[person].values) for person in moved}
+    moves = _untouched_moves(session_state, noted, placed) if work == "fit" else ()
+    session_state.set(comparison=replace(noted, warning=_warning(session_state, noted, placed), moved=moves))
 
 
-def _warning(session_state: SessionState, noted: PoseComparison, moved: Sequence[int]) -> str:
+def _placed_points(session_state: SessionState, person: int, before: Array) -> dict[str, list[PointObservation]]:
+    """Return the points of a person that the user has placed, with where; nowhere if a point was held by command.
+
+    Args:
+        session_state: holds the state.
+        person: index of the person.
+        before: the pose before the work, (n_values,).
+    """
+    state, model = session_state.state, session_state.models[person]
+    held = [h for h in state.held if (h.frame, h.person) == (state.frame, person)]
+    names = {h.point for h in held}
+    marks = [*state.pins[person], *(at for at in session_state.fit_constraints(person).seen if at.point in names)]
+    found = {name: [at for at in marks if at.point == name] for name in names | {at.point for at in marks}}
+    points_world = model.points_world(before)
+    for point, camera in {(h.point, h.camera) for h in held if not found[h.point]}:
+        if camera is not None:  # where it was put is not stored any more
+            u, v = session_state.session.cameras[camera].camera.pinhole.project(
+                points_world[model.point_names.index(point)]
+            )
+            found[point].append(PointObservation(point, camera, (float(u), float(v))))
+    return found
+
+
+def _untouched_moves(
+    session_state: SessionState, noted: PoseComparison, placed: Mapping[int, Mapping[str, object]]
+) -> tuple[tuple[int, LimbMove], ...]:
+    """Return the limbs that a fit moved although nobody had touched them.
+
+    This concerns people of whom the user has placed something else: a fit of a whole body is meant to move its limbs.
+    """
+    found = [
+        (person, move)
+        for person, points in placed.items()
+        if points
+        for move in untouched_moves(
+            session_state.models[person], noted.before[person].values, noted.after[person], points.keys()
+        )
+    ]
+    return tuple(sorted(found, key=lambda one: -one[1].distance_m))
+
+
+def _warning(session_state: SessionState, noted: PoseComparison, placed: Mapping[int, _Placed]) -> str:
     """Return where the result disagrees with the user's placement or between views, as a sentence; empty if nowhere."""
-    work, before_px, after_px = noted.work, noted.before_px, noted.after_px
-    is_pinned = any(session_state.state.pins[person] for person in moved)
+    work, before_px, after_px = f"{noted.work}{_whose(session_state, placed)}", noted.before_px, noted.after_px
+    is_pinned = any(session_state.state.pins[person] for person in placed)
     # Pins are set where edges mislead: some rise of the cost is what they are for.
     if (
         before_px is not None
@@ -109,13 +156,13 @@ def _warning(session_state: SessionState, noted: PoseComparison, moved: Sequence
     ):
         why = ": pins and edges disagree; check the pins" if is_pinned else "; undo it"
         return f"The {work} raised the cost from {before_px:.2f} to {after_px:.2f} px{why}, or check the body's sizes."
-    left = _farthest_left(session_state, noted, moved)
+    left = _farthest_left(session_state, noted, placed)
     if left is not None:
-        joint, distance_m = left
+        person, joint, distance_m = left
         how = "lowered the cost but " if before_px is not None and after_px is not None else ""
         return (
-            f"The {work} {how}left the {joint} {100 * distance_m:.0f} cm from where you placed it; "
-            "compare both poses, and check the body's sizes."
+            f"The {noted.work} {how}left the {joint}{_whose(session_state, [person])} {100 * distance_m:.0f} cm from "
+            "where you placed it; compare both poses, and check the body's sizes."
         )
     risen = _most_risen(noted)
     if risen is not None:
@@ -128,32 +175,34 @@ def _warning(session_state: SessionState, noted: PoseComparison, moved: Sequence
     return ""
 
 
-def _farthest_left(
-    session_state: SessionState, noted: PoseComparison, moved: Sequence[int]
-) -> tuple[str, float] | None:
-    """Return the placed joint that was left farthest behind, and by how many metres; None if none was left.
+def _whose(session_state: SessionState, people: Iterable[int]) -> str:
+    """Return " of NAME", with the names of some people; empty where there is only one person."""
+    everybody = session_state.session.people
+    names = " and ".join(everybody[person].name for person in people)
+    return f" of {names}" if names and len(everybody) > 1 else ""
 
-    Pins count, and the held joints of a pose set by hand. A joint that was placed in a view is measured across the line
-    of sight of that view, because its depth was not placed.
+
+def _farthest_left(
+    session_state: SessionState, noted: PoseComparison, placed: Mapping[int, _Placed]
+) -> tuple[int, str, float] | None:
+    """Return the placed joint that was left farthest behind, its person and by how many metres; None if none was left.
+
+    A joint is measured from where the user put it in each view, across the line of sight, because its depth was not
+    placed. It may have been moved by later drags. One that was held by command is measured from where it was.
     """
-    state, found = session_state.state, list[tuple[float, str]]()
-    cameras = [c.camera for c in session_state.session.cameras]
-    for person in moved:
-        model = state.models[person]
+    found = list[tuple[float, str, int]]()
+    cameras = [c.camera.pinhole for c in session_state.session.cameras]
+    for person, points in placed.items():
+        model = session_state.state.models[person]
         was, now = (model.points_world(v) for v in (noted.before[person].values, noted.after[person]))
-        for pin in state.pins[person]:
-            camera, i = cameras[pin.camera].pinhole, model.point_names.index(pin.point)
-            pinned = camera.back_project(np.array(pin.position_px), float(camera.depths(now[i])))
-            found.append((float(np.linalg.norm(now[i] - pinned)), pin.point))
-        if noted.before[person].source != "manual":
-            continue
-        for held in state.held:
-            if (held.frame, held.person) == (noted.frame, person):
-                i = model.point_names.index(held.point)
-                eye = None if held.camera is None else cameras[held.camera].center_world
-                found.append((_across(was[i], now[i], eye), held.point))
-    distance_m, point = max(found, default=(0.0, ""))
-    return (display_name(point), distance_m) if distance_m > _LEFT_M else None
+        for point, marks in points.items():
+            i = model.point_names.index(point)
+            places = [cameras[at.camera].back_project(np.array(at.position_px), 1.0) for at in marks]
+            eyes = [cameras[at.camera].center_world for at in marks]
+            off = [_across(place, now[i], eye) for place, eye in zip(places, eyes, strict=True)]
+            found.append((max(off, default=_across(was[i], now[i], None)), point, person))
+    distance_m, point, person = max(found, default=(0.0, "", 0))
+    return (person, display_name(point), distance_m) if distance_m > _LEFT_M else None
 
 
 def _across(was: Array, now: Array, eye: Array | None) -> float:

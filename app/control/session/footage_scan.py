@@ -3,6 +3,7 @@
 import threading
 
 from app.control.session.session_state import SessionState
+from app.remedies import page_text
 from app.state.progress import FootageState
 from tracker.errors import TrackerError
 
@@ -48,7 +49,7 @@ class FootageScan:
             share = session_state.frames.listed_share
             error = session_state.frames.problem()
         except TrackerError as failure:
-            share, error = None, str(failure)
+            share, error = None, page_text(failure)
         recovered = before.error is not None and error is None
         found = FootageState(share, error, before.recoveries + recovered)
         if found != before:

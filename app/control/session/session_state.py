@@ -10,6 +10,7 @@ from typing import Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from app.remedies import page_text
 from app.session.frame_cache import FrameCache
 from app.state.people import ShownPose
 from app.state.search import SearchView
@@ -315,7 +316,7 @@ class SessionState:
         try:
             undo, redo = self.saver.undo_label(), self.saver.redo_label()
         except TrackerError as unreadable:  # its drive may be gone: edits wait in the queue
-            error = error or str(unreadable)
+            error = error or page_text(unreadable)
         self.set(undo=undo, redo=redo, save_error=error, timeline_version=self.saver.index.version)
 
     def is_shown_stored(self, state: State) -> bool:

@@ -1,8 +1,11 @@
 """Compare the poses of a range of frames with those that they replaced, such as those of another tracker."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from app.control.session.session_state import SessionState
+from app.control.tracking.run_verdicts import stretches
 from app.runtime.jobs import LatestWinsWorker
 from app.state.comparison import ComparedPose, RangeComparison
 from app.state.state import State
@@ -22,7 +25,8 @@ class ComparingRuns:
     def __init__(self, session_state: SessionState) -> None:
         """Compare nothing yet."""
         self._session_state = session_state
-        self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._refresh, "comparison", _REST_S)
+        self._latest: LatestWinsWorker[range | None] = LatestWinsWorker(self._work, "comparison", _REST_S)
+        self._runs = 0
         self._offered = session_state.state.timeline_version
         session_state.subscribe(self._changed)
 
@@ -39,6 +43,13 @@ class ComparingRuns:
         with self._session_state.lock:
             self._session_state.set(range_comparison=found)
 
+    def compare_run(self, frames: range) -> None:
+        """Compare the poses of a run that has just ended with those that it replaced, in the background.
+
+        Nothing happens if none is better or worse.
+        """
+        self._latest.offer(frames, key="run")
+
     def leave(self) -> None:
         """End the comparison."""
         with self._session_state.lock:
@@ -52,18 +63,30 @@ class ComparingRuns:
         if state.timeline_version != self._offered:
             self._offered = state.timeline_version
             if state.range_comparison is not None:
-                self._latest.offer(state.timeline_version)
+                self._latest.offer(None)
 
-    def _refresh(self, _: int) -> None:
+    def _work(self, run: range | None) -> None:
+        if run is None:
+            self._refresh()
+            return
+        found = self._compared(run.start, run[-1], with_keyframes=False)
+        if found.stretches:
+            self._runs += 1
+            with self._session_state.lock:
+                self._session_state.set(range_comparison=replace(found, run=self._runs))
+
+    def _refresh(self) -> None:
         before = self._session_state.state.range_comparison
         if before is None:
             return
-        found = self._compared(before.first, before.last)
+        found = self._compared(before.first, before.last, with_keyframes=before.run is None)
+        if before.run is not None:  # poses that were taken back are no gain of the run
+            found = replace(found, stretches=before.stretches, run=before.run)
         with self._session_state.lock:
             if self._session_state.state.range_comparison is before:
                 self._session_state.set(range_comparison=found)
 
-    def _compared(self, first: int, last: int) -> RangeComparison:
+    def _compared(self, first: int, last: int, with_keyframes: bool = True) -> RangeComparison:
         session_state, frames = self._session_state, range(first, last + 1)
         rows, others = list[tuple[ComparedPose, ...]](), dict[int, dict[int, Array]]()
         for person in range(len(session_state.models)):
@@ -71,11 +94,14 @@ class ComparingRuns:
             with session_state.lock:
                 pairs = session_state.saver.replaced(person, frames)
             for frame, (now, other) in pairs.items():
+                if now.keyframe and not with_keyframes:
+                    continue
                 former = self._in_present_body(person, other)
                 of_person.append(self._pose(person, frame, now, other, former))
                 others.setdefault(frame, {})[person] = former
             rows.append(tuple(of_person))
-        return RangeComparison(first, last, tuple(rows), others)
+        found = tuple(one for person, poses in enumerate(rows) for one in stretches(person, poses))
+        return RangeComparison(first, last, tuple(rows), others, found)
 
     def _pose(self, person: int, frame: int, now: PoseRecord, other: PoseRecord, former: Array) -> ComparedPose:
         """Compare a stored pose with another, which has the values `former`, (n_values,), in the present body."""

@@ -10,6 +10,7 @@ from app.control.search.search_runs import SearchRuns
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.control.tracking.tracking import Tracking
+from app.remedies import page_text
 from app.state.progress import FindState, Line
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
@@ -113,7 +114,7 @@ class FindingPeople:
         except Exception as error:
             if not isinstance(error, TrackerError):
                 _LOG.exception("a search for people failed")
-            text = str(error)
+            text = page_text(error)
             self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
 
     def _report(self, stage: str, share: float, text: str) -> None:

@@ -11,6 +11,7 @@ from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.control.tracking.comparing_runs import nothing_replaced
 from app.control.tracking.tracking import Tracking
+from app.remedies import page_text
 from app.runtime.jobs import Job
 from app.state.progress import RangeState
 from tracker.errors import TrackerError
@@ -229,7 +230,7 @@ class Ranges:
     def _ended(self, run: _Run, error: Exception | None) -> None:
         with self._session_state.lock:
             if run is self._run:
-                self._end(run, "done" if error is None else f"stopped, because {error}")
+                self._end(run, "done" if error is None else f"stopped, because {page_text(error)}")
 
     def _end(self, run: _Run, how: str) -> None:
         state = self._session_state.state.ranges

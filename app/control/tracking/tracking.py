@@ -9,6 +9,7 @@ from typing import NamedTuple
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.control.tracking import track_settings
+from app.remedies import page_text
 from app.runtime.jobs import Job
 from app.state.people import ShownPose
 from app.state.progress import TrackState
@@ -74,6 +75,8 @@ class Tracking:
         settings, choices = track_settings.restored(kept, session_state.session.camera_names)
         session_state.set(settings=settings, run_choices=choices)
         self._run: _Run | None = None
+        self.after_run: Callable[[range], None] = lambda frames: None
+        """Is told the frames of each run that ended. It must return quickly."""
         session_state.unwritten.append(lambda: self._run is not None and self._run.session.has_unsaved)
 
     @property
@@ -309,7 +312,7 @@ class Tracking:
             if error is None:
                 how = "done"
             else:
-                why = str(error) if isinstance(error, TrackerError) else f"the tracker failed: {error}"
+                why = page_text(error) if isinstance(error, TrackerError) else f"the tracker failed: {error}"
                 how = f"stopped, because {why}"
             self._end(run, how, error is not None)
             self._session_state.request_evidence()
@@ -324,6 +327,9 @@ class Tracking:
         self._save(run)
         track = self._session_state.state.track
         self._run = None
+        tracked = run.session.tracked
+        if tracked:
+            self.after_run(range(min(tracked), max(tracked) + 1))
         self._session_state.set(
             track=TrackState(message=f"{how}: {_summary(len(run.session.tracked), track)}", failed=failed)
         )

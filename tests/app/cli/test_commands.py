@@ -34,7 +34,10 @@ def test_new_info_init_track_evaluate(run, tmp_path):
         "new", s, "--calibration", SAMPLE / "calibration.toml", "--videos", *videos,
         "--background", SAMPLE / "background", "--height", "1.78", "--people", "ann", "--model", "gavrila22",
     )  # fmt: skip
-    assert (status, out) == (0, f"made {s}: 4 cameras, 50 frames at 25 per second\n")
+    made, rig = out.splitlines()
+    assert (status, made) == (0, f"made {s}: 4 cameras, 50 frames at 25 per second")
+    assert "3.58 to 3.63 m from the point at which they look" in rig
+    assert "heights over the floor (origin, z up) are 2.16 to 2.21 m" in rig
 
     status, out, err = run("info", s, "--json")
     summary = json.loads(out)
@@ -428,4 +431,4 @@ def test_every_second_frame_with_some_cameras(run, session):
 def test_strides_and_cameras_that_are_none(run, session):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     assert_refused(run("track", session, "--stride", "0"), ["--stride as a whole number from 1, found 0"])
-    assert_refused(run("track", session, "--cameras", "attic"), ["--cameras names an unknown camera 'attic'"])
+    assert_refused(run("track", session, "--cameras", "attic"), ["unknown camera 'attic' among --cameras"])

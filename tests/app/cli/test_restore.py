@@ -6,6 +6,7 @@ from contextlib import closing
 
 import pytest
 from command_line import SAMPLE, assert_refused, stored
+from crashes import crashed_in_a_commit
 
 from tracker.session.lock import SessionLock
 
@@ -58,3 +59,23 @@ def test_what_cannot_be_restored_is_refused(run, edited, tmp_path):
     next((edited / "backups").iterdir()).unlink()
     damage(edited)
     assert_refused(run("restore", edited), ["found none; put a copy of the file in its place"])
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["info", "--no-check"],
+        ["export", "--out", "out.csv"],
+        ["evaluate", "--reference", SAMPLE / "truth.trc"],
+        ["observability", "--frame", "3"],
+        ["restore"],
+    ],
+    ids=lambda words: words[0],
+)
+def test_every_command_reads_what_a_crash_in_a_commit_left(run, edited, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    crashed_in_a_commit(edited / "annotations.sqlite")
+    status, _, err = run(words[0], edited, *words[1:])
+    assert (status, "quadrille:" in err) == (0, False), err
+    assert not (edited / "lock.json").exists()
+    assert list(stored(edited)) == [3, 5]

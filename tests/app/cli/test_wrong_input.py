@@ -95,7 +95,7 @@ SKEWED = [[1.0, 0.0, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]]
         (lambda room: film(room / "left.mp4", size=(32, 24)), ["'left'", "64x48", "32x24"]),
         (calibrated(translation=[float("nan"), 0.0, 1.0]), ["'left'", "finite", "translation"]),
         (calibrated(rotation=SKEWED), ["'left'", "not a rotation"]),
-        (calibrated(translation=[1000.0, -500.0, 3000.0]), ["'left'", "millimetres", "--units mm"]),
+        (calibrated(translation=[1000.0, -500.0, 3000.0]), ["the unit is another", "--units mm (3.2 m)"]),
         (lambda room: (room / "Calib.toml").write_text("[front]\nname = \n"), ["Calib.toml", "line 2"]),
         (lambda room: (room / "Calib.toml").unlink(), ["Calib.toml not found"]),
     ],
@@ -127,7 +127,10 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
         (["--height", "tall"], ["--height", "'tall'"]),
         (["--height", "17.5"], ["0.3 to 3 metres"]),
         (["--height", "nan"], ["0.3 to 3 metres", "nan"]),
-        (["--offset", "left=" + "9" * 30], ["a whole number of frames", "check the footage and the offsets", "-9999"]),
+        (
+            ["--offset", "left=" + "9" * 30],
+            ["'left'", "an offset below its 6 frames", "check the footage"],
+        ),
         (["--fps", "0"], ["a frame rate above 0"]),
         (["--fps", "nan"], ["a frame rate above 0"]),
         (["--model", "ROOM/latin.toml"], ["body model", "latin.toml", "expected UTF-8 text"]),
@@ -137,7 +140,7 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
         (["--model", "gavrila23"], ["gavrila23", "gavrila22"]),
         (["--model", "ROOM/loop.toml"], ["loop"]),
         (["--model", "ROOM/orphan.toml"], ["missing parent", "'tail'"]),
-        (["--units", "mm"], ["look like metres"]),
+        (["--units", "mm"], ["1.5 millimetres", "say --units m (1.5 m)"]),
     ],
 )
 def test_wrong_options(run, room, more, expected):

@@ -1,77 +1,14 @@
 """Other sessions, listed and opened by a page."""
 
 import json
-import shutil
 
-import aiohttp
 import pytest
-from command_line import SAMPLE
-from serving import listening
 
 from app.runtime import restart
-from app.server import server
-from app.server.access import Access
-from app.server.session_routes import SessionRoutes, refusal
-from app.server.static_files import static_folder
+from app.server.session_routes import refusal
 from app.session.recent_sessions import recent_sessions, remember
 from tracker.session.lock import SessionLock
 from tracker.session.session import load_session
-
-
-class Nobody:
-    async def serve(self, socket):
-        pass
-
-
-@pytest.fixture
-def folders(tmp_path):
-    """Two sessions, and the folder of the user's state."""
-    for name in ("walk", "dance"):
-        shutil.copytree(SAMPLE, tmp_path / name)
-    return tmp_path / "walk", tmp_path / "dance", tmp_path / "state"
-
-
-class Client:
-    """A page of the program."""
-
-    def __init__(self, session, port, routes):
-        self._session, self._origin, self.routes = session, f"http://127.0.0.1:{port}", routes
-
-    async def get(self, path):
-        async with self._session.get(path) as response:
-            return response.status, await response.text()
-
-    async def make(self, form):
-        status, text = await self.open(form, "/sessions/new")
-        assert status == 200, text
-        return [json.loads(line) for line in text.splitlines()]
-
-    async def open(self, body, path="/sessions/open", **headers):
-        headers = {"Origin": self._origin, "Content-Type": "application/json"} | headers
-        data = body if isinstance(body, bytes) else json.dumps(body).encode()
-        async with self._session.post(path, data=data, headers=headers) as response:
-            return response.status, await response.text()
-
-
-@pytest.fixture
-async def serve(folders, tmp_path):
-    clients = []
-
-    async def start(why=None, unsaved=None):
-        app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), static_folder())
-        routes = SessionRoutes(folders[0], folders[2], why, lambda: unsaved)
-        routes.add_to(app)
-        context = listening(app)
-        port = await context.__aenter__()
-        session = aiohttp.ClientSession(f"http://127.0.0.1:{port}")
-        session.cookie_jar.update_cookies({f"quadrille_{port}": "secret"})
-        clients.append((context, session))
-        return Client(session, port, routes)
-
-    yield start
-    for context, session in clients:
-        await session.close()
-        await context.__aexit__(None, None, None)
 
 
 async def test_recent_sessions_are_listed_and_one_is_opened(folders, serve):
@@ -136,7 +73,7 @@ async def test_foreign_requests_and_public_pages_open_nothing(folders, serve):
     listed = json.loads((await public.get("/sessions"))[1])
     assert (listed["recent"], listed["folder"], listed["refusal"]) == ([], "", text)
     assert refusal(True, True) is None
-    assert "--no-token" in refusal(True, False)
+    assert "without a token" in refusal(True, False)
 
 
 async def test_paths_are_completed(folders, serve):
@@ -186,7 +123,7 @@ async def test_a_session_is_made_with_its_checks_told_one_by_one(folders, serve,
     client = await serve()
     form = {
         "folder": str(tmp_path / "new"), "calibration": str(walk / "calibration.toml"), "footage": str(walk),
-        "people": ["ann", "bob"], "heights_m": [1.7, 1.6],
+        "people": ["ann", "bob"], "heights_cm": [170, 160],
     }  # fmt: skip
     lines = await client.make(form)
     assert [next(iter(line)) for line in lines] == ["passed"] * 6 + ["made"]
@@ -201,14 +138,15 @@ async def test_a_session_is_made_with_its_checks_told_one_by_one(folders, serve,
     assert "exists already" in lines[-1]["failed"]
     for wrong, expected in (
         ({"footage": str(tmp_path / "state")}, "expected a folder of videos"),
-        ({"heights_m": [1.7, 1.6, 1.5]}, "one for each of 2 people, found 3"),
+        ({"heights_cm": [170, 160, 150]}, "one for each of 2 people, found 3"),
         ({"footage": "relative"}, "expected a path from the root"),
         ({"calibration": str(walk / "session.toml"), "folder": str(tmp_path / "other")}, "calibration"),
     ):
         (line,) = await client.make(form | wrong)
         assert expected in line["failed"]
     assert not (tmp_path / "other").exists()
-    status, text = await client.open(form | {"heights_m": [9]}, "/sessions/new")
-    assert (status, "a height of 0.3 to 3 metres" in text) == (400, True)
+    status, text = await client.open(form | {"heights_cm": [9]}, "/sessions/new")
+    assert status == 400
+    assert text == "the form: expected a height of 30 to 300 centimetres as 'Height', found 9; correct it"
     public = await serve(why="no")
     assert (await public.open(form, "/sessions/new"))[0] == 403

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from command_line import stored
+from command_line import SAMPLE, stored
 from gestures import drag, wait_for
 from page_visits import visiting
 
@@ -165,13 +165,50 @@ def test_a_damaged_rescue_file_is_refused_and_changes_nothing(open_with, session
 def test_rescued_edits_are_of_one_session(open_with, session, tmp_path):
     with pytest.raises(TrackerError):
         open_with(edit_on_a_full_disk)
-    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
-        store_id = store.id
-    assert len(rescue.find(session, store_id)) == 1
-    assert rescue.find(tmp_path / "copy", store_id) == []  # a copy of the session, beside it
+    assert len(rescue.find(session, store_id(session))) == 1
+    assert rescue.find(tmp_path / "copy", store_id(session)) == []  # a copy of the session, beside it
     assert rescue.find(session, "another") == []
-    session.rename(tmp_path / "renamed")
-    assert len(rescue.find(tmp_path / "renamed", store_id)) == 1
+
+
+def test_edits_of_another_folder_are_offered_and_written_on_request_alone(open_with, session, run, tmp_path, places):
+    """A copy of a session has its id, and the folder that the edits were made in may be a drive that is away."""
+    with pytest.raises(TrackerError):
+        open_with(edit_on_a_full_disk)
+    (path,) = (places[0] / "quadrille" / "rescue").iterdir()
+    copy = tmp_path / "copy"
+    session.rename(copy)
+    before = (copy / "annotations.sqlite").read_bytes()
+    status, out, _ = run("restore", copy)
+    assert (status, f"made in {session}" in out or f"into {session}" in out, f"--rescue {path}" in out) == (
+        0,
+        True,
+        True,
+    )
+    assert (copy / "annotations.sqlite").read_bytes() == before
+    session.mkdir()  # where the drive was mounted
+    assert [found.origin for found in rescue.find(copy, store_id(copy))] == [str(session)]
+    status, out, _ = run("restore", copy, "--rescue", path)
+    assert (status, "wrote 2 rescued edits" in out) == (0, True)
+    np.testing.assert_array_equal(stored(copy)[0].values, edit_on_a_full_disk.values)
+    assert path.exists()
+
+
+def test_a_rescue_file_of_another_session_is_refused(open_with, session, run, tmp_path, places):
+    with pytest.raises(TrackerError):
+        open_with(edit_on_a_full_disk)
+    (path,) = (places[0] / "quadrille" / "rescue").iterdir()
+    other = shutil.copytree(SAMPLE, tmp_path / "other")
+    AnnotationStore(other / "annotations.sqlite").close()
+    if store_id(other) == store_id(session):
+        with closing(AnnotationStore(other / "annotations.sqlite")) as store:
+            store.set_setting("store_id", "another")
+    status, _, err = run("restore", other, "--rescue", path)
+    assert (status, "edits of another session" in err) == (1, True)
+
+
+def store_id(session):
+    with closing(AnnotationStore(session / "annotations.sqlite", read_only=True)) as store:
+        return store.id
 
 
 def test_the_end_of_the_terminal_ends_the_program_as_control_c_does(open_with, session):

@@ -247,3 +247,28 @@ async def test_the_backward_pass_is_told_from_the_first(page, endpoint):
         await endpoint.broadcast(endpoint.state)
         await expect(page.locator("#search-stage")).to_have_text(text, use_inner_text=True)
     assert await page.locator("#search-stage").get_attribute("title") == "Tracking lost people backward"
+
+
+USUAL = "document.querySelector('#usual-cost').textContent"
+
+
+async def test_the_cost_has_a_scale_from_the_good_frames(page, endpoint):
+    good = sorted(endpoint.cell(k)["cost_px"] for k in range(100) if endpoint.cell(k)["status"] == "good")
+    low, high = (f"{good[i]:.1f}" for i in (len(good) // 10, len(good) - 1 - len(good) // 10))
+    await shows(page, f"{USUAL} === 'usual here {low}–{high}'")
+    sizes = (
+        "['#cost', '#session-name'].map((one) => parseFloat(getComputedStyle(document.querySelector(one)).fontSize))"
+    )
+    cost, name = await page.evaluate(sizes)
+    assert cost <= name  # it is not the largest thing on the screen
+    for width in (1280, 1440, 1920):
+        await page.set_viewport_size({"width": width, "height": 720})
+        bar, usual, number = [await page.locator(one).bounding_box() for one in (".top-bar", "#usual-cost", "#cost")]
+        assert usual["y"] + usual["height"] <= bar["y"] + bar["height"]
+        assert usual["y"] >= number["y"] + number["height"] - 4
+    await page.set_viewport_size({"width": 1440, "height": 900})
+
+
+@pytest.mark.endpoint(n_frames=9)
+async def test_without_good_frames_nothing_is_usual(page):
+    assert await page.evaluate(USUAL) == ""

@@ -93,7 +93,13 @@ CUT_OFF = """() => [...document.querySelectorAll("#first-steps > :not(p), #first
 ).length"""
 
 
-@pytest.mark.parametrize("endpoint", [{"n_people": 1}, {"n_people": 2}], indirect=True, ids=("one", "two"))
+BY_HAND = {"sources": ("manual",)}
+"""A session that was never tracked."""
+
+
+@pytest.mark.parametrize(
+    "endpoint", [{"n_people": 1, **BY_HAND}, {"n_people": 2, **BY_HAND}], indirect=True, ids=("one", "two")
+)
 async def test_the_first_steps_cover_nothing(browser, address, endpoint):
     context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
     page = await context.new_page()
@@ -113,6 +119,7 @@ async def test_the_first_steps_cover_nothing(browser, address, endpoint):
     await context.close()
 
 
+@pytest.mark.endpoint(**BY_HAND)
 async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(browser, address, endpoint):
     context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
     page = await context.new_page()
@@ -133,7 +140,7 @@ async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(bro
     assert not await page.locator("#first-off").is_visible()
     endpoint.state["compared"] = {
         "number": 1, "work": "fit", "before_px": 6.3, "after_px": 2.4, "before_view_costs_px": [],
-        "after_view_costs_px": [], "warning": "", "is_before_shown": False,
+        "after_view_costs_px": [], "warning": "", "moved": [], "is_before_shown": False,
     }  # fmt: skip
     await endpoint.broadcast(endpoint.state)
     await shows(page, "document.querySelector('#first-fit').classList.contains('is-done')")
@@ -152,4 +159,29 @@ async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(bro
     await card.wait_for()
     await page.keyboard.press("t")
     await card.wait_for(state="hidden")  # the first steps are done
+    await context.close()
+
+
+@pytest.mark.endpoint(**BY_HAND)
+async def test_the_first_steps_belong_to_a_session(browser, address, endpoint):
+    """Closed in one, they show in the next one, but not where a run has tracked."""
+    context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
+    page = await context.new_page()
+    await page.goto(address)
+    card = page.locator("#first-steps")
+    await card.wait_for()
+    assert await page.locator("#first-new-session").is_visible()
+    await page.locator("#close-first-steps").click()
+    endpoint.name = "dance"
+    await page.goto(address)
+    await shows(page, "window.quadrille?.state.session?.name === 'dance'")
+    await card.wait_for()
+    endpoint.name, endpoint.sources = "walk", ("manual", "tracked")
+    await page.goto(address)
+    await shows(page, "window.quadrille?.state.overlay && quadrille.state.session.name === 'walk'")
+    assert not await card.is_visible()
+    await page.keyboard.press("Control+k")
+    await page.keyboard.type("first steps")
+    await page.keyboard.press("Enter")
+    await card.wait_for()
     await context.close()

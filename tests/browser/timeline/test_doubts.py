@@ -1,9 +1,7 @@
 """The queue of doubtful and lost poses: ranked, with thumbnails, walked through, resolved."""
 
-from itertools import pairwise
-
 import pytest
-from page_driver import shows, state_of, until
+from page_driver import handle_of, shows, state_of, to_client, until
 
 ROWS = "[...document.querySelectorAll('#doubt-list li')]"
 LOADED = f"{ROWS}.every((row) => row.querySelector('img').naturalWidth > 0)"
@@ -17,14 +15,14 @@ async def rows_of(page):
 async def test_doubts_are_listed_by_severity_and_vanish_when_they_are_resolved(page, endpoint):
     await page.keyboard.press("Shift+L")
     await shows(page, f"{ROWS}.length === 4 && {LOADED}")
-    doubtful = ["left arm 31 %", "frames 31–32"]
-    lost = ["left arm 97 %", "right arm 4 %", "frame 50"]
+    doubtful = ["right arm: 31 % chance that it is lost", "frames 31–32"]
+    lost = ["left arm: 97 % chance that it is lost", "right arm: 4 %", "frame 50"]
     assert await rows_of(page) == [
         ["lost", "person 0", *lost], ["lost", "person 1", *lost],
         ["doubtful", "person 0", *doubtful], ["doubtful", "person 1", *doubtful],
     ]  # fmt: skip
     assert {url.split("v=")[0] for url in endpoint.thumbnails} == {
-        f"thumbnail/{person}/{frame}?limb=0&" for person in (0, 1) for frame in (50, 31)
+        f"thumbnail/{person}/{frame}?limb={limb}&" for person in (0, 1) for frame, limb in ((50, 0), (31, 1))
     }
     assert "4 to check" in await page.locator("#doubts-count").inner_text()
     await page.locator("#doubt-list .doubt").nth(1).click()
@@ -52,25 +50,100 @@ async def test_doubts_are_listed_by_severity_and_vanish_when_they_are_resolved(p
     await page.locator("#notices .notice", has_text="no doubtful or lost frame left").wait_for()
 
 
-@pytest.mark.endpoint(n_frames=12_000)
-async def test_a_long_stretch_is_listed_in_pieces_around_its_worst_frames(page, endpoint):
-    def cell(frame, worst):
-        limbs = [0.0, worst, 0.03, 0.0, 0.0]
-        return endpoint.cell(31) | {"source": "tracked", "limbs_lost": limbs, "reviewed": False, "keyframe": False}
+async def replace_doubts(page, endpoint, doubts):
+    """Let the page know these doubts alone: probabilities of the limbs by frame."""
+    rest = endpoint.cell(31) | {"status": "good", "limbs_lost": [], "remark": "", "reviewed": False, "keyframe": False}
+    cells = {str(k): rest for k in range(10, 120)} | {
+        str(k): rest | {"status": "doubtful", "limbs_lost": limbs} for k, limbs in doubts.items()
+    }
+    await endpoint.broadcast({"type": "timeline", "person": None, "cells": cells, "replace": True})
+    await shows(page, f"quadrille.state.timeline[{max(doubts)}]?.status === 'doubtful'")
 
-    cells = {str(k): cell(k, 0.44 if k == 1040 else 0.2 if k == 1100 else 0.1) for k in range(1000, 1121)}
-    cells |= {str(k): None for k in (31, 32, 50)}
-    await endpoint.broadcast({"type": "timeline", "person": None, "cells": cells, "replace": False})
-    await shows(page, "quadrille.state.timeline[1040]?.status === 'doubtful'")
+
+async def test_doubts_of_one_cause_are_one_entry(page, endpoint):
+    right_arm = {k: [0.0, 0.44 if k == 40 else 0.2, 0.03, 0.0, 0.0] for k in (*range(30, 46), *range(52, 60), 75)}
+    left_leg = {k: [0.0, 0.0, 0.3, 0.0, 0.0] for k in (47, 110)}
+    await replace_doubts(page, endpoint, right_arm | left_leg)
     await page.keyboard.press("Shift+L")
-    await shows(page, f"{ROWS}.length === 4")
-    rows = await rows_of(page)
-    assert rows[0] == ["doubtful", "right arm 44 %", "left leg 3 %", "frames 1025–1055"]
-    assert rows[1] == ["doubtful", "right arm 20 %", "left leg 3 %", "frames 1085–1120"]
-    spans = sorted([int(k) for k in row[-1].removeprefix("frames ").split("–")] for row in rows)
-    assert spans[0][0] == 1000
-    assert spans[-1][1] == 1120
-    assert all(after == before + 1 for (_, before), (after, _) in pairwise(spans))
+    await shows(page, f"{ROWS}.length === 3")
+    assert await rows_of(page) == [
+        ["doubtful", "right arm: 44 % chance that it is lost", "left leg: 3 %", "frames 30–75, in 3 stretches"],
+        ["doubtful", "left leg: 30 % chance that it is lost", "frame 47"],
+        ["doubtful", "left leg: 30 % chance that it is lost", "frame 110"],
+    ]
+    await page.locator("#doubt-list .doubt-accept").first.click()
+    await until(lambda: len(endpoint.heard("range")) == 3)
+    assert [(m["first"], m["last"]) for m in endpoint.heard("range")] == [(30, 45), (52, 59), (75, 75)]
+    await shows(page, f"{ROWS}.length === 2")
+
+
+@pytest.mark.endpoint(n_frames=1200)
+async def test_ten_entries_are_listed_before_more(page, endpoint):
+    await replace_doubts(page, endpoint, {k: [0.05 + k / 3000, 0.0, 0.0, 0.0, 0.0] for k in range(100, 1100, 60)})
+    await page.keyboard.press("Shift+L")
+    await shows(page, f"{ROWS}.length === 11")
+    assert await page.locator("#doubts-count").inner_text() == "17 to check, the 10 most severe are listed"
+    await page.get_by_role("button", name="7 more").click()
+    await shows(page, f"{ROWS}.length === 17 && document.activeElement === {ROWS}[10].querySelector('button')")
+    await page.keyboard.press("Shift+L")
+    await page.keyboard.press("Shift+L")
+    await shows(page, f"{ROWS}.length === 11")
+
+
+@pytest.mark.parametrize("way", ["entry", "key"])
+async def test_going_to_a_doubt_selects_the_limb_and_zooms_the_views_that_show_it(page, endpoint, way):
+    assert await page.evaluate("quadrille.state.views.every(({ zoom }) => zoom === 1)")
+    if way == "entry":
+        await page.keyboard.press("Shift+L")
+        await page.locator("#doubt-list .doubt").first.click()
+    else:
+        for _ in range(3):
+            await page.keyboard.press("n")
+            frames = [m["frame"] for m in endpoint.heard("seek")]
+            await shows(page, f"quadrille.state.shown.frame === {frames[-1] if frames else 12}")
+    await shows(page, "quadrille.state.shown.frame === 50 && quadrille.state.state.point === 'l_wrist'")
+    # The left arm is visible in FRONT and BACK, in which it is on the right and on the left.
+    await shows(page, "quadrille.state.views[0].zoom > 1.5 && quadrille.state.views[2].zoom > 1.5")
+    others = await page.evaluate("[1, 3].map((camera) => quadrille.state.views[camera].zoom)")
+    # By key it went to the right arm on frames 31 and 32 before: RIGHT and LEFT show the whole person again.
+    assert others == [1, 1] if way == "entry" else max(others) < 1.5
+    for camera in (0, 2):
+        box = await page.locator(".pane").nth(camera).bounding_box()
+        for point in ("l_shoulder", "l_wrist"):
+            x, y = await to_client(page, camera, *await handle_of(page, camera, point))
+            assert box["x"] < x < box["x"] + box["width"]
+            assert box["y"] < y < box["y"] + box["height"]
+
+
+KEYFRAME = {
+    "person": 0, "frame": 40, "distance_cm": 26.9, "point": "l wrist",
+    "views": [{"camera": 2, "cost_px": 5.1, "usual_px": 2.0}],
+}  # fmt: skip
+
+
+async def test_a_keyframe_in_doubt_comes_first_and_takes_its_neighbours(page, endpoint):
+    await replace_doubts(page, endpoint, {39: [0.2, 0.0, 0.0, 0.0, 0.0], 41: [0.0, 0.3, 0.0, 0.0, 0.0]})
+    await page.keyboard.press("Shift+L")
+    await shows(page, f"{ROWS}.length === 2")
+    before = await page.locator("#timeline canvas").first.screenshot()
+    await endpoint.broadcast({"type": "inconsistent", "frames": [40], "keyframes": [KEYFRAME]})
+    await shows(page, f"{ROWS}.length === 1")
+    assert await rows_of(page) == [
+        ["keyframe", "disagrees with its neighbours: l wrist 27 cm off",
+         "disagrees with BACK: 5.10 px, usually 2.00 px", "frames 39–41"]
+    ]  # fmt: skip
+    assert await page.locator("#timeline canvas").first.screenshot() != before
+    await page.locator("#doubt-list .doubt").click()
+    await shows(page, "quadrille.state.shown.frame === 40 && quadrille.state.state.point === 'l_wrist'")
+    card = page.locator("#frame-card")
+    assert "disagrees with its neighbours: l wrist 27 cm off" in await card.inner_text()
+    await page.keyboard.press("Alt+Enter")
+    await until(lambda: endpoint.heard("confirm_keyframe"))
+    assert endpoint.heard("confirm_keyframe") == [{"type": "confirm_keyframe", "person": 0, "frame": 40}]
+    assert [(m["first"], m["last"]) for m in endpoint.heard("range")] == [(39, 41)]
+    await endpoint.broadcast({"type": "inconsistent", "frames": [], "keyframes": []})
+    await shows(page, f"{ROWS}.length === 0")
+    assert "disagrees" not in await card.inner_text()
 
 
 @pytest.mark.endpoint(n_frames=6)

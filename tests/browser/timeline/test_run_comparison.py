@@ -17,7 +17,11 @@ COMPARED = {
     "type": "range_comparison", "first": 24, "last": 36,
     "people": [[pose(24, 2.5, 3.0, "good", "lost", 20.0), pose(25, 2.5, 2.25, "doubtful", "good", 40.0),
                 pose(26, None, 2.0, "", "good", 30.0)]],
+    "stretches": [], "run": None,
 }  # fmt: skip
+
+
+NOTHING = {"type": "range_comparison", "first": None, "last": None, "people": [], "stretches": [], "run": None}
 
 
 async def open_comparison(page, endpoint):
@@ -54,5 +58,45 @@ async def test_the_replaced_poses_are_taken_and_the_comparison_ends(page, endpoi
     await page.locator("#run-comparison-end").click()
     await until(lambda: endpoint.heard("compare_range"))
     assert endpoint.heard("compare_range") == [{"type": "compare_range", "first": None, "last": None}]
-    await endpoint.broadcast({"type": "range_comparison", "first": None, "last": None, "people": []})
+    await endpoint.broadcast(NOTHING)
     await shows(page, f"{ROWS}.length === 0 && !document.querySelector('#run-comparison-empty').hidden")
+
+
+def stretch(first, last, frames, verdict):
+    return {"person": 0, "first": first, "last": last, "frames": frames, "verdict": verdict}
+
+
+async def test_gain_and_harm_of_a_run_are_opened_and_decided_by_stretch(page, endpoint):
+    await endpoint.broadcast(NOTHING)
+    endpoint.state["point"] = "l_wrist"
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "quadrille.state.state.point === 'l_wrist'")  # and nothing is compared
+    stretches = [stretch(24, 30, 6, "better"), stretch(31, 31, 1, "worse"), stretch(33, 36, 4, "better")]
+    run = COMPARED | {"stretches": stretches, "run": 1}
+    await endpoint.broadcast(run)
+    await shows(page, f"{ROWS}.length === 3 && quadrille.state.drawer === 'runs'")
+    text = await page.locator("#run-comparison-text").inner_text()
+    assert text == "Tracked again, 3 frames: better on 10, worse on 1"
+    items = page.locator("#run-stretches li")
+    assert [" ".join(one.split()) for one in await items.all_inner_texts()] == [
+        "Frames 24–30 better on 6 Keep Take back", "Frame 31 worse on 1 Keep Take back",
+        "Frames 33–36 better on 4 Keep Take back",
+    ]  # fmt: skip
+    await items.nth(1).get_by_role("button", name="Take back").click()
+    await until(lambda: endpoint.heard("range"))
+    assert endpoint.heard("range") == [
+        {"type": "range", "action": "take_replaced", "first": 31, "last": 31, "person": 0}
+    ]
+    await items.first.get_by_role("button", name="Keep").click()
+    await shows(page, "document.querySelectorAll('#run-stretches li').length === 2")
+    await items.last.get_by_role("button", name="Frames 33–36").click()
+    await until(lambda: [m["frame"] for m in endpoint.heard("seek")] == [33])
+
+    await page.keyboard.press("c")
+    await shows(page, "quadrille.state.drawer === 'arms'")
+    await endpoint.broadcast(run)  # of the same run: it follows an edit
+    await shows(page, "quadrille.state.rangeComparison?.run === 1")
+    assert await page.evaluate("quadrille.state.drawer") == "arms"
+    await endpoint.broadcast(run | {"run": 2})
+    await shows(page, "document.querySelectorAll('#run-stretches li').length === 3")
+    assert await page.evaluate("quadrille.state.drawer") == "runs"

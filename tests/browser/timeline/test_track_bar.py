@@ -130,11 +130,14 @@ async def test_a_tooltip_says_what_the_tracker_thinks_of_each_limb(page):
     tip = page.locator("#cell-tip")
     await page.mouse.move(*await place_of(page, 31))
     await shows(page, "document.querySelector('#cell-tip').innerText.startsWith('Frame 31: tracked, doubtful, ')")
-    assert (await tip.inner_text()).split("\n")[1:] == ["left arm: doubtful (31 %); others tracked", REMARK]
+    assert (await tip.inner_text()).split("\n")[1:] == [
+        "right arm: doubtful (31 % chance that it is lost); others tracked",
+        REMARK,
+    ]
     await page.mouse.move(*await place_of(page, 50))
     await shows(page, "document.querySelector('#cell-tip').innerText.startsWith('Frame 50')")
     assert (await tip.inner_text()).split("\n")[1:] == [
-        "left arm: lost (97 %); right arm: doubtful (4 %); others tracked"
+        "left arm: lost (97 % chance that it is lost); right arm: doubtful (4 %); others tracked"
     ]
     await page.mouse.move(*await place_of(page, 110))
     await shows(page, "document.querySelector('#cell-tip').innerText === 'Frame 110: no pose'")

@@ -3,6 +3,7 @@ import re
 import numpy as np
 import pytest
 
+from app.remedies import command_line_text
 from tracker.evaluation.comparability import distance_note, length_note
 from tracker.evaluation.metrics import axes_matrix
 from tracker.formats.joint_maps import LIMB_JOINTS
@@ -25,8 +26,8 @@ def moved(points):
     ("change", "expected"),
     [
         (lambda p: p @ axes_matrix("y,z,x"), "m from the poses .*with --axes y,z,x it would be 0[.]00 m"),
-        (lambda p: 1000 * p, "1000 times as large: correct the Units"),
-        (lambda p: p / 1000, "1000 times smaller: correct the Units"),
+        (lambda p: 1000 * p, "1000 times as large; correct the Units"),
+        (lambda p: p / 1000, "1000 times smaller; correct the Units"),
         (moved, "say --align rigid-all"),
         (lambda p: p[::-1, ::-1] * [1.0, -2.0, 1.5] + 4, "check that it is of this recording"),
     ],
@@ -34,13 +35,14 @@ def moved(points):
 def test_a_reference_metres_away(change, expected):
     note = distance_note(table(), table(change), range(20))
     assert note is not None
-    assert re.search(expected, note), note
+    assert re.search(expected, command_line_text(*note)), note
 
 
 def test_axes_are_said_with_respect_to_the_file():
     """Read with wrong axes, the note names the right ones."""
     wrong = table(lambda p: p @ axes_matrix("y,z,x") @ axes_matrix("-y,x,z").T)
-    assert "--axes y,z,x " in distance_note(table(), wrong, range(20), axes="-y,x,z")
+    _, remedy = distance_note(table(), wrong, range(20), axes="-y,x,z")
+    assert remedy.fields["axes"] == "y,z,x"
 
 
 def test_a_reference_that_fits():

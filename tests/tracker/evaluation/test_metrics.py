@@ -6,7 +6,6 @@ import pytest
 from tracker.errors import FormatError
 from tracker.evaluation.metrics import (
     Motion,
-    at_rate,
     best_rigid,
     evaluate_joints,
     evaluate_poses,
@@ -131,43 +130,6 @@ def test_malformed_axes(axes):
 def test_axes_that_mirror():
     with pytest.raises(FormatError, match="mirror"):
         remap_axes(table([[[1.0, 2.0, 3.0]]], names=["a"]), "x,z,y")
-
-
-def line(n, rate, frames=None):
-    """A point that moves 1 m a second."""
-    frames = np.arange(n) if frames is None else np.asarray(frames)
-    points = np.zeros((len(frames), 1, 3))
-    points[:, 0, 0] = frames / rate
-    return table(points, frames, ["a"], rate)
-
-
-@pytest.mark.parametrize(("file_rate", "fps", "n"), [(60, 30, 5), (30, 60, 17), (100, 60, 5), (50, 30, 5)])
-def test_other_rates_by_time(file_rate, fps, n):
-    moved = at_rate(line(9, file_rate), fps)
-    assert moved.frames.tolist() == list(range(n))
-    np.testing.assert_allclose(moved.points[:, 0, 0], np.arange(n) / fps, atol=1e-12)
-
-
-def test_same_rate_keeps_the_rows():
-    same = line(3, 59.94, [0, 2, 5])
-    assert at_rate(same, 59.95) is same
-
-
-def test_a_tiny_file_with_far_frames_is_not_resampled_to_gigabytes():
-    table = line(2, 0.001)
-    table.frames[1] = 10_000_000
-    with pytest.raises(FormatError, match="found 1000000000001 frames of 1 points; correct the file's DataRate"):
-        at_rate(table, 100.0)
-
-
-def test_missing_values_do_not_spread_over_rows_that_are_there():
-    source = line(5, 60)
-    source.points[3] = np.nan
-    assert at_rate(source, 30).points[:, 0, 0] == pytest.approx([0, 2 / 60, 4 / 60])
-    assert np.isnan(at_rate(source, 120).points[:, 0, 0]).tolist() == [False] * 5 + [True] * 3 + [False]
-    source = line(3, 60)
-    source.points[1] = np.nan
-    assert np.isnan(at_rate(source, 120).points[:, 0, 0]).tolist() == [False] + [True] * 3 + [False]
 
 
 def pose(model, **degrees):

@@ -13,7 +13,7 @@ from staging import cameras_around
 from stored_motions import FPS, distorted_cameras, store_motion
 
 from tracker.contours.label_image import part_labels
-from tracker.errors import SessionError
+from tracker.errors import Remedy, SessionError
 from tracker.export import writers
 from tracker.export.keypoints import keypoints_in_views, project_through_lens
 from tracker.export.motion import read_motion
@@ -295,8 +295,9 @@ def test_poses_of_another_body_are_tabled_but_give_no_skeleton(tmp_path):
     assert np.isnan(found["waist"][:, 0]).tolist() == [False, True]
     writers.write_keypoints(motion, ExportOptions(), [tmp_path / "k.json"], no_tick)
     assert {c["name"] for c in COCO(str(tmp_path / "k.json")).dataset["categories"]} > {"gavrila34", "gavrila22"}
-    with pytest.raises(SessionError, match="of 'gavrila34', found some of 'gavrila22'; give frames of one body"):
+    with pytest.raises(SessionError, match="of 'gavrila34', found some of 'gavrila22'") as caught:
         writers.write_person_bvh(motion, ExportOptions(), [tmp_path / "a.bvh"], no_tick)
+    assert caught.value.remedy == Remedy("frames_of_one_body")
 
 
 def test_poses_of_earlier_sizes_are_refitted_for_a_skeleton(tmp_path):

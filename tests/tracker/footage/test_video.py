@@ -6,7 +6,7 @@ import av
 import cv2
 import numpy as np
 import pytest
-from clips import SIZE, N, encode, number, write_images
+from clips import SIZE, N, encode, encode_stamped, number, picture, write_images
 
 from tracker.errors import RecordingError
 from tracker.footage.image_folder import ImageFolder, image_numbers, missing_numbers
@@ -131,6 +131,33 @@ def test_display_rotation_turns_as_opencv_does(tmp_path, rotation):
     assert np.abs(bgr[..., ::-1].astype(int) - image).mean() < 3
 
 
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        (1, 0, 0, 1),
+        (-1, 0, 0, 1),
+        (1, 0, 0, -1),
+        (-1, 0, 0, -1),
+        (0, 1, 1, 0),
+        (0, -1, -1, 0),
+        (0, 1, -1, 0),
+        (0, -1, 1, 0),
+    ],
+)
+def test_display_matrix_moves_pixels_as_it_says(tmp_path, matrix):
+    """Each pixel goes where the matrix maps it, mirrored or not."""
+    exact = {"pix_fmt": "yuv444p", "options": {"qp": "0"}}
+    video = VideoFile(encode(tmp_path / "a.mp4", n=4, matrix=matrix, **exact), "cam")
+    a, b, c, d = matrix
+    y, x = np.mgrid[: SIZE[1], : SIZE[0]]
+    to_x, to_y = a * x + c * y, b * x + d * y
+    expected = np.zeros((np.ptp(to_y) + 1, np.ptp(to_x) + 1, 3), np.uint8)
+    expected[to_y - to_y.min(), to_x - to_x.min()] = picture(3)
+    assert video.size == expected.shape[1::-1]
+    assert video.is_mirrored == (a * d - b * c < 0)
+    assert np.abs(video.read(3).astype(int) - expected).mean() < 2
+
+
 def test_facts_of_a_video(tmp_path):
     video = VideoFile(encode(tmp_path / "a.mp4", rate=50), "cam")
     assert (video.size, video.n_frames, video.fps, video.has_constant_rate) == (SIZE, N, 50.0, True)
@@ -146,6 +173,18 @@ def test_coarse_ticks_are_still_a_constant_rate(tmp_path, rate):
 def test_variable_rate_is_noticed(tmp_path):
     times = [i + (i > 20) for i in range(N)]  # one dropped frame
     assert not VideoFile(encode(tmp_path / "a.mp4", times=times), "cam").has_constant_rate
+
+
+@pytest.mark.parametrize(("late", "jitter", "gaps"), [(0, 0.0, 0), (90, 0.0, 0), (0, 0.15, 0), (0, 0.0, 2)])
+def test_start_jitter_and_gaps_of_time_stamps(tmp_path, late, jitter, gaps):
+    times = 3000 * np.arange(N) + np.round(3000 * jitter * np.array([(-1) ** k for k in range(N)])).astype(int)
+    for k in range(gaps):
+        times[20 * (k + 1) :] += 3000
+    video = VideoFile(encode_stamped(tmp_path / "a.mp4", (times - times[0] + late * 1000).tolist()), "cam")
+    assert video.stamps.start_s == pytest.approx(late / 90)
+    assert video.stamps.n_gaps == gaps
+    if not gaps:
+        assert video.stamps.jitter == pytest.approx(jitter, abs=0.01)
 
 
 def test_many_threads_get_the_right_frames(tmp_path):

@@ -90,12 +90,6 @@ def test_absent_distortions_are_none(write):
     assert camera.is_pinhole
 
 
-def test_millimetres_become_metres(write):
-    (mm,) = read_calibration(write({"cam01": section(translation=[500.0, -250.0, 4000.0])}), units="mm")
-    (m,) = read_calibration(write({"cam01": section()}))
-    np.testing.assert_allclose(mm.T_world_camera, m.T_world_camera, atol=1e-12)
-
-
 def test_rotation_matrix_is_accepted(write):
     R = rigid.so3_exp(np.array(section()["rotation"]))
     (matrix,) = read_calibration(write({"cam01": section(rotation=np.round(R, 5).tolist())}))
@@ -106,7 +100,7 @@ def test_rotation_matrix_is_accepted(write):
 
 def test_camera_that_defines_the_world_may_stand_at_the_origin(write):
     path = write({"cam01": section(translation=[0.0, 0.0, 0.0])})
-    assert read_calibration(path, units="mm")[0].center_world == pytest.approx([0, 0, 0])
+    assert read_calibration(path)[0].center_world == pytest.approx([0, 0, 0])
 
 
 def test_round_trip(tmp_path):
@@ -162,7 +156,6 @@ MIRROR = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
         ({"translation": [float("inf"), 0.0, 0.0]}, r"finite number within 1e9 as 'translation\[0\]', found inf"),
         ({"translation": [0.0, 1.0]}, "3 finite numbers as 'translation'"),
         ({"translation": ["a", 1.0, 2.0]}, r"number within 1e9 as 'translation\[0\]', found 'a'"),
-        ({"translation": [500.0, -250.0, 4000.0]}, "look like millimetres.*--units mm"),
         ({"fisheye": True, "distortions": [0.0] * 5}, "expected 0 or 4 fisheye values as 'distortions', found 5"),
         ({"matrix": [[500.0, 0.0, 320.0], [0.0, -1.0, 240.0], [0.0, 0.0, 1.0]]}, "positive fx and fy"),
         ({"matrix": [[500.0, 0.0, 320.0], [0.0, 500.0, 240.0]]}, "fx, skew, cx"),
@@ -185,11 +178,6 @@ def test_malformed_cameras(write, changes, expected):
     with pytest.raises(CalibrationError, match=expected) as caught:
         read_calibration(write({"cam01": section(**changes)}))
     assert re.search(r"cam01|front", str(caught.value))
-
-
-def test_metres_read_as_millimetres(write):
-    with pytest.raises(CalibrationError, match="leave out --units mm"):
-        read_calibration(write({"cam01": section()}), units="mm")
 
 
 @pytest.mark.parametrize("text", ["[cam01]\nname = \nsize = [640, 480]\n", "[cam01]\nname = "])

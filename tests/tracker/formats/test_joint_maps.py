@@ -4,7 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tracker.errors import FormatError
+from app.remedies import command_line_text
+from tracker.errors import FormatError, Remedy
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS, guess_joint_map, joints_of, read_joint_map
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.formats.trc import MarkerTable, read_trc
@@ -65,8 +66,9 @@ def test_markers_that_a_file_lacks_are_left_out():
 
 
 def test_unknown_convention():
-    with pytest.raises(FormatError, match=r"x\.trc follow no known convention.*found LASI, RASI.*--joint-map"):
+    with pytest.raises(FormatError, match=r"x\.trc follow no known convention.*found LASI, RASI") as caught:
         guess_joint_map(["LASI", "RASI", "LHip"], "x.trc")
+    assert caught.value.remedy == Remedy("give_joint_map", marker='"LASI"')
 
 
 def test_joint_map_file(tmp_path):
@@ -106,5 +108,6 @@ def test_the_documented_joint_map(tmp_path):
 
 
 def test_unknown_names_are_answered_with_an_example_of_a_map():
-    with pytest.raises(FormatError, match=r'a line such as left_shoulder = "C7"'):
+    with pytest.raises(FormatError) as caught:
         guess_joint_map(["C7", "LSHO"], "x.trc")
+    assert 'a line such as left_shoulder = "C7" for each joint' in command_line_text(caught.value)

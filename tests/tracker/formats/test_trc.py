@@ -26,7 +26,8 @@ def write(tmp_path):
 def test_rows_frames_and_blanks(write):
     table = read_trc(write("\n7\t0.12\t1\t2\t3\t4\t5\t6\n9\t0.16\t1.5\t\t3\t\t\t\n"))
     assert table.names == ("Knee", "Heel")
-    assert table.frames.tolist() == [0, 2]  # Frame# minus the first Frame#
+    assert table.frames.tolist() == [7, 9]
+    assert table.origin == 1
     assert table.times.tolist() == [0.12, 0.16]
     assert table.rate == 50
     np.testing.assert_array_equal(table.points[0], [[1, 2, 3], [4, 5, 6]])
@@ -42,7 +43,11 @@ def test_ways_to_leave_a_point_out(write, row):
     assert np.isnan(points[0, 1]).all()
 
 
-@pytest.mark.parametrize(("units", "metres"), [("m", 1.0), ("mm", 0.001), ("cm", 0.01), ("meters", 1.0), ("MM", 0.001)])
+@pytest.mark.parametrize(("units", "metres"), [
+    ("m", 1.0), ("meter", 1.0), ("meters", 1.0), ("Metres", 1.0), ("mm", 0.001), ("MM", 0.001), ("millimeters", 0.001),
+    ("millimetre", 0.001), ("cm", 0.01), ("centimeters", 0.01), ("centimetre", 0.01), ("in", 0.0254), ("inch", 0.0254),
+    ("Inches", 0.0254), ("ft", 0.3048), ("feet", 0.3048),
+])  # fmt: skip
 def test_units(write, units, metres):
     assert read_trc(write("1\t0\t1\t2\t3\t4\t5\t6\n", units)).points[0, 1] == pytest.approx(
         np.array([4, 5, 6]) * metres
@@ -58,7 +63,8 @@ def test_round_trip(tmp_path, units):
     write_trc(tmp_path / "a.trc", ["a b", "c", "d"], points, 59.94, frames=frames, units=units)
     back = read_trc(tmp_path / "a.trc")
     assert back.names == ("a b", "c", "d")
-    assert back.frames.tolist() == frames
+    assert (back.frames - 1).tolist() == frames
+    assert back.origin == 1
     assert back.rate == 59.94
     np.testing.assert_allclose(back.points, points, atol=1e-7)
     np.testing.assert_allclose(back.times, np.array(frames) / 59.94, atol=1e-6)
@@ -70,11 +76,19 @@ def test_frame_numbers_in_the_file_begin_at_one(tmp_path):
     assert [r.split("\t")[:3] for r in rows] == [["1", "0.000000", "1.0000000"], ["2", "0.040000", "1.0000000"]]
 
 
-def test_first_frame_is_kept_by_a_blank_row(tmp_path):
-    write_trc(tmp_path / "a.trc", ["a"], np.ones((2, 1, 3)), 30, frames=[40, 41])
+def test_first_frame_is_kept_by_number_time_and_origin(tmp_path):
+    write_trc(tmp_path / "a.trc", ["a"], np.ones((2, 1, 3)), 25, frames=[40, 41])
     back = read_trc(tmp_path / "a.trc")
-    assert back.frames.tolist() == [0, 40, 41]
-    assert np.isnan(back.points[0]).all()
+    assert (back.frames.tolist(), back.times.tolist(), back.origin) == ([41, 42], [1.6, 1.64], 41)
+    assert np.isfinite(back.points).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "origin"), [("1", 1), ("0", 0), ("20.0", 20), ("", None), ("x", None), ("1e300", None)]
+)
+def test_original_start_frame(write, text, origin):
+    header = HEADER.replace("\t50\t1\t2\n", f"\t50\t{text}\t2\n")
+    assert read_trc(write("1\t0\t1\t2\t3\t4\t5\t6\n", header=header)).origin == origin
 
 
 @pytest.mark.parametrize(
@@ -91,7 +105,7 @@ def test_first_frame_is_kept_by_a_blank_row(tmp_path):
         ("1\tinf\t1\n", "m", "line 6, column 2: expected a finite number"),
         ("1\t0\t1\t2\t3\n2\t0\t1\tinf\t3\n", "m", "line 7, column 4: expected a finite number .*found inf"),
         ("", "m", "no rows"),
-        ("1\t0\t1\t2\t3\t4\t5\t6\n", "feet", "line 3: expected Units.*'feet'"),
+        ("1\t0\t1\t2\t3\t4\t5\t6\n", "ells", "line 3: expected Units.*'ells'"),
     ],
 )
 def test_malformed(write, rows, units, expected):
@@ -134,7 +148,7 @@ def test_missing(tmp_path):
 def test_footage_at_hand(data_folder, name, n_frames, n_points):
     folder, file = name.split("/")
     table = read_trc(data_folder(folder) / file)
-    assert table.frames.tolist() == list(range(n_frames))
+    assert table.frames.tolist() == list(range(1, n_frames + 1))
     assert len(table.names) == n_points
     heights = table.points[..., 2]
     assert -0.1 < np.nanmin(heights) < np.nanmax(heights) < 2.0

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from clips import SIZE, encode
 
-from tracker.errors import RecordingError, SessionError
+from tracker.errors import RecordingError, Remedy, SessionError
 from tracker.footage.proxy import FOLDER, Proxy
 from tracker.footage.video import open_footage
 from tracker.formats.anipose import write_calibration
@@ -63,10 +63,9 @@ def test_everything_is_found_by_a_search(room):
     assert [(m.camera, m.kind) for m in missing_files(session)] == [
         (camera, kind) for camera in "ab" for kind in ("footage", "background", "masks")
     ]
-    with pytest.raises(
-        SessionError, match=r"'a': footage .*a\.mp4 and 5 more not found; .*quadrille relink .*--search"
-    ):
+    with pytest.raises(SessionError, match=r"'a': footage .*a\.mp4 and 5 more not found") as caught:
         require_files(session)
+    assert caught.value.remedy == Remedy("relink", session=session.folder)
     session, found = relink(session, Places(search=[room / "disk"]))
     assert len(found) == 6
     again = loaded(room)
@@ -88,8 +87,24 @@ def test_of_equal_names_the_one_in_the_folder_of_the_same_name(room):
 def test_equal_names_in_strange_folders_are_left_to_the_user(room):
     take = moved(room, "disk/x/one")
     shutil.copytree(take, room / "disk" / "x" / "two")
-    refuse(room, SessionError, "'a': the footage may be .*(one|two).*--camera a=PATH", Places(search=[room / "disk"]))
+    refuse(room, SessionError, "'a': the footage may be .*(one|two)", Places(search=[room / "disk"]))
     session, _ = relink(loaded(room), Places(search=[room / "disk" / "x" / "two"]))
+    assert missing_files(session) == ()
+
+
+def test_a_longer_video_of_common_frames_is_found_again(room):
+    take = room / "take1"
+    encode(take / "b.mp4", n=12)
+    videos = [take / "a.mp4", take / "b.mp4"]
+    shutil.rmtree(room / "s" / "s")
+    request = NewSession(room / "s" / "s", calibration=take / "Calib.toml", videos=videos, common_frames=True)
+    assemble(request)
+    take = moved(room)
+    encode(room / "disk" / "b.mp4", n=9)
+    refuse(
+        room, RecordingError, "'b': expected 12 frames .* found 9", Places(camera_paths={"b": room / "disk" / "b.mp4"})
+    )
+    session, _ = relink(loaded(room), Places(search=[take]))
     assert missing_files(session) == ()
 
 
@@ -129,7 +144,7 @@ def test_side_files_are_given_by_folder(room):
 
 
 def test_a_search_needs_a_folder(room):
-    refuse(room, SessionError, "expected a folder as --search", Places(search=[room / "none"]))
+    refuse(room, SessionError, "expected a folder to search", Places(search=[room / "none"]))
 
 
 def test_a_proxy_follows_its_footage(room):

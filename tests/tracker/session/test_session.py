@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from clips import SIZE, encode
 
-from tracker.errors import CalibrationError, ModelError, SessionError
+from tracker.errors import CalibrationError, ModelError, Remedy, SessionError
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
@@ -158,7 +158,7 @@ def edit(folder, old, new):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("version = 1", "version = 4", "version 4, this program reads up to 3; upgrade"),
+        ("version = 1", "version = 5", "version 5, this program reads up to 4; upgrade"),
         ("version = 1", "version = 'x'", "'version': expected a whole number, found 'x'"),
         ("fps = 50.0", "", "expected the key 'fps', found none"),
         ("fps = 50.0", "fps = 'fast'", "a frame rate above 0.* as 'fps', found 'fast'"),
@@ -210,5 +210,6 @@ def test_missing_parts(tmp_path, cameras):
 
 
 def test_no_session(tmp_path):
-    with pytest.raises(SessionError, match="quadrille new"):
+    with pytest.raises(SessionError, match="is not a session") as caught:
         load_session(tmp_path)
+    assert caught.value.remedy == Remedy("make_session")

@@ -146,6 +146,27 @@ def test_the_last_three_states_are_backed_up_at_opening(path):
     assert sorted(p.name for p in (path.parent / "backups").iterdir()) == sorted(p.name for p in kept)
 
 
+def renamed_as_of_the_future(path, with_counter):
+    """Name the backups as a program whose clock is ahead does; older programs had no counter."""
+    for backup in backups.backups_of(path):
+        counter = backup.stem.split("-")[1]
+        stamp = f"29990101T0000{int(counter):02}000Z"
+        backup.rename(backup.with_name(f"annotations-{counter + '-' if with_counter else ''}{stamp}.sqlite"))
+
+
+@pytest.mark.parametrize("with_counter", [True, False])
+def test_backups_of_a_clock_that_was_ahead_do_not_disable_newer_ones(path, with_counter):
+    for frame in (10, 11, 12):
+        edited(path, frame)
+    AnnotationStore(path).close()
+    renamed_as_of_the_future(path, with_counter)
+    for frame, kept in ((13, [12, 11]), (14, [13, 12])):
+        edited(path, frame)
+        AnnotationStore(path).close()
+        assert [frames_of(b)[-1] for b in backups.backups_of(path)] == [frame, *kept]
+    assert backups.restore(path).backup == backups.backups_of(path)[0]
+
+
 def test_a_damaged_store_is_not_backed_up_and_its_backup_is_offered(path):
     edited(path, 10)
     before = backups.backups_of(path)

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.evidence.view_evidence import EdgeSettings
 from tracker.formats.model_toml import load_model
 from tracker.geometry.shapes import TaperedSuperquadric
@@ -59,7 +59,8 @@ def require_paper_body(bodies: Mapping[str, BodyModel]) -> None:
         if body.dof_names != _paper_dofs() or not all(isinstance(s, TaperedSuperquadric) for s in body.shapes):
             raise TrackerError(
                 f"expected the paper's body {PAPER_BODY} of '{name}', found {body.name} of {body.n_dofs} degrees of "
-                f"freedom; make a session of it with 'quadrille new --model {PAPER_BODY}', or track without --paper"
+                "freedom",
+                Remedy("paper_body", body=PAPER_BODY),
             )
 
 

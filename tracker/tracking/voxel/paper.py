@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 
 from tracker.body.model import BodyModel
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.formats.model_toml import load_model
 from tracker.tracking.voxel.measurement import MeasurementNoise
 from tracker.tracking.voxel.motion_model import ProcessNoise
@@ -56,7 +56,8 @@ def require_paper_body(bodies: Mapping[str, BodyModel]) -> None:
         if body.dof_names != _paper_dofs():
             raise TrackerError(
                 f"expected the paper's body {PAPER_BODY} of '{name}', found {body.name} of {body.n_dofs} degrees of "
-                f"freedom; make a session of it with 'quadrille new --model {PAPER_BODY}', or track without --paper"
+                "freedom",
+                Remedy("paper_body", body=PAPER_BODY),
             )
 
 

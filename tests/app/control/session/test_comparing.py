@@ -7,9 +7,11 @@ import pytest
 from gestures import PAGE, drag, pixel_of, wait_for
 
 from app.control.session import comparing
-from app.drawing import overlays
+from app.drawing import former_limbs, overlays
 from app.page import messages
 from app.state.page_view import View
+from app.state.people import ShownPose
+from tracker.body.limbs import limbs
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -105,7 +107,7 @@ def test_a_search_is_compared_with_its_start(opened):
 
 def test_a_fit_that_leaves_a_placed_joint_is_reported(fitted):
     controller, _ = fitted  # the wrist alone was placed, beside the person: the fit takes it away
-    assert "left the left wrist 25 cm from where you placed it" in controller.state.compared.warning
+    assert "left the left wrist 26 cm from where you placed it" in controller.state.compared.warning
     assert "body's sizes" in controller.state.compared.warning
     controller.held_points.set(0, None, held=False)
     drag(controller, "torso", (3.0, 0.0))
@@ -115,14 +117,34 @@ def test_a_fit_that_leaves_a_placed_joint_is_reported(fitted):
 
 def test_a_fit_that_leaves_a_pin_is_reported(fitted):
     controller, _ = fitted
-    noted = controller.state.compared
+    noted, session_state = controller.state.compared, controller._session_state
     controller.held_points.set(0, None, held=False)
     u, v = pixel_of(controller, "right_wrist", camera=1)
     for off_px, is_left in ((1.0, False), (40.0, True)):
         controller.pinning.begin(PAGE, 0, 1, 0, "right_wrist", (u + off_px, v), live=False)
         controller.pinning.end(PAGE)
-        left = comparing._farthest_left(controller._session_state, noted, [0])
-        assert (left is not None and left[0] == "right wrist" and 0.1 < left[1] < 1.0) == is_left
+        placed = {0: comparing._placed_points(session_state, 0, noted.before[0].values)}
+        left = comparing._farthest_left(session_state, noted, placed)
+        assert (left is not None and left[:2] == (0, "right wrist") and 0.1 < left[2] < 1.0) == is_left
+
+
+def test_a_joint_is_measured_from_where_it_was_put_and_not_from_where_later_drags_took_it(opened):
+    """The elbow that the trunk carried away comes back to its place: nothing is left behind."""
+    controller = opened()
+    session_state, model = controller._session_state, controller.models[0]
+    drag(controller, "left_elbow", (8.0, 0.0))
+    put = controller.state.poses[0]
+    drag(controller, "torso", (150.0, 0.0))
+    moved = controller.state.poses[0]
+    i = model.point_names.index("left_elbow")
+    assert np.linalg.norm(model.points_world(moved)[i] - model.points_world(put)[i]) > comparing._LEFT_M
+    costs = session_state.costs((moved,))
+    session_state.set(people=session_state.people_with_pose(0, put))
+    comparing.note_comparison(session_state, "fit", (ShownPose(moved, "manual"),), costs, [0])
+    placed = {0: comparing._placed_points(session_state, 0, moved)}
+    assert {at.camera for at in placed[0]["left_elbow"]} == {0}
+    elbow_alone = {0: {"left_elbow": placed[0]["left_elbow"]}}
+    assert comparing._farthest_left(session_state, controller.state.comparison, elbow_alone) is None
 
 
 def test_a_placement_in_one_view_says_nothing_of_depth():
@@ -146,7 +168,7 @@ def test_costs_that_disagree_are_reported(fitted):
             before_px=before_px, after_px=after_px,
             before_view_costs_px=views_before, after_view_costs_px=views_after,
         )  # fmt: skip
-        warning = comparing._warning(controller._session_state, noted, [])
+        warning = comparing._warning(controller._session_state, noted, {})
         assert (words in warning) if words else warning == ""
     place = tuple(pixel_of(controller, "right_wrist"))
     controller.pinning.begin(PAGE, 0, 0, 0, "right_wrist", place, live=False)
@@ -155,5 +177,65 @@ def test_costs_that_disagree_are_reported(fitted):
     for after_px, words in ((5.4, ""), (6.0, "pins and edges disagree")):  # pins may raise the cost a little
         costs = {"before_view_costs_px": (), "after_view_costs_px": ()}
         noted = replace(controller.state.comparison, before_px=5.0, after_px=after_px, **costs)
-        warning = comparing._warning(controller._session_state, noted, [0])
+        warning = comparing._warning(controller._session_state, noted, {0: {}})
         assert (words in warning) if words else warning == ""
+
+
+def test_a_limb_that_nobody_touched_is_named_drawn_and_taken_back_alone(opened):
+    controller = opened()
+    session_state, model = controller._session_state, controller.models[0]
+    bent = np.array(controller.state.poses[0])
+    bent[model.value_names.index("right_shoulder.abduction")] += 0.2
+    session_state.show_pose(0, bent)
+    for point in ("left_wrist", "left_ankle"):
+        drag(controller, point, (2.0, 0.0))
+    before = controller.state.people
+    arm, leg = (next(x for x in limbs(model) if x.name.startswith(name)) for name in ("right_forearm", "left_calf"))
+    after = np.array(before[0].values)
+    for name in ("right_shoulder.abduction", "right_shoulder.elevation", "left_hip.abduction", "right_hip.elevation"):
+        after[model.value_names.index(name)] += 0.02 if name.startswith("right_hip") else 0.5
+    session_state.set(people=session_state.people_with_pose(0, after))
+    comparing.note_comparison(session_state, "fit", before, session_state.costs((after,)), [0])
+    session_state.save("fit", "fitted", None, 0)
+    # The left leg was touched, and the right one hardly moved.
+    (named,) = messages.state(controller.session, controller.state).compared.moved
+    assert (named.person, named.limb) == (0, "right arm")
+    was, now = model.points_world(before[0].values), model.points_world(after)
+    i = model.point_names.index("right_wrist")
+    comparing.note_comparison(session_state, "search", before, session_state.costs((after,)), [0])
+    assert controller.state.compared.moved == ()
+    comparing.note_comparison(session_state, "fit", before, session_state.costs((after,)), [0])
+    assert named.distance_cm == pytest.approx(100 * np.linalg.norm(now[i] - was[i]), abs=0.1)
+    lines = former_limbs.former_limb_lines(controller.session, controller.state, CONTOURS)
+    assert {line.camera for line in lines if len(line.segments_px)} == {0, 1, 2, 3}
+    u, v = controller.session.cameras[0].camera.pinhole.project(was[i])
+    first = next(line for line in lines if line.camera == 0).segments_px
+    assert np.hypot(first[:, 0] - u, first[:, 1] - v).min() < 15
+
+    controller.pinning.take_limb_back(0)
+    back = controller.state.poses[0]
+    of_arm = np.isin(model.value_names, np.array(model.dof_names)[arm.dofs])
+    np.testing.assert_array_equal(back[of_arm], before[0].values[of_arm])
+    np.testing.assert_array_equal(back[~of_arm], after[~of_arm])
+    assert leg.dofs.any()
+    assert controller.state.undo == "take back right arm, frame 0"
+    assert controller.state.compared.moved == ()
+    assert former_limbs.former_limb_lines(controller.session, controller.state, CONTOURS) == []
+    with pytest.raises(TrackerError, match="undo takes back the whole fit"):
+        controller.pinning.take_limb_back(0)
+
+
+def test_a_fit_of_one_limb_leaves_the_rest_of_the_body(fitted):
+    controller, _ = fitted
+    model, before = controller.models[0], controller.state.poses[0]
+    pose = np.array(before)
+    for name in ("right_shoulder.abduction", "left_hip.abduction"):
+        pose[model.value_names.index(name)] += 0.15
+    controller._session_state.show_pose(0, pose)
+    controller.pinning.fit(0, 0, "right_wrist")
+    after = controller.state.poses[0]
+    moved = {name.split(".")[0] for name, a, b in zip(model.value_names, pose, after, strict=True) if a != b}
+    assert moved
+    assert moved <= {"right_shoulder", "right_elbow"}
+    assert controller.state.undo == "fit right arm to edges, frame 0"
+    assert controller.state.compared.after_px < controller.state.compared.before_px

@@ -5,6 +5,7 @@ import pytest
 from gestures import drag, wait_for
 
 from app.control.tracking.comparing_runs import method_of
+from app.state.comparison import Stretch
 from tracker.errors import TrackerError
 from tracker.store.records import PoseChange, PoseRecord
 
@@ -93,3 +94,33 @@ def test_a_pose_by_hand_is_named_by_its_source(twice):
     assert one.other_method == "contour"
     assert one.method in ("manual", "ik")
     assert method_of(PoseRecord(np.zeros(2), ("tracked", "tracked"), 1)) == "chamfer"
+
+
+def test_a_run_tells_gain_and_harm_and_a_stretch_is_taken_back(twice):
+    controller, before, after = twice
+    controller.comparing_runs.compare_run(RANGE)
+    wait_for(lambda: controller.state.range_comparison is not None)
+    found = controller.state.range_comparison
+    assert (found.first, found.last, found.run) == (3, 6, 1)
+    assert found.stretches == (Stretch(0, 3, 6, 4, "better"),)
+    controller.ranges.take_replaced(3, 4, [0])
+    wait_for(lambda: controller.state.range_comparison.frames[0][0].method == "chamfer")
+    now = controller.state.range_comparison
+    assert now.stretches == found.stretches  # those of the run's end
+    assert [p.method for p in now.frames[0]] == ["chamfer", "chamfer", "contour", "contour"]
+    np.testing.assert_array_equal(controller.stored_poses.on_frame(3)[0].values, before)
+    np.testing.assert_array_equal(controller.stored_poses.on_frame(6)[0].values, after)
+
+
+def test_a_run_over_frames_without_poses_and_keyframes_is_not_compared(opened):
+    controller = opened()
+    written(controller, "chamfer", 0.5, "lost")
+    controller.comparing_runs._work(RANGE)
+    assert controller.state.range_comparison is None
+    written(controller, "contour", 0.8, "good")
+    controller.ranges.mark(3, 6, "keyframe")
+    controller.comparing_runs._work(RANGE)
+    assert controller.state.range_comparison is None
+    controller.ranges.mark(4, 4, "none")
+    controller.comparing_runs._work(RANGE)
+    assert controller.state.range_comparison.stretches == (Stretch(0, 4, 4, 1, "better"),)

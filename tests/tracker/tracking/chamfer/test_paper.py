@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.formats.model_toml import load_model
 from tracker.search.best_first import stages
 from tracker.tracking.chamfer.paper import PAPER_BODY, paper_settings, require_paper_body
@@ -30,5 +30,6 @@ def test_the_papers_body_of_any_height_is_accepted():
 
 @pytest.mark.parametrize("name", ["gavrila34", "gavrila22_cones"])
 def test_another_body_is_refused(name):
-    with pytest.raises(TrackerError, match=rf"gavrila22 of 'bob', found {name} .*--model gavrila22"):
+    with pytest.raises(TrackerError, match=rf"gavrila22 of 'bob', found {name} ") as caught:
         require_paper_body({"ann": load_model(PAPER_BODY), "bob": load_model(name)})
+    assert caught.value.remedy == Remedy("paper_body", body="gavrila22")

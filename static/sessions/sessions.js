@@ -42,7 +42,7 @@ export class Sessions {
       this.toggle();
       void this.#choose(folder);
     });
-    byId("show-new-session", HTMLButtonElement).addEventListener("click", () => this.showNew());
+    byId("show-new-session", HTMLButtonElement).addEventListener("click", () => void this.showNew());
     completePaths(this.#folder, byId("session-folders", HTMLDataListElement));
     /** @type {string | undefined} */
     let first;
@@ -62,28 +62,39 @@ export class Sessions {
     void this.#fill();
   }
 
-  /** Show the form of a new session. */
-  showNew() {
+  /** Show the form of a new session, or why there is none. */
+  async showNew() {
+    const { refusal, folder } = await listed();
+    if (refusal) {
+      this.#notify({ type: "notice", level: "error", text: `No session can be made here: ${refusal}` });
+      return;
+    }
+    this.#present = folder;
     if (this.#panel.matches(":popover-open")) this.#panel.hidePopover();
     this.#create.show();
   }
 
   async #fill() {
-    /** @type {Listed} */
-    let listed = { refusal: "The program does not answer.", folder: "", recent: [] };
-    try {
-      listed = await (await fetch("sessions")).json();
-    } catch {
-      // Said in the panel.
-    }
-    this.#present = listed.folder;
+    const found = await listed();
+    this.#present = found.folder;
     for (const control of [...this.#form.elements, byId("show-new-session", HTMLButtonElement)]) {
-      /** @type {HTMLInputElement} */ (control).disabled = listed.refusal !== null;
+      /** @type {HTMLInputElement} */ (control).disabled = found.refusal !== null;
     }
-    if (listed.refusal) this.#say(listed.refusal, true);
-    this.#list.replaceChildren(...listed.recent.map((one) => this.#row(one)));
-    if (!listed.recent.length && !listed.refusal) this.#say("No other session was opened before.");
+    if (found.refusal) this.#say(found.refusal, true);
+    this.#list.replaceChildren(...found.recent.map((one) => this.#row(one)));
+    if (!found.recent.length && !found.refusal) this.#list.append(this.#firstRow());
     if (document.activeElement === document.body) this.#folder.focus();
+  }
+
+  /** Say what to do where no other session was opened before. */
+  #firstRow() {
+    const item = document.createElement("li");
+    item.className = "is-empty";
+    const make = document.createElement("button");
+    Object.assign(make, { type: "button", className: "is-primary", textContent: "New session…", title: "Make a session of videos and a calibration" });
+    make.addEventListener("click", () => void this.showNew());
+    item.append("No other session was opened before. Make one of your own videos and their calibration:", make);
+    return item;
   }
 
   /** @param {Listed["recent"][number]} session */
@@ -154,4 +165,13 @@ async function untilAnotherIsOpen(present, showStep) {
     }
   }
   return false;
+}
+
+/** The sessions that the program lists. @returns {Promise<Listed>} */
+async function listed() {
+  try {
+    return await (await fetch("sessions")).json();
+  } catch {
+    return { refusal: "The program does not answer.", folder: "", recent: [] };
+  }
 }

@@ -1,0 +1,157 @@
+"""The remedies of the library's errors and warnings, in the words of the command line and of the page.
+
+One entry for each code of a `tracker.errors.Remedy`, with the names of its fields in braces. The command line names
+options; the page names its fields and buttons, and no option.
+"""
+
+from typing import NamedTuple
+
+from tracker.errors import Remedy, TrackerError
+
+
+class Phrases(NamedTuple):
+    """What to do, each way as the end of a sentence."""
+
+    command_line: str
+    page: str
+
+
+PHRASES = {
+    # footage and calibration of a new session
+    "name_footage": Phrases(
+        "rename it, leave it out or say --camera NAME={video}",
+        "rename it, leave it out, or give it to a camera in the list of cameras",
+    ),
+    "give_footage": Phrases(
+        "give a file named {camera}.mp4, say --camera {camera}=PATH, or choose other cameras with --cameras",
+        "give a file named {camera}.mp4, choose its file in the list of cameras, or leave the camera out",
+    ),
+    "give_rate": Phrases("give it with --fps RATE", "enter it as Frame rate"),
+    "give_common_rate": Phrases(
+        "convert the videos to the same rate, or give the rate at which all cameras filmed with --fps {fps}",
+        "convert the videos to the same rate, or enter the rate at which all cameras filmed, such as {fps}, as Frame "
+        "rate",
+    ),
+    "give_constant_rate": Phrases(
+        "say --fps {fps} if frame k of all cameras is of one instant all the same, else convert it to a constant rate "
+        "with frames at the times of the other cameras",
+        "enter {fps} as Frame rate if frame k of all cameras is of one instant all the same, else convert it to a "
+        "constant rate with frames at the times of the other cameras",
+    ),
+    "give_frame_offset": Phrases(
+        "if they began together, --common-frames takes the {n} frames that all have; else say --offset CAM=N for a "
+        "camera that began N frames earlier, or cut them to the same start and end",
+        "if they began together, choose Common frames to take the {n} that all have; else enter the offset of a camera "
+        "that began earlier, its number of frames, or cut them to the same start and end",
+    ),
+    "give_image_offset": Phrases(
+        "restore it, take those that all have with --common-frames, or say --offset CAM=N for a camera that began N "
+        "images earlier",
+        "restore it, choose Common frames to take those that all have, or enter the offset of a camera that began "
+        "earlier: its number of images",
+    ),
+    "give_camera_background": Phrases(
+        "add it or leave out --background", "add it, or leave the field Background empty"
+    ),
+    "give_camera_masks": Phrases("add them or leave out --masks", "add them, or leave the field Masks empty"),
+    "give_background": Phrases("give one with --background", "make the session again with a folder of backgrounds"),
+    "make_session": Phrases("make one with 'quadrille new'", "choose another folder, or make one with New session…"),
+    "rescale": Phrases(
+        "say --rescale if it does, and calibrate at the size of the footage if it does not",
+        "scale the matrices of the calibration if it does, and calibrate at the size of the footage if it does not",
+    ),
+    "give_unit": Phrases("say --units {units}", "choose {units} as unit"),
+    "give_poses": Phrases("say --poses {poses}, or rewrite them ({rewrite})", "rewrite them ({rewrite})"),
+    "choose_poses": Phrases("say which with --poses", "rewrite them to X_camera = R X_world + t"),
+    # files of a session that have moved
+    "relink": Phrases(
+        "put it back, or run quadrille relink {session} --search FOLDER",
+        "put it back, or give its new place on the command line with 'quadrille relink'",
+    ),
+    "relink_nothing": Phrases("leave out --{kind}", "give no {kind}"),
+    "relink_search": Phrases("check the path of --search", "check the path"),
+    "relink_which_footage": Phrases(
+        "search a smaller folder, or say --camera {camera}=PATH",
+        "search a smaller folder, or give the footage of camera '{camera}'",
+    ),
+    "relink_which_side_files": Phrases(
+        "search a smaller folder, or say --{kind} FOLDER", "search a smaller folder, or give the folder of the {kind}"
+    ),
+    "relink_each": Phrases("give each its own with --camera NAME=PATH", "give each its own"),
+    # first poses
+    "another_frame": Phrases(
+        "choose another --frame, on which {condition}", "go to another frame, on which {condition}"
+    ),
+    "another_frame_or_place": Phrases(
+        "choose another --frame, or place the person in the page", "go to another frame, or place the person by hand"
+    ),
+    "another_frame_or_background": Phrases(
+        "choose another --frame, or check the background", "go to another frame, or check the background"
+    ),
+    "another_frame_or_camera": Phrases(
+        "choose another --frame, or add a camera from another side",
+        "go to another frame, or add a camera from another side",
+    ),
+    "name_all_people": Phrases(
+        "make the session with all --people, or give masks of the person",
+        "make the session with the names of all people, or give masks of the person",
+    ),
+    "place_body": Phrases(
+        "place the body in the page, or use quadrille init", "place the body by hand, or press Find people"
+    ),
+    # bodies and joints
+    "paper_body": Phrases(
+        "make a session of it with 'quadrille new --model {body}', or track without --paper",
+        "make a session with the body model {body}, or track as usual",
+    ),
+    "without_paper": Phrases(
+        "add poses of such a frame, or leave out --paper", "add poses of such a frame, or acquire as usual"
+    ),
+    "check_joint_map": Phrases("check --joint-map", "check which joint each marker stands for"),
+    "give_joint_map": Phrases(
+        "give a --joint-map FILE.toml with a line such as left_shoulder = {marker} for each joint "
+        "(docs/recordings.md has an example)",
+        "rename the markers as one of these conventions does",
+    ),
+    # references and exports
+    "check_reference_frames": Phrases(
+        "check --frames, --person and the reference's frame numbers",
+        "check the frames, the person and the reference's frame numbers",
+    ),
+    "turn_axis": Phrases("turn one sign of --axes, e.g. x,-z,y", "turn the sign of one axis, e.g. x,-z,y"),
+    "name_axes": Phrases("correct --axes", "correct the axes"),
+    "reference_axes": Phrases(
+        "with --axes {axes} it would be {distance_m:.2f} m", "with the axes {axes} it would be {distance_m:.2f} m"
+    ),
+    "reference_units": Phrases("correct the Units of the file", "correct the Units of the file"),
+    "align_reference": Phrases("say --align rigid-all", "align it rigidly"),
+    "check_reference": Phrases(
+        "check that it is of this recording and person, --axes, and the units",
+        "check that it is of this recording and person, its axes, and its units",
+    ),
+    "frames_of_one_body": Phrases(
+        "give frames of one body as --frames, or another format", "choose Frames of one body, or another format"
+    ),
+    "name_format": Phrases("correct --format", "choose another format"),
+    "another_file": Phrases("choose another --out", "choose another file"),
+    "another_file_or_overwrite": Phrases("choose another --out, or add --overwrite", "choose another file"),
+}
+"""Phrases by code."""
+
+
+def command_line_text(text: object, remedy: Remedy | None = None) -> str:
+    """Return an error, or a warning with its remedy, in the words of the command line."""
+    return _sentence(text, remedy, 0)
+
+
+def page_text(text: object, remedy: Remedy | None = None) -> str:
+    """Return an error, or a warning with its remedy, in the words of the page."""
+    return _sentence(text, remedy, 1)
+
+
+def _sentence(text: object, remedy: Remedy | None, column: int) -> str:
+    if isinstance(text, TrackerError):
+        remedy = remedy or text.remedy
+    if remedy is None:
+        return str(text)
+    return f"{text}; {PHRASES[remedy.code][column].format(**remedy.fields)}"

@@ -1,0 +1,108 @@
+"""What the form of a new session asks for: folders, small pictures of footage, a survey, and the session itself.
+
+A page names paths of this machine. `SessionRoutes` says where such requests are answered.
+"""
+
+import asyncio
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import msgspec
+from aiohttp import web
+
+from app.remedies import page_text
+from app.server import connections
+from app.server.page_requests import read_body, require_page
+from app.session.footage_preview import preview
+from app.session.new_session import NewSessionForm, make_session
+from app.session.path_choice import folder_contents, typed_path
+from app.session.survey import SurveyForm, survey
+from tracker.errors import TrackerError
+from tracker.formats.model_toml import PRESETS
+from tracker.session.assemble import DEFAULT_MODEL
+
+_MAX_WAITING = 64
+"""Number of pictures that may wait: those of the cameras of a large studio."""
+_MAX_PATH = 4096
+
+
+class NewSessionRoutes:
+    """Answers what the form of a new session asks for, below `/sessions`."""
+
+    def __init__(self, refusal: str | None) -> None:
+        """Serve the form.
+
+        Args:
+            refusal: why no session can be made; None if one can.
+        """
+        self._refusal = refusal
+        self._making = asyncio.Lock()
+        self._pool = ThreadPoolExecutor(1, thread_name_prefix="previews")
+        self._n_waiting = 0
+
+    def add_to(self, app: web.Application) -> None:
+        """Add the routes to an application."""
+        app.router.add_get("/sessions/models", self._models)
+        app.router.add_get("/sessions/folder", self._list)
+        app.router.add_get("/sessions/preview", self._preview)
+        app.router.add_post("/sessions/survey", self._survey)
+        app.router.add_post("/sessions/new", self._make)
+        app.on_cleanup.append(self._close)
+
+    async def _close(self, _: web.Application) -> None:
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    async def _models(self, request: web.Request) -> web.Response:
+        require_page(request, self._refusal)
+        return web.json_response({"models": PRESETS, "default": DEFAULT_MODEL})
+
+    async def _list(self, request: web.Request) -> web.Response:
+        require_page(request, self._refusal)
+        try:
+            found = await asyncio.to_thread(folder_contents, request.query.get("path", "")[:_MAX_PATH])
+        except TrackerError as error:
+            raise web.HTTPBadRequest(text=page_text(error)) from error
+        entries = [entry._asdict() for entry in found.entries]
+        return web.json_response(found._asdict() | {"entries": entries})
+
+    async def _preview(self, request: web.Request) -> web.Response:
+        require_page(request, self._refusal)
+        if self._n_waiting >= _MAX_WAITING:
+            raise web.HTTPServiceUnavailable(text="Too many pictures are being made; try again later.")
+        self._n_waiting += 1
+        try:
+            path = typed_path(request.query.get("path", "")[:_MAX_PATH])
+            made = await asyncio.get_running_loop().run_in_executor(self._pool, preview, path)
+        except TrackerError as error:
+            raise web.HTTPNotFound(text=page_text(error)) from error
+        finally:
+            self._n_waiting -= 1
+        return web.Response(body=made, content_type="image/jpeg")
+
+    async def _survey(self, request: web.Request) -> web.Response:
+        form = await read_body(request, SurveyForm, self._refusal)
+        found = await asyncio.to_thread(survey, form)
+        return web.Response(body=msgspec.json.encode(found), content_type="application/json")
+
+    async def _make(self, request: web.Request) -> web.StreamResponse:
+        """Make a session. The answer has one JSON object per line: each check that has passed, then the outcome."""
+        form = await read_body(request, NewSessionForm, self._refusal)
+        if self._making.locked():
+            raise web.HTTPConflict(text="Another session is being made; wait for it.")
+        async with self._making:
+            connections.keep_open(request)
+            response = web.StreamResponse(headers={"Content-Type": "application/x-ndjson"})
+            await response.prepare(request)
+            lines: asyncio.Queue[dict[str, Any] | None] = asyncio.Queue()
+            loop = asyncio.get_running_loop()
+
+            def report(kind: str, what: Any) -> None:
+                loop.call_soon_threadsafe(lines.put_nowait, {kind: what})
+
+            work = asyncio.ensure_future(asyncio.to_thread(make_session, form, report))
+            work.add_done_callback(lambda _: lines.put_nowait(None))
+            while (line := await lines.get()) is not None:
+                await response.write(msgspec.json.encode(line) + b"\n")
+            await work
+            await response.write_eof()
+            return response

@@ -1,0 +1,51 @@
+"""Requests that only the page of the program's own user may send: where they come from, and what they hold."""
+
+from typing import Any
+
+import msgspec
+from aiohttp import web
+
+from tracker.errors import SessionError
+from tracker.validation import check
+
+
+def require_page(request: web.Request, refusal: str | None) -> None:
+    """Check that a request comes from the page itself.
+
+    Args:
+        request: the request.
+        refusal: why no page may send such requests; None if it may.
+
+    Raises:
+        HTTPForbidden: it may not.
+    """
+    if refusal is not None:
+        raise web.HTTPForbidden(text=refusal)
+    # Without a token, an image in a foreign page could start work, though never read the result.
+    if request.headers.get("Sec-Fetch-Site", "same-origin") != "same-origin":
+        raise web.HTTPForbidden(text="Expected a request of this page, found one of another site.")
+
+
+async def read_body(request: web.Request, declaration: Any, refusal: str | None) -> Any:
+    """Return the body of a request of the page, checked against its declaration.
+
+    Args:
+        request: the request, with JSON.
+        declaration: a type that msgspec knows.
+        refusal: as for `require_page`.
+
+    Raises:
+        HTTPForbidden: it is not of the page.
+        HTTPBadRequest: it does not fit the declaration.
+    """
+    require_page(request, refusal)
+    # A foreign page can send a form without asking, JSON it cannot. The guard has seen the Origin.
+    if request.content_type != "application/json" or "Origin" not in request.headers:
+        raise web.HTTPForbidden(text="Expected a request of this page, found another.")
+    data = await request.read()
+    try:
+        return check(msgspec.json.decode(data), declaration, "the form", SessionError)
+    except (msgspec.DecodeError, UnicodeError, RecursionError) as error:
+        raise web.HTTPBadRequest(text=f"Expected a request in JSON, found other data ({error}).") from error
+    except SessionError as error:
+        raise web.HTTPBadRequest(text=str(error)) from error

@@ -1,0 +1,93 @@
+"""Look at the calibration and footage that a user has chosen for a session, before anything is made."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from app.remedies import page_text
+from app.session.new_session import MAX_CAMERAS, Up
+from app.session.path_choice import TypedPath, typed_path
+from tracker.calibrations.reading import read_cameras
+from tracker.errors import TrackerError
+from tracker.formats.camera_section import CameraEntry, Units
+from tracker.session.assemble import footage_in
+from tracker.session.matching import camera_name
+from tracker.session.rig_summary import RigSummary, summarize_rig
+
+_SOME_SIZE = (1920, 1080)
+"""Stands for the size of pictures that a calibration does not state; where cameras stand does not depend on it."""
+
+
+class SurveyForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What to look at; a field that is still empty is null."""
+
+    calibration: TypedPath | None = None
+    footage: TypedPath | None = None
+    up: Up = "z"
+    units: Units | None = None
+
+
+class Survey(msgspec.Struct, frozen=True):
+    """What the chosen files hold, for the page."""
+
+    cameras: list[str]
+    """Names of the calibrated cameras."""
+    footage: Annotated[list[dict[str, str]], Meta(max_length=MAX_CAMERAS)]
+    """Path and name of each video or folder of images."""
+    assigned: dict[str, str]
+    """Path of the footage that is named after a camera, by camera."""
+    rig: dict[str, Any] | None
+    """Where the cameras stand and look (`RigSummary`); null without cameras."""
+    problems: list[str]
+    """Sentences on what cannot be read."""
+
+
+def survey(form: SurveyForm) -> Survey:
+    """Return what the chosen files hold; what cannot be read is a problem, not an error."""
+    problems: list[str] = []
+    entries: tuple[CameraEntry, ...] = ()
+    rig: dict[str, Any] | None = None
+    footage: list[Path] = []
+    try:
+        if form.calibration is not None:
+            calibration = read_cameras(typed_path(form.calibration), form.units)
+            entries = calibration.entries
+            rig = _rig(summarize_rig([e.camera(None if e.size else _SOME_SIZE) for e in entries], form.up))
+            rig["doubts"] = [*calibration.notes, *rig["doubts"]]
+    except TrackerError as error:
+        problems.append(page_text(error))
+    try:
+        if form.footage is not None:
+            footage = footage_in(typed_path(form.footage))[:MAX_CAMERAS]
+    except TrackerError as error:
+        problems.append(page_text(error))
+    by_name = {camera_name(path): str(path) for path in footage}
+    names = [e.name for e in entries]
+    return Survey(
+        names,
+        [{"path": str(path), "name": path.name} for path in footage],
+        {name: by_name[name] for name in names if name in by_name},
+        rig,
+        problems,
+    )
+
+
+def _rig(summary: RigSummary) -> dict[str, Any]:
+    """Return a summary as plain data, rounded to millimetres."""
+
+    def plain(values: Any) -> Any:
+        return None if values is None else np.round(values, 3).tolist()
+
+    return {
+        "names": summary.names,
+        "centers": plain(summary.centers_world),
+        "axes": plain(summary.axes_world),
+        "point": plain(summary.viewed_point_world),
+        "distances_m": plain(summary.distances_m),
+        "heights_m": plain(summary.heights_m),
+        "sentence": summary.sentence,
+        "doubts": summary.doubts,
+    }

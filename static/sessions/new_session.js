@@ -1,0 +1,253 @@
+/**
+ * Dialog that makes a session of videos and a calibration. It shows the cameras before anything is made; the program's
+ * checks are listed as they pass.
+ */
+
+import { button, byId } from "../widgets/elements.js";
+import { CameraCards } from "./camera_cards.js";
+import { PathPicker } from "./path_picker.js";
+import { drawRig } from "./rig_drawing.js";
+import { completePaths, postJson } from "./session_requests.js";
+
+/**
+ * @typedef {{cameras: [string, string], with_backgrounds: boolean, text: string}} Exchanged
+ * @typedef {{passed?: string, warning?: string, failed?: string, exchanged?: Exchanged, made?: string}} Line
+ * @typedef {{cameras: string[], footage: import("./camera_cards.js").Footage[], assigned: Record<string, string>,
+ *   rig: import("./rig_drawing.js").Rig | null, problems: string[]}} Survey
+ */
+
+/** Wait for a pause in typing before the files are looked at. */
+const PAUSE_MS = 250;
+/** Fields on which the survey depends. */
+const SURVEYED = ["footage", "calibration", "up", "units"];
+
+export class NewSession {
+  #dialog = byId("new-session", HTMLDialogElement);
+  #form = byId("new-session-form", HTMLFormElement);
+  #checks = byId("new-session-checks", HTMLElement);
+  #make = byId("make-session", HTMLButtonElement);
+  #openIt = byId("open-made-session", HTMLButtonElement);
+  #rig = byId("rig", HTMLElement);
+  #picker = new PathPicker();
+  #cards = new CameraCards(
+    () => this.#begin(),
+    (from, take) => this.#picker.show("footage", from || this.#value("footage"), take),
+  );
+  /** Folder of the session that was made; empty before. */
+  #made = "";
+  /** Folder that the form proposed. */
+  #proposed = "";
+  /** Footage and calibration of the cards. */
+  #surveyed = "";
+  #nSurveys = 0;
+  /** @type {ReturnType<typeof setTimeout> | undefined} */
+  #timer;
+
+  /** @param {(folder: string) => void} open opens a session */
+  constructor(open) {
+    this.#form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      void this.#run(false);
+    });
+    this.#form.addEventListener("input", (event) => this.#onInput(event.target));
+    button("cancel-new-session", () => this.#dialog.close());
+    this.#openIt.addEventListener("click", () => {
+      this.#dialog.close();
+      open(this.#made);
+    });
+    for (const field of this.#form.querySelectorAll("input[list$='-paths']")) {
+      const input = /** @type {HTMLInputElement} */ (field);
+      completePaths(input, /** @type {HTMLDataListElement} */ (input.list));
+    }
+    for (const browse of this.#form.querySelectorAll("button[data-browse]")) {
+      const { browse: name = "", kind } = /** @type {HTMLElement} */ (browse).dataset;
+      browse.addEventListener("click", () => this.#browse(name, kind === "file" ? "file" : "folder"));
+    }
+  }
+
+  show() {
+    this.#dialog.showModal();
+    this.#begin();
+    void this.#fillModels();
+    void this.#survey();
+  }
+
+  async #fillModels() {
+    const answer = await fetch("sessions/models").catch(() => null);
+    if (!answer?.ok) return;
+    const { models, default: usual } = await answer.json();
+    byId("new-models", HTMLDataListElement).replaceChildren(...models.map((/** @type {string} */ name) => new Option("", name)));
+    byId("new-model", HTMLInputElement).placeholder = usual;
+  }
+
+  /**
+   * @param {string} name of a field
+   * @param {"folder" | "file"} kind
+   */
+  #browse(name, kind) {
+    const field = this.#field(name);
+    this.#picker.show(kind, field.value || this.#value("footage") || this.#value("calibration"), (path) => {
+      field.value = path;
+      field.dispatchEvent(new Event("input", { bubbles: true }));
+    });
+  }
+
+  /** @param {EventTarget | null} target */
+  #onInput(target) {
+    const name = target instanceof HTMLInputElement || target instanceof HTMLSelectElement ? target.name : "";
+    if (!name) return; // a card
+    this.#begin();
+    if (!SURVEYED.includes(name)) return;
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => void this.#survey(), PAUSE_MS);
+  }
+
+  /** Look at footage and calibration, and show the cameras. */
+  async #survey() {
+    const [footage, calibration] = [this.#value("footage"), this.#value("calibration")];
+    const number = ++this.#nSurveys;
+    /** @type {Survey} */
+    let found = { cameras: [], footage: [], assigned: {}, rig: null, problems: [] };
+    if (footage || calibration) {
+      const form = { footage: footage || null, calibration: calibration || null, up: this.#value("up"), units: this.#value("units") || null };
+      try {
+        await postJson("sessions/survey", form, (line) => (found = JSON.parse(line)));
+      } catch (error) {
+        found.problems.push(error instanceof Error ? error.message : String(error));
+      }
+    }
+    if (number !== this.#nSurveys) return;
+    this.#cards.show(found.cameras, found.footage, found.assigned, this.#files === this.#surveyed);
+    this.#surveyed = this.#files;
+    this.#showRig(found.rig);
+    if (!this.#checks.children.length) found.problems.forEach((problem) => this.#add("is-failed", problem));
+    if (found.footage.length) this.#propose(footage);
+  }
+
+  /**
+   * Propose a folder for the session, beside its footage, unless the user has named one.
+   *
+   * @param {string} footage
+   */
+  #propose(footage) {
+    const field = this.#field("folder");
+    if (field.value && field.value !== this.#proposed) return;
+    this.#proposed = `${footage.trim().replace(/\/+$/, "")}_session`;
+    field.value = this.#proposed;
+  }
+
+  /** @param {Survey["rig"]} rig */
+  #showRig(rig) {
+    this.#rig.hidden = rig === null;
+    if (!rig) return;
+    const [top, side] = this.#rig.querySelectorAll("svg");
+    drawRig(top, side, rig, this.#value("up"));
+    const doubts = rig.doubts.map((doubt) => Object.assign(document.createElement("p"), { className: "is-warning", textContent: doubt }));
+    const sentence = Object.assign(document.createElement("p"), { textContent: rig.sentence });
+    byId("rig-text", HTMLElement).replaceChildren(sentence, ...doubts);
+  }
+
+  /** Forget the outcome of the last attempt. */
+  #begin() {
+    this.#made = "";
+    this.#openIt.hidden = true;
+    this.#make.hidden = false;
+    this.#checks.replaceChildren();
+  }
+
+  /** @param {boolean} keepsAssignment whether the footage stays as assigned even if cameras seem exchanged */
+  async #run(keepsAssignment) {
+    this.#begin();
+    this.#make.disabled = true;
+    clearTimeout(this.#timer);
+    if (this.#files !== this.#surveyed) await this.#survey(); // else the cameras would be those of other files
+    this.#begin();
+    try {
+      await postJson("sessions/new", this.#request(keepsAssignment), (line) => this.#showLine(JSON.parse(line)));
+    } catch (error) {
+      this.#add("is-failed", error instanceof Error ? error.message : String(error));
+    }
+    this.#make.disabled = false;
+    this.#make.hidden = this.#made !== "";
+    this.#openIt.hidden = this.#made === "";
+    if (this.#made) this.#openIt.focus();
+  }
+
+  /** @param {boolean} keepsAssignment */
+  #request(keepsAssignment) {
+    const optional = (/** @type {string} */ name) => this.#value(name) || null;
+    const list = (/** @type {string} */ name) => this.#value(name).split(",").map((part) => part.trim()).filter(Boolean); // prettier-ignore
+    return {
+      folder: this.#value("folder"),
+      calibration: this.#value("calibration"),
+      footage: this.#value("footage"),
+      cameras: this.#cards.chosen,
+      people: list("people"),
+      heights_cm: list("heights").map(Number),
+      models: list("models"),
+      up: this.#value("up"),
+      units: optional("units"),
+      fps: this.#value("fps") ? Number(this.#value("fps")) : null,
+      background: optional("background"),
+      masks: optional("masks"),
+      keep_assignment: keepsAssignment,
+    };
+  }
+
+  /** @param {Line} line */
+  #showLine({ passed, warning, failed, exchanged, made }) {
+    if (passed) this.#add("is-passed", passed);
+    if (warning) this.#add("is-warning", warning);
+    if (failed) this.#add("is-failed", failed);
+    if (exchanged) this.#offerExchange(exchanged);
+    if (!made) return;
+    this.#made = made;
+    this.#add("is-passed", `The session is in ${made}.`);
+  }
+
+  /** @param {Exchanged} exchanged */
+  #offerExchange({ cameras: [first, second], with_backgrounds: withSide, text }) {
+    const item = this.#add("is-warning", `${text[0].toUpperCase()}${text.slice(1)}. Nothing has been made yet.`);
+    const offer = (/** @type {string} */ label, /** @type {string} */ title, /** @type {() => void} */ run) => {
+      const choice = Object.assign(document.createElement("button"), { type: "button", textContent: label, title });
+      choice.addEventListener("click", run);
+      item.append(choice);
+      return choice;
+    };
+    const exchange = offer("Exchange these two", `Give the footage of ${first} to ${second} and the other way round, then check again`, () => {
+      this.#cards.exchange(first, second, withSide);
+      void this.#run(false);
+    });
+    exchange.className = "is-primary";
+    offer("Keep as they are", "Make the session with the footage as it is", () => void this.#run(true));
+    item.scrollIntoView({ block: "nearest" });
+    exchange.focus();
+  }
+
+  /**
+   * @param {string} kind
+   * @param {string} text
+   */
+  #add(kind, text) {
+    const item = Object.assign(document.createElement("li"), { className: kind });
+    item.append(Object.assign(document.createElement("span"), { textContent: text }));
+    this.#checks.append(item);
+    item.scrollIntoView({ block: "nearest" });
+    return item;
+  }
+
+  /** Footage and calibration in one text. */
+  get #files() {
+    return JSON.stringify([this.#value("footage"), this.#value("calibration")]);
+  }
+
+  /** @param {string} name */
+  #field(name) {
+    return /** @type {HTMLInputElement} */ (this.#form.elements.namedItem(name));
+  }
+
+  /** @param {string} name */
+  #value(name) {
+    return this.#field(name).value.trim();
+  }
+}

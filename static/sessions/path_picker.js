@@ -1,0 +1,135 @@
+/** Dialog that chooses a file or folder of the program's machine. */
+
+import { button, byId } from "../widgets/elements.js";
+
+/**
+ * @typedef {{name: string, path: string, kind: "folder" | "session" | "video" | "file"}} Entry
+ * @typedef {{folder: string, parent: string | null, entries: Entry[], is_cut_off: boolean}} FolderContents
+ * @typedef {"folder" | "file" | "footage"} Wanted kind of the choice; footage is a video, or a folder of images
+ */
+
+const TITLES = { folder: "Choose a folder", file: "Choose a file", footage: "Choose a video or a folder of images" };
+const MARKS = { folder: "▸", session: "▸", video: "", file: "" };
+
+export class PathPicker {
+  #dialog = byId("path-picker", HTMLDialogElement);
+  #title = byId("path-picker-title", HTMLElement);
+  #path = byId("path-picker-path", HTMLInputElement);
+  #list = byId("path-picker-entries", HTMLElement);
+  #note = byId("path-picker-note", HTMLOutputElement);
+  #up = byId("path-picker-up", HTMLButtonElement);
+  #choose = byId("path-picker-choose", HTMLButtonElement);
+  /** @type {Wanted} */
+  #wanted = "folder";
+  /** @type {FolderContents | null} */
+  #contents = null;
+  #take = (/** @type {string} */ _path) => {};
+
+  constructor() {
+    byId("path-picker-form", HTMLFormElement).addEventListener("submit", (event) => {
+      event.preventDefault();
+      void this.#go(this.#path.value);
+    });
+    this.#up.addEventListener("click", () => this.#contents?.parent && void this.#go(this.#contents.parent));
+    this.#list.addEventListener("keydown", (event) => {
+      if (event.key === "Backspace") this.#up.click();
+      else if (event.key === "ArrowDown" || event.key === "ArrowUp") moveFocus(this.#list, event.key === "ArrowDown" ? 1 : -1);
+      else return;
+      event.preventDefault();
+    });
+    button("path-picker-cancel", () => this.#dialog.close());
+    this.#choose.addEventListener("click", () => this.#contents && this.#finish(this.#contents.folder));
+  }
+
+  /**
+   * Let the user choose.
+   *
+   * @param {Wanted} wanted
+   * @param {string} from a path to begin at; empty for the user's home
+   * @param {(path: string) => void} take called with the choice
+   */
+  show(wanted, from, take) {
+    this.#wanted = wanted;
+    this.#take = take;
+    this.#title.textContent = TITLES[wanted];
+    this.#choose.hidden = wanted === "file";
+    this.#contents = null;
+    this.#list.replaceChildren();
+    this.#dialog.showModal();
+    void this.#go(from).then((isThere) => !isThere && from && void this.#go(""));
+  }
+
+  /**
+   * Show a folder. Returns whether it could be read.
+   *
+   * @param {string} path
+   */
+  async #go(path) {
+    const answer = await fetch(`sessions/folder?path=${encodeURIComponent(path)}`).catch(() => null);
+    if (!answer?.ok) {
+      this.#note.textContent = (await answer?.text()) ?? "The program does not answer.";
+      return false;
+    }
+    /** @type {FolderContents} */
+    const contents = await answer.json();
+    this.#contents = contents;
+    this.#path.value = contents.folder;
+    this.#up.disabled = contents.parent === null;
+    this.#note.textContent = contents.is_cut_off ? "Not all entries are shown." : contents.entries.length ? "" : "This folder is empty.";
+    this.#list.replaceChildren(...contents.entries.map((entry) => this.#row(entry)));
+    this.#list.scrollTop = 0;
+    /** @type {HTMLElement} */ (this.#list.querySelector("button:not(:disabled)") ?? this.#list).focus();
+    return true;
+  }
+
+  /** @param {Entry} entry */
+  #row(entry) {
+    const { name, path, kind } = entry;
+    const isFolder = kind === "folder" || kind === "session";
+    const item = document.createElement("li");
+    const open = document.createElement("button");
+    open.type = "button";
+    open.className = `is-${kind}`;
+    open.title = isFolder ? `Open the folder ${name}` : `Choose ${name}`;
+    // Files are listed where a folder is wanted, so that it can be recognized.
+    open.disabled = !isFolder && (this.#wanted === "folder" || (this.#wanted === "footage" && kind !== "video"));
+    if (kind === "video") {
+      const picture = document.createElement("img");
+      Object.assign(picture, { alt: "", loading: "lazy", src: previewOf(path) });
+      picture.addEventListener("error", () => picture.removeAttribute("src"));
+      open.append(picture);
+    } else {
+      open.append(Object.assign(document.createElement("i"), { textContent: MARKS[kind] }));
+    }
+    open.append(Object.assign(document.createElement("span"), { textContent: name }));
+    if (kind === "session") open.append(Object.assign(document.createElement("small"), { textContent: "session" }));
+    open.addEventListener("click", () => (isFolder ? void this.#go(path) : this.#finish(path)));
+    item.append(open);
+    return item;
+  }
+
+  /** @param {string} path */
+  #finish(path) {
+    this.#dialog.close();
+    this.#take(path);
+  }
+}
+
+/**
+ * Address of a small picture of a video or a folder of images.
+ *
+ * @param {string} path
+ */
+export function previewOf(path) {
+  return `sessions/preview?path=${encodeURIComponent(path)}`;
+}
+
+/**
+ * @param {HTMLElement} list
+ * @param {number} step
+ */
+function moveFocus(list, step) {
+  const buttons = /** @type {HTMLButtonElement[]} */ ([...list.querySelectorAll("button:not(:disabled)")]);
+  const at = buttons.findIndex((one) => one === document.activeElement);
+  buttons[Math.max(0, Math.min(buttons.length - 1, at + step))]?.focus();
+}

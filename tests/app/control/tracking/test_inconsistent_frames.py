@@ -1,0 +1,83 @@
+"""Keyframes are judged in the background, named in the place of their neighbours, and never changed."""
+
+import numpy as np
+import pytest
+from gestures import wait_for
+
+from app.page import messages
+from tracker.store.records import PoseChange, PoseRecord
+
+KEY = 10
+
+
+@pytest.fixture
+def steady(opened):
+    """A person who moves steadily on frames 0 to 20; frame 10 is a keyframe."""
+    controller = opened()
+    saver, model = controller._session_state.saver, controller.session.people[0].model
+    pose = np.array(controller.state.poses[0])
+    revision = saver.revisions.current(0)
+
+    def place(frame, keyframe=False, off=0.0, costs=(2.0, 2.0, 2.0, 2.0)):
+        values = np.array(pose)
+        values[0] += 0.02 * frame
+        values[model.value_names.index("left_shoulder.abduction")] += off
+        record = PoseRecord(
+            values, ("tracked",) * len(values), revision, keyframe=keyframe, status="" if keyframe else "good",
+            cost_px=float(np.mean(costs)), view_costs_px=costs,
+        )  # fmt: skip
+        saver.write("place", [PoseChange("person", frame, record)], None, by_program=False)
+        controller._session_state.refresh_saving()
+        return values
+
+    for frame in range(21):
+        place(frame, frame == KEY)
+    return controller, place
+
+
+def checked(controller):
+    checker = controller.inconsistent_frames
+    wait_for(lambda: checker._seen == controller._session_state.saver.index.version)
+    return messages.inconsistent(controller.state)
+
+
+def test_a_wrong_keyframe_stands_for_its_neighbours_and_is_left_unchanged(steady):
+    controller, place = steady
+    assert checked(controller).keyframes == ()
+    values = place(KEY, keyframe=True, off=0.9)
+    wait_for(lambda: checked(controller).keyframes)
+    message = checked(controller)
+    (doubt,) = message.keyframes
+    assert (doubt.person, doubt.frame, doubt.views) == (0, KEY, ())
+    assert doubt.point in ("left wrist", "left elbow")
+    assert 20 < doubt.distance_cm < 60
+    assert message.frames == (KEY,)
+    np.testing.assert_array_equal(controller._session_state.saver.record(0, KEY).values, values)
+    place(KEY, keyframe=True)
+    wait_for(lambda: not checked(controller).keyframes)
+    assert checked(controller).frames == ()
+
+
+def test_a_view_contradicts_a_keyframe_until_it_is_confirmed_or_changed(steady, opened):
+    controller, place = steady
+    place(KEY, keyframe=True, costs=(2.0, 6.5, 2.2, 2.1))
+    wait_for(lambda: checked(controller).keyframes)
+    (doubt,) = checked(controller).keyframes
+    assert doubt.distance_cm is None
+    assert [(v.camera, v.cost_px, v.usual_px) for v in doubt.views] == [(1, 6.5, 2.0)]
+    undo = controller.state.undo
+    controller.inconsistent_frames.confirm(0, KEY)
+    assert checked(controller).keyframes == ()
+    assert controller.state.undo == undo
+    again = opened()  # a restart
+    assert checked(again).keyframes == ()
+
+
+def test_a_confirmed_keyframe_is_judged_again_when_its_pose_changes(steady):
+    controller, place = steady
+    place(KEY, keyframe=True, off=0.9)
+    wait_for(lambda: checked(controller).keyframes)
+    controller.inconsistent_frames.confirm(0, KEY)
+    assert checked(controller).keyframes == ()
+    place(KEY, keyframe=True, off=0.8)
+    wait_for(lambda: checked(controller).keyframes)

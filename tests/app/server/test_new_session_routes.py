@@ -1,0 +1,121 @@
+"""What the form of a new session asks for: folders, small pictures, a survey of the files, exchanged cameras."""
+
+import json
+import os
+import shutil
+
+import cv2
+import numpy as np
+import pytest
+
+from tracker.session.session import load_session
+
+
+@pytest.fixture
+def form(folders, tmp_path):
+    walk = folders[0]
+    return {
+        "folder": str(tmp_path / "new"), "calibration": str(walk / "calibration.toml"), "footage": str(walk),
+        "people": ["ann"],
+    }  # fmt: skip
+
+
+async def test_a_folder_is_listed_without_what_cannot_be_read(folders, serve):
+    walk = folders[0]
+    os.mkfifo(walk / "pipe.mp4")
+    (walk / "gone.mp4").symlink_to(walk / "nothing.mp4")
+    (walk / ".hidden.mp4").touch()
+    client = await serve()
+    found = json.loads((await client.get(f"/sessions/folder?path={walk}/../walk/"))[1])
+    assert (found["folder"], found["parent"], found["is_cut_off"]) == (str(walk), str(walk.parent), False)
+    kinds = {e["name"]: e["kind"] for e in found["entries"]}
+    assert kinds["FRONT.mp4"] == "video"
+    assert kinds["calibration.toml"] == "file"
+    assert next(iter(kinds)) == "background"  # folders first
+    assert not {"pipe.mp4", "gone.mp4", ".hidden.mp4"} & kinds.keys()
+    above = json.loads((await client.get(f"/sessions/folder?path={walk}/FRONT.mp4"))[1])
+    assert above["entries"] == found["entries"]
+    sessions = json.loads((await client.get(f"/sessions/folder?path={walk.parent}"))[1])["entries"]
+    assert "session" in {e["kind"] for e in sessions}
+    for text in ("relative", "%00", f"{walk}/nothing/x", "~nobody-of-this-name"):
+        status, why = await client.get(f"/sessions/folder?path={text}")
+        assert (status, why.startswith("expected")) == (400, True), why
+    public = await serve(why="no")
+    for path in ("/sessions/folder?path=/", f"/sessions/preview?path={walk}/FRONT.mp4", "/sessions/models"):
+        assert (await public.get(path))[0] == 403
+
+
+async def test_footage_has_a_small_picture_and_nothing_else_has(folders, serve):
+    walk = folders[0]
+    client = await serve()
+    images = walk / "images"
+    images.mkdir()
+    cv2.imwrite(str(images / "0.png"), np.full((900, 1200, 3), 200, np.uint8))
+    os.mkfifo(walk / "pipe.mp4")
+    async with client.session.get(f"/sessions/preview?path={walk}/FRONT.mp4") as response:
+        assert (response.status, response.content_type) == (200, "image/jpeg")
+        assert max(cv2.imdecode(np.frombuffer(await response.read(), np.uint8), 1).shape) == 320
+    async with client.session.get(f"/sessions/preview?path={images}") as response:
+        assert cv2.imdecode(np.frombuffer(await response.read(), np.uint8), 1).shape == (240, 320, 3)
+    for path in ("calibration.toml", "pipe.mp4", "none.mp4", "models"):
+        status, why = await client.get(f"/sessions/preview?path={walk}/{path}")
+        assert (status, len(why) > 20) == (404, True), path
+
+
+async def test_a_survey_says_how_cameras_stand_and_which_have_footage(folders, serve, form):
+    client, walk = await serve(), folders[0]
+    (walk / "LEFT.mp4").rename(walk / "gopro7.mp4")
+    chosen = {"calibration": form["calibration"], "footage": form["footage"], "up": "z", "units": None}
+    status, text = await client.open(chosen, "/sessions/survey")
+    found = json.loads(text)
+    assert (status, found["cameras"]) == (200, ["FRONT", "RIGHT", "BACK", "LEFT"])
+    assert found["assigned"] == {n: str(walk / f"{n}.mp4") for n in ("FRONT", "RIGHT", "BACK")}
+    assert "gopro7.mp4" in {f["name"] for f in found["footage"]}
+    assert np.shape(found["rig"]["centers"]) == np.shape(found["rig"]["axes"]) == (4, 3)
+    assert len(found["rig"]["heights_m"]) == 4
+    assert found["rig"]["sentence"].startswith("The cameras stand")
+    assert found["problems"] == []
+    found = json.loads((await client.open(chosen | {"calibration": str(walk / "session.toml")}, "/sessions/survey"))[1])
+    assert (found["cameras"], found["rig"], len(found["problems"])) == ([], None, 1)
+    assert len(found["footage"]) >= 4
+    assert json.loads((await client.open({}, "/sessions/survey"))[1])["problems"] == []
+    status, text = await client.open({"up": "q"}, "/sessions/survey")
+    assert status == 400
+
+
+async def test_footage_is_given_to_cameras_by_hand(folders, serve, form):
+    client, walk = await serve(), folders[0]
+    (walk / "LEFT.mp4").rename(walk / "gopro7.mp4")
+    cameras = [{"name": n, "footage": str(walk / f)} for n, f in (("FRONT", "FRONT.mp4"), ("LEFT", "gopro7.mp4"))]
+    cameras[1]["offset"] = 2
+    lines = await client.make(form | {"cameras": cameras, "models": ["gavrila22"]})
+    assert "made" in lines[-1], lines
+    made = load_session(form["folder"])
+    assert [(c.camera.name, c.footage.name, c.offset) for c in made.cameras] == [
+        ("FRONT", "FRONT.mp4", 0), ("LEFT", "gopro7.mp4", 2),
+    ]  # fmt: skip
+    assert made.people[0].model.name == "gavrila22"
+    (line,) = await client.make(form | {"models": ["a", "b"]})
+    assert "one body model for all" in line["failed"]
+
+
+async def test_nothing_is_made_while_two_cameras_seem_exchanged(serve, form, tmp_path, data_folder):
+    walk = data_folder("walk")
+    mixed = tmp_path / "mixed"
+    shutil.copytree(walk, mixed)
+    videos = {p.stem: p for p in mixed.glob("*.mp4")}
+    a, b = sorted(videos)[:2]
+    videos[a].rename(mixed / "x.mp4")
+    videos[b].rename(videos[a])
+    (mixed / "x.mp4").rename(videos[b])
+    form |= {"calibration": str(mixed / "Calib.toml"), "footage": str(mixed)}
+    client = await serve()
+    lines = await client.make(form)
+    assert set(lines[-1]["exchanged"]["cameras"]) == {a, b}, lines
+    assert "seems to be exchanged" in lines[-1]["exchanged"]["text"]
+    assert not (tmp_path / "new").exists()
+    right = {n: str(p) for n, p in videos.items()} | {a: str(videos[b]), b: str(videos[a])}
+    lines = await client.make(form | {"cameras": [{"name": n, "footage": p} for n, p in sorted(right.items())]})
+    assert [*lines[-1], lines[-2]] == ["made", {"passed": "No two cameras seem to be exchanged."}]
+    lines = await client.make(form | {"folder": str(tmp_path / "kept"), "keep_assignment": True})
+    assert [next(iter(line)) for line in lines[-2:]] == ["warning", "made"]

@@ -1,0 +1,66 @@
+"""Units of translations: named by the distance to the point at which the cameras look."""
+
+import numpy as np
+import pytest
+from calibration_files import anipose, opencv_words
+from rigs import cameras, looking, ring
+
+from tracker.calibrations.reading import read_cameras
+from tracker.errors import CalibrationError
+from tracker.geometry import rigid
+
+
+def in_units(factor, rig=None):
+    """Cameras whose translations count other units than metres."""
+    return cameras([rigid.transform(T[:3, :3], factor * T[:3, 3]) for T in (rig or ring(4))])
+
+
+@pytest.mark.parametrize(
+    ("factor", "units", "remedy"),
+    [
+        (100, None, "cm (4 m)"),
+        (1000, None, "cm (40 m)"),
+        (100, "mm", "cm (4 m)"),
+        (1, "mm", "m (4 m)"),
+        (1, "cm", "m (4 m)"),
+        (1e6, None, "none of m, cm, mm"),
+    ],
+)
+def test_a_wrong_unit_names_those_that_fit(tmp_path, factor, units, remedy):
+    path = opencv_words(tmp_path, in_units(factor))
+    with pytest.raises(
+        CalibrationError, match=r"from the point at which they look, found .* unit is another"
+    ) as caught:
+        read_cameras(path, units)
+    assert remedy in caught.value.remedy.fields["units"]
+
+
+def test_millimetres_are_offered_before_farther_centimetres(tmp_path):
+    with pytest.raises(CalibrationError) as caught:
+        read_cameras(opencv_words(tmp_path, in_units(1000)))
+    assert caught.value.remedy.fields["units"].startswith("mm (4 m)")
+
+
+@pytest.mark.parametrize(("factor", "units"), [(1, None), (100, "cm"), (1000, "mm")])
+def test_the_right_unit(tmp_path, factor, units):
+    found = read_cameras(opencv_words(tmp_path, in_units(factor)), units)
+    np.testing.assert_allclose([e.T_world_camera for e in found.entries], ring(4), atol=1e-9)
+    assert found.notes == ()
+
+
+def test_squares_of_the_board_are_noted_and_no_unit_is_advised(tmp_path):
+    path = anipose(tmp_path, in_units(1 / 0.058), {"charuco_square_size": 1})
+    (note,) = read_cameras(path).notes
+    assert "stand 69.5 m" in note
+    assert "a square of its board is 1 wide" in note
+    with pytest.raises(CalibrationError, match="multiply the translations by the side of a square") as caught:
+        read_cameras(path, "mm")
+    assert caught.value.remedy is None
+
+
+def test_parallel_cameras_have_no_point_but_an_extent(tmp_path):
+    row = [looking([x, 0, 0], [x, 4.0, 0]) for x in (0.0, 0.065)]
+    path = opencv_words(tmp_path, in_units(1000, row))
+    assert "within 0.065 m" in read_cameras(path, "mm").notes[0]
+    with pytest.raises(CalibrationError, match="within 100 m from the origin"):
+        read_cameras(opencv_words(tmp_path, in_units(10_000, row)))

@@ -1,0 +1,249 @@
+"""Rewrite the cameras of common layouts to sections of the anipose layout, by the words that their keys are.
+
+OpenCV's words (K, R, t, rvec, ...) mean `X_camera = R X_world + t` and OpenCV's order of distortion. Keys that may
+change the meaning and are not understood are refused by name, never left out.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from tracker.calibrations.document import Document, refuse
+from tracker.calibrations.lens_words import UnknownLensError, is_fisheye, is_lens_key, is_unknown_key, spelled
+from tracker.errors import CalibrationError
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.validation import quoted
+
+Section: TypeAlias = dict[str, Any]
+"""One camera: name, size, matrix, distortions, rotation, translation, fisheye; what is missing is None."""
+
+_KEYS = {
+    "matrix": "matrix k cameramatrix cammatrix intrinsic intrinsics intrinsicmatrix intrinsicsmatrix mtx",
+    "distortions": "distortions distortion dist distcoef distcoefs distcoeff distcoeffs d "
+    "distortioncoefficients distortioncoeffs distortionvector distortionparameters distortionparams",
+    "radial": "rdistort radialdistortion",
+    "tangential": "tdistort tangentialdistortion",
+    "matrix_R": "rotation r rot rotationmatrix rmat",
+    "rodrigues": "rvec rotationvector rodrigues",
+    "translation": "translation t tvec translationvector",
+    "T_camera_world": "rt extrinsic extrinsics extrinsicmatrix extrinsicsmatrix worldtocamera worldtocam world2cam "
+    "world2camera w2c tcameraworld tcamworld tcw",
+    "T_world_camera": "cameratoworld camtoworld cam2world camera2world c2w tworldcamera tworldcam twc",
+    "size": "size resolution imagesize imgsize",
+    "width": "width w imagewidth imgwidth",
+    "height": "height h imageheight imgheight",
+    "name": "name cameraname label",
+    "number": "id camid cameraid serial serialnumber",
+    "ignore": "ignore",
+}
+_MEANING = {alias: meaning for meaning, aliases in _KEYS.items() for alias in aliases.split()}
+_NUMBERS = ("fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_OTHER_POSES = (
+    "pose", "camerapose", "position", "cameraposition", "center", "centre", "cameracenter", "quaternion", "q", "quat",
+    "orientation", "euler", "eulerangles", "transform", "transformmatrix", "location", "worldposition", "axisangle",
+)  # fmt: skip
+"""Words of poses whose direction or order programs do not agree on."""
+_SHORTER = {14: 12, 12: 8, 8: 5}
+_LISTS = ("cameras", "cams", "camera")
+"""Keys under which the cameras of a file may lie."""
+
+
+def camera_groups(data: Any) -> dict[str, Mapping[str, Any]]:
+    """Return the keys and values of each camera by its key or index; empty where there is no camera."""
+    if isinstance(data, list):
+        rows = [item for item in data if isinstance(item, Mapping)]
+        return {plain_text(known_values(row).get("number", i)): row for i, row in enumerate(rows) if is_camera(row)}
+    if not isinstance(data, Mapping):
+        return {}
+    for key in _LISTS:
+        if isinstance(data.get(key), Mapping | list) and (found := camera_groups(data[key])):
+            return found
+    if any(_MEANING.get(spelled(key)) == "matrix" and not isinstance(v, Mapping) for key, v in data.items()):
+        return {"": data}
+    nested = {k: v for k, v in data.items() if isinstance(v, Mapping) and is_camera(v)}
+    return nested or _by_suffix(data)
+
+
+def _by_suffix(data: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Group flat keys such as `K_01`, `dist_01`, `Rot_01` by what follows the underscore."""
+    found: dict[str, dict[str, Any]] = {}
+    for key, value in data.items():
+        parts = key.split("_")
+        for i in range(1, len(parts)):
+            meaning = _MEANING.get("".join(parts[:i]).lower())
+            if meaning not in (None, "name", "number", "ignore"):
+                found.setdefault("_".join(parts[i:]), {})["_".join(parts[:i])] = value
+                break
+    return {name: group for name, group in found.items() if is_camera(group) or "translation" in known_values(group)}
+
+
+def is_camera(group: Mapping[str, Any]) -> bool:
+    """Return whether a group has the matrix of a camera."""
+    known = known_values(group)
+    return "matrix" in known or "fx" in known
+
+
+def known_values(group: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of one camera by their meaning, without empty ones; keys of groups inside are lifted."""
+    found: dict[str, Any] = {}
+    for key, value in _flat(group):
+        plain = spelled(key)
+        if plain in _NUMBERS:
+            found[plain] = value
+        elif (meaning := _MEANING.get(plain)) is not None and not is_absent(value):
+            # EasyMocap has both a vector R and a matrix Rot, which are equal.
+            if meaning == "matrix_R" and np.size(plain_array(value)) == 3:
+                meaning = "rodrigues"
+            found[meaning] = value
+    return found
+
+
+def _flat(group: Mapping[str, Any], depth: int = 0) -> Iterator[tuple[str, Any]]:
+    """Yield keys and values of a group; those of groups inside come first, so that outer ones replace them."""
+    inner = {k: v for k, v in group.items() if isinstance(v, Mapping) and spelled(k) not in _KEYS["size"].split()}
+    if depth < 4:
+        for value in inner.values():
+            yield from _flat(value, depth + 1)
+    yield from ((str(k), v) for k, v in group.items() if k not in inner)
+
+
+def plain_text(value: Any) -> str:
+    """Return text as it is, and a short form of anything else."""
+    return value if isinstance(value, str) else quoted(value)
+
+
+def is_absent(value: Any) -> bool:
+    """Return whether a value stands for none, as `null` in JSON and its word in TOML do."""
+    return value is None or (isinstance(value, str) and value.strip().lower() in ("", "null", "none", "nan"))
+
+
+def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Section:
+    """Rewrite one camera.
+
+    Args:
+        group: its keys and values.
+        camera: its name, for messages.
+        document: the file, for messages.
+
+    Raises:
+        CalibrationError: a key or value that changes the meaning is not understood, or half of the pose is missing.
+    """
+    known = known_values(group)
+    for key, value in _flat(group):
+        plain = spelled(key)
+        if plain in _MEANING or plain in _NUMBERS or is_lens_key(plain) or is_absent(value):
+            continue
+        if is_unknown_key(plain):
+            advice = (
+                "rewrite the camera to K, distortion, R and t of OpenCV's model, or remove the key if it says nothing"
+            )
+            raise refuse(document, camera, "known keys of a lens or a convention", quoted(key), advice)
+    try:
+        fisheye = is_fisheye({key: value for key, value in _flat(group) if is_lens_key(spelled(key))})
+    except UnknownLensError as error:
+        raise CalibrationError(f"{document.where}, camera {quoted(camera)}: {error}") from error
+    rotation, translation = _pose(known, group, camera, document)
+    distortions = _distortions(known, fisheye)
+    if not fisheye and isinstance(distortions, list) and len(distortions) in (12, 14):
+        advice = "undistort the footage, or calibrate without this model"
+        raise refuse(document, camera, "up to 8 coefficients", "those of a thin prism or a tilted sensor", advice)
+    return {
+        "name": known.get("name"),
+        "size": _size(known),
+        "matrix": _matrix(known),
+        "distortions": distortions,
+        "rotation": rotation,
+        "translation": translation,
+        "fisheye": fisheye,
+    }
+
+
+def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, document: Document) -> tuple[Any, Any]:
+    """Return rotation and translation; None and None of a camera without a pose.
+
+    Raises:
+        CalibrationError: only one of them is there, or the pose lies under words whose meaning is not fixed.
+    """
+    rotation = known.get("matrix_R", known.get("rodrigues"))
+    translation = known.get("translation")
+    if rotation is None and translation is None:
+        for key in ("T_camera_world", "T_world_camera"):
+            if (whole := homogeneous(known.get(key))) is not None:
+                whole = whole if key == "T_camera_world" else rigid.inverse(whole)
+                return whole[:3, :3].tolist(), whole[:3, 3].tolist()
+    if rotation is None or translation is None:
+        others = [key for key, value in _flat(group) if spelled(key) in _OTHER_POSES and not is_absent(value)]
+        whole_key = next((key for key in ("T_camera_world", "T_world_camera") if key in known), None)
+        if rotation is not None or translation is not None or others or whole_key:
+            has = ["the rotation"] * (rotation is not None) + ["the translation"] * (translation is not None)
+            has += [quoted(key) for key in others] + ["a matrix that is no pose"] * (whole_key is not None)
+            expected = "its pose as R and t (X_camera = R X_world + t)"
+            raise refuse(document, camera, expected, f"{', '.join(has)} alone", "rewrite the pose to R and t")
+        return None, None
+    return reshaped(rotation, {3: (3,), 9: (3, 3)}), reshaped(translation, {3: (3,)})
+
+
+def homogeneous(value: Any) -> Array | None:
+    """Return a pose of shape (3, 4) or (4, 4) as (4, 4), also one written for row vectors; None for anything else."""
+    array = plain_array(value)
+    if array.shape not in ((3, 4), (4, 4)) or not np.isfinite(array).all():
+        return None
+    whole = np.eye(4)
+    if array.shape == (4, 4) and np.any(array[3, :3]) and not np.any(array[:3, 3]):
+        array = array.T
+    whole[: len(array)] = array
+    return whole if np.allclose(whole[3], (0, 0, 0, 1)) else None
+
+
+def _matrix(known: Mapping[str, Any]) -> Any:
+    matrix = known.get("matrix")
+    if matrix is None and {"fx", "fy", "cx", "cy"} <= known.keys():
+        matrix = [known[k] for k in ("fx", "fy", "cx", "cy")]
+    if _shape(matrix) == (4,):  # as Kalibr writes it
+        fx, fy, cx, cy = plain_array(matrix).tolist()
+        return [[fx, known.get("skew", 0.0), cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
+    return reshaped(matrix, {9: (3, 3)})
+
+
+def _distortions(known: Mapping[str, Any], fisheye: bool) -> Any:
+    found = known.get("distortions")
+    if found is None and "radial" in known:
+        radial, tangential = plain_array(known["radial"]).ravel(), plain_array(known.get("tangential", [0, 0])).ravel()
+        found = [*radial[:2], *tangential, *radial[2:]]
+    if found is None:
+        order = ("k1", "k2", "k3", "k4") if fisheye else ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+        found = [known.get(k, 0.0) for k in order] if "k1" in known else []
+    flat = reshaped(found, {n: (n,) for n in range(1, 15)})
+    # OpenCV writes 12 or 14 values; those of thin prisms and tilted sensors are usually 0.
+    while not fisheye and isinstance(flat, list) and len(flat) in _SHORTER and not any(flat[_SHORTER[len(flat)] :]):
+        flat = flat[: _SHORTER[len(flat)]]
+    return flat
+
+
+def _size(known: Mapping[str, Any]) -> Any:
+    size = known.get("size")
+    if isinstance(size, Mapping):
+        known, size = known_values(size), None
+    if size is None:
+        return [known["width"], known["height"]] if {"width", "height"} <= known.keys() else None
+    return reshaped(size, {2: (2,)})
+
+
+def reshaped(value: Any, shapes: Mapping[int, tuple[int, ...]]) -> Any:
+    """Give numbers the shape that belongs to their count; other data is returned as it is, to be refused by name."""
+    array = plain_array(value)
+    return value if array.size not in shapes else array.reshape(shapes[array.size]).tolist()
+
+
+def plain_array(value: Any) -> Array:
+    """Return an array of numbers; an empty one if it is none."""
+    try:
+        return np.array(value, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        return np.zeros(0)
+
+
+def _shape(value: Any) -> tuple[int, ...]:
+    return () if value is None else tuple(plain_array(value).shape)

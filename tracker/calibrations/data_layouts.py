@@ -1,0 +1,212 @@
+"""Calibrations in JSON, YAML or OpenCV's XML, with all cameras in one file.
+
+Where the pose of a tool is another than `X_camera = R X_world + t`, its direction is that of the tool's own source:
+`export_json` of multical, `Calibration::saveCamerasParams` of MC-Calib, and the camchain of Kalibr's manual.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tracker.calibrations.camera_words import (
+    Section,
+    camera_groups,
+    homogeneous,
+    known_values,
+    plain_array,
+    plain_text,
+    section_of,
+)
+from tracker.calibrations.document import Document, refuse
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+
+_ANIPOSE_KEYS = {"name", "size", "matrix", "rotation", "translation", "distortions"}
+
+
+def has_cameras(document: Document) -> bool:
+    """Return whether the data have a camera under OpenCV's words."""
+    return bool(camera_groups(document.data))
+
+
+def read_words(document: Document) -> dict[str, Section]:
+    """Read cameras under OpenCV's words."""
+    sections: dict[str, Section] = {}
+    for key, group in camera_groups(document.data).items():
+        if known_values(group).get("ignore") is True:
+            continue
+        section = section_of(group, key or document.stem, document)
+        name = key if section["name"] is None else plain_text(section["name"])
+        name = name if name not in sections else f"{name} ({key})"
+        sections[name] = section | ({"name": name} if name else {})
+    return sections
+
+
+def is_panoptic(document: Document) -> bool:
+    """Return whether the key of CMU Panoptic is there."""
+    return isinstance(document.data, dict) and "calibDataSource" in document.data
+
+
+def is_aniposelib(document: Document) -> bool:
+    """Return whether the data are a list of cameras with anipose's keys."""
+    data = document.data
+    return isinstance(data, list) and any(isinstance(row, dict) and row.keys() >= _ANIPOSE_KEYS for row in data)
+
+
+# --- EasyMocap ------------------------------------------------------------------------------------------------------
+
+
+def is_easymocap(document: Document) -> bool:
+    """Return whether keys such as `K_01`, or `R_01` and `T_01`, are at the top."""
+    return has_intrinsics(document) or has_extrinsics(document)
+
+
+def has_intrinsics(document: Document) -> bool:
+    """Return whether EasyMocap's matrices are there."""
+    return isinstance(document.data, dict) and any(key.startswith("K_") for key in document.data)
+
+
+def has_extrinsics(document: Document) -> bool:
+    """Return whether EasyMocap's poses are there."""
+    keys = document.data.keys() if isinstance(document.data, dict) else ()
+    return any(k.startswith(("R_", "Rot_")) for k in keys) and any(k.startswith("T_") for k in keys)
+
+
+# --- Kalibr ---------------------------------------------------------------------------------------------------------
+
+
+def is_kalibr(document: Document) -> bool:
+    """Return whether a group has the model and the intrinsics of a camera, as Kalibr names them."""
+    return any(map(_is_kalibr, document.groups.values()))
+
+
+def _is_kalibr(group: Mapping[str, Any]) -> bool:
+    return "camera_model" in group and "intrinsics" in group
+
+
+def read_kalibr(document: Document) -> dict[str, Section]:
+    """Read a camchain: `T_cn_cnm1` maps from the camera before; the first camera defines the world."""
+    found: dict[str, Section] = {}
+    T_camera_world: Array | None = np.eye(4)
+    for i, (name, group) in enumerate((n, g) for n, g in document.groups.items() if _is_kalibr(g)):
+        step = homogeneous(group.get("T_cn_cnm1"))
+        if i:
+            T_camera_world = None if step is None or T_camera_world is None else step @ T_camera_world
+        lens = {key: value for key, value in group.items() if not key.startswith("T_")}
+        found[name] = section_of(lens, name, document) | {"name": name} | _posed(T_camera_world)
+    return found
+
+
+def _posed(T_camera_world: Array | None) -> Section:
+    if T_camera_world is None:
+        return {"rotation": None, "translation": None}
+    return {"rotation": T_camera_world[:3, :3].tolist(), "translation": T_camera_world[:3, 3].tolist()}
+
+
+# --- multical -------------------------------------------------------------------------------------------------------
+
+
+def is_multical(document: Document) -> bool:
+    """Return whether the poses lie in a group of their own beside the cameras."""
+    return {"cameras", "camera_poses"} <= document.groups.keys()
+
+
+def read_multical(document: Document) -> dict[str, Section]:
+    """Read cameras and their poses; `a_to_b` is the pose of camera a in the frame of b."""
+    poses = {name.partition("_to_")[0]: pose for name, pose in document.groups["camera_poses"].items()}
+    poses |= document.groups["camera_poses"]
+    found: dict[str, Section] = {}
+    for name, lens in document.groups["cameras"].items():
+        group = {
+            key: value for half in (lens, poses.get(name)) if isinstance(half, dict) for key, value in half.items()
+        }
+        found[name] = section_of(group, name, document) | {"name": name}
+    return found
+
+
+# --- MC-Calib -------------------------------------------------------------------------------------------------------
+
+
+def is_mc_calib(document: Document) -> bool:
+    """Return whether a camera has MC-Calib's matrix of its pose."""
+    return any("camera_pose_matrix" in group for group in document.groups.values())
+
+
+def read_mc_calib(document: Document) -> dict[str, Section]:
+    """Read cameras whose pose maps camera to world: the inverse of the projection's, as MC-Calib writes it.
+
+    Raises:
+        CalibrationError: the cameras are in groups that do not know of each other.
+    """
+    cameras = {n: g for n, g in document.groups.items() if "camera_matrix" in g or "camera_pose_matrix" in g}
+    groups = {plain_text(group.get("camera_group", 0)) for group in cameras.values()}
+    if len(groups) > 1:
+        raise refuse(
+            document, None, "one group of cameras", f"{len(groups)} (camera_group), each with a world of its own",
+            "film the boards so that all cameras are connected",
+        )  # fmt: skip
+    found = {}
+    for name, group in cameras.items():
+        T_world_camera = homogeneous(group.get("camera_pose_matrix"))
+        lens = {key: value for key, value in group.items() if key != "camera_pose_matrix"}
+        pose = None if T_world_camera is None else rigid.inverse(T_world_camera)
+        found[name] = section_of(lens, name, document) | {"name": name} | _posed(pose)
+    return found
+
+
+# --- JARVIS and DANNCE: row vectors ---------------------------------------------------------------------------------
+
+
+def is_jarvis(document: Document) -> bool:
+    """Return whether cameras have JARVIS's words."""
+    return any({"intrinsicMatrix", "R", "T"} <= group.keys() for group in _row_groups(document).values())
+
+
+def is_dannce(document: Document) -> bool:
+    """Return whether cameras have DANNCE's words."""
+    return any({"K", "RDistort", "r", "t"} <= group.keys() for group in _row_groups(document).values())
+
+
+def _row_groups(document: Document) -> dict[str, Mapping[str, Any]]:
+    if isinstance(document.data, list):  # `params` of MATLAB
+        return {f"camera{i + 1}": row for i, row in enumerate(document.data) if isinstance(row, dict)}
+    return dict(document.groups) or ({"": document.data} if isinstance(document.data, dict) else {})
+
+
+def read_row_vectors(document: Document) -> dict[str, Section]:
+    """Read cameras that project row vectors, `x = [X 1] [R; t] K`: all matrices are transposed.
+
+    A camera whose matrix stands upright was rewritten by a person; it is read as it is.
+    """
+    found = {}
+    for name, group in _row_groups(document).items():
+        section = section_of(group, name or document.stem, document)
+        if is_transposed(section["matrix"]):
+            section["matrix"] = plain_array(section["matrix"]).T.tolist()
+            rotation = plain_array(section["rotation"])
+            if rotation.shape == (3, 3):
+                section["rotation"] = rotation.T.tolist()
+        found[name] = section | ({"name": name} if name else {})
+    return found
+
+
+def is_transposed(matrix: Any) -> bool:
+    """Return whether a matrix of a camera has its principal point in the last row."""
+    K = plain_array(matrix)
+    return K.shape == (3, 3) and not np.any(K[:2, 2]) and bool(np.all(K[2, :2] > 1))
+
+
+# --- OpenPose -------------------------------------------------------------------------------------------------------
+
+
+def is_openpose(document: Document) -> bool:
+    """Return whether the file is one camera with OpenPose's words."""
+    return isinstance(document.data, dict) and {"CameraMatrix", "Intrinsics"} <= document.data.keys()
+
+
+def read_openpose(document: Document) -> dict[str, Section]:
+    """Read one camera: OpenPose's `CameraMatrix` is the pose, (3, 4)."""
+    words = {"CameraMatrix": "Rt", "Intrinsics": "K"}
+    group = {words.get(key, key): value for key, value in document.data.items() if key != "CameraMatrixInitial"}
+    return {"": section_of(group, document.stem, document)}

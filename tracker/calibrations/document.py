@@ -1,0 +1,97 @@
+"""Read a calibration file to plain data; its syntax is told by its content, never by its name."""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from tracker.calibrations.foreign import name_binary, named
+from tracker.errors import CalibrationError
+from tracker.formats.anipose import KIND
+from tracker.formats.plain_data import parse_json, parse_xml, parse_yaml, storage_data
+from tracker.text_files import parse_toml, read_text
+from tracker.validation import quoted
+
+_TOML_LINE = re.compile(r"\[{1,2}[^\[\]{}\n]+\]{1,2}\s*(#.*)?|[\w.\"'-]+\s*=.*")
+_YAML_LINE = re.compile(r"[^\s:,{}\[\]][^:,{}\[\]]*:(\s.*)?|- .*")
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """One calibration file."""
+
+    path: Path
+    syntax: str
+    """toml, json, yaml or xml."""
+    data: Any
+    """Dicts, lists, numbers and text; of XML that OpenCV has not written, its root element."""
+
+    @property
+    def where(self) -> str:
+        """Name of the file for messages."""
+        return f"calibration {self.path}"
+
+    @cached_property
+    def groups(self) -> dict[str, dict[str, Any]]:
+        """Groups at the top of the data by their keys; empty if it is no dict."""
+        if not isinstance(self.data, dict):
+            return {}
+        return {str(key): value for key, value in self.data.items() if isinstance(value, dict)}
+
+    @property
+    def stem(self) -> str:
+        """Name of the file without what follows its first dot."""
+        return self.path.name.partition(".")[0]
+
+
+def read_document(path: Path) -> Document:
+    """Read a file.
+
+    Raises:
+        CalibrationError: it is missing, too large, no text, malformed, or of no known syntax.
+    """
+    name_binary(path)
+    text = read_text(path, KIND)
+    syntax = _syntax(text)
+    if syntax == "toml":
+        data: Any = parse_toml(text, str(path), KIND)
+    elif syntax == "json":
+        data = parse_json(text, str(path), KIND)
+    elif syntax == "yaml":
+        data = parse_yaml(text, str(path), KIND)
+    elif syntax == "xml":
+        data = parse_xml(text, str(path), KIND)
+        data = storage_data(data) if data.tag == "opencv_storage" else data
+    else:
+        raise named(path, "another kind of file" if text.strip() else "an empty file", "export the calibration again")
+    return Document(path, syntax, data)
+
+
+def _syntax(text: str) -> str | None:
+    """Return toml, json, yaml or xml by the first line that is no comment; None for anything else."""
+    for line in map(str.strip, text.splitlines()):
+        if line.startswith("<"):
+            return "xml"
+        if line.startswith("%YAML"):
+            return "yaml"
+        if not line or line == "---" or line.startswith("#"):
+            continue
+        if _TOML_LINE.fullmatch(line):
+            return "toml"
+        if line[0] in "[{":
+            return "json"
+        return "yaml" if _YAML_LINE.fullmatch(line) else None
+    return None
+
+
+def is_element(data: Any, tag: str) -> bool:
+    """Return whether data is the root element of XML with this tag."""
+    return isinstance(data, ElementTree.Element) and data.tag == tag
+
+
+def refuse(document: Document, camera: str | None, expected: str, found: str, advice: str) -> CalibrationError:
+    """Return the error of a file, or of one camera in it."""
+    place = document.where if camera is None else f"{document.where}, camera {quoted(camera)}"
+    return CalibrationError(f"{place}: expected {expected}, found {found}; {advice}")

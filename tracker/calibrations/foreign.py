@@ -1,0 +1,79 @@
+"""Names and advice for files of other programs that are not read."""
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from tracker.errors import CalibrationError
+
+EXPECTED = "a calibration of a layout that docs/recordings.md lists"
+_POSE2SIM = "convert it with Pose2Sim (calibration_type = 'convert' in its Config.toml), which writes a Calib.toml"
+_TO_JSON = "write K, distortion, R and t of each camera to JSON"
+_BEGINNINGS = (
+    (b"MATLAB", "a MATLAB file", f"{_TO_JSON} with jsonencode"),
+    (b"\x89HDF", "a MATLAB or HDF5 file", f"{_TO_JSON} with jsonencode"),
+    (b"PK\x03\x04", "a NumPy archive or ZIP file", _TO_JSON),
+    (b"\x93NUMPY", "a NumPy array", _TO_JSON),
+    (b"\x80", "a Python pickle, as OpenCap writes", f"{_POSE2SIM}, with convert_from = 'opencap'"),
+)
+"""First bytes of files of other programs, their names, and how to convert them."""
+_SUFFIXES = {
+    ".pickle": _BEGINNINGS[4][1:],
+    ".pkl": _BEGINNINGS[4][1:],
+    ".mat": _BEGINNINGS[0][1:],
+    ".npz": _BEGINNINGS[2][1:],
+    ".npy": _BEGINNINGS[3][1:],
+    ".mcal": ("a calibration of OptiTrack Motive", _POSE2SIM),
+    ".cal": ("a calibration of OptiTrack or a project of another program", _POSE2SIM),
+    ".c3d": ("a file of markers", "export the calibration of the cameras"),
+}
+
+
+def named(path: Path, found: str, advice: str) -> CalibrationError:
+    """Return the error of a file that is not read."""
+    return CalibrationError(f"calibration {path}: expected {EXPECTED}, found {found}; {advice}")
+
+
+def name_binary(path: Path) -> None:
+    """Name a file of another program that is no text; one that is missing is left to the reader of texts.
+
+    Raises:
+        CalibrationError: it is one.
+    """
+    if not path.is_file():
+        return
+    try:
+        with path.open("rb") as file:
+            begin = file.read(8)
+    except OSError:
+        return
+    for first, found, advice in _BEGINNINGS:
+        if begin.startswith(first):
+            raise named(path, found, advice)
+    if path.suffix.lower() in _SUFFIXES:
+        raise named(path, *_SUFFIXES[path.suffix.lower()])
+
+
+def foreign(path: Path, data: Any) -> CalibrationError:
+    """Name the program that wrote data of no known layout."""
+    if isinstance(data, ElementTree.Element):
+        if data.tag == "document" and data.find("chunk") is not None:
+            return named(path, "a project of Agisoft Metashape", "export the cameras as OpenCV XML with their poses")
+        if data.tag.lower().startswith("optitrack"):
+            return named(path, "a calibration of OptiTrack", f"{_POSE2SIM}, with convert_from = 'optitrack'")
+        return named(path, f"XML with <{data.tag[:40]}>", "export it in one of these layouts")
+    if isinstance(data, dict):
+        frames = data.get("frames")
+        if isinstance(frames, list) and any(isinstance(f, dict) and "transform_matrix" in f for f in frames):
+            return named(path, "a transforms.json of NeRF tools, whose scale is not known", "calibrate with a board")
+        if {"M1", "D1", "M2", "D2"} <= data.keys() or {"R1", "R2", "P1", "P2"} <= data.keys():
+            return named(
+                path,
+                "one half of a stereo calibration of OpenCV",
+                "write both cameras to one file: K, distortion, R and t; R = I and t = 0 for the first",
+            )
+        if "camera_count" in data or "charuco" in data:
+            return named(
+                path, "the settings of a Caliscope project without cameras", "give the camera_array.toml beside it"
+            )
+    return named(path, "no camera", "export it in one of these layouts")

@@ -1,0 +1,175 @@
+"""Test which convention the poses of a calibration follow, by where the cameras would look and stand.
+
+The numbers of a pose are a rotation and a vector, which programs use in different ways. Each passes every check of a
+single camera. Of a whole rig, only the right one lets cameras that film one scene look at one place with their pictures
+level: the others turn the axes apart, let the cameras look away, or put all at one place.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
+from tracker.errors import CalibrationError, Remedy
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.geometry.camera_rig import axes_point
+
+STATED: PoseConvention = "world-to-camera"
+_MEANING = {
+    "world-to-camera": "X_camera = R X_world + t",
+    "camera-to-world": "X_world = R X_camera + t",
+    "row-vectors": "X_camera = R^T X_world + t, as MATLAB writes it",
+    "camera-position": "R maps world to camera, and t is the place of the camera",
+}
+_REWRITE = {
+    "world-to-camera": "keep R and t",
+    "camera-to-world": "invert them: R' = R^T, t' = -R^T t",
+    "row-vectors": "transpose R alone: R' = R^T, t' = t",
+    "camera-position": "replace t alone: t' = -R t",
+}
+_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+"""From a camera's axes in OpenGL (y up, z backwards) to OpenCV's."""
+
+# Degrees; measured on simulated rigs of 2 to 8 cameras in rings, arcs, corners and rows, aimed up to 12 degrees beside
+# one point, level or turned by 90 degrees: tests/tracker/calibrations/test_pose_conventions.py.
+_FITS = 30.0
+"""Cost up to which a convention fits."""
+_RATIO, _MARGIN = 1.3, 5.0
+"""A convention is doubted if it costs more than this many times another and that much more."""
+_PAIR_RATIO, _PAIR_MARGIN = 2.0, 20.0
+"""The same for two cameras, whose axes meet by chance more often."""
+_PARALLEL = 45.0
+"""Cost of axes that are all parallel: the cameras may look at one place, but nothing shows it."""
+_MAX_ANGLE = 60.0
+"""Largest cost of an axis: what points elsewhere counts alike."""
+_LOOK_DOWN = 0.3
+"""Part of the vertical in the picture below which a camera that looks down has no level (17 degrees)."""
+_UNKNOWN_ROLL = 22.5
+"""Cost of a roll that is not known: the mean of all."""
+_MAX_COMPARED = 24
+"""Most cameras that are compared in pairs; of more, some are chosen evenly."""
+
+
+def read_pose(T_stated: Array, convention: PoseConvention) -> Array:
+    """Return the pose of a camera, world to camera, that a convention reads from a stated one, both (4, 4)."""
+    R, t = T_stated[:3, :3], T_stated[:3, 3]
+    kind = convention.removesuffix("-opengl")
+    if kind == "camera-to-world":
+        T = rigid.inverse(T_stated)
+    elif kind == "row-vectors":
+        T = rigid.transform(R.T, t)
+    elif kind == "camera-position":
+        T = rigid.transform(R, -R @ t)
+    else:
+        T = T_stated
+    return _OPENGL @ T if convention.endswith("-opengl") else T
+
+
+def costs(Ts_stated: Sequence[Array]) -> dict[PoseConvention, float]:
+    """Return how badly each convention fits, degrees.
+
+    Args:
+        Ts_stated: stated poses of at least two cameras, (4, 4), in any unit.
+
+    Returns:
+        The root mean square angle between the axes and the point that all see, plus that between the sides of the
+        pictures and the vertical that levels them best; turns by 90 degrees count as level.
+    """
+    n = len(Ts_stated)
+    chosen = np.unique(np.linspace(0, n - 1, min(n, _MAX_COMPARED)).astype(int))
+    return {c: _cost([rigid.inverse(read_pose(Ts_stated[i], c)) for i in chosen]) for c in CONVENTIONS}
+
+
+def _cost(Ts_world_camera: Sequence[Array]) -> float:
+    point = axes_point(Ts_world_camera)
+    look = _PARALLEL
+    if point.is_determined:
+        look = float(np.sqrt(np.mean(np.minimum(np.degrees(point.angles_rad), _MAX_ANGLE) ** 2)))
+    return look + _roll(np.asarray(Ts_world_camera))
+
+
+def _roll(Ts_world_camera: Array) -> float:
+    """Return the root mean square roll of the pictures against the vertical that levels them best, degrees."""
+    x, y = Ts_world_camera[:, :3, 0], Ts_world_camera[:, :3, 1]
+    sides = np.concatenate([x, y])
+    pairs = np.array([(i, j) for i, j in combinations(range(len(sides)), 2) if (j - i) % len(x)])
+    # A vertical that is level in two pictures is across one side of each, or along a side that they share.
+    normals = np.cross(sides[pairs[:, 0]], sides[pairs[:, 1]])
+    lengths = np.linalg.norm(normals, axis=1)
+    verticals = np.concatenate([normals[lengths > 0.1] / lengths[lengths > 0.1, None], sides])
+    across, along = verticals @ x.T, verticals @ y.T
+    rolls = np.abs((np.degrees(np.arctan2(across, along)) + 45.0) % 90.0 - 45.0)
+    rolls = np.where(np.hypot(across, along) < _LOOK_DOWN, _UNKNOWN_ROLL, rolls)
+    return float(np.sqrt(np.mean(rolls**2, axis=1)).min())
+
+
+def check_convention(Ts_stated: Sequence[Array], where: str, expected: str, is_fixed: bool) -> str | None:
+    """Check that the stated convention fits: poses that map world to camera, with OpenCV's axes.
+
+    Args:
+        Ts_stated: stated poses, (4, 4), in any unit.
+        where: names the file in messages.
+        expected: names the convention in which the file's poses were read, for messages.
+        is_fixed: whether the layout of the file fixes the convention.
+
+    Returns:
+        A note, if another convention fits as well and the layout fixes none; None otherwise.
+
+    Raises:
+        CalibrationError: another convention fits, and this one does not.
+    """
+    if len(Ts_stated) < 2:
+        return None
+    cost = costs(Ts_stated)
+    stated = cost.pop(STATED)
+    best = min(cost.values())
+    ratio, margin = (_PAIR_RATIO, _PAIR_MARGIN) if len(Ts_stated) == 2 else (_RATIO, _MARGIN)
+    others = _distinct([c for c in cost if cost[c] <= min(_FITS, max(_RATIO * best, best + _MARGIN))], Ts_stated)
+    if best < _FITS and stated > ratio * best + margin:
+        misfit = f"expected {expected}, by which the cameras see no one place"
+        if len(others) == 1:
+            raise CalibrationError(
+                f"{where}: {misfit}, found that they do if {_in_words(others[0])}",
+                Remedy("give_poses", poses=others[0], rewrite=_rewrite(others[0])),
+            )
+        raise CalibrationError(
+            f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({_in_words(c)})' for c in others)}",
+            Remedy("choose_poses"),
+        )
+    others = [c for c in others if cost[c] <= _RATIO * stated + _MARGIN]
+    if is_fixed or not others or stated >= _PARALLEL:
+        return None
+    return (
+        f"Expected were {expected}; {' or '.join(others)} would fit these cameras as well. Check with "
+        "the pictures that the cameras stand where they should."
+    )
+
+
+def _distinct(conventions: Sequence[PoseConvention], Ts_stated: Sequence[Array]) -> list[PoseConvention]:
+    """Leave out conventions that read the same rig, as seen from its first camera, as the stated one or another."""
+    found: list[PoseConvention] = []
+    for convention in conventions:
+        rig = _from_first(Ts_stated, convention)
+        if not any(np.allclose(rig, _from_first(Ts_stated, c), atol=1e-6) for c in (STATED, *found)):
+            found.append(convention)
+    return found
+
+
+def _from_first(Ts_stated: Sequence[Array], convention: PoseConvention) -> Array:
+    Ts = np.array([read_pose(T, convention) for T in Ts_stated])
+    scale = max(float(np.abs(Ts[:, :3, 3]).max()), 1e-12)
+    Ts[:, :3, 3] /= scale
+    return Ts @ rigid.inverse(Ts[0])
+
+
+def _in_words(convention: PoseConvention) -> str:
+    kind = convention.removesuffix("-opengl")
+    axes = ", with the camera's axes of OpenGL (y up, z backwards)" if kind != convention else ""
+    return _MEANING[kind] + axes
+
+
+def _rewrite(convention: PoseConvention) -> str:
+    kind = convention.removesuffix("-opengl")
+    return _REWRITE[kind] + (", then negate the last two rows of R' and t'" if kind != convention else "")

@@ -1,0 +1,235 @@
+"""Read calibrated cameras from files of any layout of the table; others are named, with a way to convert them."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tracker.calibrations.camera_words import Section, is_absent, plain_text
+from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
+from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics, is_transposed
+from tracker.calibrations.document import Document, read_document, refuse
+from tracker.calibrations.foreign import foreign, named
+from tracker.calibrations.layouts import CalibrationLayout, find_layout
+from tracker.calibrations.pose_conventions import check_convention, read_pose
+from tracker.calibrations.toml_layouts import board_square
+from tracker.calibrations.units import check_units
+from tracker.errors import CalibrationError, Remedy
+from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names, read_entry
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.validation import same_form
+
+_SUFFIXES = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt")
+"""Files of a folder that may hold a calibration; the others are not opened."""
+_MAX_FILES = 1000
+"""Most files of a folder that are looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedCameras:
+    """The cameras of a calibration."""
+
+    entries: tuple[CameraEntry, ...]
+    """Cameras with lens and pose, in the order of the file."""
+    left_out: dict[str, str]
+    """Why other cameras of the file are left out, by their names: `has no pose`."""
+    notes: tuple[str, ...]
+    """Sentences for the user: cameras left out, and what may be another unit or convention."""
+
+
+def read_cameras(
+    paths: Path | Sequence[Path],
+    units: Units | None = None,
+    poses: PoseConvention | None = None,
+    footage: Collection[str] = (),
+) -> CalibratedCameras:
+    """Read the cameras of a calibration.
+
+    Args:
+        paths: a file; a folder; or several files, one for each camera.
+        units: unit of the translations; by default the one that the layout fixes, else metres.
+        poses: convention of the poses; by default that of the layout, if the cameras do not contradict it.
+        footage: names of cameras that have footage, by which the names of files with one camera are told.
+
+    Raises:
+        CalibrationError: a file is missing or malformed, of an unknown layout, or describes impossible cameras.
+    """
+    if units is not None and units not in METRES:
+        raise CalibrationError(f"expected the unit {', '.join(METRES)}, found '{units}'; correct it")
+    if poses is not None and poses not in CONVENTIONS:
+        raise CalibrationError(f"expected as convention {', '.join(CONVENTIONS)}, found '{poses}'; correct it")
+    documents = _documents([Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths])
+    layout, sections = _sections(documents, footage)
+    where = documents[0][0].where
+    reasons = {key: reason for key, section in sections.items() if (reason := _reason(section)) is not None}
+    usable = {key: section for key, section in sections.items() if key not in reasons}
+    left_out = {str(sections[key]["name"]): reason for key, reason in reasons.items()}
+    if not usable:
+        raise _nothing_usable(sections, documents[0][0])
+    used: Units = units or layout.unit or "m"
+    entries = tuple(_entry(name, section, where, METRES[used], poses) for name, section in usable.items())
+    notes = [f"Camera '{name}' is left out: {reason}." for name, reason in left_out.items()]
+    entries, note = _with_convention(entries, where, layout, poses)
+    notes += [] if note is None else [note]
+    check_names(entries, where)
+    square = next((s for d, _ in documents if (s := board_square(d)) is not None), None)
+    notes += check_units(entries, where, used, square)
+    return CalibratedCameras(entries, left_out, tuple(notes))
+
+
+# --- files ----------------------------------------------------------------------------------------------------------
+
+
+def _documents(paths: Sequence[Path]) -> list[tuple[Document, CalibrationLayout]]:
+    """Read files with their layouts; of a folder those that have one.
+
+    Raises:
+        CalibrationError: a given file has none, or a folder holds no calibration or several.
+    """
+    if len(paths) == 1 and paths[0].is_dir():
+        return _in_folder(paths[0])
+    found = []
+    for path in paths:
+        document = read_document(path)
+        layout = find_layout(document)
+        if layout is None:
+            raise foreign(path, document.data)
+        found.append((document, layout))
+    if len(paths) == 1:
+        return _with_other_half(found[0])
+    return found
+
+
+def _in_folder(folder: Path) -> list[tuple[Document, CalibrationLayout]]:
+    files = sorted(p for p in folder.iterdir() if p.suffix.lower() in _SUFFIXES and p.is_file())
+    found: list[tuple[Document, CalibrationLayout]] = []
+    failure: CalibrationError | None = None
+    for path in files[:_MAX_FILES]:
+        try:
+            document = read_document(path)
+        except CalibrationError as error:
+            failure = error
+            continue
+        if (layout := find_layout(document)) is not None:
+            found.append((document, layout))
+    if not found:
+        if failure is not None:
+            raise failure
+        raise named(folder, "a folder without one", "give the files of the cameras")
+    if len({layout.name for _, layout in found}) > 1:
+        names = ", ".join(document.path.name for document, _ in found[:4])
+        raise named(folder, f"a folder with calibrations of several layouts, {names}", "give one of these files")
+    return found
+
+
+def _with_other_half(found: tuple[Document, CalibrationLayout]) -> list[tuple[Document, CalibrationLayout]]:
+    """Add the other half of EasyMocap's pair of files, which lies beside it."""
+    document, layout = found
+    other = {"intri": "extri", "extri": "intri"}.get(document.path.stem)
+    pair = document.path.with_name(f"{other}{document.path.suffix}")
+    if other is None or not pair.exists():
+        return [found]
+    return [found, (read_document(pair), layout)]
+
+
+def _sections(
+    documents: list[tuple[Document, CalibrationLayout]], footage: Collection[str]
+) -> tuple[CalibrationLayout, dict[str, Section]]:
+    """Return the cameras of all files by name."""
+    first, layout = documents[0]
+    if other := next((d for d, its_layout in documents if its_layout.name != layout.name), None):
+        raise refuse(first, None, "files of one layout", f"another one in {other.path.name}", "give one calibration")
+    whole = [d for d, _ in documents if isinstance(d.data, dict)]
+    if len(whole) > 1 and any(map(has_intrinsics, whole)) and any(map(has_extrinsics, whole)):
+        merged = {key: value for d in whole for key, value in d.data.items()}
+        documents = [(replace(first, data=merged), layout)]
+    stems = _camera_names([d.stem for d, _ in documents], footage)
+    found: dict[str, Section] = {}
+    for (document, _), stem in zip(documents, stems, strict=True):
+        for name, section in layout.read(document).items():
+            name = name or stem
+            if name in found:
+                raise CalibrationError(
+                    f"{document.where}: camera '{name}' is in two files or twice; give each camera its own name"
+                )
+            found[name] = section | {"name": same_form(plain_text(section.get("name") or name))}
+    return layout, found
+
+
+def _camera_names(stems: list[str], footage: Collection[str]) -> list[str]:
+    """Name cameras by their files; without what all names share at both ends, where the footage has these names."""
+    names = [same_form(stem) for stem in stems]
+    if len(names) < 2 or any(name in footage for name in names):
+        return names
+    start, end = _shared([*names]), _shared([name[::-1] for name in names])
+    shorter = [name[start : len(name) - end] for name in names]
+    return shorter if any(name in footage for name in shorter) else names
+
+
+def _shared(names: list[str]) -> int:
+    """Return how many letters all names share at their beginning, up to a separator."""
+    first, last = min(names), max(names)
+    count = next((i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), min(len(first), len(last)))
+    return max((i + 1 for i in range(count) if not first[i].isalnum()), default=0)
+
+
+# --- cameras --------------------------------------------------------------------------------------------------------
+
+
+def _reason(section: Section) -> str | None:
+    """Return why a camera cannot be used; None if it can."""
+    if "refusal" in section:
+        return str(section["refusal"])
+    if section["matrix"] is None or is_absent(section["matrix"]):
+        return "the calibration has no matrix of its lens"
+    if section["rotation"] is None or section["translation"] is None:
+        return "the calibration has no pose for it"
+    return None
+
+
+def _nothing_usable(sections: dict[str, Section], document: Document) -> CalibrationError:
+    """Return the error of a file all of whose cameras lack the same."""
+    if not sections:
+        return refuse(
+            document, None, "one section for each camera", "none", "export it in a layout that docs/recordings.md lists"
+        )
+    name, section = next(iter(sections.items()))
+    if "refusal" in section:
+        return CalibrationError(f"{document.where}: {section['refusal']}")
+    if section["matrix"] is None:
+        expected, advice = "its matrix under a key such as K or camera_matrix", "give the file of the intrinsics too"
+        return refuse(document, name, expected, "none", f"{advice}, or one file with both")
+    return refuse(
+        document, name, "its pose under keys such as R and t (X_camera = R X_world + t)", "the lens alone",
+        "calibrate the cameras together and give the file with their poses",
+    )  # fmt: skip
+
+
+def _entry(name: str, section: Section, where: str, metres: float, poses: PoseConvention | None) -> CameraEntry:
+    """Check one camera.
+
+    Raises:
+        CalibrationError: it describes no possible camera.
+    """
+    if is_transposed(section["matrix"]):
+        if poses is None or not poses.startswith("row-vectors"):
+            raise CalibrationError(
+                f"{where}, camera '{name}': expected [[fx, skew, cx], [0, fy, cy], [0, 0, 1]] as matrix, found the "
+                "principal point in the last row, so that the file holds row vectors, as MATLAB writes them, and its "
+                "rotations are transposed too",
+                Remedy("give_poses", poses="row-vectors", rewrite="transpose K and R of all cameras"),
+            )
+        section = section | {"matrix": [list(column) for column in zip(*section["matrix"], strict=True)]}
+    return read_entry(name, section, where, metres)
+
+
+def _with_convention(
+    entries: tuple[CameraEntry, ...], where: str, layout: CalibrationLayout, poses: PoseConvention | None
+) -> tuple[tuple[CameraEntry, ...], str | None]:
+    """Return the cameras with their poses in the right convention, and a note where it is not sure."""
+    stated: list[Array] = [rigid.inverse(entry.T_world_camera) for entry in entries]
+    if poses is None:
+        expected = layout.poses_in_words
+        return entries, check_convention(stated, where, expected, layout.by_program)
+    changed = [rigid.inverse(read_pose(T, poses)) for T in stated]
+    return tuple(replace(e, T_world_camera=T) for e, T in zip(entries, changed, strict=True)), None

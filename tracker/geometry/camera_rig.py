@@ -1,0 +1,49 @@
+"""Where the cameras of a rig stand and look: the point that all of them see, and its distance."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.geometry.arrays import Array
+
+MIN_SPREAD_RAD = float(np.radians(8.0))
+"""Largest angle between two optical axes below which they count as parallel: their point is then undetermined."""
+
+
+@dataclass(frozen=True, eq=False)
+class AxesPoint:
+    """The point nearest to all optical axes of a rig, in the least squares sense."""
+
+    position: Array
+    """In the world and unit of the poses, (3,)."""
+    angles_rad: Array
+    """Angle between each axis and the direction from its camera to the point, (N,)."""
+    distances: Array
+    """Distance of each camera to the point, (N,), in the unit of the poses."""
+    spread_rad: float
+    """Largest angle between two axes."""
+
+    @property
+    def is_determined(self) -> bool:
+        """Whether the axes differ enough to fix the point."""
+        return self.spread_rad >= MIN_SPREAD_RAD
+
+
+def axes_point(Ts_world_camera: Sequence[Array]) -> AxesPoint:
+    """Find the point nearest to all optical axes.
+
+    Args:
+        Ts_world_camera: poses of at least one camera, each (4, 4), in any unit of length.
+    """
+    Ts = np.asarray(Ts_world_camera)
+    centers, axes = Ts[:, :3, 3], Ts[:, :3, 2]
+    middle = centers.mean(axis=0)
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    # For parallel axes, the solution of minimum norm lies beside the cameras.
+    offset = np.linalg.lstsq(across.sum(axis=0), (across @ (centers - middle)[..., None]).sum(axis=0)[:, 0], rcond=1e-9)
+    toward = middle + offset[0] - centers
+    distances = np.linalg.norm(toward, axis=1)
+    cosines = (axes * toward).sum(axis=1) / np.maximum(distances, 1e-12)
+    spread = np.arccos(np.clip(axes @ axes.T, -1, 1)).max()
+    return AxesPoint(middle + offset[0], np.arccos(np.clip(cosines, -1, 1)), distances, float(spread))

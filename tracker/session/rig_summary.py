@@ -1,0 +1,110 @@
+"""How the cameras of a session stand: distances to the point they look at, heights, and what is odd about them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.geometry.arrays import Array
+from tracker.geometry.camera_rig import axes_point
+from tracker.geometry.cameras import Camera
+from tracker.geometry.ground_plane import UP_ROTATIONS
+
+_MAX_AIM_RAD = np.radians(30.0)
+"""Angle between an axis and the common point above which the cameras do not look at one point: half a usual lens."""
+_PERSON_M = 1.7
+"""Height of an adult, metres."""
+_MIN_PERSON_SHARE = 0.04
+"""Share of the picture's longer side that a person fills, below which no limb can be seen: 40 of 1000 pixels."""
+_UNDER_FLOOR_M = 0.1
+"""Depth of a camera below the floor above which it is noted, metres: the error of a floor that was set by hand."""
+_AGREEMENT = 0.8
+"""Mean cosine of the pictures' up direction and an axis above which the cameras stand upright to it (37 degrees)."""
+_DISAGREEMENT = 0.5
+"""The same mean, below which the stated up axis is doubted (60 degrees)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RigSummary:
+    """How calibrated cameras stand, in the world of their calibration."""
+
+    names: tuple[str, ...]
+    """Names of the cameras."""
+    centers_world: Array
+    """Where they stand, (N, 3), metres."""
+    axes_world: Array
+    """Where they look, unit vectors, (N, 3)."""
+    viewed_point_world: Array | None
+    """The point at which all look, (3,), metres; None if they look at none, or are parallel."""
+    distances_m: Array | None
+    """Their distances to that point, (N,); None if there is none."""
+    heights_m: Array
+    """Their heights over the plane through the origin across `up`, (N,), metres."""
+    sentence: str
+    """Distances and heights in words."""
+    doubts: tuple[str, ...]
+    """Sentences on what is odd, such as cameras under the floor; usually empty."""
+
+
+def summarize_rig(cameras: Sequence[Camera], up: str = "z") -> RigSummary:
+    """Describe how cameras stand and look.
+
+    Args:
+        cameras: at least one.
+        up: world axis that points up: x, y, z, -x, -y or -z. The floor is the plane through the origin across it.
+    """
+    Ts = np.array([c.T_world_camera for c in cameras])
+    names = tuple(c.name for c in cameras)
+    centers, axes = Ts[:, :3, 3], Ts[:, :3, 2]
+    heights = centers @ UP_ROTATIONS[up][:, 2]
+    point = axes_point(Ts)
+    meet = len(cameras) > 1 and point.is_determined and point.angles_rad.max() < _MAX_AIM_RAD
+    distances = point.distances if meet else None
+    if distances is None:
+        sentence = "The cameras look at no common point"
+    else:
+        sentence = f"The cameras stand {_interval(distances)} from the point at which they look"
+    sentence += f"; their heights over the floor (origin, {up} up) are {_interval(heights)}."
+    doubts = _far_doubts(cameras, distances) + _floor_doubts(names, centers, heights, up) + _up_doubts(Ts, up)
+    return RigSummary(
+        names, centers, axes, point.position if meet else None, distances, heights, sentence, tuple(doubts)
+    )
+
+
+def _interval(values_m: Array) -> str:
+    low, high = f"{values_m.min():.2f}", f"{values_m.max():.2f}"
+    return f"{low} m" if low == high else f"{low} to {high} m"
+
+
+def _far_doubts(cameras: Sequence[Camera], distances_m: Array | None) -> list[str]:
+    """Doubt the unit where a person at the viewed point would be too small to be seen."""
+    if distances_m is None:
+        return []
+    focal_px = np.array([c.K[1, 1] for c in cameras])
+    heights_px = float(np.median(focal_px * _PERSON_M / distances_m))
+    if heights_px >= _MIN_PERSON_SHARE * float(np.median([max(c.size) for c in cameras])):
+        return []
+    return [
+        f"At {np.median(distances_m):.0f} m a person would be {heights_px:.0f} pixels high in the pictures: check the "
+        "unit of the calibration. It may count squares of its board, or another unit than metres."
+    ]
+
+
+def _floor_doubts(names: Sequence[str], centers_world: Array, heights_m: Array, up: str) -> list[str]:
+    below = [name for name, height in zip(names, heights_m, strict=True) if height < -_UNDER_FLOOR_M]
+    # Where a camera is the origin, the calibration knows no floor.
+    if not below or np.linalg.norm(centers_world, axis=1).min() < _UNDER_FLOOR_M:
+        return []
+    return [
+        f"Under the floor (origin, {up} up): {', '.join(below)}. Another axis may point up, or the origin does not lie "
+        "on the floor."
+    ]
+
+
+def _up_doubts(Ts_world_camera: Array, up: str) -> list[str]:
+    """Doubt the up axis where the upper sides of all pictures point along another one."""
+    cosines = {name: float(np.mean(-Ts_world_camera[:, :3, 1] @ R[:, 2])) for name, R in UP_ROTATIONS.items()}
+    best = max(cosines, key=lambda name: cosines[name])
+    if best == up or cosines[best] < _AGREEMENT or cosines[up] > _DISAGREEMENT:
+        return []
+    return [f"The upper sides of the pictures point along {best}, not {up}: check which axis points up."]
