@@ -27,6 +27,7 @@ from app.cli import (
 from app.cli import open as open_
 from app.remedies import command_line_text
 from app.runtime import process_exit
+from app.runtime.log_limit import limit_log
 from app.runtime.malloc_trim import give_back_freed_memory
 from tracker.errors import TrackerError
 
@@ -99,6 +100,7 @@ def _version() -> str:
 
 def program() -> None:
     """Run `main` as a process of its own."""
+    limit_log()
     give_back_freed_memory()
     process_exit.run(main)
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 _SHOWN = 12
 """Number of sizes that are listed."""
-_TICKS = 100
 
 OptionalViews = Annotated[tuple[str, ...], tyro.conf.arg(metavar="FRONT SIDE", help_behavior_hint="")]
 
@@ -136,15 +135,12 @@ def acquire(
 
     session, (person,) = at
     require_files(session)
-    name, done = session.people[person].name, 0
+    name = session.people[person].name
     with SessionLock(session.folder), Recording(session.cameras) as recording:
-        with progress.over(_TICKS, "acquiring") as tick:
+        with progress.share("acquiring") as advance:
 
             def report(stage: str, share: float) -> None:
-                nonlocal done
-                while done < int(share * _TICKS):
-                    done += 1
-                    tick()
+                advance(share)
 
             found = acquire_body(session, Observer(session.cameras, recording), person, frames, settings, report)
         changes = size_changes(found)

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 _CHAIN = "find people"
 """Setting of the store: the first frame of a chain that was interrupted while tracking, and the directions that are
 done."""
-_TICKS = 100
 
 
 Track = Callable[[Target, Sequence[int]], dict[str, Any]]
@@ -118,19 +117,17 @@ def _found(
     from tracker.footage.recording import Recording
     from tracker.pipeline.find_people import FindSettings, find_people
 
-    done, stage_now = 0, ""
-    with Recording(session.cameras) as recording, progress.over(_TICKS, "finding people") as tick:
+    stage_now = ""
+    with Recording(session.cameras) as recording, progress.share("finding people") as advance:
 
         def report(stage: str, share: float, text: str) -> None:
-            nonlocal done, stage_now
+            nonlocal stage_now
             if stage not in (stage_now, "done"):
                 stage_now = stage
                 progress.say(stage)
             if text:
                 progress.say(text)
-            while done < int(share * _TICKS):
-                done += 1
-                tick()
+            advance(share)
 
         observer = Observer(session.cameras, recording)
         return find_people(session, observer, people, frames, FindSettings(acquire=acquire), report)

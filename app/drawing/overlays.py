@@ -135,6 +135,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             out += _some(changed, others, camera, index, "alternative")
         if replaced:
             out += _some(replaced, former, camera, index, "compared")
+        out += _found(state, bodies, camera, index, view)
         for kind, poses in outlined:
             if poses is not None:
                 out += _outlined(session, poses, camera, index, kind)
@@ -156,47 +157,34 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     points = [b.points_world for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
     if "contours" in state.compiled:
-        hidden_by_view = part_edges.points_occluded(bodies, list(seen.values()), np.concatenate(points))
+        occluded = part_edges.points_occluded_by_body(bodies, list(seen.values()), np.concatenate(points))
     else:  # the kernels are being compiled: every joint can be grabbed
-        hidden_by_view = np.zeros((len(seen), sum(map(len, points))), bool)
+        occluded = np.zeros((len(seen), len(bodies), sum(map(len, points))), bool)
+    people = np.repeat(np.arange(len(bodies)), list(map(len, points)))
     out = []
-    for (index, camera), hidden in zip(seen.items(), hidden_by_view, strict=True):
+    for (index, camera), by_body in zip(seen.items(), occluded, strict=True):
         first = 0
-        occluders = _other_occluders(bodies, camera, hidden)
+        hidden, occluders = by_body.any(axis=0), _other_occluders(by_body, people)
         for person, body in enumerate(bodies):
             px, held = camera.project(points[person]), state.held_points(person)
             for i, name in enumerate(body.model.point_names):
                 if person not in state.visibility.hidden and np.all(np.isfinite(px[i])):
                     u, v = float(px[i, 0]), float(px[i, 1])
-                    by, is_held = occluders[first + i], name in held
-                    out.append(Handle(index, person, name, u, v, not hidden[first + i], by, is_held, side_of(name)))
+                    is_visible, by, is_held = not hidden[first + i], occluders[first + i], name in held
+                    out.append(Handle(index, person, name, u, v, is_visible, by, is_held, side_of(name)))
             first += len(px)
     return out
 
 
-def _other_occluders(bodies: Sequence[PosedBody], camera: Camera, hidden: Mask) -> list[int | None]:
+def _other_occluders(by_body: Mask, people: IntArray) -> list[int | None]:
     """Return for each point of all bodies the index of another body that occludes it, if its own does not.
 
     Args:
-        bodies: all bodies in the scene.
-        camera: the view.
-        hidden: whether each point is occluded, (n,).
+        by_body: whether each body occludes each point in a view, (n_bodies, n).
+        people: index of the body of each point, (n,).
     """
-    found: list[int | None] = [None] * len(hidden)
-    first = 0
-    for person, body in enumerate(bodies):
-        points = body.points_world
-        rest = first + np.flatnonzero(hidden[first : first + len(points)])
-        others = [i for i in range(len(bodies)) if i != person]
-        if others and len(rest):
-            rest = rest[~part_edges.points_occluded([body], [camera], points[rest - first])[0]]
-        for other in others:
-            if len(rest):
-                is_behind = part_edges.points_occluded([body, bodies[other]], [camera], points[rest - first])[0]
-                for point in rest[is_behind]:
-                    found[point] = other if found[point] is None else found[point]
-        first += len(points)
-    return found
+    is_by_other = by_body.any(axis=0) & ~by_body[people, np.arange(len(people))]
+    return [int(i) if is_other else None for i, is_other in zip(by_body.argmax(axis=0), is_by_other, strict=True)]
 
 
 def out_of_reach(session: Session, state: State) -> OutOfReach | None:
@@ -288,6 +276,14 @@ def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
         PosedBody(b.model, s.alternatives[0]) if s.alternatives else b
         for b, s in zip(bodies, state.people, strict=True)
     ]
+
+
+def _found(state: State, bodies: Sequence[PosedBody], camera: Camera, index: int, view: View) -> list[Path]:
+    """Draw the people who were found on the shown frame so far, while the search for people goes on."""
+    candidates = state.finding.candidates
+    if not candidates or state.finding.tried != state.frame or "contours" not in view.layers:
+        return []
+    return _some(candidates, [candidates.get(i, b) for i, b in enumerate(bodies)], camera, index, "candidate")
 
 
 def _some(

@@ -325,6 +325,8 @@ class FindingMessage(Message, frozen=True, tag="finding"):
     """How the last one ended, or empty."""
     failed: bool
     """Whether it ended with an error."""
+    tried: int | None
+    """The frame that is being tried, or that a failure is about."""
     frame: int | None
     """The frame on which people were found last."""
     axes: tuple[SilhouetteAxes, ...]

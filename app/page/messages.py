@@ -144,8 +144,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         hulls.append(Outline(hull.camera, hull.person, hull.part, hull.depth, first, count))
         segments.append(hull.segments_px)
         first += count
-    # A replayed or former pose is not the stored one, so its joints cannot be dragged.
-    handles = overlays.handles(session, state, view.cameras) if state.is_stored_drawn else []
+    handles = overlays.handles(session, state.drawn, view.cameras)
     header = OverlayHeader(
         frame=state.frame,
         seq=dict(state.drag_seqs).get(page, 0),

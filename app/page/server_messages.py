@@ -207,7 +207,7 @@ class Compared(Part, frozen=True):
     moved: tuple[MovedLimb, ...]
     """Limbs that a fit moved although nobody had touched them, farthest first; their former places are drawn."""
     is_before_shown: bool
-    """Whether the views show the poses before. The costs are theirs then, and the overlay has no handles."""
+    """Whether the views show the poses before. The costs and handles are theirs then, and no joint can be dragged."""
 
 
 class FloorPicking(Part, frozen=True):

@@ -367,6 +367,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.drag_seqs,
         state.visibility.hidden,
         state.compiled,
+        Identity(state.finding.candidates),
     )
     return (*drawn, _pins(state), state.floor.picking)
 

@@ -19,7 +19,9 @@ class Job(Generic[T]):
     """Exhausts a generator of steps in the background.
 
     `on_step(step, seconds)` is called in the worker with each step and the time worked so far. `on_end(error)` is
-    called once, when the generator is exhausted or has raised. A stopped job is paused: it can be continued.
+    called once, when the generator is exhausted or has raised. A stopped job is paused: it can be continued. A job that
+    has ended or is discarded drops its generator and callbacks: they and their owner refer to one another, so that what
+    they hold, tens of megabytes of images, would stay until the interpreter searches for such cycles, minutes later.
     """
 
     def __init__(
@@ -79,6 +81,18 @@ class Job(Generic[T]):
                 "first time; it stops as soon as it can, so wait and try again"
             ) from error
 
+    def discard(self) -> None:
+        """End without further steps or calls, and drop what the generator holds; after the current step if it runs."""
+        self.ended = True
+        self._stop.set()
+        self._wake.set()
+        if not self.running:
+            self._release()
+
+    def _release(self) -> None:
+        self._start, self._steps = lambda: iter(()), None
+        self._on_step, self._on_end, self._on_pause = (lambda *_: None), (lambda _: None), (lambda: None)
+
     def _launch(self, until: Callable[[T], bool]) -> None:
         if not self.running and not self.ended:
             self._stop.clear()
@@ -95,8 +109,7 @@ class Job(Generic[T]):
                 step = next(self._steps, None)
                 self._seconds += time.perf_counter() - began
                 if step is None:
-                    self.ended, self.running = True, False
-                    self._on_end(None)
+                    self._end(None)
                     return
                 self._on_step(step, self._seconds)
                 done = until(step)
@@ -104,10 +117,17 @@ class Job(Generic[T]):
                     due = self._rest(due)
             self.running = False
             self._on_pause()
+            if self.ended:  # discarded during the step
+                self._release()
         except Exception as error:
-            self.ended, self.running = True, False
             _LOG.exception("a job failed")
-            self._on_end(error)
+            self._end(error)
+
+    def _end(self, error: Exception | None) -> None:
+        on_end = self._on_end
+        self.ended, self.running = True, False
+        self._release()
+        on_end(error)
 
     def _rest(self, due: float) -> float:
         """Rest until the next step is due; returns that time.

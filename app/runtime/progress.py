@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, Task, TaskProgressColumn, TextColumn
 from rich.text import Text
 
 _OUTLIER, _COMPILING_S = 8.0, 1.0
@@ -80,14 +80,58 @@ class Reporter:
 
             yield tick
 
+    @contextmanager
+    def share(self, what: str) -> Iterator[Callable[[float], None]]:
+        """Yield a function to call with the share of the work that is done, 0 to 1, after each step.
+
+        Steps are of any size, so that the time left follows from the share, not from the number of calls.
+        """
+        began, shown = time.monotonic(), 0
+        columns = (TextColumn(what), BarColumn(), TaskProgressColumn(), TextColumn("{task.fields[left]}"))
+        if self._silent or not self._console.is_terminal:
+
+            def line(share: float) -> None:
+                nonlocal shown
+                if self._silent or int(10 * share) <= shown:
+                    return
+                shown = int(10 * share)
+                left = share_text(share, time.monotonic() - began)
+                self._console.print(f"{what}: {100 * share:.0f}%{left}", highlight=False)
+
+            yield line
+            return
+        with Progress(*columns, console=self._console) as bar:
+            task = bar.add_task(what, total=1.0, left="")
+
+            def advance(share: float) -> None:
+                left = share_text(share, time.monotonic() - began)
+                bar.update(task, completed=share, left=left.removeprefix(", "))
+
+            yield advance
+
+
+def share_text(share: float, elapsed_s: float) -> str:
+    """Return the time that the rest of the work will take, such as `, 12 s left`; empty if unknown.
+
+    Args:
+        share: of the work that is done, 0 to 1.
+        elapsed_s: time that it took, s.
+    """
+    if not 0 < share < 1:
+        return ""
+    return f", {_duration(elapsed_s * (1 - share) / share)} left"
+
+
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
+
 
 def pace_text(pace: Pace, left: int) -> str:
     """Return the rate, and the time that `left` items will take, such as `, 4.1/s, 12 s left`; empty if unknown."""
     if pace.item_s is None:
         return ""
     seconds = left * pace.item_s
-    time_left = f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
-    return f", {1 / pace.item_s:.1f}/s" + (f", {time_left} left" if left else "")
+    return f", {1 / pace.item_s:.1f}/s" + (f", {_duration(seconds)} left" if left else "")
 
 
 class _PaceColumn(ProgressColumn):

@@ -52,11 +52,11 @@ class Access:
         called = _HOST.fullmatch(host or "")
         if called is None or not (is_loopback(called["name"]) or called["name"].lower() in self.hosts):
             return (
-                f"expected to be called by a name of this machine, found Host '{host or ''}'; "
+                f"expected to be called by a name of this machine, found Host '{_shown(host or '')}'; "
                 "open the address printed at the start, or allow this name when the program is started"
             )
         if origin is not None and not _same(origin, called):
-            return f"expected a request of this page, found one of '{origin}'; open the page itself"
+            return f"expected a request of this page, found one of '{_shown(origin)}'; open the page itself"
         if self.token is not None and not any(self._admits(t) for t in tokens):
             return (
                 "expected the token of this start, found none or another; open the address that quadrille open "
@@ -142,6 +142,11 @@ def is_loopback(name: str) -> bool:
 def _equal(secret: str, found: str) -> bool:
     """Compare in constant time. What a request brings may be any text, also no Unicode."""
     return secrets.compare_digest(secret.encode(), found.encode("utf-8", "surrogatepass"))
+
+
+def _shown(text: str) -> str:
+    """Return a header for a message; what is no Unicode is escaped."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _same(origin: str, called: re.Match[str]) -> bool:

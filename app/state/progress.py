@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from tracker.body.model import PosedBody
+
 Line = tuple[float, float, float, float]
 """x0, y0, x1, y1, undistorted px."""
 
@@ -51,6 +53,10 @@ class FindState:
     """How the last one ended."""
     failed: bool = False
     """Whether it ended with an error."""
+    tried: int | None = None
+    """Frame that is being tried; after a failure the one that the message is about. None otherwise."""
+    candidates: Mapping[int, PosedBody] = field(default_factory=dict)
+    """By index of the person, the first poses found on that frame so far."""
     frame: int | None = None
     """Frame on which people were found; None before."""
     axes: Mapping[str, tuple[tuple[Line, ...], ...]] = field(default_factory=dict)

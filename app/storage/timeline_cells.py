@@ -5,7 +5,9 @@ from itertools import takewhile
 
 from tracker.store.records import SOURCES, FrameRow
 
-_WORST_FIRST = ("lost", "doubtful", "good", "")
+_STATUS_RANKS = {status: i for i, status in enumerate(("lost", "doubtful", "good", ""))}
+"""The worst status first."""
+_SOURCE_RANKS = {source: i for i, source in enumerate(SOURCES)}
 
 
 class TimelineCells:
@@ -53,25 +55,49 @@ class TimelineCells:
         return {frame: cells.get(frame) for frame, _ in latest}
 
     def _put(self, rows: Mapping[int, Mapping[str, FrameRow]]) -> None:
-        self._all |= {frame: _cell(people) for frame, people in rows.items()}
-        for name, lane in self._lanes.items():
-            lane |= {frame: _cell({name: people[name]}) for frame, people in rows.items() if name in people}
+        if not self._lanes:
+            self._all |= {frame: _cell(row) for frame, people in rows.items() for row in people.values()}
+            return
+        for frame, people in rows.items():
+            for name, row in people.items():
+                self._lanes[name][frame] = _cell(row)
+            self._all[frame] = _summary(people)
 
 
-def _cell(rows: Mapping[str, FrameRow]) -> dict:
-    """Summarize a frame: the worst status and cost of the people, and the source nearest to a person's own work."""
-    costs = [row.cost_px for row in rows.values() if row.cost_px is not None]
-    # Several people have lanes of their own, which name their limbs.
-    alone = next(iter(rows.values())) if len(rows) == 1 else None
-    is_assessed = alone is not None and alone.status in ("lost", "doubtful")
-    remarks = [row.remark if len(rows) == 1 else f"{name}: {row.remark}" for name, row in rows.items() if row.remark]
+def _cell(row: FrameRow) -> dict:
+    """Return the cell of one person on a frame. A long recording has a million: each field is taken once."""
+    is_assessed = row.status in ("lost", "doubtful")
     return {
-        "source": min((row.source for row in rows.values()), key=SOURCES.index),
-        "cost_px": round(max(costs), 3) if costs else None,
-        "keyframe": any(row.keyframe for row in rows.values()),
-        "status": min((row.status for row in rows.values()), key=_WORST_FIRST.index),
-        "remark": "; ".join(remarks),
-        "reviewed": all(row.reviewed for row in rows.values()),
-        "ambiguous": any(row.ambiguous for row in rows.values()),
-        "limbs_lost": tuple(round(p, 3) for p in alone.limbs_lost) if alone is not None and is_assessed else (),
+        "source": row.source,
+        "cost_px": None if row.cost_px is None else round(row.cost_px, 3),
+        "keyframe": row.keyframe,
+        "status": row.status,
+        "remark": row.remark,
+        "reviewed": row.reviewed,
+        "ambiguous": row.ambiguous,
+        "limbs_lost": tuple(round(p, 3) for p in row.limbs_lost) if is_assessed else (),
     }
+
+
+def _summary(rows: Mapping[str, FrameRow]) -> dict:
+    """Summarize a frame: the worst status and cost of the people, and the source nearest to a person's own work.
+
+    The limbs of several people are named in their own lanes.
+    """
+    first, *others = rows.values()
+    cell = _cell(first)
+    if not others:
+        return cell
+    for row in others:
+        if _SOURCE_RANKS[row.source] < _SOURCE_RANKS[cell["source"]]:
+            cell["source"] = row.source
+        if _STATUS_RANKS[row.status] < _STATUS_RANKS[cell["status"]]:
+            cell["status"] = row.status
+        if row.cost_px is not None:
+            cell["cost_px"] = max(round(row.cost_px, 3), cell["cost_px"] or 0.0)
+        cell["keyframe"] |= row.keyframe
+        cell["reviewed"] &= row.reviewed
+        cell["ambiguous"] |= row.ambiguous
+    cell["remark"] = "; ".join(f"{name}: {row.remark}" for name, row in rows.items() if row.remark)
+    cell["limbs_lost"] = ()
+    return cell

@@ -14,6 +14,10 @@ const GAIN = 1.02;
 /** An image counts at most so many times the smallest one: views are compared, so none is large at the cost of the others. */
 const MAX_UNEVENNESS = 2;
 const ROUNDING = 1e-6;
+/** A width other than the usual one must show this much more area, which is a tenth in size: less is not worth another place. */
+const WIDER_GAIN = 1.2;
+/** Step in which a useful width is looked for, CSS pixels: less is not noticed. */
+const WIDTH_STEP = 8;
 
 /**
  * @typedef {{x: number, y: number, width: number, height: number}} Box
@@ -30,27 +34,61 @@ const ROUNDING = 1e-6;
  */
 
 /**
- * Choose the arrangement and shares that show the largest total area of the images, none much smaller than the others.
+ * Choose the arrangement that shows the largest total area of the images, none much smaller than the others.
  *
  * @param {number[]} aspects width / height of each image
  * @param {number} width
  * @param {number} height
- * @returns {{arrangement: Arrangement, shares: Shares}}
+ * @returns {{arrangement: Arrangement, shares: Shares, area: number}}
  */
 export function arrange(aspects, width, height) {
-  let best = { area: -1, arrangement: { isColumns: false, counts: [aspects.length] }, shares: { tracks: [1], panes: [[1]] } };
+  const first = { isColumns: false, counts: [aspects.length] };
+  let best = { arrangement: first, ...fit(first, aspects, width, height) };
   for (const isColumns of [false, true]) {
-    const ratios = isColumns ? aspects.map((aspect) => 1 / aspect) : aspects;
-    const [length, depth] = isColumns ? [height, width] : [width, height];
-    for (const counts of fillings(ratios)) {
-      const tracks = inTracks(ratios, counts);
-      for (const shares of [sharesOf(tracks, length, depth), equalShares(counts)]) {
-        const area = shownArea(tracks, shares, length, depth);
-        if (area > GAIN * best.area) best = { area, arrangement: { isColumns, counts }, shares };
-      }
+    for (const counts of fillings(isColumns ? aspects.map((aspect) => 1 / aspect) : aspects)) {
+      const arrangement = { isColumns, counts };
+      const found = fit(arrangement, aspects, width, height);
+      if (found.area > GAIN * best.area) best = { arrangement, ...found };
     }
   }
   return best;
+}
+
+/**
+ * Choose the shares that show the largest total area of the images in a given arrangement.
+ *
+ * @param {Arrangement} arrangement
+ * @param {number[]} aspects width / height of each image
+ * @param {number} width
+ * @param {number} height
+ * @returns {{shares: Shares, area: number}}
+ */
+export function fit({ isColumns, counts }, aspects, width, height) {
+  const [length, depth] = isColumns ? [height, width] : [width, height];
+  const tracks = inTracks(isColumns ? aspects.map((aspect) => 1 / aspect) : aspects, counts);
+  const [own, equal] = [sharesOf(tracks, length, depth), equalShares(counts)].map((shares) => ({
+    shares,
+    area: shownArea(tracks, shares, length, depth),
+  }));
+  return equal.area > GAIN * own.area ? equal : own;
+}
+
+/**
+ * Width that the images can use: the usual one, or else the smallest at which they are shown about as large as at the
+ * largest one.
+ *
+ * @param {number[]} aspects width / height of each image
+ * @param {{usual: number, max: number}} widths
+ * @param {number} height
+ */
+export function usefulWidth(aspects, { usual, max }, height) {
+  if (aspects.length === 0) return usual;
+  const areaAt = (/** @type {number} */ width) => arrange(aspects, width, height).area;
+  const most = areaAt(max);
+  if (most < WIDER_GAIN * areaAt(usual)) return usual;
+  let width = usual;
+  while (width < max && GAIN * areaAt(width) < most) width += WIDTH_STEP;
+  return Math.min(width, max);
 }
 
 /**

@@ -1,8 +1,8 @@
-/** What the browser keeps of each session's panes. */
+/** What the browser keeps of each session's views. */
 
 /**
- * @typedef {"views" | "filled-pane" | "pane-shares"} Kind zoom of each view by the name of its camera; name of the camera
- *   whose pane fills the grid, or null; shares of the panes by arrangement
+ * @typedef {"views" | "filled-pane" | "pane-shares" | "drawer"} Kind zoom of each view by the name of its camera; name of the
+ *   camera whose pane fills the grid, or null; shares of the panes by arrangement; open tab of the drawer, or null
  */
 
 /**

@@ -71,11 +71,11 @@ export const LAYERS = [
     id: "hidden",
     group: "Model",
     label: "Hidden contours",
-    title: "Occluded contours of the model, dashed",
+    title: "Occluded contours of the model, dashed; hidden with the contours",
     shown: false,
     opacity: 0.8,
   },
-  { id: "contours", group: "Model", label: "Contours", title: "Visible contours of the model", shown: true, opacity: 1 },
+  { id: "contours", group: "Model", label: "Contours", title: "Contours of the model, and of the poses compared with it", shown: true, opacity: 1 },
   { id: "skeleton", group: "Model", label: "Skeleton", title: "Lines between the joints", shown: false, opacity: 0.8 },
   { id: "joints", group: "Model", label: "Joints", title: "Joints, which can be dragged", shown: true, opacity: 1 },
   {
@@ -127,6 +127,8 @@ export function defaultLayers(people = 1) {
 
 export class Layers {
   #store;
+  /** Whether hidden contours were shown when all contours were hidden, to be shown with them again. */
+  #hadHidden = false;
   #session = "";
 
   /** @param {import("./store.js").Store} store */
@@ -148,6 +150,11 @@ export class Layers {
     const show = isShown ?? !ids.every((id) => layers.shown[id]);
     const shown = { ...layers.shown };
     for (const id of ids) shown[id] = show;
+    if (ids.includes("contours") && !ids.includes("hidden") && show !== layers.shown.contours) {
+      // Dashed contours are contours, too: alone they would stay where the user wants to see the picture.
+      if (!show) this.#hadHidden = layers.shown.hidden;
+      shown.hidden = show && (layers.shown.hidden || this.#hadHidden);
+    }
     this.#save({ ...layers, shown });
   }
 

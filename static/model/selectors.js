@@ -30,6 +30,15 @@ export function isInSight(state, { visible, hidden_by }) {
 }
 
 /**
+ * Whether the views show the stored poses, whose joints can be dragged, and no replayed or former ones.
+ *
+ * @param {import("./protocol.js").StateMessage | null} state
+ */
+export function isStoredDrawn(state) {
+  return !state?.replay && !state?.compared?.is_before_shown;
+}
+
+/**
  * Cells of the person worked on.
  *
  * @param {import("./store.js").Facts} facts

@@ -30,12 +30,14 @@ import { defaultLayers } from "./layers.js";
  * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
  * @property {import("./series.js").Curves | null} curves the current group of curves
  * @property {import("./series.js").Tab | null} drawer the open tab; null while the drawer is closed
+ * @property {number} drawerPx height that the open drawer takes from the views, CSS pixels
  * @property {{choice: import("./theme.js").ThemeChoice, isDark: boolean}} theme
  * @property {import("./protocol.js").SettingsMessage | null} settings of tracker and search
  * @property {import("./protocol.js").View3dMessage | null} view3d what the 3-D view shows
  * @property {import("./protocol.js").BodySizesMessage | null} bodySizes of the active person
  * @property {import("./protocol.js").AcquisitionMessage | null} acquisition of sizes from the footage
  * @property {import("./protocol.js").FindingMessage | null} finding the search for people whom nobody has placed
+ * @property {number | null} exporting share of an export that is done, 0 to 1; null without one
  * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
  * @property {import("./protocol.js").SearchRunsMessage | null} searchRuns
  * @property {Map<number, import("./search_runs.js").Steps>} searchSteps recorded steps by run
@@ -66,6 +68,7 @@ import { defaultLayers } from "./layers.js";
  * @property {boolean} linkedViews whether all views follow the zoom of one
  * @property {number | null} filled the camera whose pane fills the grid
  * @property {import("./layers.js").LayerChoice} layers visible layers and their opacity
+ * @property {boolean} bare whether the views show pictures alone, without anything drawn over them
  * @property {(import("./image_tone.js").ImageTone | undefined)[]} imageTones tone of each camera's image
  * @property {number[]} reductions pixels of each camera's image per displayed pixel, per side; 0 if not visible
  */
@@ -89,12 +92,14 @@ export class Store {
     visible: null,
     curves: null,
     drawer: null,
+    drawerPx: 0,
     theme: { choice: "system", isDark: true },
     settings: null,
     view3d: null,
     bodySizes: null,
     acquisition: null,
     finding: null,
+    exporting: null,
     searchSetup: null,
     searchRuns: null,
     searchSteps: new Map(),
@@ -125,6 +130,7 @@ export class Store {
     linkedViews: false,
     filled: null,
     layers: defaultLayers(),
+    bare: false,
     imageTones: [],
     reductions: [],
   };

@@ -118,8 +118,8 @@ export class Gestures {
    * @param {{x: number, y: number}} at
    */
   #hitPart(pane, camera, at) {
-    const { layers, overlay, state } = this.#store.facts;
-    if (!this.#store.isSettled || !overlay || !layers.shown.joints || state?.floor) return null;
+    const { layers, overlay, state, bare } = this.#store.facts;
+    if (!this.#store.isSettled || !overlay || !layers.shown.joints || state?.floor || bare) return null;
     const place = pane.view.toImage(at.x, at.y);
     const found = partAt(overlay, camera, place, (person) => !isDimmed(state, person));
     if (!found) return null;

@@ -21,7 +21,8 @@ import { PoseLegend } from "./pose_legend.js";
  *
  * @param {import("../model/index.js").Context} context
  */
-export function mount({ store, send, latency, layers, imageTones, recentImages }) {
+export function mount({ store, send, notify, latency, layers, imageTones, recentImages }) {
+  const say = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
   const gestures = new Gestures(store, send, latency);
   const layersMenu = new LayersMenu(store, layers);
   const toneMenu = new ImageToneMenu(store, imageTones);
@@ -30,5 +31,5 @@ export function mount({ store, send, latency, layers, imageTones, recentImages }
   new PlaceholderFrames(store, recentImages);
   new ViewRequest(store, send);
   new PoseLegend(store);
-  return { grid, gestures, bindings: paneBindings({ grid, gestures, layers, layersMenu }) };
+  return { grid, gestures, bindings: paneBindings({ store, grid, gestures, layers, layersMenu, say }) };
 }

@@ -8,7 +8,7 @@ import { opensPopover, slider, togglePopover } from "../widgets/popovers.js";
 
 /** @type {{label: string, title: string, ids: Layer[]}[]} */
 const QUICK = [
-  { label: "Contours", title: "Visible contours of the model", ids: ["contours"] },
+  { label: "Contours", title: "Contours of the model, solid and dashed", ids: ["contours"] },
   { label: "Joints", title: "Joints, which can be dragged", ids: ["joints"] },
   { label: "Edges", title: "Image edges: explained by the pose (turquoise) or not (pink)", ids: ["accepted", "rejected"] },
   { label: "Distance", title: "Distance to the nearest edge, which the search minimizes", ids: ["distance"] },

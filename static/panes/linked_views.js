@@ -1,8 +1,15 @@
-/** Link the zoom of all views: the others show the place that one is zoomed to, at the same size of the people. */
+/**
+ * Move views with others and with people. Linked views show the place that one is zoomed to, at the same size of the people.
+ * Zoomed views follow the people from frame to frame.
+ */
 
-/** @typedef {{camera: number, person: number, point: string, u: number, v: number}} Joint */
+/**
+ * @typedef {{camera: number, person: number, point: string, u: number, v: number}} Joint
+ * @typedef {import("../model/store.js").Facts} Facts
+ */
 
 const STORED = "quadrille.linked-views";
+const STORED_FOLLOWS = "quadrille.views-follow";
 
 /** @returns {boolean} whether this browser links views */
 export function keptLink() {
@@ -59,8 +66,115 @@ function nearest(joints, { u, v }) {
  * @param {Joint[]} joints
  */
 function spread(joints) {
-  const mean = (/** @type {number[]} */ values) => values.reduce((sum, value) => sum + value, 0) / values.length;
-  const u = mean(joints.map((joint) => joint.u));
-  const v = mean(joints.map((joint) => joint.v));
-  return Math.sqrt(mean(joints.map((joint) => (joint.u - u) ** 2 + (joint.v - v) ** 2)));
+  const [u, v] = [mean(joints, "u"), mean(joints, "v")];
+  return Math.sqrt(joints.reduce((sum, joint) => sum + (joint.u - u) ** 2 + (joint.v - v) ** 2, 0) / joints.length);
+}
+
+/** Moves zoomed views as the people in them move from one frame to another. */
+export class PeopleFollower {
+  isOn = localStorage.getItem(STORED_FOLLOWS) !== "false";
+  /** @type {number | null} frame of the last overlay */
+  #frame = null;
+  /** @type {Map<number, Joint[]>} joints of each person in all views, on the last frame on which the person has a pose */
+  #joints = new Map();
+  /** @type {Map<number, number>} person whom the view of a camera follows, until it is moved by hand */
+  #subjects = new Map();
+
+  /** Follow people, or no longer. */
+  toggle() {
+    this.isOn = !this.isOn;
+    localStorage.setItem(STORED_FOLLOWS, String(this.isOn));
+  }
+
+  /** Forget the people, who are those of another session. */
+  forget() {
+    this.#frame = null;
+    this.#joints.clear();
+    this.#subjects.clear();
+  }
+
+  /** @param {number} camera whose view was moved: it may show another person now */
+  moved(camera) {
+    this.#subjects.delete(camera);
+  }
+
+  /**
+   * Take a new overlay. Views move only with the frame: a pose that is edited leaves them where they are.
+   *
+   * @param {import("./pane.js").Pane[]} panes by camera
+   * @param {Facts} facts
+   * @returns {boolean} whether views may have moved
+   */
+  take(panes, facts) {
+    const { overlay, state } = facts;
+    // The state of another frame does not tell who has a pose here, but a tracker that is ahead has posed the same people.
+    if (!overlay || !state || (state.frame !== overlay.frame && !state.track.running)) return false;
+    const placed = state.people.flatMap(({ source }, person) => (source === null ? [] : [person]));
+    const joints = new Map(placed.map((person) => [person, overlay.handles.filter((joint) => joint.person === person)]));
+    const isOther = this.isOn && this.#frame !== null && this.#frame !== overlay.frame;
+    if (isOther) {
+      panes.forEach((pane, camera) => this.#move(pane, camera, joints, facts));
+    }
+    this.#frame = overlay.frame;
+    for (const [person, own] of joints) this.#joints.set(person, own);
+    return isOther;
+  }
+
+  /**
+   * @param {import("./pane.js").Pane} pane
+   * @param {number} camera
+   * @param {Map<number, Joint[]>} joints of the new frame
+   * @param {Facts} facts
+   */
+  #move(pane, camera, joints, { state, session }) {
+    const { view } = pane;
+    const info = session?.cameras[camera];
+    if (!info || view.zoom <= 1) return;
+    if (view.isFramed) {
+      const people = state?.solo ? [state.person] : [...joints.keys()];
+      const box = boxOf(people.flatMap((person) => seen(joints.get(person) ?? [], camera, info)));
+      if (box) pane.refit(box);
+      return;
+    }
+    const before = [...this.#joints.values()].flat().filter((joint) => joint.camera === camera);
+    const person = this.#subjects.get(camera) ?? nearest(before, view.center)?.person;
+    if (person === undefined) return;
+    this.#subjects.set(camera, person);
+    const now = new Map(joints.get(person)?.filter((joint) => joint.camera === camera).map((joint) => [joint.point, joint]));
+    const both = before.filter((joint) => joint.person === person && now.has(joint.point));
+    if (both.length === 0) return;
+    const there = both.map(({ point }) => /** @type {Joint} */ (now.get(point)));
+    pane.follow({ du: mean(there, "u") - mean(both, "u"), dv: mean(there, "v") - mean(both, "v") });
+  }
+}
+
+/**
+ * Joints that lie in an image.
+ *
+ * @template {Joint} T
+ * @param {T[]} joints
+ * @param {number} camera
+ * @param {{width: number, height: number}} image
+ */
+export function seen(joints, camera, { width, height }) {
+  return joints.filter((joint) => joint.camera === camera && joint.u >= 0 && joint.v >= 0 && joint.u < width && joint.v < height);
+}
+
+/**
+ * Box around some joints, image positions; null without any.
+ *
+ * @param {{u: number, v: number}[]} joints
+ */
+export function boxOf(joints) {
+  if (joints.length === 0) return null;
+  const [us, vs] = [joints.map(({ u }) => u), joints.map(({ v }) => v)];
+  return { left: Math.min(...us), top: Math.min(...vs), right: Math.max(...us), bottom: Math.max(...vs) };
+}
+
+/**
+ * @param {Joint[]} joints
+ * @param {"u" | "v"} axis
+ */
+function mean(joints, axis) {
+  return joints.reduce((sum, joint) => sum + joint[axis], 0) / joints.length;
 }

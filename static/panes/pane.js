@@ -7,7 +7,7 @@ import { ofJoint } from "../model/observability.js";
 import { jointLabel } from "./joint_label.js";
 import { drawObservability } from "./observability_marks.js";
 import { drawAxes } from "./axis_lines.js";
-import { isDimmed, isInSight } from "../model/selectors.js";
+import { isDimmed, isInSight, isStoredDrawn } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
 import { PaneCorner } from "./pane_corner.js";
@@ -95,17 +95,32 @@ export class Pane {
   }
 
   /**
-   * Zoom to some joints; without any, show the whole image.
+   * Zoom to a box; without one, show the whole image.
    *
-   * @param {{u: number, v: number}[]} joints
+   * @param {import("./pane_view.js").ImageBox | null} box
    */
-  frame(joints) {
-    const us = joints.map(({ u }) => u);
-    const vs = joints.map(({ v }) => v);
-    if (joints.length) {
-      this.view.frame({ left: Math.min(...us), top: Math.min(...vs), right: Math.max(...us), bottom: Math.max(...vs) });
-    } else this.view.reset();
+  frame(box) {
+    if (box) this.view.frame(box);
+    else this.view.reset();
     this.#redraw();
+  }
+
+  /**
+   * Keep a framed box in view that has moved with the frame. The caller draws.
+   *
+   * @param {import("./pane_view.js").ImageBox} box
+   */
+  refit(box) {
+    this.view.refit(box);
+  }
+
+  /**
+   * Move the view with what it shows, image pixels. The caller draws.
+   *
+   * @param {{du: number, dv: number}} way
+   */
+  follow({ du, dv }) {
+    this.view.follow(du, dv);
   }
 
   /**
@@ -138,9 +153,10 @@ export class Pane {
     return { x: event.clientX - box.left, y: event.clientY - box.top };
   }
 
-  /** Joints of this view that can be dragged, with their positions in the pane. Dimmed people have none. */
+  /** Joints of this view that can be dragged, with their positions in the pane. Dimmed people and the bare picture have none. */
   graspableHandles() {
-    const { session, hover, dragging, state } = this.#store.facts;
+    const { session, hover, dragging, state, bare } = this.#store.facts;
+    if (bare || !isStoredDrawn(state)) return [];
     const placed = this.#placedHandles().filter(({ handle }) => !isDimmed(state, handle.person));
     return decluttered(placed, session?.people ?? [], dragging ? hover : null);
   }
@@ -187,17 +203,18 @@ export class Pane {
    */
   draw(withPictures) {
     const { width, height } = this.#size;
-    const { state, session, overlay, layers, placeholder } = this.#store.facts;
+    const { state, session, overlay, layers, placeholder, bare } = this.#store.facts;
     if (width === 0 || height === 0) return;
     if (withPictures) this.#drawPictures();
     const context = drawing.prepare(this.#overlay, width, height, true);
     if (IN_SOFTWARE) context.drawImage(this.#image, 0, 0, width, height);
     this.#corner.showPlaceholder(placeholder);
     if (!state || !session || !overlay || placeholder?.pictures) return;
+    this.#showJoint(state);
+    if (bare) return;
     drawing.drawPaths(context, this.view, overlay, this.#camera, layers, (person) => isDimmed(state, person));
     drawAxes(context, this.view, this.#store.facts, this.#camera);
     this.#drawJoints(context, state, session.people);
-    this.#showJoint(state);
     drawPins(context, this.view, this.#store.facts, this.#camera, width);
   }
 
@@ -207,14 +224,15 @@ export class Pane {
 
   #drawPictures() {
     const { width, height } = this.#size;
-    const { shown, placeholder, layers, imageTones } = this.#store.facts;
+    const { shown, placeholder, layers, imageTones, bare } = this.#store.facts;
     const pictures = placeholder?.pictures ?? shown?.pictures;
     const context = drawing.prepare(this.#image, width, height, IN_SOFTWARE);
     drawing.drawBackground(context, this.view);
     /** @type {number | null} */
     let limitPx = null;
     for (const layer of PICTURE_LAYERS) {
-      const picture = layers.shown[layer] ? pictures?.get(keyOf(layer, this.#camera)) : undefined;
+      const isShown = bare ? layer === "image" : layers.shown[layer];
+      const picture = isShown ? pictures?.get(keyOf(layer, this.#camera)) : undefined;
       if (!picture) continue;
       const source = layer === "image" ? this.#tonedImage.of(picture.bitmap, imageTones[this.#camera]) : picture.bitmap;
       drawing.drawPicture(context, this.view, source, layers.opacity[layer]);

@@ -1,8 +1,8 @@
 /** Grid of the panes of all cameras, or one pane that fills it. */
 
-import { arrange, layOut, movedShares } from "../layout/grid_layout.js";
+import { arrange, fit, layOut, movedShares } from "../layout/grid_layout.js";
 import { keep, kept, keptByName } from "../layout/kept_views.js";
-import { followView, keepLink, keptLink } from "./linked_views.js";
+import { PeopleFollower, boxOf, followView, keepLink, keptLink, seen } from "./linked_views.js";
 import { Pane } from "./pane.js";
 import { PaneBorders } from "../layout/pane_borders.js";
 import { isInSight } from "../model/selectors.js";
@@ -13,7 +13,7 @@ const SECOND_DIGIT_MS = 700;
 /** Facts that change the marks over the overlay. @type {(keyof import("../model/store.js").Facts)[]} */
 const MARKED = ["hover", "hoverPart", "pinHover", "heldPin", "observability", "finding"];
 /** Facts that change the pictures. @type {(keyof import("../model/store.js").Facts)[]} */
-const PICTURED = ["shown", "placeholder", "layers", "imageTones"];
+const PICTURED = ["shown", "placeholder", "layers", "imageTones", "bare"];
 
 /** @typedef {{watch: (pane: Pane, camera: number) => void}} PointerTarget handles the pointer in a pane */
 
@@ -32,8 +32,13 @@ export class PaneGrid {
   #digit = { value: 0, at: -Infinity };
   #built = "";
   #choice = "";
-  /** Whether the session opens for the first time, and no view was moved yet. */
+  #follower = new PeopleFollower();
+  /** Whether the views are to be framed at the next overlay: the session opens, and no view was moved yet. */
   #isOpening = false;
+  /** Whether whole images are the views that nobody has chosen yet. */
+  #isFirst = false;
+  /** @type {number | null} frame on which people were found last */
+  #foundOn = null;
   /** Panes whose view changes with that of another, or of all. @type {Set<number>} */
   #following = new Set();
   /** Cameras of the views that were zoomed to joints last. @type {Set<number>} */
@@ -150,14 +155,25 @@ export class PaneGrid {
 
   /** Zoom every view to the people in it; with Solo, to the selected person. */
   framePeople() {
-    const { overlay, state, session } = this.#store.facts;
     this.#following = new Set(this.panes.keys());
-    this.panes.forEach((pane, camera) => {
-      const { width, height } = session?.cameras[camera] ?? { width: 0, height: 0 };
-      const isSeen = (/** @type {{u: number, v: number}} */ { u, v }) => u >= 0 && v >= 0 && u < width && v < height;
-      const isMeant = (/** @type {{person: number}} */ { person }) => !state?.solo || person === state.person;
-      pane.frame((overlay?.handles ?? []).filter((h) => h.camera === camera && isMeant(h) && isSeen(h)));
-    });
+    this.panes.forEach((pane, camera) => pane.frame(this.#boxIn(camera)));
+  }
+
+  /**
+   * Box around the people in a view; with Solo, around the selected person. Null if none is in it.
+   *
+   * @param {number} camera
+   */
+  #boxIn(camera) {
+    const { overlay, state, session } = this.#store.facts;
+    const meant = (overlay?.handles ?? []).filter(({ person }) => !state?.solo || person === state.person);
+    return boxOf(seen(meant, camera, session?.cameras[camera] ?? { width: 0, height: 0 }));
+  }
+
+  /** Let zoomed views follow the people from frame to frame, or no longer. */
+  togglePeopleFollowed() {
+    this.#follower.toggle();
+    return this.#follower.isOn;
   }
 
   /**
@@ -181,7 +197,7 @@ export class PaneGrid {
     this.#following = new Set(moved);
     for (const camera of moved) {
       const [ofBody, own] = [inside, meant].map((joints) => joints.filter((one) => one.camera === camera));
-      this.panes[camera].frame(cameras.has(camera) ? withMargin(own, extentOf(ofBody)) : ofBody);
+      this.panes[camera].frame(boxOf(cameras.has(camera) ? withMargin(own, extentOf(ofBody)) : ofBody));
     }
     this.#zoomedToJoints = cameras;
   }
@@ -215,10 +231,13 @@ export class PaneGrid {
   #update(changed) {
     if (changed.has("session")) this.#build();
     if (changed.has("filled")) this.#fill();
+    if (changed.has("bare")) document.body.classList.toggle("is-bare", this.#store.facts.bare);
+    if (changed.has("finding")) this.#expectPeople();
+    const isMoved = changed.has("overlay") && this.#follower.take(this.panes, this.#store.facts);
     if (changed.has("overlay")) this.#frameAtOpening();
     if (changed.has("target")) this.#ask(this.panes.map((pane) => pane.reduction));
     if (changed.has("active") || changed.has("session")) this.#markActive();
-    const withPictures = PICTURED.some((fact) => changed.has(fact));
+    const withPictures = isMoved || PICTURED.some((fact) => changed.has(fact));
     // Each move of a drag changes the state, but only these fields of it change the vectors.
     const { person, point, solo } = this.#store.facts.state ?? {};
     const choice = JSON.stringify([person, point, solo]);
@@ -248,7 +267,9 @@ export class PaneGrid {
     this.#zoomedToJoints.clear();
     this.#shares.open(name);
     const views = keptByName("views", name);
-    this.#isOpening = views === null;
+    this.#isOpening = true;
+    this.#isFirst = views === null;
+    this.#follower.forget();
     this.panes = cameras.map((info, camera) => {
       const pane = new Pane(this.#store, camera, info, {
         viewChanged: () => this.#viewChanged(camera),
@@ -270,18 +291,38 @@ export class PaneGrid {
   /** @param {number} camera */
   #viewChanged(camera) {
     this.#isOpening = false;
+    this.#follower.moved(camera);
     this.#refine();
     this.#keep();
     if (!this.#following.delete(camera)) this.#follow(camera);
   }
 
-  /** Zoom to the people when the session opens for the first time, if anybody has a pose. */
+  /**
+   * Show the people when the session opens, if anybody has a pose: views that were never moved or were framed are framed,
+   * and so are views of a place where nobody is now.
+   */
   #frameAtOpening() {
     const { overlay, state } = this.#store.facts;
     if (!this.#isOpening || !overlay || !state) return;
     this.#isOpening = false;
-    const isMoved = this.panes.some(({ view }) => !view.isReset);
-    if (!isMoved && state.people.some(({ source }) => source !== null)) this.framePeople();
+    if (!state.people.some(({ source }) => source !== null)) return;
+    const isNew = this.panes.every(({ view }) => view.isReset);
+    if (isNew && this.#isFirst) return this.framePeople();
+    this.panes.forEach((pane, camera) => {
+      const box = this.#boxIn(camera);
+      if (box && !pane.view.isReset && (pane.view.isFramed || !pane.view.shows(box))) {
+        this.#following.add(camera);
+        pane.frame(box);
+      }
+    });
+  }
+
+  /** Frame people who have just been found, if no view was moved. */
+  #expectPeople() {
+    const { finding } = this.#store.facts;
+    const isNew = !!finding?.running && finding.frame !== null && finding.frame !== this.#foundOn;
+    this.#foundOn = finding?.frame ?? null;
+    if (isNew && this.panes.every(({ view }) => view.isReset)) this.#isOpening = this.#isFirst = true;
   }
 
   /** Keep the zoom of all views. */
@@ -305,7 +346,9 @@ export class PaneGrid {
     const { clientWidth, clientHeight } = this.#element;
     const shown = filled === null ? cameras : [cameras[filled]];
     const aspects = shown.map(({ width, height }) => width / height);
-    const { arrangement, shares: automatic } = arrange(aspects, clientWidth, clientHeight);
+    // The drawer takes height and leaves the arrangement: panes stay where the user knows them.
+    const { arrangement } = arrange(aspects, clientWidth, clientHeight + this.#store.facts.drawerPx);
+    const { shares: automatic } = fit(arrangement, aspects, clientWidth, clientHeight);
     this.#arrangement = arrangement;
     const shares = this.#shares.of(arrangement, automatic);
     const { boxes, borders } = layOut(arrangement, shares, clientWidth, clientHeight);

@@ -4,10 +4,10 @@ import { BY_KEY } from "../model/layers.js";
 import { alt, inArea, plain } from "../widgets/key_matching.js";
 
 /**
- * @param {{grid: import("./pane_grid.js").PaneGrid, gestures: import("./gestures.js").Gestures, layers: import("../model/layers.js").Layers,
- *   layersMenu: import("./layers_menu.js").LayersMenu}} parts
+ * @param {{store: import("../model/store.js").Store, grid: import("./pane_grid.js").PaneGrid, gestures: import("./gestures.js").Gestures, layers: import("../model/layers.js").Layers,
+ *   layersMenu: import("./layers_menu.js").LayersMenu, say: (text: string) => void}} parts
  */
-export function paneBindings({ grid, gestures, layers, layersMenu }) {
+export function paneBindings({ store, grid, gestures, layers, layersMenu, say }) {
   return inArea("Views", [
     { keys: ["A"], label: "Layers", matches: plain("a"), run: () => layersMenu.toggle() },
     {
@@ -42,6 +42,22 @@ export function paneBindings({ grid, gestures, layers, layersMenu }) {
       label: "Link the zoom of all views (toggle)",
       matches: alt("Digit0", false),
       run: () => grid.toggleLink(),
+    },
+    {
+      keys: ["`"],
+      label: "Bare picture: hide all drawing while the key left of 1 is held",
+      words: "hide show nothing overlay contours joints",
+      matches: plain("`", "Backquote"),
+      // The palette has no key to hold: there it is a toggle.
+      run: ({ code }) => store.set({ bare: code !== "" || !store.facts.bare }),
+      release: () => store.set({ bare: false }),
+    },
+    {
+      keys: ["Alt V"],
+      label: "Zoomed views follow the people from frame to frame (toggle)",
+      words: "pan track playback steady still",
+      matches: alt("KeyV", false),
+      run: () => say(`Zoomed views ${grid.togglePeopleFollowed() ? "follow the people." : "stay where they are."}`),
     },
     {
       keys: [],

@@ -11,6 +11,8 @@ const MAX_ZOOM = 40;
 /** Size of what is framed with its margin, in sizes of its box: joints lie within the body. */
 const FRAME_MARGIN = 1.4;
 const MAX_FRAME_ZOOM = 8;
+/** A framed box that moves keeps its zoom while it takes this share of the pane: less is small, more is nearly cut off. */
+const [MIN_FRAMED, MAX_FRAMED] = [0.5, 0.92];
 
 /** @typedef {{left: number, top: number, right: number, bottom: number}} ImageBox image positions */
 
@@ -22,6 +24,8 @@ export class PaneView {
   #center;
   /** @type {ImageBox | null} what the pane is filled with */
   #framed = null;
+  /** @type {{u: number, v: number} | null} the followed centre, if it lies outside the image */
+  #beyond = null;
 
   /**
    * @param {number} width of the image, px
@@ -61,6 +65,16 @@ export class PaneView {
     return { ...this.#center };
   }
 
+  /**
+   * Whether the pane shows some part of a box.
+   *
+   * @param {ImageBox} box
+   */
+  shows({ left, top, right, bottom }) {
+    const [first, last] = [this.toScreen(left, top), this.toScreen(right, bottom)];
+    return last.x > 0 && last.y > 0 && first.x < this.#pane.width && first.y < this.#pane.height;
+  }
+
   /** What the view shows, to be restored; null for the whole image. */
   get choice() {
     if (this.#framed) return { framed: this.#framed };
@@ -80,6 +94,11 @@ export class PaneView {
     if (!Number.isFinite(zoom) || !Number.isFinite(u) || !Number.isFinite(v)) return;
     this.zoom = Math.max(MIN_ZOOM, Math.min(MAX_ZOOM, Number(zoom)));
     this.#moveCenter(Number(u) - this.#center.u, Number(v) - this.#center.v);
+  }
+
+  /** Whether the view is filled with a box. */
+  get isFramed() {
+    return this.#framed !== null;
   }
 
   get isReset() {
@@ -139,7 +158,7 @@ export class PaneView {
   }
 
   reset() {
-    this.#framed = null;
+    this.#framed = this.#beyond = null;
     this.zoom = 1;
     this.#center = this.#middle();
   }
@@ -158,6 +177,32 @@ export class PaneView {
     this.zoom = Math.max(1, Math.min(MAX_FRAME_ZOOM, scale / this.scale));
     this.#center = this.#middle();
     if (this.zoom > 1) this.#moveCenter((left + right) / 2 - this.#center.u, (top + bottom) / 2 - this.#center.v);
+  }
+
+  /**
+   * Keep a framed box in the middle that has moved. The zoom stays while the box fits the pane well.
+   *
+   * @param {ImageBox} box
+   */
+  refit(box) {
+    const { left, top, right, bottom } = box;
+    const share = Math.max((right - left) / this.#pane.width, (bottom - top) / this.#pane.height) * this.scale;
+    if (this.zoom === 1 || share < MIN_FRAMED || share > MAX_FRAMED) return this.frame(box);
+    this.#framed = box;
+    this.#moveCenter((left + right) / 2 - this.#center.u, (top + bottom) / 2 - this.#center.v);
+  }
+
+  /**
+   * Move the centre with what the view shows. Where it would leave the image, the way back starts from there.
+   *
+   * @param {number} du
+   * @param {number} dv
+   */
+  follow(du, dv) {
+    const { u, v } = this.#beyond ?? this.#center;
+    const wanted = { u: u + du, v: v + dv };
+    this.#moveCenter(wanted.u - this.#center.u, wanted.v - this.#center.v);
+    if (this.#center.u !== wanted.u || this.#center.v !== wanted.v) this.#beyond = wanted;
   }
 
   /**
@@ -181,6 +226,7 @@ export class PaneView {
    */
   #moveCenter(du, dv) {
     const { width, height } = this.#image;
+    this.#beyond = null;
     this.#center = {
       u: Math.max(0, Math.min(width - 1, this.#center.u + du)),
       v: Math.max(0, Math.min(height - 1, this.#center.v + dv)),

@@ -36,10 +36,15 @@ export class ExportPanel {
     this.#notify = notify;
     opensPopover(this.#panel, this.#open, () => void this.toggle());
     this.#start = button("export-start", () => void this.#run());
-    this.#cancel = button("export-cancel", () => this.#running?.abort());
+    this.#cancel = button("export-cancel", () => this.cancel());
     this.#format.addEventListener("change", () => this.#show());
     this.#frames.addEventListener("keydown", (event) => event.key === "Enter" && void this.#run());
     for (const select of this.#panel.querySelectorAll("select")) this.#select(select);
+  }
+
+  /** Cancel the export in progress. */
+  cancel() {
+    this.#running?.abort();
   }
 
   async toggle() {
@@ -118,6 +123,7 @@ export class ExportPanel {
     this.#start.disabled = true;
     this.#cancel.hidden = false;
     this.#showMessage("Exporting…");
+    this.#store.set({ exporting: 0 });
     const timer = setInterval(() => void this.#showProgress(), PROGRESS_MS);
     try {
       const answer = await fetch(address, { signal: running.signal });
@@ -136,6 +142,7 @@ export class ExportPanel {
     } finally {
       clearInterval(timer);
       this.#running = null;
+      this.#store.set({ exporting: null });
       this.#start.disabled = false;
       this.#cancel.hidden = true;
     }
@@ -144,7 +151,9 @@ export class ExportPanel {
   async #showProgress() {
     try {
       const { done, total } = await (await fetch("export/progress")).json();
-      if (this.#running && total) this.#showMessage(`Exporting, ${Math.floor((100 * done) / total)}%`);
+      if (!this.#running || !total) return;
+      this.#showMessage(`Exporting, ${Math.floor((100 * done) / total)}%`);
+      this.#store.set({ exporting: done / total });
     } catch {
       // The export itself reports that the program cannot be reached.
     }

@@ -17,10 +17,10 @@ import { Notices, watchConnection } from "./notices.js";
 import { Palette } from "./palette.js";
 import { People } from "./people.js";
 import { peopleBindings } from "./people_keys.js";
-import { showProgressMarks } from "./progress_marks.js";
 import { SavedMark } from "./saved_mark.js";
 import { escapeBinding, helpBindings } from "./shell_keys.js";
 import { TopBar } from "./top_bar.js";
+import { WorkList } from "./work_list.js";
 import { Workspace } from "./workspace.js";
 
 /**
@@ -49,11 +49,11 @@ export function mount(context, rooms) {
   new TopBar(store, actions);
   new Comparison(store, actions);
   const people = new People(store, actions, posing);
-  showProgressMarks(store);
   watchConnection(byId("banner", HTMLElement), store);
   const workspace = new Workspace(store);
   const history = new HistoryList(store, send);
-  new ExportPanel(store, context.notify);
+  const exporting = new ExportPanel(store, context.notify);
+  new WorkList(context, () => exporting.cancel());
   new SavedMark(store, send);
   new Announcer(byId("announcer", HTMLElement), store);
   const firstSteps = new FirstSteps(store);

@@ -45,6 +45,14 @@ export function orderedByArea(rooms) {
  *   command is unavailable
  */
 export function listen(target, table, { viser, isDragging, say }) {
+  /** @type {{binding: Binding, code: string} | null} the command whose key is held */
+  let held = null;
+  const release = () => {
+    held?.binding.release?.();
+    held = null;
+  };
+  target.addEventListener("keyup", (event) => event.code === held?.code && release());
+  target.defaultView?.addEventListener("blur", release);
   target.addEventListener("keydown", (event) => {
     const from = /** @type {HTMLElement | null} */ (event.target);
     const isEscape = event.key === "Escape";
@@ -56,6 +64,7 @@ export function listen(target, table, { viser, isDragging, say }) {
     event.preventDefault();
     const why = binding.why?.();
     if (why) say(why);
+    if (binding.release) held = { binding, code: event.code };
     binding.run(event);
   });
 }

@@ -57,6 +57,7 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
 export function escapeBinding({ store, actions, notices, grid, gestures, pinning, floor }) {
   const run = () => {
     if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel()) return;
+    if (store.facts.bare) return store.set({ bare: false });
     if (actions.leaveReplay() || actions.leaveBefore()) return;
     const { state, range, filled } = store.facts;
     if (hasTrack(state)) actions.stopTracking();

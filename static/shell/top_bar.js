@@ -92,12 +92,12 @@ export class TopBar {
   #showTrack({ running, first, last, at, done, total, per_second, doubtful, lost, back, message }) {
     const isActive = first !== null;
     const [how, ...rest] = message.split(", ");
-    const work = back ? "followed" : "tracked";
-    const way = back ? "Tracking lost people backward" : `Frame ${at ?? first}, tracking to frame ${last}`;
-    this.#stage.textContent = isActive ? `${running ? work : "paused"} ${done} of ${total}` : how;
+    const work = back ? "checking alternatives" : `tracked ${done} of ${total}`;
+    const way = back ? "Tracking lost people backward; you can go on" : `Frame ${at ?? first}, tracking to frame ${last}`;
+    this.#stage.textContent = isActive ? (running ? work : `paused ${done} of ${total}`) : how;
     this.#stage.title = isActive ? way : message;
     const counts = [doubtful && `${doubtful} doubtful`, lost && `${lost} lost`].filter(Boolean);
-    const rate = per_second > 0 ? `${per_second.toFixed(1)}/s` : done === 0 && "starting";
+    const rate = back ? "" : per_second > 0 ? `${per_second.toFixed(1)}/s` : done === 0 && "starting";
     const figures = [rate, ...counts].filter(Boolean).join(" · ");
     this.#figures.textContent = isActive ? figures : rest.join(" · ");
     const bar = document.createElement("i");

@@ -1,15 +1,18 @@
 /**
- * Widths of the camera panes and of the 3-D view beside them. The 3-D view folds away on request, or where the inspector
- * leaves the panes too little room. The place of the separator and the choice are stored.
+ * Widths of the camera panes and of the 3-D view beside them. The panes are as wide as their images can use, unless the user
+ * has moved the separator. The 3-D view folds away on request, or where the inspector leaves the panes too little room. The
+ * place of the separator and the choice are stored.
  */
 
+import { usefulWidth } from "../layout/grid_layout.js";
 import { byId } from "../widgets/elements.js";
 import { inArea, alt } from "../widgets/key_matching.js";
 import { makeSeparator, showPosition } from "../widgets/separator.js";
 
 const STORED = "quadrille.panes-fraction";
 const STORED_FOLD = "quadrille.scene-fold";
-const DEFAULT_FRACTION = 0.62;
+/** Automatic share of the panes: the usual one, and the largest, which leaves a 3-D view in which a person can be seen. */
+const [USUAL_FRACTION, MAX_FRACTION] = [0.62, 0.75];
 const MIN_PANES_PX = 480;
 const MIN_SCENE_PX = 300;
 /** Panes below both sizes, beside inspector and 3-D view, are too small for work. */
@@ -24,12 +27,17 @@ export class Workspace {
   #bar = byId("split", HTMLElement);
   #inspector = byId("inspector", HTMLElement);
   #button = byId("show-scene", HTMLButtonElement);
-  #fraction = Number(localStorage.getItem(STORED)) || DEFAULT_FRACTION;
+  #store;
+  /** Share chosen by the user; null for the automatic one. */
+  #chosen = Number(localStorage.getItem(STORED)) || null;
+  /** The automatic width by what it depends on, of which only the newest is needed. */
+  #useful = { from: "", width: 0 };
   /** @type {Fold} */
   #fold = restoredFold();
 
   /** @param {import("../model/store.js").Store} store */
   constructor(store) {
+    this.#store = store;
     makeSeparator(this.#bar, {
       position: () => this.#show(),
       moveTo: (position) => this.#moveTo(position),
@@ -43,6 +51,7 @@ export class Workspace {
     this.#button.addEventListener("click", () => this.toggleScene());
     let isLookingThrough = false;
     store.subscribe((changed) => {
+      if (changed.has("session")) this.#show();
       if (!changed.has("state")) return;
       const looks = (store.facts.state?.snapped ?? null) !== null;
       if (looks && !isLookingThrough && this.#isFolded) this.toggleScene();
@@ -99,7 +108,7 @@ export class Workspace {
     const bar = this.#bar.offsetWidth;
     const max = this.#width - MIN_SCENE_PX;
     const min = Math.min(MIN_PANES_PX, max);
-    const panes = isFolded ? this.#width - bar : Math.round(Math.max(min, Math.min(max, this.#fraction * whole)));
+    const panes = isFolded ? this.#width - bar : Math.round(Math.max(min, Math.min(max, this.#chosen ? this.#chosen * whole : this.#automatic(whole))));
     this.#element.classList.toggle("is-scene-folded", isFolded);
     this.#element.style.setProperty("--panes-width", `${panes}px`);
     const share = 100 / Math.max(1, whole);
@@ -109,6 +118,20 @@ export class Workspace {
     return panes;
   }
 
+  /** @param {number} whole width of the workspace */
+  #automatic(whole) {
+    const { session, drawerPx } = this.#store.facts;
+    const aspects = session?.cameras.map(({ width, height }) => width / height) ?? [];
+    // The height without a drawer: opening one moves no separator.
+    const height = this.#element.clientHeight + drawerPx;
+    const from = JSON.stringify([aspects, whole, height]);
+    if (from !== this.#useful.from) {
+      const widths = { usual: USUAL_FRACTION * whole, max: MAX_FRACTION * whole };
+      this.#useful = { from, width: usefulWidth(aspects, widths, height) };
+    }
+    return this.#useful.width;
+  }
+
   /** @param {number} position */
   #moveTo(position) {
     const edge = this.#width - this.#bar.offsetWidth;
@@ -116,13 +139,13 @@ export class Workspace {
     const folds = position > edge - MIN_SCENE_PX / 2;
     if (folds !== this.#isFolded) this.#choose(folds);
     if (folds) return;
-    this.#fraction = position / this.#element.clientWidth;
-    this.#fraction = this.#show() / this.#element.clientWidth;
-    localStorage.setItem(STORED, String(this.#fraction));
+    this.#chosen = position / this.#element.clientWidth;
+    this.#chosen = this.#show() / this.#element.clientWidth;
+    localStorage.setItem(STORED, String(this.#chosen));
   }
 
   #reset() {
-    this.#fraction = DEFAULT_FRACTION;
+    this.#chosen = null;
     localStorage.removeItem(STORED);
     this.#choose(this.#isCramped);
   }

@@ -9,6 +9,7 @@
  * @property {string} [words] further words that the palette finds it by
  * @property {string} [area] area of the key list
  * @property {() => string | null} [why] why the command is unavailable; null if it is available
+ * @property {() => void} [release] end of a command that lasts while its key is held
  * @property {boolean} [anywhere] whether it also applies while the user types text
  */
 

@@ -23,7 +23,7 @@ from app.page.message_parsing import parse
 
 WIDTH, HEIGHT, N_FRAMES = 640, 480, 120
 CAMERA_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
-COLORS = ("#ffb454", "#6ccbff")
+COLORS = ("#ffb454", "#6ccbff", "#8be06a", "#ff8fa3", "#c9a6ff", "#ffe066", "#5ee0c8", "#ff9df2")
 REST = {
     "torso": (0.0, 0.25, 0.0),
     "waist": (0.0, 0.18, 0.0),
@@ -158,6 +158,8 @@ class FakeEndpoint:
     sockets: set = field(default_factory=set)
     thumbnails: list = field(default_factory=list)
     """Addresses of the thumbnails that the pages requested."""
+    walk_m: float = 0.0
+    """How far the people walk from a frame to the next."""
     start: str = "first"
     """Identifies the start of the pretended program."""
     name: str = "elbow_rotation"
@@ -537,7 +539,7 @@ class FakeEndpoint:
                 for (p, name), at in self.pose.items():
                     if p != person:
                         continue
-                    ((u, v),) = project(at[None], camera)
+                    ((u, v),) = project((at + self.walked)[None], camera)
                     visible = (name.startswith("l_"), name.startswith("r_"))[camera % 2] or name in ("torso", "head")
                     handles.append({
                         "camera": camera, "person": p, "point": name, "u": u, "v": v, "visible": visible,
@@ -559,7 +561,7 @@ class FakeEndpoint:
         around = np.linspace(0, 2 * np.pi, 33)
         lines = []
         for names in BONES:
-            ends = project(np.stack([self.pose[person, n] for n in names]) + shift, camera)
+            ends = project(np.stack([self.pose[person, n] for n in names]) + self.walked + shift, camera)
             axis = ends[1] - ends[0]
             length = np.hypot(*axis) + 1e-9
             along, across = axis / length, np.array([-axis[1], axis[0]]) / length
@@ -570,6 +572,11 @@ class FakeEndpoint:
             )
             lines.append(np.concatenate([ring[:-1], ring[1:]], axis=1))
         return np.concatenate(lines)
+
+    @property
+    def walked(self):
+        """Way of the people from frame 12, where the page opens, to the shown one."""
+        return np.array([self.walk_m * (self.state["frame"] - 12), 0.0, 0.0])
 
     def picture(self, camera, frame, layer):
         """The image of a room with a bright figure that shows its number; masks and a distance image of even colour."""

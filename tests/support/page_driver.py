@@ -7,6 +7,15 @@ from contextlib import asynccontextmanager
 OPENED = "window.quadrille?.state.overlay && quadrille.state.overlay.frame === quadrille.state.shown?.frame"
 """That a page shows its first frame, for `shows`."""
 
+DRAWN = """[...document.querySelectorAll(".pane-overlay")].reduce((sum, canvas) => {
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  const people = quadrille.state.session.people.map(({ color }) => parseInt(color.slice(1), 16));
+  for (let i = 0; i < data.length; i += 4)
+    if (people.includes((data[i] << 16) | (data[i + 1] << 8) | data[i + 2])) sum++;
+  return sum;
+}, 0)"""
+"""JavaScript: how many pixels of all panes have exactly a person's colour; the images have none."""
+
 
 async def shows(page, expression, timeout_s=20.0):
     """Wait until a JavaScript expression holds and the page has drawn it.

@@ -20,7 +20,14 @@ _LIFT_M = 0.012
 
 
 def points_occluded(bodies: Sequence[PosedBody], cameras: Sequence[Camera], points_world: Array) -> NDArray[np.bool_]:
-    """Return whether a part occludes each point, (V, n).
+    """Return whether any body occludes each point, (V, n); see `points_occluded_by_body`."""
+    return points_occluded_by_body(bodies, cameras, points_world).any(axis=1)
+
+
+def points_occluded_by_body(
+    bodies: Sequence[PosedBody], cameras: Sequence[Camera], points_world: Array
+) -> NDArray[np.bool_]:
+    """Return whether each body occludes each point, (V, n_bodies, n).
 
     Parts that contain the point itself, as around a joint, do not count.
 
@@ -29,17 +36,18 @@ def points_occluded(bodies: Sequence[PosedBody], cameras: Sequence[Camera], poin
         cameras: the views.
         points_world: (n, 3), metres.
     """
-    surfaces = surfaces_of(tuple(b.model for b in bodies))
-    Ts = occluding_contours.part_poses(bodies)
-    shapes = [s for b in bodies for s in b.model.shapes]
-    holds = np.stack(
-        [
-            shape.inside_outside((points_world - T[:3, 3]) @ T[:3, :3] - center) < 1.5
-            for shape, T, center in zip(shapes, Ts, surfaces.centers, strict=True)
-        ]
-    )
-    occluded = [_occluded_points(c, Ts, surfaces, points_world, holds) for c in cameras]
-    return np.array(occluded, dtype=bool).reshape(len(cameras), len(points_world))
+    occluded = np.zeros((len(cameras), len(bodies), len(points_world)), dtype=bool)
+    for i, body in enumerate(bodies):
+        surfaces, Ts = surfaces_of((body.model,)), occluding_contours.part_poses([body])
+        holds = np.stack(
+            [
+                shape.inside_outside((points_world - T[:3, 3]) @ T[:3, :3] - center) < 1.5
+                for shape, T, center in zip(body.model.shapes, Ts, surfaces.centers, strict=True)
+            ]
+        )
+        for view, camera in enumerate(cameras):
+            occluded[view, i] = _occluded_points(camera, Ts, surfaces, points_world, holds)
+    return occluded
 
 
 def part_edges(bodies: Sequence[PosedBody], camera: Camera) -> FloatArray:

@@ -12,7 +12,7 @@ from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.pipeline.body_acquisition import SIZES_EDITS, PosedFrames, acquire_body, with_sizes_changed
-from tracker.pipeline.first_pose import FirstPose, FirstPoses, find_first_poses_anywhere
+from tracker.pipeline.first_pose import FirstPose, FirstPoses, Show, find_first_poses_anywhere
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
@@ -82,7 +82,7 @@ def frames_to_try(frames: range, first: int | None) -> list[int]:
 
 def find_people(
     session: Session, observer: Observer, people: Sequence[int], frames: range, settings: FindSettings,
-    report: Report = lambda stage, share, text: None,
+    report: Report = lambda stage, share, text: None, show: Show = lambda frame, found: None,
 ) -> FoundPeople:  # fmt: skip
     """Find the first poses of people, all on one frame, and their sizes. Nothing is stored; see `store_found`.
 
@@ -93,6 +93,7 @@ def find_people(
         frames: the frames that may be used.
         settings: of the search.
         report: shows progress.
+        show: shows each frame that is tried and the first poses on it.
 
     Raises:
         TrackerError: no frame shows the people well enough.
@@ -106,7 +107,7 @@ def find_people(
         report("finding first poses", end * min(0.95, done / (len(tried) + 2)), text)
 
     report("finding first poses", 0.0, "")
-    first = find_first_poses_anywhere(session, observer, people, tried, say=say)
+    first = find_first_poses_anywhere(session, observer, people, tried, say=say, show=show)
     bodies = {i: p.model for i, p in first.poses.items()}
     poses = {i: p.fitted.pose for i, p in first.poses.items()}
     acquired: dict[int, Acquisition] = {}

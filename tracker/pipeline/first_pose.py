@@ -45,6 +45,8 @@ _LARGER = 0.02
 """Share by which some silhouette grows with what looks like shadows, above which it is worth another start."""
 
 Say = Callable[[str], None]
+Show = Callable[[int, "FirstPoses | None"], None]
+"""Is given each frame that is tried, at first with None, and then with the poses if some were found."""
 Silhouettes: TypeAlias = Callable[[int, int], Sequence[ViewSilhouette]]
 """Returns the silhouettes of all views by frame and by index of the person whose masks are used."""
 
@@ -116,14 +118,14 @@ def find_first_poses(
 
 def find_first_poses_anywhere(
     session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int], size_m: float = VOXEL_M,
-    say: Say = lambda text: None,
+    say: Say = lambda text: None, show: Show = lambda frame, found: None,
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever method and on whatever of some frames tracks best; see `find_first_poses`.
 
     Voxels are tried until their starts are good on enough frames. The axis is tried on the best of these, and a search
-    along the figure where neither finds a good start.
+    along the figure where neither finds a good start. `show` receives each frame and what was found on it.
     """
-    with _Trial(session, observer, people, size_m, say) as trial:
+    with _Trial(session, observer, people, size_m, say, show) as trial:
         for frame in frames:
             if sum(f.is_good for f in trial.found) < _ENOUGH_FRAMES:
                 trial.add(frame, ("voxels",))
@@ -140,7 +142,11 @@ def find_first_poses_anywhere(
 class _Trial:
     """First poses on the frames that were tried."""
 
-    def __init__(self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say) -> None:
+    def __init__(
+        self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say,
+        show: Show = lambda frame, found: None,
+    ) -> None:  # fmt: skip
+        self._show = show
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
         self._finder = SilhouetteFinder(session.cameras, observer.recording)
         floor = floor_plane(session.up, session.floor)
@@ -167,6 +173,7 @@ class _Trial:
     def add(self, frame: int, methods: Sequence[StartMethod]) -> None:
         """Try a frame."""
         own: dict[int, FirstPose] = {}
+        self._show(frame, None)
         try:
             for person in self._people:
                 task = _Task(self._session, self._observer, self._sources, person, self._size_m)
@@ -176,6 +183,7 @@ class _Trial:
             self._say(f"frame {frame}, {' and '.join(methods)}: {error}")
             return
         self.found.append(FirstPoses(frame, own))
+        self._show(frame, self.found[-1])
         statuses = ", ".join(p.fitted.status for p in own.values())
         cost = f"cost {self.found[-1].cost_px:.2f} px over a short track"
         self._say(f"frame {frame}, {' and '.join(methods)}: {statuses}, {cost}")

@@ -65,7 +65,7 @@ def carve_people(
     if not figures:
         raise TrackerError(
             f"expected a figure of at least {1000 * MIN_FIGURE_M3:.0f} litres where the silhouettes meet, found "
-            f"{1000 * voxels.volume_m3:.0f} litres in all; check that no camera has moved, and the background"
+            f"{_largest(voxels)}; check that no camera has moved, and the background"
         )
     poor = [f"{n} {100 * c:.0f}%" for n, c in zip(names, found, strict=True) if c < _MIN_COVERAGE]
     if len(poor) > (broken >= 0):
@@ -135,3 +135,13 @@ def _coverage(points: Array, size_m: float, silhouette: ViewSilhouette) -> float
     """Return the share of a silhouette that projected surface voxels cover."""
     covered = paint(points, size_m, silhouette) & silhouette.mask
     return float(np.count_nonzero(covered) / np.count_nonzero(silhouette.mask))
+
+
+def _largest(voxels: Voxels) -> str:
+    """Describe the largest piece of a hull without a figure, for people to read."""
+    if not voxels.occupied.any():
+        return "none"
+    litres = 1000 * max(v.volume_m3 for v in voxels.components(0.0))
+    if litres < 1000 * MIN_FIGURE_M3:
+        return f"pieces of at most {litres:.1f} litres"
+    return "only pieces that the silhouettes do not need"

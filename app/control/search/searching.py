@@ -139,6 +139,8 @@ class SearchRunner:
 
     def forget(self) -> None:
         """Discard a paused search; late steps are ignored."""
+        if self._job is not None:
+            self._job.discard()
         self._job = None
         if self._run is not None:
             self._run.over = True
@@ -178,6 +180,8 @@ class SearchRunner:
                 raise TrackerError("expected degrees of freedom to search, found all of them locked; unlock some")
             if self._run is not None:
                 self._run.over = True
+            if self._job is not None:
+                self._job.discard()
             costs = session_state.costs(poses)
             people = tuple(
                 p if p.values is v else ShownPose(v, p.source) for p, v in zip(state.people, poses, strict=True)

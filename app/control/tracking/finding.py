@@ -12,6 +12,7 @@ from app.control.session.session_state import SessionState
 from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
 from app.state.progress import FindState, Line
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.body_acquisition import SIZES_EDITS, with_sizes_changed
@@ -24,6 +25,7 @@ from tracker.pipeline.find_people import (
     first_record,
     sentences,
 )
+from tracker.pipeline.first_pose import FirstPoses
 from tracker.session.session import save_model
 from tracker.store.records import PoseChange
 
@@ -53,6 +55,9 @@ class FindingPeople:
         self._session_state, self._activities, self._tracking, self._runs = session_state, activities, tracking, runs
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
+        self._shown: int | None = None
+        """Frame at which the user is shown what is tried; another frame is one that the user has gone to."""
+        self._first_tried: int | None = None
         frame, axes = _axes(session_state.saver.setting(AXES))
         session_state.set(finding=FindState(frame=frame, axes=axes))
 
@@ -79,8 +84,11 @@ class FindingPeople:
                 )
             finding = session_state.state.finding
             session_state.set(
-                finding=replace(finding, running=True, stage="starting", share=0.0, notes=(), message="", failed=False)
+                finding=replace(
+                    finding, running=True, stage="starting", share=0.0, notes=(), message="", failed=False, tried=None
+                )
             )
+            self._shown, self._first_tried = session_state.state.frame, None
         self._stopping.clear()
         self._thread = threading.Thread(target=self._work, args=(people, acquire), name="find people", daemon=True)
         self._thread.start()
@@ -103,19 +111,20 @@ class FindingPeople:
             session = session_state.session
             found = find_people(
                 session, session_state.frames.observer, people, range(session.n_frames), FindSettings(acquire=acquire),
-                self._report,
+                self._report, self._show,
             )  # fmt: skip
             edit = self._store(found, people)
             self._set(notes=tuple(sentences(session, found)))
             is_done = self._track(found, edit)
             self._set(running=False, message="Done." if is_done else "Stopped; what was tracked stays.")
         except _StoppedError:
-            self._set(running=False, message="Stopped; nothing was changed.")
+            self._set(running=False, message="Stopped; nothing was changed.", tried=None, candidates={})
         except Exception as error:
             if not isinstance(error, TrackerError):
                 _LOG.exception("a search for people failed")
             text = page_text(error)
-            self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
+            message = f"{text[:1].upper()}{text[1:]}."
+            self._set(running=False, message=message, failed=True, tried=self._first_tried, candidates={})
 
     def _report(self, stage: str, share: float, text: str) -> None:
         if self._stopping.is_set():
@@ -125,6 +134,20 @@ class FindingPeople:
         notes = (*before.notes, text) if text else before.notes
         if (stage, share, notes) != (before.stage, before.share, before.notes):
             self._set(stage=stage, share=share, notes=notes)
+
+    def _show(self, frame: int, found: FirstPoses | None) -> None:
+        """Draw the first poses of a frame that is tried. Go there unless the user looks or works elsewhere."""
+        session_state = self._session_state
+        self._first_tried = frame if self._first_tried is None else self._first_tried
+        bodies = {} if found is None else {i: PosedBody(p.model, p.fitted.pose) for i, p in found.poses.items()}
+        with session_state.lock:
+            state = session_state.state
+            finding = replace(state.finding, tried=frame, candidates=bodies)
+            if state.frame == self._shown != frame and state.drag is None and not state.search.running:
+                self._shown = frame
+                session_state.show_frame(frame, finding=finding)
+            else:
+                session_state.set(finding=finding)
 
     def _set(self, **changes: Any) -> None:
         with self._session_state.lock:
@@ -158,7 +181,8 @@ class FindingPeople:
                 saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, sizes))
                 self._runs.clear()
             frame, lines = _axes(axes)
-            session_state.show_frame(found.frame, finding=replace(session_state.state.finding, frame=frame, axes=lines))
+            finding = replace(session_state.state.finding, frame=frame, axes=lines, tried=None, candidates={})
+            session_state.show_frame(found.frame, finding=finding)
             session_state.refresh_saving()
             return edit
 

@@ -1,7 +1,9 @@
 """Find frames whose poses disagree with their neighbours, and keyframes that views contradict, in the background."""
 
+import time
 import zlib
 from collections.abc import Iterable, Sequence
+from itertools import product
 
 import numpy as np
 
@@ -16,6 +18,9 @@ from tracker.store.records import FramePose, FrameRow
 
 _REST_S = 0.3
 """Minimum time between two checks: a tracker writes twice a second."""
+_REST_SHARE = 3.0
+"""Rest after an interval of many, in the time that it took. Each query of an edit gives up the interpreter, and waits
+for it again while a check computes: beside a check without rests, the first edits in a long recording took seconds."""
 _REACH = 3
 """A changed pose affects the result of frames up to this distance."""
 _MAX_INTERVAL = 2000
@@ -52,9 +57,13 @@ class InconsistentFrames:
         with session_state.lock:
             changed = sorted(session_state.saver.index.timeline(self._seen))
         self._seen = version
-        for first, last in _intervals(changed):
-            for person in range(len(session_state.models)):
-                self._check_interval(person, first, last)
+        people, took_s = range(len(session_state.models)), 0.0
+        for i, (person, (first, last)) in enumerate(product(people, _intervals(changed))):
+            if i >= len(people):  # a long recording, not an edit
+                time.sleep(_REST_SHARE * took_s)
+            began_s = time.monotonic()
+            self._check_interval(person, first, last)
+            took_s = time.monotonic() - began_s
         self._publish()
 
     def confirm(self, person: int, frame: int) -> None:

@@ -241,6 +241,7 @@ class Ranges:
             unit = "frames" if n_people < 2 else "poses"
             did = f"{how}: {run.did} {state.done} of {state.total} {unit}"
         self._run = None
+        run.job.discard()
         self._session_state.refresh_saving()
         self._session_state.set(ranges=RangeState(message=did))
 

@@ -328,6 +328,7 @@ class Tracking:
         track = self._session_state.state.track
         self._run = None
         tracked = run.session.tracked
+        run.job.discard()
         if tracked:
             self.after_run(range(min(tracked), max(tracked) + 1))
         self._session_state.set(

@@ -10,7 +10,7 @@ from app.drawing.overlays import Path
 from app.state.page_view import View
 from app.state.people import ShownPose
 from tracker.body.model import PosedBody
-from tracker.contours import occluding_contours
+from tracker.contours import occluding_contours, part_edges
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.images.edge_segments import EdgeSegments, sample_segments
 
@@ -170,3 +170,18 @@ def test_a_joint_behind_another_person_says_by_whom_it_is_hidden(couple):
     assert [h for h in found if h.person == 0 and h.point in visible and not h.visible]
     assert {h.hidden_by for h in found if h.person == 1} == {None}
     assert {h.hidden_by for h in found if h.visible} == {None}
+
+
+def test_joints_are_tested_once_against_each_body_in_the_visible_views(couple, monkeypatch):
+    """With eight people and sixteen cameras, a test of each pair of people took most of a seek."""
+    occluded, tested = part_edges._occluded_points, []
+    monkeypatch.setattr(part_edges, "_occluded_points", lambda *args: (tested.append(args[0].name), occluded(*args))[1])
+    cameras = [c.camera for c in couple.session.cameras]
+    names, values = [c.name for c in cameras], couple.state.poses[0]
+    behind = values.copy()
+    behind[:3] += 0.6 * cameras[0].T_world_camera[:3, 2]  # of the first in this view
+    state = replace(couple.state, people=(ShownPose(values, "manual"), ShownPose(behind, "manual")))
+    found = overlays.handles(couple.session, state, {0, 2})
+    assert sorted(tested) == sorted(2 * [names[0], names[2]])
+    assert {h.camera for h in found} == {0, 2}
+    assert {(h.person, h.hidden_by) for h in found if h.camera == 0 and not h.visible} >= {(0, None), (1, None), (1, 0)}

@@ -1,4 +1,7 @@
+import gc
 import threading
+import weakref
+from contextlib import contextmanager
 
 import pytest
 from gestures import wait_for
@@ -118,3 +121,45 @@ def test_a_job_that_fails_hands_its_error_on():
     wait_for(lambda: watched.ended)
     assert watched.done == [1]
     assert str(watched.ended[0]) == "no light"
+
+
+@contextmanager
+def no_collector():
+    """Only what nobody refers to is freed."""
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+@pytest.mark.parametrize("ends_by", ["discarding a paused job", "discarding a running job", "the last step"])
+def test_a_job_that_is_over_frees_what_its_steps_held(ends_by):
+    images, go = [], threading.Semaphore(0)
+
+    def steps():
+        held = Images()
+        images.append(weakref.ref(held))
+        yield 1
+        go.acquire()
+        yield held.number
+
+    class Images:
+        number = 2
+
+    with no_collector():
+        watched = Watched(steps())
+        watched.job.step()
+        wait_for(lambda: watched.paused)
+        if ends_by != "discarding a paused job":
+            watched.job.run()
+        if ends_by == "discarding a running job":
+            watched.job.discard()
+        go.release()
+        if ends_by.startswith("discarding"):
+            watched.job.discard()
+        wait_for(lambda: images[0]() is None and watched.job.ended)
+        assert watched.ended == [] if ends_by.startswith("discarding") else len(watched.ended) == 1
+        watched.job.run()
+        assert not watched.job.running

@@ -1,6 +1,6 @@
 """Progress of long work: the rate and the time left are those of a usual item."""
 
-from app.runtime.progress import Pace, Reporter, pace_text
+from app.runtime.progress import Pace, Reporter, pace_text, share_text
 
 
 def paced(durations):
@@ -43,3 +43,19 @@ def test_lines_where_there_is_no_terminal(capsys, monkeypatch):
             tick()
     lines = capsys.readouterr().err.splitlines()
     assert lines == ["tracking: 1 of 3", "tracking: 2 of 3, 2.0/s, 0 s left", "tracking: 3 of 3, 2.0/s"]
+
+
+def test_time_left_of_work_whose_steps_differ_in_size():
+    """A step of many hundredths at once said "439781.4/s, 0 s left"."""
+    assert share_text(0.25, 30.0) == ", 90 s left"
+    assert share_text(0.1, 60.0) == ", 9 min left"
+    assert share_text(0.0, 5.0) == share_text(1.0, 5.0) == ""
+
+
+def test_shares_are_lines_where_there_is_no_terminal(capsys, monkeypatch):
+    times = iter([0.0, 30.0, 40.0])
+    monkeypatch.setattr("app.runtime.progress.time.monotonic", lambda: next(times))
+    with Reporter().share("finding people") as advance:
+        for share in (0.5, 0.505, 1.0):  # a line for each tenth
+            advance(share)
+    assert capsys.readouterr().err.splitlines() == ["finding people: 50%, 30 s left", "finding people: 100%"]

@@ -126,7 +126,7 @@ async def test_a_session_is_made_with_its_checks_told_one_by_one(folders, serve,
         "people": ["ann", "bob"], "heights_cm": [170, 160],
     }  # fmt: skip
     lines = await client.make(form)
-    assert [next(iter(line)) for line in lines] == ["passed"] * 6 + ["made"]
+    assert [next(iter(line)) for line in lines] == ["passed"] * 7 + ["made"]
     assert "4 cameras: FRONT" in lines[0]["passed"]
     assert "50 frames at 25" in lines[3]["passed"]
     assert "ann 1.70 m, bob 1.60 m" in lines[4]["passed"]

@@ -185,7 +185,7 @@ class TestGrid:
     async def fit(self, page, endpoint, n_cameras):
         """Side by side, as large as there is room for, in pictures as fine as they are shown."""
         await page.set_viewport_size({"width": 1280, "height": 720})
-        await shows(page, "document.querySelector('#panes').clientWidth < 800")
+        await shows(page, "document.querySelector('#workspace').clientWidth === 1280")
         whole = await page.locator("#panes").bounding_box()
         boxes = [await pane.bounding_box() for pane in await page.locator(".pane:visible").all()]
         assert len(boxes) == n_cameras
@@ -252,7 +252,7 @@ async def test_the_axes_of_the_silhouettes_are_drawn_on_their_frame_alone(page, 
     line = [u, v - 40, u, v + 40]
     found = {
         "type": "finding", "running": False, "stage": "", "share": 1.0, "notes": [], "message": "Done.",
-        "failed": False,
+        "failed": False, "tried": None,
         "axes": [{"camera": camera, "people": [[[u + 30, v - 40, u + 30, v + 40], line]]}],
     }  # fmt: skip
     frame = await page.evaluate("quadrille.state.state.frame")

@@ -5,7 +5,7 @@ import asyncio
 import numpy as np
 import pytest
 from fake_endpoint import project
-from page_driver import OPENED, dragging, handle_of, shows, state_of, to_client, until
+from page_driver import DRAWN, OPENED, dragging, handle_of, shows, state_of, to_client, until
 
 PIXEL = """([x, y]) => {
   const canvas = document.querySelector(".pane-overlay");
@@ -180,16 +180,6 @@ async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
     await page.locator("#quick-layers").get_by_text("Joints").click()
     await shows(page, f"({DRAWN}) === 0")
     await until(lambda: set(endpoint.views[-1]["layers"]) == {"image", "distance", "epipolar", "axes"})
-
-
-DRAWN = """[...document.querySelectorAll(".pane-overlay")].reduce((sum, canvas) => {
-  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-  const people = quadrille.state.session.people.map(({ color }) => parseInt(color.slice(1), 16));
-  for (let i = 0; i < data.length; i += 4)
-    if (people.includes((data[i] << 16) | (data[i + 1] << 8) | data[i + 2])) sum++;
-  return sum;
-}, 0)"""
-"""JavaScript: how many pixels of all panes have exactly a person's colour; the images have none."""
 
 
 async def test_contours_and_joints_are_drawn_in_the_persons_colour(page):

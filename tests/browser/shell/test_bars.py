@@ -216,7 +216,7 @@ async def test_every_control_has_a_name_and_a_tooltip(page):
 
 
 async def test_that_kernels_are_compiled_is_said_while_they_are(page, endpoint):
-    mark = page.locator("#compiling")
+    mark = page.locator("#work-compiling b")
     assert not await mark.is_visible()
     endpoint.state["compiling"] = "contours"
     await endpoint.broadcast(endpoint.state)
@@ -242,11 +242,11 @@ async def test_work_that_waits_for_kernels_says_so(page, endpoint):
 
 async def test_the_backward_pass_is_told_from_the_first(page, endpoint):
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "lost": 2}
-    for back, text in ((False, "Tracked 4 of 9"), (True, "Followed 4 of 9")):
+    for back, text in ((False, "Tracked 4 of 9"), (True, "Checking alternatives")):
         endpoint.state["track"] = track | {"back": back, "done": 4, "total": 9}
         await endpoint.broadcast(endpoint.state)
         await expect(page.locator("#search-stage")).to_have_text(text, use_inner_text=True)
-    assert await page.locator("#search-stage").get_attribute("title") == "Tracking lost people backward"
+    assert await page.locator("#search-stage").get_attribute("title") == "Tracking lost people backward; you can go on"
 
 
 USUAL = "document.querySelector('#usual-cost').textContent"

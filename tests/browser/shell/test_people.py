@@ -87,7 +87,7 @@ LANE = """([lane, frame]) => {
 
 async def test_a_lane_has_the_colour_of_its_person_and_the_pattern_of_the_status(couple):
     await shows(couple, "document.querySelector('#timeline canvas').width === 1280 * devicePixelRatio")
-    for lane, color in enumerate(COLORS):
+    for lane, color in enumerate(COLORS[:2]):
         plain, doubtful, lost = [await couple.evaluate(LANE, [lane, frame]) for frame in (15, 31, 50)]
         assert plain == [[color], 0.0]
         assert color in doubtful[0]
@@ -146,7 +146,7 @@ async def test_bars_and_legend_tell_what_is_visible_of_the_person_worked_on(coup
     assert len({await samples.nth(i).get_attribute("stroke-dasharray") for i in (0, 2)}) == 2
     assert await couple.locator("#source").inner_text() == "person 1: replay"
     await couple.keyboard.press("Shift+Digit6")
-    await shows(couple, "document.querySelectorAll('#pose-legend svg').length === 1")
+    await shows(couple, "document.querySelectorAll('#pose-legend svg').length === 0")
     assert "contours are hidden" in await legend.inner_text()
 
 
@@ -166,6 +166,6 @@ async def test_the_top_bar_has_room_while_kernels_are_compiled(couple, endpoint)
     await couple.set_viewport_size({"width": 1280, "height": 720})
     endpoint.state["compiling"] = "contours"
     await endpoint.broadcast(endpoint.state)
-    await shows(couple, "!document.querySelector('#compiling').hidden")
+    await shows(couple, "document.querySelector('#work-compiling')")
     bar = "document.querySelector('.top-bar')"
     assert await couple.evaluate(f"{bar}.scrollWidth <= {bar}.clientWidth")

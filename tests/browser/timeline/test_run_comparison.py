@@ -59,6 +59,8 @@ async def test_the_replaced_poses_are_taken_and_the_comparison_ends(page, endpoi
     await until(lambda: endpoint.heard("compare_range"))
     assert endpoint.heard("compare_range") == [{"type": "compare_range", "first": None, "last": None}]
     await endpoint.broadcast(NOTHING)
+    await shows(page, "quadrille.state.drawer === null")  # nothing is left to show
+    await page.locator("#show-curves").click()
     await shows(page, f"{ROWS}.length === 0 && !document.querySelector('#run-comparison-empty').hidden")
 
 

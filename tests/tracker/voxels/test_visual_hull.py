@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -62,6 +63,15 @@ def test_no_view_is_left_out_where_several_could_be():
 def test_nothing_of_the_size_of_a_person():
     with pytest.raises(TrackerError, match="a figure of at least 8 litres"):
         carve_people(silhouettes_of([ellipsoid((0, 0, 0), np.full(3, 0.1))], CAMERAS), SIZE_M)
+
+
+def test_a_refusal_does_not_contradict_itself():
+    """Three pieces of 4 litres each are no figure; "at least 8 litres, found 12" would be."""
+    pieces = [ellipsoid((0.7 * i, 0, 0), np.full(3, 0.1)) for i in (-1, 0, 1)]
+    with pytest.raises(TrackerError, match="a figure of at least 8 litres") as error:
+        carve_people(silhouettes_of(pieces, CAMERAS), SIZE_M)
+    found = float(re.search(r"at most ([\d.]+) litres", str(error.value))[1])
+    assert 3 < found < 8
 
 
 def test_a_small_child_is_a_figure():

@@ -1,6 +1,8 @@
 """Searches as they are watched: to the end of a stage, paced, replayed, compared, run again, taken over."""
 
+import gc
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -259,3 +261,20 @@ def test_contours_are_fitted_iteration_by_iteration(opened):
     searched(controller)
     controller.replay.show(controller.replay.runs()[-1].number, 0)
     assert controller.state.search_view.replay.fitted_from is None
+
+
+def test_a_search_that_is_forgotten_leaves_nothing_to_the_collector_of_cycles(opened):
+    controller = opened()
+    controller.search.set_settings(QUICK)
+    gc.collect()
+    gc.disable()
+    try:
+        controller.search.step()
+        wait_for(
+            lambda: controller.replay.runs() and controller.replay.runs()[-1].steps and not controller.search.running
+        )
+        job = weakref.ref(controller.search._job)
+        controller.navigation.seek(3)
+        wait_for(lambda: job() is None)
+    finally:
+        gc.enable()

@@ -1,5 +1,6 @@
 """Before and after of fits and searches: what is compared, how long it holds, and where the page warns."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -51,6 +52,11 @@ def test_the_views_show_the_pose_before_and_nothing_is_undone(fitted):
     kinds = {p.kind for p in overlays.paths(controller.session_of(state), state, CONTOURS, None)}
     assert "result" in kinds  # the result, to see where they differ
     assert not state.is_stored_drawn
+    # Joints of the pose that is drawn tell in which views they are visible.
+    binary = messages.overlay(controller.session, state, PAGE, CONTOURS, None)
+    header = json.loads(binary[4 : 4 + int.from_bytes(binary[:4], "little")])
+    drawn = overlays.handles(controller.session, state.drawn, CONTOURS.cameras)
+    assert [(h["point"], h["u"], h["visible"]) for h in header["handles"]] == [(h.point, h.u, h.visible) for h in drawn]
     controller.comparing.show_before(False)
     assert controller.state.drawn is controller.state
 

@@ -7,7 +7,9 @@ import pytest
 from gestures import drag, wait_for
 
 from app.control.tracking import finding
+from app.drawing import overlays
 from app.page import inspector_feed
+from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.initialization.candidates import StartCandidate
 from tracker.initialization.start_fit import FittedStart
@@ -22,7 +24,8 @@ def found(monkeypatch):
     """Stands for the search, which takes many seconds: finds a person 5% larger once it is let go."""
     go = threading.Event()
 
-    def find(session, observer, people, frames, settings, report):
+    def find(session, observer, people, frames, settings, report, show):
+        show(FRAME, None)
         report("finding first poses", 0.25, "frame 1, voxels: good")
         assert go.wait(10)
         report("acquiring sizes", 0.5, "")
@@ -125,6 +128,44 @@ def test_one_at_a_time_and_only_where_somebody_is_missing(opened, found, tracked
     drag(controller, "left_wrist", (6.0, -9.0))
     with pytest.raises(TrackerError, match="a person without a pose"):
         controller.finding.start()
+
+
+def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another_frame(opened, monkeypatch):
+    go = [threading.Event() for _ in range(3)]
+
+    def find(session, observer, people, frames, settings, report, show):
+        model = session.people[0].model.with_height(1.9)
+        candidate = StartCandidate("axis", model, model.neutral(), np.array([1.0, 0.0, 0.0]), 2.0)
+        poses = {0: FirstPose(2, candidate, FittedStart(model.neutral(), "good", 1.0), True, ())}
+        for frame, event in zip((2, 3, 5), go, strict=True):
+            show(frame, None)
+            show(frame, FirstPoses(frame, poses))
+            assert event.wait(10)
+        raise TrackerError("expected a body that fills the silhouettes, found none")
+
+    monkeypatch.setattr(finding, "find_people", find)
+    controller = opened()
+    controller.finding.start()
+    wait_for(lambda: controller.state.finding.candidates)
+    state = controller.state
+    assert (state.frame, state.finding.tried) == (2, 2)
+    view = View(frozenset({"contours"}), (1,) * len(controller.session.cameras), False)
+    drawn = [p for p in overlays.paths(controller.session_of(state), state, view, None) if p.kind == "candidate"]
+    assert {p.camera for p in drawn} == set(range(len(controller.session.cameras)))
+    assert all(len(p.segments_px) > 0 for p in drawn)
+    go[0].set()
+    wait_for(lambda: controller.state.frame == 3)
+    controller.navigation.seek(1)  # the user looks around
+    go[1].set()
+    wait_for(lambda: controller.state.finding.tried == 5)
+    assert controller.state.frame == 1
+    assert not [
+        p for p in overlays.paths(controller.session_of(state), controller.state, view, None) if p.kind == "candidate"
+    ]
+    go[2].set()
+    wait_for(lambda: not controller.state.finding.running)
+    found = controller.state.finding
+    assert (found.failed, found.tried, dict(found.candidates)) == (True, 2, {})  # the message is about the first frame
 
 
 def test_an_error_is_one_sentence(opened, monkeypatch):

@@ -1,0 +1,231 @@
+/**
+ * List of all long work under way, in one place over the 3-D view: what is done, how long the rest takes, and Stop. A search
+ * for people that has failed stays in it until it is closed.
+ */
+
+import { hasTrack } from "../model/selectors.js";
+import { button, byId } from "../widgets/elements.js";
+import { capital, count, displayName, percent } from "../widgets/text.js";
+import { TimeLeft, timeText } from "../widgets/time_left.js";
+
+/**
+ * @typedef {import("../model/store.js").Facts} Facts
+ * @typedef {object} Work
+ * @property {string} id
+ * @property {string} text what is being done
+ * @property {string} done how much of it is done, for people to read
+ * @property {number | null} share of it that is done; null if unknown
+ * @property {string} [title] tooltip
+ * @property {(() => void) | null} stop null for what ends by itself
+ *
+ * @typedef {{row: HTMLElement, text: HTMLElement, figures: HTMLElement, bar: HTMLProgressElement, stop: HTMLButtonElement,
+ *   left: TimeLeft, work: Work}} Shown
+ */
+
+const TICK_MS = 1000;
+const COMPILING =
+  "The numerical kernels are compiled once after installation, which takes a minute or two. Until its kernels are compiled, the body is " +
+  "drawn as a skeleton and has no cost. A search or tracking run waits for the kernels that it needs.";
+const INDEXING = "The footage is indexed when it is first opened. Frames can be shown as soon as they are indexed.";
+
+export class WorkList {
+  #store;
+  #send;
+  #navigation;
+  #layers;
+  #actions;
+  #notify;
+  #cancelExport;
+  #list = byId("work", HTMLElement);
+  /** @type {Map<string, Shown>} */
+  #shown = new Map();
+  #failure = byId("find-failure", HTMLElement);
+  #damage = byId("damage", HTMLElement);
+  /** Whether the silhouettes are shown for the failure only. */
+  #hasSilhouettes = false;
+  #wasFinding = false;
+
+  /**
+   * @param {import("../model/index.js").Context} context
+   * @param {() => void} cancelExport
+   */
+  constructor({ store, send, navigation, layers, actions, notify }, cancelExport) {
+    this.#store = store;
+    this.#send = send;
+    this.#navigation = navigation;
+    this.#layers = layers;
+    this.#actions = actions;
+    this.#notify = notify;
+    this.#cancelExport = cancelExport;
+    button("failure-look", () => this.#lookAtSilhouettes());
+    button("failure-place", () => this.#placeByHand());
+    button("failure-close", () => this.#closeFailure());
+    store.subscribe((changed) => {
+      if (changed.has("session")) this.#failure.hidden = true;
+      if (changed.has("finding")) this.#watchFinding();
+      if (["state", "finding", "acquisition", "connected", "exporting"].some((fact) => changed.has(/** @type {"state"} */ (fact)))) this.#show();
+      if (changed.has("state")) this.#showDamage();
+    });
+    setInterval(() => this.#shown.size > 0 && this.#showFigures(), TICK_MS);
+  }
+
+  #show() {
+    const all = this.#store.facts.connected ? this.#work() : [];
+    for (const [id, { row }] of this.#shown) {
+      if (all.some((work) => work.id === id)) continue;
+      row.remove();
+      this.#shown.delete(id);
+    }
+    for (const work of all) {
+      const shown = this.#shown.get(work.id) ?? this.#add(work);
+      shown.work = work;
+      shown.text.textContent = work.text;
+      shown.row.title = work.title ?? "";
+      shown.stop.hidden = work.stop === null;
+      shown.bar.hidden = work.share === null;
+      shown.bar.value = work.share ?? 0;
+      shown.left.note(work.text, work.share, performance.now() / 1000);
+    }
+    this.#showFigures();
+  }
+
+  #showFigures() {
+    for (const { work, figures, left } of this.#shown.values()) {
+      const seconds = work.share === null ? null : left.at(performance.now() / 1000);
+      const text = [work.done, seconds === null ? "" : timeText(seconds)].filter(Boolean).join(", ");
+      if (figures.textContent !== text) figures.textContent = text;
+    }
+  }
+
+  /** @param {Work} work */
+  #add(work) {
+    const row = document.createElement("div");
+    row.className = "work";
+    row.id = `work-${work.id}`;
+    const [text, figures] = [document.createElement("b"), document.createElement("output")];
+    const bar = document.createElement("progress");
+    bar.setAttribute("aria-label", work.text);
+    const stop = document.createElement("button");
+    stop.type = "button";
+    stop.textContent = "Stop";
+    stop.title = "Stop; what is done and stored stays";
+    const shown = { row, text, figures, bar, stop, left: new TimeLeft(), work };
+    stop.addEventListener("click", () => shown.work.stop?.());
+    row.append(text, stop, figures, bar);
+    this.#shown.set(work.id, shown);
+    this.#list.append(row);
+    return shown;
+  }
+
+  /** @returns {Work[]} */
+  #work() {
+    const { state, finding, acquisition, session, exporting } = this.#store.facts;
+    if (!state) return [];
+    const { track, range, compiling, footage } = state;
+    const name = session?.people[acquisition?.person ?? 0]?.name ?? "";
+    const stopFinding = () => this.#send({ type: "find_people", action: "stop" });
+    const run = hasTrack(state) ? trackWork(track, finding?.running ? stopFinding : () => this.#actions.stopTracking()) : null;
+    const search = finding?.running && !run && { id: "find", text: `Finding people: ${finding.stage}`, ...shareOf(finding.share), stop: stopFinding };
+    const sizes = acquisition?.running && {
+      id: "sizes",
+      text: `Acquiring sizes of ${name}: ${acquisition.stage}`,
+      ...shareOf(acquisition.share),
+      stop: () => this.#send({ type: "acquire", action: "stop", person: acquisition.person }),
+    };
+    const frames = range.running && {
+      id: "range",
+      text: capital(range.what),
+      ...ofTotal(range.done, range.total),
+      stop: () => this.#actions.stopRange(),
+    };
+    const files = exporting !== null && { id: "export", text: "Exporting", ...shareOf(exporting), stop: this.#cancelExport };
+    const kernels = compiling !== null && {
+      id: "compiling",
+      text: `Compiling ${displayName(compiling)}`,
+      done: "you can go on",
+      title: COMPILING,
+      share: null,
+      stop: null,
+    };
+    const index = footage.listed !== null && { id: "indexing", text: "Indexing the footage", ...shareOf(footage.listed), title: INDEXING, stop: null };
+    return [search, run, sizes, frames, files, kernels, index].filter((work) => !!work);
+  }
+
+  #showDamage() {
+    const error = this.#store.facts.state?.footage.error ?? null;
+    this.#damage.hidden = error === null;
+    this.#damage.title = error ?? "";
+  }
+
+  #watchFinding() {
+    const { finding } = this.#store.facts;
+    if (finding?.running) this.#closeFailure();
+    else if (this.#wasFinding && finding?.failed) this.#showFailure(finding);
+    this.#wasFinding = finding?.running ?? false;
+  }
+
+  /** @param {import("../model/protocol.js").FindingMessage} finding */
+  #showFailure({ message, notes, tried }) {
+    const [reason] = message.split(/;|\.$/);
+    byId("failure-text", HTMLElement).textContent = `People were not found: ${reason.charAt(0).toLowerCase()}${reason.slice(1)}.`;
+    byId("failure-look", HTMLButtonElement).hidden = tried === null;
+    byId("failure-look", HTMLButtonElement).textContent = `Show silhouettes of frame ${tried}`;
+    byId("failure-details", HTMLDetailsElement).open = false;
+    byId("failure-notes", HTMLElement).replaceChildren(
+      ...[message, ...notes].map((text) => Object.assign(document.createElement("li"), { textContent: text })),
+    );
+    this.#failure.hidden = false;
+    if (tried === this.#store.facts.target) this.#lookAtSilhouettes();
+  }
+
+  /** Show the silhouettes of the frame that the message is about, and the view that it names. */
+  #lookAtSilhouettes() {
+    const { finding, session, layers } = this.#store.facts;
+    if (!finding || finding.tried === null) return;
+    this.#navigation.goTo(finding.tried);
+    this.#hasSilhouettes ||= !layers.shown.silhouette;
+    this.#layers.toggle(["silhouette"], true);
+    const bad = session?.cameras.findIndex(({ name }) => finding.message.split(/[^\w-]+/).includes(name)) ?? -1;
+    if (bad >= 0) this.#store.set({ active: bad });
+  }
+
+  #closeFailure() {
+    this.#failure.hidden = true;
+    if (this.#hasSilhouettes) this.#layers.toggle(["silhouette"], false);
+    this.#hasSilhouettes = false;
+  }
+
+  #placeByHand() {
+    const { finding, state } = this.#store.facts;
+    const person = state?.people.findIndex(({ source }) => source === null) ?? 0;
+    if (finding && finding.tried !== null) this.#navigation.goTo(finding.tried);
+    this.#send({ type: "select", person: Math.max(0, person), point: "torso" });
+    this.#closeFailure();
+    this.#notify({ type: "notice", level: "info", text: "Drag the square of the body in two views, then joints; G fits the body to the edges." });
+  }
+}
+
+/**
+ * @param {import("../model/protocol.js").Track} track
+ * @param {() => void} stop
+ * @returns {Work}
+ */
+function trackWork({ running, back, done, total }, stop) {
+  // The backward pass visits stretches, and no frame waits for it.
+  const text = running ? (back ? "Checking alternatives" : "Tracking") : "Tracking is paused";
+  const figures = ofTotal(done, total);
+  return { id: "track", text, ...figures, done: back ? "you can go on" : figures.done, stop };
+}
+
+/** @param {number} share 0 to 1 */
+function shareOf(share) {
+  return { share, done: percent(share) };
+}
+
+/**
+ * @param {number} done
+ * @param {number} total
+ */
+function ofTotal(done, total) {
+  return { share: done / Math.max(1, total), done: `${count(done)} of ${count(total)}` };
+}

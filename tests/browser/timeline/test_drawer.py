@@ -1,0 +1,54 @@
+"""The drawer closes when it is empty, belongs to its session, and leaves the lanes of the timeline their room."""
+
+import pytest
+from page_driver import OPENED, shows
+
+EMPTY = {"type": "timeline", "person": None, "cells": {}, "replace": True}
+
+
+async def test_a_drawer_opens_again_in_its_session_only_and_only_with_content(page, endpoint):
+    await page.keyboard.press("c")
+    await shows(page, "quadrille.state.drawer === 'arms'")
+    await page.reload()
+    await shows(page, f"{OPENED} && quadrille.state.drawer === 'arms'")
+    await page.evaluate("localStorage.setItem('quadrille.drawer.elbow_rotation', '\"runs\"')")
+    await page.reload()
+    await shows(page, OPENED)
+    await page.wait_for_timeout(300)
+    assert await page.locator("#drawer").is_hidden()  # nothing is compared
+    await page.keyboard.press("c")
+    await page.evaluate("localStorage.setItem('quadrille.drawer.other', '\"arms\"')")
+    await page.evaluate("localStorage.removeItem('quadrille.drawer.elbow_rotation')")
+    await page.reload()
+    await shows(page, OPENED)
+    await page.wait_for_timeout(300)
+    assert await page.locator("#drawer").is_hidden()
+
+
+async def test_a_drawer_whose_content_is_gone_closes(page, endpoint):
+    await page.keyboard.press("c")
+    await shows(page, "quadrille.state.drawer === 'arms'")
+    await endpoint.broadcast(EMPTY)
+    await shows(page, "quadrille.state.drawer === null")
+    # On request it opens all the same, and says why it is empty.
+    await page.keyboard.press("c")
+    await shows(page, "quadrille.state.drawer === 'arms'")
+    await endpoint.broadcast(EMPTY)
+    await page.wait_for_timeout(300)
+    assert await page.locator("#drawer").is_visible()
+
+
+@pytest.mark.parametrize("endpoint", [{"n_people": 2}, {"n_people": 8}], indirect=True, ids=["2", "8"])
+@pytest.mark.parametrize("height", [720, 1080])
+async def test_no_lane_of_the_timeline_is_cut_off(page, endpoint, height):
+    await page.evaluate("localStorage.removeItem('quadrille.first_steps')")
+    for kind in ("search", "curves", "doubts"):
+        await page.evaluate("(kind) => localStorage.setItem(`quadrille.drawer-height-${kind}`, '2000')", kind)
+    await page.set_viewport_size({"width": 1280, "height": height})
+    for key in ("b", "c", "Shift+l"):
+        await page.keyboard.press(key)
+        await shows(page, "document.querySelector('#drawer').offsetHeight > 0")
+        timeline = await page.locator("#timeline").bounding_box()
+        assert timeline["y"] + timeline["height"] <= height
+        views = await page.locator("#panes").bounding_box()
+        assert views["height"] >= 100
