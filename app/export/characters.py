@@ -58,7 +58,8 @@ def draw_bodies(bodies: Sequence[PosedBody], camera: Camera) -> Image:
         cv2.polylines(image, list(ends), False, _OUTLINE, max(1, round(max(camera.size) / 640)), cv2.LINE_AA)
     if camera.fisheye:
         maps = undistortion_map(lens_of(camera))
-        image = cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=_GROUND)
+        filmed = cv2.remap(image, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=_GROUND)
+        return np.asarray(filmed, dtype=np.uint8)
     return np.asarray(image, dtype=np.uint8)
 
 

@@ -212,6 +212,11 @@ class Observer:
         changes = view.changes(prepared, smooth, box) if settings.foreground else None
         margin_px = FOREGROUND_MARGIN * max(filmed.size)
         foreground = None if changes is None else background_subtraction.dilate(changes.anything, margin_px)
+        shown = view.view.shown
+        if shown is not None:
+            u0, v0, u1, v1 = box
+            part = np.ascontiguousarray(shown[v0:v1, u0:u1])
+            foreground = part if foreground is None else foreground & part
         # The model of static edges refuses texture, so low thresholds can keep the weaker edges of bodies.
         edges = detect_edges(
             smooth, levels(prepared.strengths, restricted=changes is not None or with_static_edges), foreground

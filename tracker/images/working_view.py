@@ -105,6 +105,19 @@ class WorkingView:
         """The camera of the footage at working scale, with its lens. The picture of a fisheye is larger undistorted."""
         return self.source.scaled(self.scale)
 
+    @cached_property
+    def shown(self) -> Mask | None:
+        """Where the picture of a fisheye lens shows footage, (H, W), but for its border; None for other lenses.
+
+        Elsewhere it repeats the border of the footage, whose edges are nobody's.
+        """
+        if not self.source.fisheye:
+            return None
+        columns, rows = self._map()
+        m = _MARGIN_PX / self.scale
+        width, height = self.source.size
+        return np.asarray((columns >= m) & (columns <= width - 1 - m) & (rows >= m) & (rows <= height - 1 - m))
+
     @property
     def whole(self) -> Region:
         """Region of the whole image."""

@@ -74,5 +74,4 @@ def _sight(camera: Camera, at: Array) -> Array:
 
 
 def _is_inside(camera: Camera, at: Array) -> bool:
-    u, v = camera.pinhole.project(at)
-    return bool(-0.5 <= u < camera.width - 0.5 and -0.5 <= v < camera.height - 0.5)
+    return bool(camera.is_filmed(camera.pinhole.project(at)))

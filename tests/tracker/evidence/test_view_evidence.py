@@ -102,6 +102,16 @@ def test_edges_stay_registered_through_undistortion_and_scaling(size, lens):
     assert off.mean() < 0.6
 
 
+def test_no_edges_are_found_where_a_fisheye_shows_no_footage():
+    """The picture repeats the border of the footage there, with an edge where the stripes end."""
+    camera = with_fisheye(camera_at("c", (4, 0, 0)), 110.0)
+    stripes = np.where(np.arange(640)[None, :, None] // 40 % 2, 200, 60).astype(np.uint8)
+    view = observe(camera, np.broadcast_to(stripes, (480, 640, 3)).copy())
+    assert len(view.points_px) > 1000
+    places = (view.points_px + 0.5) / view.scale - 0.5
+    assert camera.is_filmed(places.astype(float)).all()
+
+
 def test_small_images_are_not_enlarged():
     assert working_scale(camera_at("c", (4, 0, 0), size=(320, 240))) == 1
     assert working_scale(camera_at("c", (4, 0, 0), size=(640, 480))) == 1

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from fisheye import with_fisheye
 from solids import ellipsoid, silhouettes_of
 from staging import camera_at
@@ -13,7 +14,7 @@ from tracker.geometry.ground_plane import GroundPlane
 from tracker.initialization.silhouette_axis import major_axis
 from tracker.voxels.bounding_volume import bounding_volume
 from tracker.voxels.carving import Carver, CarveSettings
-from tracker.voxels.figure_masks import paint
+from tracker.voxels.figure_masks import _px_per_m, paint
 from tracker.voxels.shadows import is_changed_at, recover_standing
 from tracker.voxels.voxel_grid import VoxelGrid
 
@@ -85,6 +86,10 @@ def test_painted_voxels_are_as_large_as_the_lens_shows_them():
     voxels = Carver(views()).carve(VoxelGrid.over(-BOX, BOX, SIZE_M))
     points = voxels.points_world[voxels.is_surface]
     for view in views():
+        camera = view.camera
+        step = 0.005 * camera.T_world_camera[:3, 1]
+        true = np.linalg.norm(camera.project(points + step) - camera.project(points - step), axis=1) / 0.01
+        assert _px_per_m(camera, points, camera.depths(points)) == pytest.approx(np.median(true), rel=0.05)
         painted = paint(points, SIZE_M, view)
         assert np.count_nonzero(view.mask & ~painted) < 0.02 * np.count_nonzero(view.mask)
         assert np.count_nonzero(painted & ~view.mask) < 0.7 * np.count_nonzero(view.mask)
