@@ -4,8 +4,8 @@ import contextlib
 import os
 import secrets
 import stat
+from io import BufferedReader
 from pathlib import Path
-from typing import BinaryIO
 
 from tracker.errors import SessionError
 
@@ -14,7 +14,7 @@ class IrregularFileError(OSError):
     """A path names a pipe, a device or a socket; reading one may wait for ever."""
 
 
-def open_regular(path: Path) -> BinaryIO:
+def open_regular(path: Path) -> BufferedReader:
     """Open a file to read its bytes, without waiting for a writer.
 
     Raises:
