@@ -84,6 +84,15 @@ PHRASES = {
         "search a smaller folder, or say --{kind} FOLDER", "search a smaller folder, or give the folder of the {kind}"
     ),
     "relink_each": Phrases("give each its own with --camera NAME=PATH", "give each its own"),
+    # edits that were kept elsewhere
+    "restore": Phrases(
+        "end the program and run 'quadrille restore' on the session to write them",
+        "end the program and run 'quadrille restore' on the session to write them",
+    ),
+    "restore_rescue": Phrases(
+        "to write them here, end the program and run 'quadrille restore' on the session with --rescue {path}",
+        "to write them here, end the program and run 'quadrille restore' on the session with the name of this file",
+    ),
     # first poses
     "another_frame": Phrases(
         "choose another --frame, on which {condition}", "go to another frame, on which {condition}"
@@ -118,6 +127,15 @@ PHRASES = {
         "give a --joint-map FILE.toml with a line such as left_shoulder = {marker} for each joint "
         "(docs/recordings.md has an example)",
         "rename the markers as one of these conventions does",
+    ),
+    "count_frames": Phrases("say --clock frames", "correct Time in the file"),
+    "choose_clock": Phrases(
+        "say --clock frames if each Frame# is one frame of the session (at {fps} per second), or --clock time if the "
+        "rows lie at their Time",
+        "correct DataRate or Time in the file (the session has {fps} frames per second)",
+    ),
+    "choose_first_frame": Phrases(
+        "say --first-frame {frames}", "correct Frame#, Time or OrigDataStartFrame in the file"
     ),
     # references and exports
     "check_reference_frames": Phrases(

@@ -92,7 +92,7 @@ def _replayed(folder: Path, path: Path, chosen: Path | None) -> tuple[int, list[
     with closing(AnnotationStore(path, read_only=True)) as store:
         files = rescue.find(folder, store.id)
     own = [found.path for found in files if not found.origin] if chosen is None else [chosen]
-    offers = [found.offer for found in files if found.origin and found.path not in own]
+    offers = [command_line_text(*found.offer) for found in files if found.origin and found.path not in own]
     if not own:
         return 0, offers
     with closing(AnnotationStore(path)) as store:

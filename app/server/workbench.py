@@ -13,7 +13,7 @@ from platformdirs import user_state_path
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
 from app.page.thumbnails import Thumbnails
-from app.remedies import command_line_text
+from app.remedies import command_line_text, page_text
 from app.runtime.kernel_compiler import KernelCompiler
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.scene import SceneView
@@ -77,7 +77,7 @@ def open_session(
         store = AnnotationStore(session.annotations_path)
         if store.backup_error is not None:
             say(store.backup_error)
-        offers = [found.offer for found in rescue.find(session.folder, store.id)]
+        offers = [page_text(*found.offer) for found in rescue.find(session.folder, store.id)]
         for offer in offers:
             say(offer)
         doorway.show("Preparing the views")

@@ -18,7 +18,7 @@ from platformdirs import user_data_path
 
 from app.remedies import page_text
 from app.storage.rescue_file import Model, Rescue, UnsavedEdit, read_rescue, write_rescue
-from tracker.errors import SessionError, TrackerError
+from tracker.errors import Remedy, SessionError, TrackerError
 from tracker.session.folder import SESSION_FILE
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Change, PoseChange, PoseRecord
@@ -36,21 +36,18 @@ class RescueFile(NamedTuple):
     """The other folder in which the edits were made; empty if it is the session's."""
 
     @property
-    def offer(self) -> str:
+    def offer(self) -> tuple[str, Remedy | None]:
         """What it holds, and what to do with it."""
         if self.damage:
-            return self.damage
+            return self.damage, None
         edits, are = ("1 edit", "is") if self.n_edits == 1 else (f"{self.n_edits} edits", "are")
         if self.origin:
-            return (
+            held = (
                 f"{edits} of {self.time} could not be written into {self.origin}, of which this session may be a copy, "
-                f"and {are} kept in {self.path}: to write them here, end the program and run 'quadrille restore' on "
-                f"the session with --rescue {self.path}"
+                f"and {are} kept in {self.path}"
             )
-        return (
-            f"{edits} of {self.time} could not be written and {are} kept in {self.path}: "
-            "end the program and run 'quadrille restore' on the session to write them"
-        )
+            return held, Remedy("restore_rescue", path=self.path)
+        return f"{edits} of {self.time} could not be written and {are} kept in {self.path}", Remedy("restore")
 
 
 def write(

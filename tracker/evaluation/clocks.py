@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from tracker.errors import FormatError
+from tracker.errors import FormatError, Remedy
 from tracker.footage.frame_rates import RATE_TOLERANCE, nominal_rate, same_clock, usual_rate
 from tracker.formats.number_rows import MAX_VALUES
 from tracker.formats.trc import MarkerTable
@@ -66,7 +66,7 @@ def place_rows(table: MarkerTable, where: str, fps: float, known: Placement | No
     known = known or Placement()
     if known.clock == "time":
         if not (np.diff(table.times) > 0).all():
-            raise FormatError(f"{where}: expected Time that rises from row to row; say --clock frames instead")
+            raise FormatError(f"{where}: expected Time that rises from row to row", Remedy("count_frames"))
         start = table.times[0] * fps if known.first_frame is None else known.first_frame
         rows = start + (table.times - table.times[0]) * fps
     else:
@@ -120,7 +120,8 @@ def _frames_per_number(table: MarkerTable, where: str, fps: float, rates: Sequen
             return 1.0
         raise FormatError(
             f"{where}: DataRate and Time disagree: {n} frames at DataRate {table.rate:g} last {n / table.rate:.3f} s, "
-            f"by Time {seconds:.3f} s. {_choose_clock(fps)}"
+            f"by Time {seconds:.3f} s",
+            _choose_clock(fps),
         )
     ratio = nominal_rate(fps) / nominal_rate(rates[0])
     last = float(table.frames[-1])
@@ -135,15 +136,13 @@ def _frames_per_number(table: MarkerTable, where: str, fps: float, rates: Sequen
         return 1.0
     raise FormatError(
         f"{where}: its {len(table.frames)} rows may be frames of the session at {usual_rate(fps):g} per second, "
-        f"or {table.rate:g} per second as its DataRate says. {_choose_clock(fps)}"
+        f"or {table.rate:g} per second as its DataRate says",
+        _choose_clock(fps),
     )
 
 
-def _choose_clock(fps: float) -> str:
-    return (
-        f"Say --clock frames if each Frame# is one frame of the session (at {fps:.6g} per second), or --clock time if "
-        "the rows lie at their Time"
-    )
+def _choose_clock(fps: float) -> Remedy:
+    return Remedy("choose_clock", fps=f"{fps:.6g}")
 
 
 def _first_number(table: MarkerTable, where: str, rates: Sequence[float], ratio: float, n_frames: int | None) -> int:
@@ -168,8 +167,10 @@ def _first_number(table: MarkerTable, where: str, rates: Sequence[float], ratio:
     if len(set(frames.values())) == 1:
         return chosen
     listed = " or ".join(f"frame {frames[at]} ({words})" for at, words in readings.items())
-    choices = " or ".join(f"--first-frame {frames[at]}" for at in readings)
-    raise FormatError(f"{where}: its first row may be {listed}, counted from 0 as in the page; say {choices}")
+    raise FormatError(
+        f"{where}: its first row may be {listed}, counted from 0 as in the page",
+        Remedy("choose_first_frame", frames=" or ".join(str(frames[at]) for at in readings)),
+    )
 
 
 def _readings(table: MarkerTable, rates: Sequence[float]) -> dict[int, str]:

@@ -68,7 +68,7 @@ def test_a_frame_in_a_gap(run, session, tmp_path):
 
 def test_a_contradiction_is_asked_about_and_decided(run, session, tmp_path):
     path = written(tmp_path / "a.trc", list(range(20, 40)), stamp=-20)  # Frame# 20 at 0 s
-    expected = ["a.trc", "Frame# 20", "Time 0 s", "--first-frame 20 or --first-frame 0"]
+    expected = ["a.trc", "Frame# 20", "Time 0 s", "--first-frame 20 or 0"]
     for words in (["init", session, "--joints", path, "--frame", 25], ["evaluate", session, "--reference", path]):
         run("init", session, "--joints", TRUTH, "--frame", 25)
         assert_refused(run(*words), expected)
