@@ -53,10 +53,10 @@ export function paneBindings({ store, grid, gestures, layers, layersMenu, say })
       release: () => store.set({ bare: false }),
     },
     {
-      keys: ["Alt V"],
+      keys: ["Alt L"],
       label: "Zoomed views follow the people from frame to frame (toggle)",
       words: "pan track playback steady still",
-      matches: alt("KeyV", false),
+      matches: alt("KeyL", false),
       run: () => say(`Zoomed views ${grid.togglePeopleFollowed() ? "follow the people." : "stay where they are."}`),
     },
     {

@@ -53,7 +53,7 @@ async def test_a_zoomed_view_follows_the_person_from_frame_to_frame(page, endpoi
     await shows(page, "!quadrille.state.playing && quadrille.state.overlay.frame === quadrille.state.target")
     assert await place_in_pane(page, 0, "head") == pytest.approx(before, abs=0.01)
     # On request it stays.
-    await page.keyboard.press("Alt+v")
+    await page.keyboard.press("Alt+l")
     frame = (await state_of(page))["target"]
     origin = (await state_of(page))["views"][0]["origin"]
     await step(page, frame + 1)

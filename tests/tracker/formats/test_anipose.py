@@ -170,7 +170,7 @@ MIRROR = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
         ({"translation": [1e300, 0.0, 0.0]}, "a finite number within 1e9"),
         ({"matrix": [[500.0, 0.0, 320.0], [9.0, 500.0, 240.0], [0.0, 0.0, 1.0]]}, "fx, skew, cx"),
         ({"name": 3}, "a name of 1 to 100 characters.* as 'name', found 3"),
-        ({"name": "../front"}, "without slashes as 'name'"),
+        ({"name": "../front"}, "without slashes, control or direction characters as 'name'"),
         ({"matrix": None, "size": None}, "expected the key 'size', found none"),
     ],
 )
