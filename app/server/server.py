@@ -24,7 +24,10 @@ from app.server.static_files import KEPT, POLICY, PREFIX, ROUTE, PageFiles, conn
 _LOG = logging.getLogger(__name__)
 _SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
 _ROOT: web.AppKey[str] = web.AppKey("root", str)
-_ENTRY = '<!doctype html><title>Quadrille</title><meta http-equiv="refresh" content="0; url={root}">'
+_ENTRY = (
+    '<!doctype html><title>Quadrille</title><link rel="icon" href="data:,">'
+    '<meta http-equiv="refresh" content="0; url={root}">'
+)
 """Answer to an address with a token: the browser goes on to the page's own address, and does not keep this one."""
 _MAX_MESSAGE_BYTES = 1 << 20  # what a page sends is a line or two of JSON
 _MAX_PATH_CHARACTERS = 2000
