@@ -2,10 +2,10 @@
 
 import json
 
-import cv2
 import numpy as np
 import pytest
 import tomli_w
+from calibration_files import to_storage
 
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import CalibrationError
@@ -35,25 +35,6 @@ def opencv_rows(c):
     return {"K": c.K, "dist": c.distortion, "R": R, "rvec": rigid.so3_log(R), "t": t, "size": list(c.size)}
 
 
-def write_storage(path, values):
-    """Write nested values by OpenCV itself."""
-    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
-
-    def write(name, value):
-        if isinstance(value, dict):
-            storage.startWriteStruct(name, cv2.FileNode_MAP)
-            for key, inner in value.items():
-                write(key, inner)
-            storage.endWriteStruct()
-        else:
-            storage.write(name, value)
-
-    for key, value in values.items():
-        write(key, value)
-    storage.release()
-    return path
-
-
 def write_json(path, data):
     path.write_text(json.dumps(data, default=lambda a: a.tolist()))
     return path
@@ -66,8 +47,8 @@ def easymocap(folder, suffix="yml"):
     intri |= {f"dist_{n}": r["dist"][None] for n, r in columns.items()}
     extri = {"names": list(columns)} | {f"R_{n}": r["rvec"][:, None] for n, r in columns.items()}
     extri |= {f"Rot_{n}": r["R"] for n, r in columns.items()} | {f"T_{n}": r["t"][:, None] for n, r in columns.items()}
-    write_storage(folder / f"intri.{suffix}", intri)
-    return write_storage(folder / f"extri.{suffix}", extri)
+    to_storage(folder / f"intri.{suffix}", intri)
+    return to_storage(folder / f"extri.{suffix}", extri)
 
 
 def opencv(suffix):
@@ -79,7 +60,7 @@ def opencv(suffix):
             c.name: {names[k]: v for k, v in opencv_rows(c).items() if k in names} | {"width": 640, "height": 480}
             for c in CAMERAS
         }
-        return write_storage(folder / f"cameras.{suffix}", groups)
+        return to_storage(folder / f"cameras.{suffix}", groups)
 
     return make
 

@@ -6,8 +6,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 from command_line import SAMPLE
-from tracker.formats.calibration import read_cameras
 
+from tracker.calibrations.reading import read_cameras
 from tracker.evidence.camera_exchange import find_body_exchange, find_exchange
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
@@ -75,7 +75,7 @@ def test_a_body_that_is_seen_only_with_two_exchanged(frames):
 def test_recordings(data_folder, name):
     """No right assignment is reported, with all cameras or three; an exchange of the first two is."""
     folder = data_folder(name)
-    entries = read_cameras(folder / ("camera_array.toml" if name == "board_real" else "Calib.toml"))
+    entries = read_cameras(folder / ("camera_array.toml" if name == "board_real" else "Calib.toml")).entries
     backgrounds = {p.stem: p for p in (folder / "background").glob("*.png")}
     sources = [CameraSource(e.camera(), folder / f"{e.name}.mp4", backgrounds.get(e.name)) for e in entries]
     for some in (sources, *combinations(sources, 3)):
