@@ -20,8 +20,8 @@ const search = searchRoom.mount(context, timeline);
 const scene = sceneRoom.mount(context, panes);
 const inspector = inspectorRoom.mount(context, { panes, posing, scene });
 const sessions = sessionsRoom.mount(context);
-shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector, sessions });
-exposeState(context, panes.grid);
+const bindings = shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector, sessions });
+exposeState(context, panes.grid, bindings);
 
 await started;
 // The access token is in a cookie by now. It should not stay in the address.

@@ -112,8 +112,8 @@ def _format(found: dict[str, Any]) -> str:
     axes = "" if found["axes"] is None else f", axes {found['axes']}"
     lines = [f"wrote {path}" for path in found["files"]]
     lines.append(f"{', '.join(found['people'])}, frames {first}:{last}{axes}")
-    if FORMATS[found["format"]].counts_from_1:
-        lines.append(f"Frame# counts from 1: frame {first} of the session is Frame# {first + 1}")
+    if numbering := FORMATS[found["format"]].numbering:
+        lines.append(numbering.format(frame=first, number=first + 1))
     if found["missing"]:
         lines.append(f"{found['missing']} poses are missing and {FORMATS[found['format']].gaps}")
     if found["lost"]:

@@ -34,8 +34,8 @@ class ExportFormat:
     """Axes by default, as programs that read it expect them."""
     gaps: str = "left empty"
     """What happens to frames without a pose."""
-    counts_from_1: bool = False
-    """Whether its frame numbers are the session's plus 1."""
+    numbering: str = ""
+    """Sentence on its frame numbers where they are not the session's, of `{frame}` and `{number}`, 1 more."""
     one_body: bool = False
     """Whether all poses of a person are of one body; those of earlier sizes are refitted."""
 
@@ -73,7 +73,7 @@ FORMATS: Mapping[str, ExportFormat] = {
             _by_writer("write_person_trc"),
             _PLACE,
             one_person=True,
-            counts_from_1=True,
+            numbering="Frame# counts from 1: frame {frame} of the session is Frame# {number}",
         ),
         ExportFormat(
             "csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _by_writer("write_tables"), _PLACE

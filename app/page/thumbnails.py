@@ -1,4 +1,4 @@
-"""Thumbnails of stored poses: one person on one frame, in the view that shows a limb best."""
+"""Thumbnails: one person on one frame, in the view that shows a limb best; or a view with its silhouette."""
 
 import time
 from functools import lru_cache
@@ -69,6 +69,25 @@ class Thumbnails:
                 tuple(b.values.tobytes() for b in bodies), colors,
             )
         )  # fmt: skip
+
+    def silhouette(self, camera: int, frame: int) -> bytes | None:
+        """Return a picture of a view with its silhouette as JPEG; None if there is no such view, frame or silhouette.
+
+        Args:
+            camera: index of the view.
+            frame: of the session.
+
+        Raises:
+            RecordingError: the footage cannot be read.
+        """
+        session = self._controller.session
+        if camera >= len(session.cameras) or frame >= session.n_frames:
+            return None
+        self._give_way()
+        found = self._controller.frames.evidence(frame)[camera].silhouette
+        if found is None:
+            return None
+        return thumbnails.silhouette_picture(self._footage.image(camera, frame), found.inside)
 
     def close(self) -> None:
         """Release the footage."""

@@ -52,7 +52,16 @@ class ExportRoutes:
 
     async def _list(self, _: web.Request) -> web.Response:
         return web.json_response(
-            [{"name": f.name, "title": f.title, "options": sorted(f.options), "axes": f.axes} for f in FORMATS.values()]
+            [
+                {
+                    "name": f.name,
+                    "title": f.title,
+                    "options": sorted(f.options),
+                    "axes": f.axes,
+                    "numbering": f.numbering,
+                }
+                for f in FORMATS.values()
+            ]
         )
 
     async def _progress(self, _: web.Request) -> web.Response:

@@ -96,7 +96,7 @@ def open_session(
                 session.folder, tokens, refusal(is_private, serving.token), lambda: controller.state.save_error
             )
             others.add_to(app)
-            ThumbnailRoutes(thumbnails.jpeg, lambda: not _can_draw(controller)).add_to(app)
+            ThumbnailRoutes(thumbnails.jpeg, thumbnails.silhouette, lambda: not _can_draw(controller)).add_to(app)
 
             def ready() -> None:
                 for name in proxies.stale(session):

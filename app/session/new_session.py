@@ -64,6 +64,8 @@ class NewSessionForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Whether a calibration at a whole multiple of the footage's size is scaled to it."""
     fps: Annotated[FrameRate, Meta(title="Frame rate")] | None = None
     """Rate at which the cameras filmed, if the videos declare another one or all footage is images."""
+    common_frames: bool = False
+    """Whether frames that only some cameras have are left out: at the end, of numbered images at both ends."""
     background: TypedPath | None = None
     """Folder with an image or video of the empty scene for each camera."""
     masks: TypedPath | None = None
@@ -120,6 +122,7 @@ def _request(form: NewSessionForm) -> NewSession:
         models=_of_each(form, "body model", [_model(m) for m in form.models]) or DEFAULT_MODEL,
         heights=_of_each(form, "height", [h / 100 for h in form.heights_cm]),
         fps=form.fps,
+        common_frames=form.common_frames,
         up=form.up,
         units=form.units,
         poses=form.poses,

@@ -46,7 +46,14 @@ export function mount(context, { panes, posing, scene }) {
   };
   button("first-find", findPeople);
   const bindings = inArea("Inspector", [
-    { keys: ["Alt I"], label: "Inspector: body sizes and settings (toggle)", matches: alt("KeyI", false), run: () => inspector.toggle() },
+    {
+      keys: ["Alt I"],
+      label: "Inspector: sizes, settings (toggle)",
+      area: "Views", // an area of one key would take two lines of the key list
+      words: "body",
+      matches: alt("KeyI", false),
+      run: () => inspector.toggle(),
+    },
     {
       keys: [],
       label: "Find people",

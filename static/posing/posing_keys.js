@@ -28,7 +28,7 @@ export function posingBindings(posing, jointBar, why) {
         event.key === `Arrow${name[0].toUpperCase()}${name.slice(1)}` && !event.altKey && !event.metaKey,
       run: (/** @type {KeyboardEvent} */ event) => posing.nudge(way, event.shiftKey ? 10 : event.ctrlKey ? 0.1 : 1),
     })),
-    { keys: ["U"], label: "Next degree of freedom of the joint", matches: plain("u"), run: () => posing.nextDof() },
+    { keys: ["U"], label: "Next degree of freedom", matches: plain("u"), run: () => posing.nextDof() },
     { keys: ["+"], label: "Increase the selected degree of freedom by one step", matches: sign(["+", "="]), run: () => posing.turn(1) },
     { keys: ["-"], label: "Decrease the selected degree of freedom by one step", matches: sign(["-", "_"]), run: () => posing.turn(-1) },
     { keys: ["Enter"], label: "Type a value for the selected degree of freedom", matches: plain("enter"), run: () => jointBar.type() },
@@ -58,7 +58,7 @@ export function posingBindings(posing, jointBar, why) {
       matches: plain("x", undefined, true),
       run: () => posing.takeAlternative(),
     },
-    { keys: ["R"], label: "Reset the joint's limb to the neutral pose", matches: plain("r"), run: () => posing.resetLimb() },
+    { keys: ["R"], label: "Reset the joint's limb to neutral", matches: plain("r"), run: () => posing.resetLimb() },
     { keys: ["Alt ,"], label: "Copy the pose from the previous frame", matches: alt("Comma", false), run: () => posing.copyNeighbour(-1) },
     { keys: ["Alt ."], label: "Copy the pose from the next frame", matches: alt("Period", false), run: () => posing.copyNeighbour(1) },
   ];
@@ -72,7 +72,7 @@ export function posingBindings(posing, jointBar, why) {
 export function pinBindings(pinning, why) {
   const shift = (/** @type {string} */ key) => plain(key, undefined, true);
   const bindings = [
-    { keys: ["X"], label: "Pin the selected joint by clicks (toggle)", matches: plain("x"), run: () => pinning.toggle() },
+    { keys: ["X"], label: "Pin the joint by clicks (toggle)", matches: plain("x"), run: () => pinning.toggle() },
     { keys: ["G"], label: "Fit to pins and edges", matches: plain("g"), run: () => pinning.fit() },
     {
       keys: ["Alt G"],
@@ -83,7 +83,7 @@ export function pinBindings(pinning, why) {
     },
     {
       keys: ["Alt B"],
-      label: "Take back the limb that the last fit moved although nobody had touched it",
+      label: "Take back the untouched limb that the last fit moved",
       matches: alt("KeyB", false),
       run: () => pinning.takeLimbBack(),
     },

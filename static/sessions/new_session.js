@@ -190,6 +190,7 @@ export class NewSession {
       units: optional("units"),
       poses: optional("poses"),
       rescale: this.#field("rescale").checked,
+      common_frames: this.#field("common_frames").checked,
       fps: this.#value("fps") ? Number(this.#value("fps")) : null,
       background: optional("background"),
       masks: optional("masks"),

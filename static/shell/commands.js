@@ -157,7 +157,7 @@ export function suitingLabels(facts) {
     [state.compared !== null, ["Show the pose before the last fit or search, or its result"]],
     [(state.people[state.person]?.alternatives ?? 0) > 0, ["Switch to the alternative pose, or back"]],
     [state.status === "doubtful" || state.status === "lost", ["Search: this frame", "Accept the doubtful or lost poses here: mark them as reviewed"]],
-    [state.point !== null, ["Fit to pins and edges", "Pin the selected joint by clicks (toggle)"]],
+    [state.point !== null, ["Fit to pins and edges", "Pin the joint by clicks (toggle)"]],
     [hasDoubts, ["Next doubtful or lost pose by severity", "Doubtful and lost poses, most severe first"]],
     [isPlaced, ["Fit to pins and edges", "Track forward", "Zoom all views to the people"]],
   ];

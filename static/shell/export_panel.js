@@ -8,7 +8,9 @@ const PROGRESS_MS = 400;
 /** Longest text of the server that is shown as its reason. */
 const MAX_REASON = 400;
 
-/** @typedef {{name: string, title: string, options: string[], axes: string}} Format */
+/** @typedef {{name: string, title: string, options: string[], axes: string, numbering: string}} Format
+ *   `numbering` is a sentence of a `{frame}` and its `{number}` in the file, or empty where they are the same
+ */
 
 export class ExportPanel {
   #store;
@@ -39,6 +41,7 @@ export class ExportPanel {
     this.#cancel = button("export-cancel", () => this.cancel());
     this.#format.addEventListener("change", () => this.#show());
     this.#frames.addEventListener("keydown", (event) => event.key === "Enter" && void this.#run());
+    this.#frames.addEventListener("input", () => this.#showNumbering());
     for (const select of this.#panel.querySelectorAll("select")) this.#select(select);
   }
 
@@ -83,12 +86,24 @@ export class ExportPanel {
 
   /** Show the options that the chosen format has. */
   #show() {
-    const format = this.#formats.find(({ name }) => name === this.#format.value);
+    const format = this.#chosen;
     const has = new Set([...(format?.options ?? []), ...((this.#store.facts.session?.people.length ?? 0) > 1 ? ["person"] : [])]);
     for (const part of this.#panel.querySelectorAll("[data-option]")) {
       if (part instanceof HTMLElement) part.hidden = !has.has(part.dataset.option ?? "");
     }
     byId("export-axes", HTMLSelectElement).value = format?.axes ?? "calibration";
+    this.#showNumbering();
+  }
+
+  /** Say how the file counts frames, of the first frame that is entered, else of frame 0. */
+  #showNumbering() {
+    const first = Number(/^\s*(\d{1,8})/.exec(this.#frames.value)?.[1] ?? 0);
+    const sentence = this.#chosen?.numbering ?? "";
+    byId("export-numbering", HTMLElement).textContent = sentence.replace("{frame}", String(first)).replace("{number}", String(first + 1));
+  }
+
+  get #chosen() {
+    return this.#formats.find(({ name }) => name === this.#format.value);
   }
 
   /** @returns {string | null} the address of the export; null, with the reason shown, if the frames are wrong */

@@ -39,6 +39,7 @@ import { Workspace } from "./workspace.js";
  *
  * @param {import("../model/index.js").Context} context
  * @param {Rooms} rooms
+ * @returns {import("../widgets/key_matching.js").Binding[]} all keys and commands of the page
  */
 export function mount(context, rooms) {
   const { store, send, actions, navigation, layers, reasons } = context;
@@ -76,6 +77,7 @@ export function mount(context, rooms) {
   palette.setBindings(table);
   keyList.setBindings(table);
   obeyKeys(context, table, scene.frame);
+  return table;
 }
 
 /**

@@ -29,7 +29,7 @@ export function peopleBindings({ actions, posing, people, reasons }) {
     },
     {
       keys: ["Shift C"],
-      label: "Copy the joint angles of the next person",
+      label: "Copy the next person's angles",
       matches: shift("c"),
       why,
       run: () => posing.copyNextPerson(),

@@ -3,9 +3,11 @@
 /**
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/pane_grid.js").PaneGrid} grid
+ * @param {import("../widgets/key_matching.js").Binding[]} bindings all keys and commands of the page
  */
-export function exposeState({ store, latency }, grid) {
+export function exposeState({ store, latency }, grid, bindings) {
   const quadrille = {
+    bindings,
     latencies: latency.latencies,
     toClient: grid.toClient.bind(grid),
     /** Serializable copy of the facts, with sizes instead of bitmaps. */

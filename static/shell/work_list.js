@@ -168,6 +168,7 @@ export class WorkList {
   #showFailure({ message, notes, tried }) {
     const [reason] = message.split(/;|\.$/);
     byId("failure-text", HTMLElement).textContent = `People were not found: ${reason.charAt(0).toLowerCase()}${reason.slice(1)}.`;
+    this.#showBadSilhouette();
     byId("failure-look", HTMLButtonElement).hidden = tried === null;
     byId("failure-look", HTMLButtonElement).textContent = `Show silhouettes of frame ${tried}`;
     byId("failure-details", HTMLDetailsElement).open = false;
@@ -178,15 +179,33 @@ export class WorkList {
     if (tried === this.#store.facts.target) this.#lookAtSilhouettes();
   }
 
+  /** Show the picture of the silhouette that the message names. Without such a view, or a silhouette, there is none. */
+  #showBadSilhouette() {
+    const { session, finding } = this.#store.facts;
+    const [picture, bad] = [byId("failure-silhouette", HTMLImageElement), this.#badView];
+    picture.hidden = true;
+    picture.removeAttribute("src");
+    if (!session || !finding || finding.tried === null || bad < 0) return;
+    picture.alt = picture.title = `Silhouette in ${session.cameras[bad].name} on frame ${finding.tried}`;
+    picture.onload = () => (picture.hidden = false);
+    picture.src = `silhouette/${bad}/${finding.tried}`;
+  }
+
+  /** Index of the view that the message names; -1 without one. */
+  get #badView() {
+    const { finding, session } = this.#store.facts;
+    const words = finding?.message.split(/[^\w-]+/) ?? [];
+    return session?.cameras.findIndex(({ name }) => words.includes(name)) ?? -1;
+  }
+
   /** Show the silhouettes of the frame that the message is about, and the view that it names. */
   #lookAtSilhouettes() {
-    const { finding, session, layers } = this.#store.facts;
+    const { finding, layers } = this.#store.facts;
     if (!finding || finding.tried === null) return;
     this.#navigation.goTo(finding.tried);
     this.#hasSilhouettes ||= !layers.shown.silhouette;
     this.#layers.toggle(["silhouette"], true);
-    const bad = session?.cameras.findIndex(({ name }) => finding.message.split(/[^\w-]+/).includes(name)) ?? -1;
-    if (bad >= 0) this.#store.set({ active: bad });
+    if (this.#badView >= 0) this.#store.set({ active: this.#badView });
   }
 
   #closeFailure() {

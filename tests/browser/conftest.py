@@ -94,6 +94,7 @@ async def server(blank_viser):
     server = _Server()
     app = create_app(server, blank_viser, Access(), static_folder())
     app.router.add_get("/thumbnail/{person}/{frame}", server.thumbnail)
+    app.router.add_get("/silhouette/{camera}/{frame}", server.thumbnail)
     async with listening(app) as port:
         server.address = f"http://127.0.0.1:{port}/"
         yield server

@@ -47,9 +47,10 @@ def bounding_volume(silhouettes: Sequence[ViewSilhouette], missing: int = 0) -> 
     """
     seen = [s for s in silhouettes if not s.is_empty]
     if len(seen) < 2:
-        listed = ", ".join(s.camera.name for s in seen) or "none"
+        empty = ", ".join(s.camera.name for s in silhouettes if s.is_empty)
+        found = f"nobody in {empty}" if seen else "none"
         raise TrackerError(
-            f"expected somebody in the silhouettes of at least 2 views, found {listed}; choose a frame that shows the "
+            f"expected somebody in the silhouettes of at least 2 views, found {found}; choose a frame that shows the "
             "person, and check the background"
         )
     around = [s.camera for s in seen]

@@ -49,6 +49,7 @@ async def test_files_are_made_sent_and_deleted(client, temporary):
         listed = await response.json()
     assert [f["name"] for f in listed] == list(formats.FORMATS)
     assert {f["name"]: f["axes"] for f in listed}["bvh"] == "y-up"
+    assert {f["name"] for f in listed if "Frame# {number}" in f["numbering"]} == {"trc"}
     async with client.get("/export/trc?person=ann&frames=1:5&axes=y-up&units=mm") as response:
         assert response.status == 200
         assert response.headers["Content-Disposition"] == "attachment; filename*=UTF-8''dance_ann.trc"

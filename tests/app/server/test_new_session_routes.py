@@ -99,6 +99,22 @@ async def test_footage_is_given_to_cameras_by_hand(folders, serve, form):
     assert "one body model for all" in line["failed"]
 
 
+async def test_frames_that_only_some_cameras_have_are_left_out_by_choice(folders, serve, form):
+    client, walk = await serve(), folders[0]
+    n_frames, images = load_session(walk).n_frames, cv2.VideoCapture(str(walk / "LEFT.mp4"))
+    shape = [int(images.get(p)) for p in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)]
+    shorter = cv2.VideoWriter(str(walk / "short.mp4"), cv2.VideoWriter.fourcc(*"mp4v"), 30, shape)
+    for _ in range(n_frames - 2):
+        shorter.write(images.read()[1])
+    shorter.release()
+    cameras = [{"name": n, "footage": str(walk / f)} for n, f in (("FRONT", "FRONT.mp4"), ("LEFT", "short.mp4"))]
+    (*_, line) = await client.make(form | {"cameras": cameras, "fps": 30})
+    assert f"choose Common frames to take the {n_frames - 2} that all have" in line["failed"]
+    lines = await client.make(form | {"cameras": cameras, "fps": 30, "common_frames": True})
+    assert "made" in lines[-1], lines
+    assert load_session(form["folder"]).n_frames == n_frames - 2
+
+
 async def test_nothing_is_made_while_two_cameras_seem_exchanged(serve, form, tmp_path, data_folder):
     walk = data_folder("walk")
     mixed = tmp_path / "mixed"

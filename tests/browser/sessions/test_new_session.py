@@ -184,6 +184,7 @@ async def test_footage_is_given_to_cameras_by_menu_drag_and_hand(form):
     await menus.nth(2).select_option("")
     await page.select_option("#new-poses", "camera-to-world")
     await page.check("#new-rescale")
+    await page.get_by_label("Common frames").check()
     await page.select_option("#new-units", "mm")  # the choices stay
     await shows(page, "document.querySelectorAll('#new-cameras li.is-left-out').length === 1")
     for field, value in {
@@ -201,7 +202,7 @@ async def test_footage_is_given_to_cameras_by_menu_drag_and_hand(form):
     ]  # fmt: skip
     assert sent.items() >= {
         "people": ["ann", "bob"], "heights_cm": [170, 158.5], "models": ["gavrila22"], "masks": "/data/m",
-        "units": "mm", "poses": "camera-to-world", "rescale": True, "keep_assignment": False,
+        "units": "mm", "poses": "camera-to-world", "rescale": True, "common_frames": True, "keep_assignment": False,
     }.items()  # fmt: skip
 
 

@@ -5,11 +5,16 @@ import json
 import pytest
 from page_driver import shows
 
+import app.export.formats
+
 FORMATS = [
-    {"name": "trc", "title": "joint centers (TRC)", "options": ["axes", "units"], "axes": "calibration"},
-    {"name": "bvh", "title": "skeleton animation (BVH)", "options": ["axes", "units"], "axes": "y-up"},
-    {"name": "mp4", "title": "overlay video (MP4)", "options": ["view"], "axes": "calibration"},
-]
+    {
+        "name": name, "title": format.title, "options": options, "axes": format.axes,
+        "numbering": format.numbering,
+    }
+    for name, options in (("trc", ["axes", "units"]), ("bvh", ["axes", "units"]), ("mp4", ["view"]))
+    for format in [app.export.formats.FORMATS[name]]
+]  # fmt: skip
 
 
 @pytest.mark.endpoint(n_people=2)
@@ -36,7 +41,12 @@ async def test_a_format_is_chosen_and_its_file_downloaded(fresh_page):
     untitled = "(all) => all.filter((one) => !one.title && !one.labels?.[0]?.title).map((one) => one.outerHTML)"
     assert await page.eval_on_selector_all("#export-panel :is(button, input, select)", untitled) == []
     assert await page.input_value("#export-axes") == "calibration"
+    numbering = page.locator("#export-numbering")
+    assert await numbering.inner_text() == "Frame# counts from 1: frame 0 of the session is Frame# 1"
+    await page.fill("#export-frames", "20-30")
+    assert await numbering.inner_text() == "Frame# counts from 1: frame 20 of the session is Frame# 21"
     await page.select_option("#export-format", "bvh")
+    assert await numbering.is_hidden()  # it counts like the session
     assert await page.input_value("#export-axes") == "y-up"
     await page.select_option("#export-person", "person 1")
     await page.fill("#export-frames", "5-500")

@@ -173,6 +173,26 @@ async def test_the_list_of_keys_is_searched_and_fits(page):
     assert await page.locator("#key-list dd:visible").all_inner_texts() == ["interpolated between poses"]
 
 
+async def test_no_two_commands_obey_the_same_key(page):
+    """Each key of the table is pressed; all commands that would obey it are asked. None of them is run."""
+    await page.evaluate("""() => window.addEventListener("keydown", (event) => {
+        if (["Alt", "Control", "Shift"].includes(event.key)) return;
+        event.preventDefault();
+        event.stopImmediatePropagation();
+        window.obeying = quadrille.bindings.filter(({ matches }) => matches(event)).map(({ label }) => label);
+    }, { capture: true })""")
+    table = await page.evaluate("quadrille.bindings.map(({ keys, label }) => [keys, label])")
+    named = {"Ctrl": "Control", "Esc": "Escape", "←": "ArrowLeft", "→": "ArrowRight", "↑": "ArrowUp", "↓": "ArrowDown"}
+    pressed = {}
+    for shown, label in ((shown, label) for keys, label in table for shown in keys):
+        first = shown.replace("1 – 9", "1")  # of a row of digits
+        await page.keyboard.press("+".join(named.get(part, part) for part in first.split(" ")))
+        pressed[shown, label] = await page.evaluate("window.obeying")
+    assert len(pressed) > 80
+    floor = "Setting the floor"  # its keys hold only meanwhile
+    assert {key: obeying for key, obeying in pressed.items() if obeying != [key[1]] and floor not in key[1]} == {}
+
+
 async def test_undo_holds_in_every_part_of_the_page(page, endpoint):
     """In a field only what is being typed is undone by the field itself."""
     await page.locator("#frame").click()

@@ -117,6 +117,9 @@ async def test_a_failure_is_a_sentence_with_its_silhouettes_and_a_way_on(page, e
     await failure.wait_for()
     sentence = await page.locator("#failure-text").inner_text()
     assert sentence == f"People were not found: e{REASON}."
+    await shows(page, "document.querySelector('#failure-silhouette').naturalWidth > 0")  # of the view that it names
+    assert endpoint.thumbnails == ["silhouette/2/12"]
+    assert await page.get_by_alt_text("Silhouette in BACK on frame 12").is_visible()
     await shows(page, "'silhouette 2' in quadrille.state.shown.pictures && quadrille.state.active === 2")
     assert await page.locator("#failure-notes").is_hidden()
     await page.locator("#failure-details summary").click()
@@ -126,6 +129,21 @@ async def test_a_failure_is_a_sentence_with_its_silhouettes_and_a_way_on(page, e
     assert await failure.is_hidden()
     assert not (await state_of(page))["layers"]["shown"]["silhouette"]
     assert "Drag the square" in await page.locator(".notice.is-info").inner_text()
+
+
+async def test_a_failure_that_names_no_view_has_no_picture(page, endpoint):
+    for message in (FAILURE, "Expected a head that stands out of the silhouettes, found none."):
+        endpoint.thumbnails.clear()
+        await endpoint.broadcast(FINDING | {"tried": 60})
+        await shows(page, "quadrille.state.finding?.running")
+        await endpoint.broadcast(FINDING | {"running": False, "failed": True, "message": message, "tried": 60})
+        await shows(page, "!document.querySelector('#find-failure').hidden")
+        picture = page.locator("#failure-silhouette")
+        if message == FAILURE:
+            await picture.wait_for()
+        else:
+            assert await picture.is_hidden()
+            assert endpoint.thumbnails == []
 
 
 async def test_a_failure_takes_nobody_away_from_another_frame(page, endpoint):
