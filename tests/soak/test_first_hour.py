@@ -377,6 +377,7 @@ async def test_a_stranger_gets_through_the_first_hour(recording, tmp_path, foota
         try:
             await program.start()
             await page.goto(program.address, timeout=120_000)
+            await page.wait_for_url(lambda url: "token" not in url)
             await shows(page, READY, 180)
             for part in (make_session, choose_frame, place, improve, track, correct, change_sizes, review, export):
                 await part(hour)

@@ -14,12 +14,13 @@ CORNER_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
 """Four cameras in the corners, named for the side of the person that each sees."""
 CORNER_DEGREES = (45.0, -45.0, -135.0, 135.0)
 FIELD_OF_VIEW_DEGREES = 67.0
+"""Field of view along the longer side: a camera turned upright keeps its lens."""
 CORNER_HEIGHT_M = 2.2
 WALL_HEIGHT_M = 2.5
 """Cameras along the walls look over the racks."""
 WALL_GAP_M = 0.2
 FISHEYE_FIELD_OF_VIEW_DEGREES = 120.0
-"""Field of view along the longer side, as that of wide action cameras."""
+"""As `FIELD_OF_VIEW_DEGREES`; that of wide action cameras."""
 FISHEYE_COEFFICIENTS = (-0.01, 0.006, -0.004, 0.0005)
 """k1 to k4: some px off the ideal equidistant lens at the border of a picture of 640x480."""
 ALL = "all"
@@ -59,9 +60,8 @@ def make_cameras(n_cameras: int, size: tuple[int, int], seed: int, fisheyes: Seq
 
 def _with_fisheye(camera: Camera) -> Camera:
     """Return a camera with a fisheye lens instead of its own, and all else as it was."""
-    focal = camera.width / 2 / np.radians(FISHEYE_FIELD_OF_VIEW_DEGREES / 2)
     K = camera.K.copy()
-    K[[0, 1], [0, 1]] *= focal / (camera.width / 2 / np.tan(np.radians(FIELD_OF_VIEW_DEGREES) / 2))
+    K[[0, 1], [0, 1]] *= np.tan(np.radians(FIELD_OF_VIEW_DEGREES) / 2) / np.radians(FISHEYE_FIELD_OF_VIEW_DEGREES / 2)
     return replace(camera, K=K, distortion=np.array(FISHEYE_COEFFICIENTS), fisheye=True)
 
 
@@ -71,7 +71,7 @@ def _mounted(name: str, direction: float, height_m: float, size: tuple[int, int]
     on_wall = out * (HALF_WIDTH_M - WALL_GAP_M) / np.max(np.abs(out))
     center = np.array([*on_wall, height_m + rng.uniform(-0.05, 0.05)])
     width, height = size
-    focal = width / 2 / np.tan(np.radians(FIELD_OF_VIEW_DEGREES) / 2) * rng.uniform(0.98, 1.02)
+    focal = max(size) / 2 / np.tan(np.radians(FIELD_OF_VIEW_DEGREES) / 2) * rng.uniform(0.98, 1.02)
     middle = np.array([(width - 1) / 2, (height - 1) / 2]) + rng.uniform(-0.01, 0.01, 2) * width
     K = np.array([[focal, 0.0, middle[0]], [0.0, focal, middle[1]], [0.0, 0.0, 1.0]])
     distortion = np.array([rng.uniform(-0.06, -0.03), rng.uniform(0.0, 0.01), *rng.uniform(-3e-4, 3e-4, 2)])

@@ -31,6 +31,12 @@ def test_each_corner_camera_sees_the_side_it_is_named_for():
         assert outward @ (np.cos(direction), np.sin(direction)) > np.cos(np.radians(20))
 
 
+@pytest.mark.parametrize("fisheyes", [(), ("all",)])
+def test_a_camera_turned_upright_keeps_its_lens(fisheyes):
+    for lying, upright in zip(*(make_cameras(4, size, 0, fisheyes) for size in [(640, 480), (480, 640)]), strict=True):
+        assert np.allclose(np.diag(upright.K), np.diag(lying.K))
+
+
 @pytest.mark.parametrize(("n", "size", "found"), [(0, (640, 480), "0"), (4, (641, 480), "641x480")])
 def test_impossible_cameras_are_refused(n, size, found):
     with pytest.raises(TrackerError, match=found):
