@@ -10,7 +10,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from tracker.calibrations.document import Document, refuse
-from tracker.calibrations.lens_words import UnknownLensError, is_fisheye, is_lens_key, is_unknown_key, spelled
+from tracker.calibrations.lens_words import (
+    UnknownLensError,
+    is_fisheye,
+    is_understood,
+    is_unknown,
+    names_lens,
+    spelled,
+)
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -22,9 +29,10 @@ Section: TypeAlias = dict[str, Any]
 _KEYS = {
     "matrix": "matrix k cameramatrix cammatrix intrinsic intrinsics intrinsicmatrix intrinsicsmatrix mtx",
     "distortions": "distortions distortion dist distcoef distcoefs distcoeff distcoeffs d "
-    "distortioncoefficients distortioncoeffs distortionvector distortionparameters distortionparams",
-    "radial": "rdistort radialdistortion",
-    "tangential": "tdistort tangentialdistortion",
+    "distortioncoefficients distortioncoeffs distortionvector distortionparameters distortionparams coefficients "
+    "coeffs coefs distortioncoefs",
+    "radial": "rdistort radial radialdistortion radialcoefficients radialcoeffs",
+    "tangential": "tdistort tangential tangentialdistortion tangentialcoefficients tangentialcoeffs",
     "matrix_R": "rotation r rot rotationmatrix rmat",
     "rodrigues": "rvec rotationvector rodrigues",
     "translation": "translation t tvec translationvector",
@@ -46,6 +54,9 @@ _OTHER_POSES = (
 )  # fmt: skip
 """Words of poses whose direction or order programs do not agree on."""
 _SHORTER = {14: 12, 12: 8, 8: 5}
+_NOTES = ("metadata", "meta", "info", "header", "general", "settings")
+"""Groups beside the cameras that may say something of all of them."""
+_REWRITE = "rewrite the camera to K, distortion, R and t of OpenCV's model, or remove the key if it says nothing"
 _LISTS = ("cameras", "cams", "camera")
 """Keys under which the cameras of a file may lie."""
 
@@ -133,17 +144,19 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
     known = known_values(group)
     for key, value in _flat(group):
         plain = spelled(key)
-        if plain in _MEANING or plain in _NUMBERS or is_lens_key(plain) or is_absent(value):
+        if plain in _MEANING or plain in _NUMBERS or names_lens(key, value) or is_absent(value):
             continue
-        if is_unknown_key(plain):
-            advice = (
-                "rewrite the camera to K, distortion, R and t of OpenCV's model, or remove the key if it says nothing"
-            )
-            raise refuse(document, camera, "known keys of a lens or a convention", quoted(key), advice)
+        if is_unknown(key, value):
+            raise refuse(document, camera, "known keys of a lens or a convention", _pair(key, value), _REWRITE)
+    words = _words_of_file(document)
+    words |= {key: value for key, value in _flat(group) if names_lens(key, value)}
     try:
-        fisheye = is_fisheye({key: value for key, value in _flat(group) if is_lens_key(spelled(key))})
+        fisheye = is_fisheye(words)
     except UnknownLensError as error:
         raise CalibrationError(f"{document.where}, camera {quoted(camera)}: {error}") from error
+    if not fisheye and "k4" in known and not {"distortions", "p1", "p2", "k5", "k6"} & known.keys():
+        found = "k1 to k4 alone, which are a fisheye's"
+        raise refuse(document, camera, "k1, k2, p1 and p2 of a lens", found, "say `fisheye: true`, or add p1 and p2")
     rotation, translation = _pose(known, group, camera, document)
     distortions = _distortions(known, fisheye)
     if not fisheye and isinstance(distortions, list) and len(distortions) in (12, 14):
@@ -158,6 +171,27 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
         "translation": translation,
         "fisheye": fisheye,
     }
+
+
+def _words_of_file(document: Document) -> dict[str, Any]:
+    """Return what a file says of the lens for all its cameras, at its top or in its metadata.
+
+    Raises:
+        CalibrationError: a key at its top may change the meaning and is not understood.
+    """
+    if not isinstance(document.data, Mapping):
+        return {}
+    top = {key: value for key, value in document.data.items() if not isinstance(value, Mapping | list)}
+    for key, value in top.items():
+        known = spelled(key) in _MEANING or spelled(key) in _NUMBERS or is_absent(value)
+        if not known and not names_lens(key, value) and is_unknown(key, value):
+            raise refuse(document, None, "known keys of a lens or a convention", _pair(key, value), _REWRITE)
+    notes = {k: v for key, group in document.groups.items() if spelled(key) in _NOTES for k, v in _flat(group)}
+    return {key: value for key, value in (notes | top).items() if is_understood(key, value)}
+
+
+def _pair(key: str, value: Any) -> str:
+    return f"{quoted(key)} = {quoted(value)}" if isinstance(value, str) else quoted(key)
 
 
 def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, document: Document) -> tuple[Any, Any]:
