@@ -21,7 +21,7 @@ from tracker.geometry.arrays import Array
 from tracker.text_files import LOST, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_FRAMES, FrameRate, check, quoted
 
-_METRES = {
+METRES_BY_WORD = {
     word: metres
     for words, metres in (
         ("m meter meters metre metres", 1.0),
@@ -142,12 +142,12 @@ def write_trc(
 
 def _scale(header: dict[str, str], where: str) -> float:
     units = header.get("Units", "").strip()
-    if units.lower() not in _METRES:
+    if units.lower() not in METRES_BY_WORD:
         raise FormatError(
             f"{where}, line 3: expected Units to be m, cm, mm, in, ft or a whole word such as millimeters, found "
             f"{quoted(units)}; correct it"
         )
-    return _METRES[units.lower()]
+    return METRES_BY_WORD[units.lower()]
 
 
 def _whole(text: str | None) -> int | None:

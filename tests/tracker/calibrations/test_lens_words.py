@@ -193,3 +193,27 @@ def test_a_camera_without_a_pose_is_left_out(tmp_path, absent):
     path = to_json(path, {"new": {"K": RIG[0].K, "size": [640, 480], **absent}})
     with pytest.raises(CalibrationError, match=r"'new': expected its pose .*, found the lens alone"):
         read_cameras(path)
+
+
+@pytest.mark.parametrize("absent", [[], [None, None, None], [float("nan")] * 3])
+def test_a_pose_of_nan_is_an_absent_pose(tmp_path, absent):
+    rows = {c.name: dict(zip(("K", "D", "R", "t"), parts(c), strict=True)) | {"D": None} for c in RIG}
+    rows["cam1"] |= {"R": [absent] * 3, "t": absent}
+    assert read_cameras(to_json(tmp_path / "c.json", rows)).left_out.keys() == {"cam1"}
+
+
+def test_a_placeholder_is_no_pose(tmp_path):
+    rig = cameras(ring(4))
+    rows = {c.name: dict(zip(("K", "D", "R", "t"), parts(c), strict=True)) | {"D": None} for c in rig}
+    rows["cam2"] |= {"R": np.eye(3), "t": [0, 0, 0]}
+    with pytest.raises(CalibrationError, match="camera 'cam2': expected its pose, found no rotation"):
+        read_cameras(to_json(tmp_path / "c.json", rows))
+
+
+def test_rotations_in_degrees_are_refused(tmp_path):
+    rows = {}
+    for c in RIG:
+        K, _, R, t = parts(c)
+        rows[c.name] = {"K": K, "rvec": np.degrees(cv2.Rodrigues(R)[0].ravel()), "tvec": t}
+    with pytest.raises(CalibrationError, match="expected a Rodrigues vector in radians, found one of length"):
+        read_cameras(to_json(tmp_path / "c.json", rows))
