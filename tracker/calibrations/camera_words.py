@@ -4,13 +4,21 @@ OpenCV's words (K, R, t, rvec, ...) mean `X_camera = R X_world + t` and OpenCV's
 change the meaning and are not understood are refused by name, never left out.
 """
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from tracker.calibrations.document import Document, refuse
-from tracker.calibrations.lens_words import UnknownLensError, is_fisheye, is_lens_key, is_unknown_key, spelled
+from tracker.calibrations.lens_words import (
+    UnknownLensError,
+    is_fisheye,
+    is_understood,
+    is_unknown,
+    names_lens,
+    spelled,
+)
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -22,9 +30,10 @@ Section: TypeAlias = dict[str, Any]
 _KEYS = {
     "matrix": "matrix k cameramatrix cammatrix intrinsic intrinsics intrinsicmatrix intrinsicsmatrix mtx",
     "distortions": "distortions distortion dist distcoef distcoefs distcoeff distcoeffs d "
-    "distortioncoefficients distortioncoeffs distortionvector distortionparameters distortionparams",
-    "radial": "rdistort radialdistortion",
-    "tangential": "tdistort tangentialdistortion",
+    "distortioncoefficients distortioncoeffs distortionvector distortionparameters distortionparams coefficients "
+    "coeffs coefs distortioncoefs",
+    "radial": "rdistort radial radialdistortion radialcoefficients radialcoeffs",
+    "tangential": "tdistort tangential tangentialdistortion tangentialcoefficients tangentialcoeffs",
     "matrix_R": "rotation r rot rotationmatrix rmat",
     "rodrigues": "rvec rotationvector rodrigues",
     "translation": "translation t tvec translationvector",
@@ -43,9 +52,16 @@ _NUMBERS = ("fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3", "k4", 
 _OTHER_POSES = (
     "pose", "camerapose", "position", "cameraposition", "center", "centre", "cameracenter", "quaternion", "q", "quat",
     "orientation", "euler", "eulerangles", "transform", "transformmatrix", "location", "worldposition", "axisangle",
+    "p", "projectionmatrix", "roll", "pitch", "yaw", "rx", "ry", "rz", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "c",
 )  # fmt: skip
 """Words of poses whose direction or order programs do not agree on."""
 _SHORTER = {14: 12, 12: 8, 8: 5}
+_UNIT = re.compile(r"^(length|translation|world|distance)?units?$|^units?(of)?(length|translation)s?$")
+"""Keys, without case and separators, whose value is the unit of the translations."""
+_OTHER_UNITS = ("px", "pixel", "pixels", "deg", "degree", "degrees", "rad", "radian", "radians")
+_NOTES = ("metadata", "meta", "info", "header", "general", "settings")
+"""Groups beside the cameras that may say something of all of them."""
+_REWRITE = "rewrite the camera to K, distortion, R and t of OpenCV's model, or remove the key if it says nothing"
 _LISTS = ("cameras", "cams", "camera")
 """Keys under which the cameras of a file may lie."""
 
@@ -59,11 +75,37 @@ def camera_groups(data: Any) -> dict[str, Mapping[str, Any]]:
         return {}
     for key in _LISTS:
         if isinstance(data.get(key), Mapping | list) and (found := camera_groups(data[key])):
-            return found
+            return _with_poses(found, {k: v for k, v in data.items() if k != key})
     if any(_MEANING.get(spelled(key)) == "matrix" and not isinstance(v, Mapping) for key, v in data.items()):
         return {"": data}
+    for key, value in data.items():
+        if isinstance(value, Mapping | list) and _holds_cameras(value):
+            return _with_poses(camera_groups(value), {k: v for k, v in data.items() if k != key})
     nested = {k: v for k, v in data.items() if isinstance(v, Mapping) and is_camera(v)}
     return nested or _by_suffix(data)
+
+
+def _holds_cameras(group: Mapping[str, Any] | list[Any]) -> bool:
+    """Return whether a group is none of a camera, but of several, or of the list of them."""
+    if isinstance(group, list):
+        return any(isinstance(row, Mapping) and is_camera(row) for row in group)
+    inner = [v for v in group.values() if isinstance(v, Mapping) and is_camera(v)]
+    return len(inner) > 1 or any(_holds_cameras(group[k]) for k in _LISTS if isinstance(group.get(k), Mapping | list))
+
+
+def _with_poses(cameras: dict[str, Mapping[str, Any]], others: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Add the poses of cameras that lie in a group beside them, under the same names, where only one group has them."""
+    groups = [group for group in others.values() if isinstance(group, Mapping) and cameras.keys() <= group.keys()]
+    groups = [g for g in groups if all(isinstance(g[name], Mapping) and has_pose(g[name]) for name in cameras)]
+    if len(groups) != 1 or any(has_pose(camera) for camera in cameras.values()):
+        return cameras
+    return {name: {**groups[0][name], **camera} for name, camera in cameras.items()}
+
+
+def has_pose(group: Mapping[str, Any]) -> bool:
+    """Return whether a group has words of a pose."""
+    words = {"matrix_R", "rodrigues", "translation", "T_camera_world", "T_world_camera"}
+    return bool(words & known_values(group).keys())
 
 
 def _by_suffix(data: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
@@ -115,8 +157,11 @@ def plain_text(value: Any) -> str:
 
 
 def is_absent(value: Any) -> bool:
-    """Return whether a value stands for none, as `null` in JSON and its word in TOML do."""
-    return value is None or (isinstance(value, str) and value.strip().lower() in ("", "null", "none", "nan"))
+    """Return whether a value stands for none, as `null` in JSON, its word in TOML, and lists of NaN do."""
+    if isinstance(value, list):
+        return all(map(is_absent, value))
+    is_word = isinstance(value, str) and value.strip().lower() in ("", "null", "none", "nan")
+    return value is None or is_word or (isinstance(value, float) and np.isnan(value))
 
 
 def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Section:
@@ -133,17 +178,19 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
     known = known_values(group)
     for key, value in _flat(group):
         plain = spelled(key)
-        if plain in _MEANING or plain in _NUMBERS or is_lens_key(plain) or is_absent(value):
+        if plain in _MEANING or plain in _NUMBERS or names_lens(key, value) or is_absent(value):
             continue
-        if is_unknown_key(plain):
-            advice = (
-                "rewrite the camera to K, distortion, R and t of OpenCV's model, or remove the key if it says nothing"
-            )
-            raise refuse(document, camera, "known keys of a lens or a convention", quoted(key), advice)
+        if is_unknown(key, value):
+            raise refuse(document, camera, "known keys of a lens or a convention", _pair(key, value), _REWRITE)
+    words = _words_of_file(document)
+    words |= {key: value for key, value in _flat(group) if names_lens(key, value)}
     try:
-        fisheye = is_fisheye({key: value for key, value in _flat(group) if is_lens_key(spelled(key))})
+        fisheye = is_fisheye(words)
     except UnknownLensError as error:
         raise CalibrationError(f"{document.where}, camera {quoted(camera)}: {error}") from error
+    if not fisheye and "k4" in known and not {"distortions", "p1", "p2", "k5", "k6"} & known.keys():
+        found = "k1 to k4 alone, which are a fisheye's"
+        raise refuse(document, camera, "k1, k2, p1 and p2 of a lens", found, "say `fisheye: true`, or add p1 and p2")
     rotation, translation = _pose(known, group, camera, document)
     distortions = _distortions(known, fisheye)
     if not fisheye and isinstance(distortions, list) and len(distortions) in (12, 14):
@@ -157,7 +204,42 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
         "rotation": rotation,
         "translation": translation,
         "fisheye": fisheye,
+        "unit": _stated_unit(_flat(group)) or _stated_unit(_said_of_all(document).items()),
     }
+
+
+def _stated_unit(values: Iterable[tuple[str, Any]]) -> str | None:
+    """Return the word for the unit of the translations; None if there is none."""
+    words = [v.strip().lower() for k, v in values if _UNIT.search(spelled(k)) and isinstance(v, str)]
+    return next((word for word in words if word and word not in _OTHER_UNITS), None)
+
+
+def _said_of_all(document: Document) -> dict[str, Any]:
+    """Return the values at the top of a file and in its metadata, which hold for all its cameras."""
+    if not isinstance(document.data, Mapping):
+        return {}
+    notes = {k: v for key, group in document.groups.items() if spelled(key) in _NOTES for k, v in _flat(group)}
+    return notes | {key: value for key, value in document.data.items() if not isinstance(value, Mapping | list)}
+
+
+def _words_of_file(document: Document) -> dict[str, Any]:
+    """Return what a file says of the lens for all its cameras, at its top or in its metadata.
+
+    Raises:
+        CalibrationError: a key at its top may change the meaning and is not understood.
+    """
+    said = _said_of_all(document)
+    for key, value in said.items() if isinstance(document.data, Mapping) else ():
+        if key not in document.data:  # metadata has remarks of any kind
+            continue
+        known = spelled(key) in _MEANING or spelled(key) in _NUMBERS or is_absent(value)
+        if not known and not names_lens(key, value) and is_unknown(key, value):
+            raise refuse(document, None, "known keys of a lens or a convention", _pair(key, value), _REWRITE)
+    return {key: value for key, value in said.items() if is_understood(key, value)}
+
+
+def _pair(key: str, value: Any) -> str:
+    return f"{quoted(key)} = {quoted(value)}" if isinstance(value, str) else quoted(key)
 
 
 def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, document: Document) -> tuple[Any, Any]:
@@ -187,7 +269,7 @@ def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, docum
 
 def homogeneous(value: Any) -> Array | None:
     """Return a pose of shape (3, 4) or (4, 4) as (4, 4), also one written for row vectors; None for anything else."""
-    array = plain_array(value)
+    array = plain_array(reshaped(value, {12: (3, 4), 16: (4, 4)}))
     if array.shape not in ((3, 4), (4, 4)) or not np.isfinite(array).all():
         return None
     whole = np.eye(4)

@@ -19,8 +19,10 @@ from tracker.calibrations.camera_words import (
     section_of,
 )
 from tracker.calibrations.document import Document, refuse
+from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.validation import quoted
 
 _ANIPOSE_KEYS = {"name", "size", "matrix", "rotation", "translation", "distortions"}
 
@@ -38,7 +40,8 @@ def read_words(document: Document) -> dict[str, Section]:
             continue
         section = section_of(group, key or document.stem, document)
         name = key if section["name"] is None else plain_text(section["name"])
-        name = name if name not in sections else f"{name} ({key})"
+        if name in sections:
+            raise CalibrationError(f"{document.where}: two cameras are named {quoted(name)}; give each its own name")
         sections[name] = section | ({"name": name} if name else {})
     return sections
 

@@ -74,9 +74,9 @@ def _syntax(text: str) -> str | None:
     for line in map(str.strip, text.splitlines()):
         if line.startswith("<"):
             return "xml"
-        if line.startswith("%YAML"):
+        if line.startswith("%YAML") or line == "---":
             return "yaml"
-        if not line or line == "---" or line.startswith("#"):
+        if not line or line.startswith("#"):
             continue
         if _TOML_LINE.fullmatch(line):
             return "toml"

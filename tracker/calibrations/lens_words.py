@@ -34,9 +34,14 @@ _NUMBERS = {"0": PINHOLE, "1": FISHEYE}
 """MC-Calib's distortion_type: 0 is Brown's model, 1 Kannala's."""
 _SUSPICIOUS = re.compile(
     r"fisheye|lens|distor|model|omni|^xi$|convention|coordinates?ys|handed|axes|^s[1-4]$|^tau[xy]?$|thinprism|tilt"
+    r"|radial|tangential|coef"
 )
 """What keys of a lens, a model or a convention are made of, without case and separators."""
-_HARMLESS = re.compile(r"error|rms|serial|modelname|modelnumber|count|flags|date|^distorted|undistort")
+_HARMLESS = re.compile(r"error|(?<!te)rms|serial|modelname|modelnumber|count|flags|date|^distorted|undistort")
+_OTHER_LENS = re.compile(r"fisheye|equidist|kannala|omnidir")
+"""Words of lenses other than the usual one, in text without case and separators."""
+_FREE_TEXT = re.compile(r"name|label|^id$|serial|path|file|video|image|folder")
+"""Keys without case and separators whose text is chosen freely."""
 
 
 class UnknownLensError(ValueError):
@@ -48,14 +53,27 @@ def spelled(key: str) -> str:
     return "".join(c for c in key.lower() if c.isalnum())
 
 
-def is_lens_key(key: str) -> bool:
-    """Return whether a key, without case and separators, names the model of a lens."""
-    return key in _FLAGS or key in _MODELS
+def names_lens(key: str, value: Any) -> bool:
+    """Return whether a key names the model of a lens, or its value does under any other key."""
+    plain = spelled(key)
+    is_word = isinstance(value, str) and spelled(value) in _FISHEYE_WORDS and not _FREE_TEXT.search(plain)
+    return plain in _FLAGS or plain in _MODELS or is_word
 
 
-def is_unknown_key(key: str) -> bool:
-    """Return whether a key, without case and separators, may change the meaning of the others unheard."""
-    return bool(_SUSPICIOUS.search(key)) and not _HARMLESS.search(key)
+def is_understood(key: str, value: Any) -> bool:
+    """Return whether a key with its value names one of the models that are read."""
+    try:
+        return names_lens(key, value) and _model(key, value) is not None
+    except UnknownLensError:
+        return False
+
+
+def is_unknown(key: str, value: Any) -> bool:
+    """Return whether a key, or text under it, may change the meaning of the others unheard."""
+    plain = spelled(key)
+    if isinstance(value, str) and _OTHER_LENS.search(spelled(value)) and not _FREE_TEXT.search(plain):
+        return True
+    return bool(_SUSPICIOUS.search(plain)) and not _HARMLESS.search(plain)
 
 
 def is_fisheye(words: Mapping[str, Any]) -> bool:

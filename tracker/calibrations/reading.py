@@ -4,6 +4,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from tracker.calibrations.camera_words import Section, is_absent, plain_text
 from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
 from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics, is_transposed
@@ -15,9 +17,10 @@ from tracker.calibrations.toml_layouts import board_square
 from tracker.calibrations.units import check_units
 from tracker.errors import CalibrationError, Remedy
 from tracker.formats.camera_section import METRES, CameraEntry, Units, check_names, read_entry
+from tracker.formats.trc import METRES_BY_WORD
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.validation import same_form
+from tracker.validation import quoted, same_form
 
 _SUFFIXES = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt")
 """Files of a folder that may hold a calibration; the others are not opened."""
@@ -66,8 +69,10 @@ def read_cameras(
     left_out = {str(sections[key]["name"]): reason for key, reason in reasons.items()}
     if not usable:
         raise _nothing_usable(sections, documents[0][0])
-    used: Units = units or layout.unit or "m"
-    entries = tuple(_entry(name, section, where, METRES[used], poses) for name, section in usable.items())
+    stated = None if units else _stated_metres(usable, where)
+    used: Units = units or (layout.unit if stated is None else None) or "m"
+    metres = METRES[used] if stated is None else stated
+    entries = tuple(_entry(name, section, where, metres, poses) for name, section in usable.items())
     notes = [f"Camera '{name}' is left out: {reason}." for name, reason in left_out.items()]
     notes += [layout.note] if layout.note else []
     entries, note = _with_convention(entries, where, layout, poses)
@@ -202,8 +207,27 @@ def _nothing_usable(sections: dict[str, Section], document: Document) -> Calibra
         return refuse(document, name, expected, "none", f"{advice}, or one file with both")
     return refuse(
         document, name, "its pose under keys such as R and t (X_camera = R X_world + t)", "the lens alone",
-        "calibrate the cameras together and give the file with their poses",
+        "if its poses lie elsewhere, move them to the cameras; else calibrate the cameras together",
     )  # fmt: skip
+
+
+def _stated_metres(sections: dict[str, Section], where: str) -> float | None:
+    """Return the metres per unit that the cameras of a file state; None if they state none.
+
+    Raises:
+        CalibrationError: a unit is not known, or they state several.
+    """
+    words = {section["unit"] for section in sections.values() if section.get("unit")}
+    metres = {METRES_BY_WORD.get(word) for word in words}
+    if not words:
+        return None
+    if None in metres or len(metres) > 1:
+        found = " and ".join(quoted(word) for word in sorted(words))
+        raise CalibrationError(
+            f"{where}: expected one unit of its translations such as m, cm, mm, in or ft, found {found}",
+            Remedy("scale_calibration", units=", ".join(METRES)),
+        )
+    return metres.pop()
 
 
 def _entry(name: str, section: Section, where: str, metres: float, poses: PoseConvention | None) -> CameraEntry:
@@ -231,6 +255,34 @@ def _with_convention(
     stated: list[Array] = [rigid.inverse(entry.T_world_camera) for entry in entries]
     if poses is None:
         is_turned = not layout.has_opencv_poses
-        return entries, check_convention(stated, where, layout.poses_in_words, layout.by_program, is_turned)
+        words = (where, layout.poses_in_words, layout.by_program, is_turned)
+        try:
+            return entries, check_convention(stated, *words)
+        except CalibrationError:
+            _refuse_placeholder(entries, stated, words)
+            raise
     changed = [rigid.inverse(read_pose(T, poses)) for T in stated]
     return tuple(replace(e, T_world_camera=T) for e, T in zip(entries, changed, strict=True)), None
+
+
+def _refuse_placeholder(
+    entries: Sequence[CameraEntry], stated: Sequence[Array], words: tuple[str, str, bool, bool]
+) -> None:
+    """Refuse a camera without any rotation, if the others see one place: programs fill in what they do not know.
+
+    Raises:
+        CalibrationError: there is one.
+    """
+    unturned = [np.array_equal(T[:3, :3], np.eye(3)) for T in stated]
+    others = [T for T, is_unturned in zip(stated, unturned, strict=True) if not is_unturned]
+    if not any(unturned) or len(others) < 2:
+        return
+    try:
+        check_convention(others, *words)
+    except CalibrationError:
+        return
+    name = entries[unturned.index(True)].name
+    raise CalibrationError(
+        f"{words[0]}, camera {quoted(name)}: expected its pose, found no rotation, as of a camera that is not "
+        "calibrated, while the others see one place; correct its pose, or remove the camera"
+    )

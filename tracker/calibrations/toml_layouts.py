@@ -5,7 +5,7 @@ from typing import Any
 
 from tracker.calibrations.camera_words import Section, is_camera, section_of
 from tracker.calibrations.document import Document, refuse
-from tracker.calibrations.lens_words import is_unknown_key, spelled
+from tracker.calibrations.lens_words import is_understood, is_unknown, spelled
 from tracker.validation import quoted
 
 _CAMERA_KEYS = {"name", "size", "matrix", "rotation", "translation", "distortions"}
@@ -50,7 +50,14 @@ def read_top_sections(document: Document) -> dict[str, Section]:
     Raises:
         CalibrationError: a key or value that changes the meaning is not understood.
     """
-    if lone := next((key for key, v in document.data.items() if not isinstance(v, dict) and _changes(key)), None):
+    if lone := next(
+        (
+            key
+            for key, v in document.data.items()
+            if not isinstance(v, dict) and not is_understood(key, v) and is_unknown(key, v)
+        ),
+        None,
+    ):
         raise refuse(document, None, "known keys of a lens or a convention", quoted(lone), "remove it")
     groups = {
         key: group
@@ -58,10 +65,6 @@ def read_top_sections(document: Document) -> dict[str, Section]:
         if key.lower() != "metadata" and (_CAMERA_KEYS & group.keys())
     }
     return _sections(groups, document)
-
-
-def _changes(key: str) -> bool:
-    return is_unknown_key(spelled(key))
 
 
 def _sections(groups: Mapping[str, Mapping[str, Any]], document: Document) -> dict[str, Section]:

@@ -54,7 +54,7 @@ def check_units(entries: Sequence[CameraEntry], where: str, units: Units, square
             f"The cameras stand {distance_m:.3g} m {place}, and the file says that a square of its board is 1 wide: if "
             f"its lengths count squares, {squares}."
         )
-    elif units != "m" and not sees_point and distance_m < MIN_STUDIO_M:
+    elif distance_m < (least if units == "m" else MIN_STUDIO_M):
         notes.append(f"All cameras stand within {distance_m:.2g} m {place}: check that the unit is {_WORDS[units]}.")
     return notes
 

@@ -23,6 +23,8 @@ METRES: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres per unit."""
 
 _ROTATION_TOLERANCE = 1e-3  # a rotation matrix printed with four digits still passes
+_MAX_TURN_RAD = 2 * np.pi + 1e-6
+"""Longest Rodrigues vector: programs write at most half a turn, and optimizers stay within one."""
 _CENTRAL = 0.25
 """Share of the picture at each side in which no principal point lies."""
 
@@ -133,6 +135,11 @@ def _rotation(value: list[Any], where: str) -> Array:
         check(value, _RotationMatrix if is_matrix else _Rodrigues, f"{where}, rotation", CalibrationError)
     )
     if rotation.shape == (3,):
+        if (angle := float(np.linalg.norm(rotation))) > _MAX_TURN_RAD:
+            raise CalibrationError(
+                f"{where}: expected a Rodrigues vector in radians, found one of length {angle:.4g}, more than a turn "
+                "(6.28), as of degrees or of angles about x, y and z; rewrite the rotations as 3x3 matrices"
+            )
         return rigid.so3_exp(rotation)
     error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     determinant = float(np.linalg.det(rotation))

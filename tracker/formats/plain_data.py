@@ -3,14 +3,17 @@
 A matrix of OpenCV's FileStorage becomes a list of rows in all three.
 """
 
+import json
 import re
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any, ClassVar, TypeGuard
 from xml.etree import ElementTree
 
-import msgspec
 import yaml
 
 from tracker.text_files import LOST, MAX_NESTING, TextKind, refuse_lost
+from tracker.validation import quoted
 
 _OPENCV_HEADER = re.compile(r"\A\s*%YAML[: ][^\n]*\n")
 """OpenCV writes `%YAML:1.0`, which is not YAML."""
@@ -26,7 +29,12 @@ _INT = re.compile(r"^[-+]?(?:0b[01_]+|0x[0-9a-fA-F_]+|0[0-7_]+|(?:0|[1-9][0-9_]*
 
 
 class _Loader(yaml.CSafeLoader if yaml.__with_libyaml__ else yaml.SafeLoader):  # type: ignore[misc]
-    """Plain YAML, with OpenCV's tag."""
+    """Plain YAML, with OpenCV's tag, and each key once."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Return a mapping; a key that is there twice is a `ValueError`."""
+        _once([(getattr(key, "value", ""), None) for key, _ in node.value if isinstance(key, yaml.ScalarNode)])
+        return dict(super().construct_mapping(node, deep))
 
     yaml_implicit_resolvers: ClassVar[dict[str, list[tuple[str, re.Pattern[str]]]]] = {
         first: [(tag, pattern) for tag, pattern in rules if not tag.endswith((":int", ":float"))]
@@ -73,12 +81,25 @@ def parse_json(text: str, source: str, kind: TextKind) -> Any:
         TrackerError: of the kind's type; the text is not JSON.
     """
     try:
-        data = _with_matrices(msgspec.json.decode(text))
-    except (msgspec.DecodeError, RecursionError) as error:
+        data = _with_matrices(json.loads(text, object_pairs_hook=_once))
+    except (ValueError, RecursionError) as error:
         raise kind.error(f"{kind.name} {source} is not valid JSON: {error}; {kind.remedy}") from error
     if LOST in text:
         refuse_lost(data, f"{kind.name} {source}", kind)
     return data
+
+
+def _once(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+    """Return pairs of keys and values as a dict.
+
+    Raises:
+        ValueError: a key is there twice, of which JSON and YAML would keep the last one.
+    """
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
+        raise ValueError(f"the key {quoted(twice)} is there twice")
+    return found
 
 
 def parse_xml(text: str, source: str, kind: TextKind) -> ElementTree.Element:

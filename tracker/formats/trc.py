@@ -21,7 +21,7 @@ from tracker.geometry.arrays import Array
 from tracker.text_files import LOST, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_FRAMES, FrameRate, check, quoted
 
-_METRES = {
+METRES_BY_WORD = {
     word: metres
     for words, metres in (
         ("m meter meters metre metres", 1.0),
@@ -75,9 +75,12 @@ def read_trc(path: str | Path) -> MarkerTable:
     head = list(islice(lines, 5))
     if len(head) < 5 or not head[0].startswith("PathFileType"):
         raise FormatError(f"{path} is not a TRC file: expected 'PathFileType' at its start; export it as TRC")
-    header = dict(zip(head[1].split("\t"), head[2].split("\t"), strict=False))
+    keys = [key.strip().lower() for key in head[1].split("\t")]
+    header = dict(zip(keys, head[2].split("\t"), strict=False))
+    if _is_row(head[4]):
+        raise FormatError(f"{where}, line 5: expected X1, Y1, Z1, ..., found a row of numbers; export it again")
     scale = _scale(header, where)
-    rate = check(_number(header.get("DataRate")), FrameRate, f"{where}, line 3, DataRate", FormatError)
+    rate = check(_number(header.get("datarate")), FrameRate, f"{where}, line 3, DataRate", FormatError)
     names = tuple(n.strip() for n in head[3].split("\t")[2:] if n.strip())
     if LOST in head[3]:  # in the first line there is a path, which nobody needs
         refuse_lost(list(names), f"{where}, line 4", _KIND)
@@ -95,7 +98,7 @@ def read_trc(path: str | Path) -> MarkerTable:
     points = values[:, 1:].reshape(len(frames), len(names), 3)
     # A point with a missing coordinate is missing.
     points[np.isnan(points).any(axis=-1)] = np.nan
-    return MarkerTable(names, frames, values[:, 0], points, rate, _whole(header.get("OrigDataStartFrame")))
+    return MarkerTable(names, frames, values[:, 0], points, rate, _whole(header.get("origdatastartframe")))
 
 
 def write_trc(
@@ -140,14 +143,19 @@ def write_trc(
     write_text_atomic(path, "\n".join(lines) + "\n")
 
 
+def _is_row(line: str) -> bool:
+    """Return whether a line begins with a number, as rows do and headers do not."""
+    return isinstance(_number(line.partition("\t")[0].strip()), float)
+
+
 def _scale(header: dict[str, str], where: str) -> float:
-    units = header.get("Units", "").strip()
-    if units.lower() not in _METRES:
+    units = header.get("units", "").strip()
+    if units.lower() not in METRES_BY_WORD:
         raise FormatError(
             f"{where}, line 3: expected Units to be m, cm, mm, in, ft or a whole word such as millimeters, found "
             f"{quoted(units)}; correct it"
         )
-    return _METRES[units.lower()]
+    return METRES_BY_WORD[units.lower()]
 
 
 def _whole(text: str | None) -> int | None:

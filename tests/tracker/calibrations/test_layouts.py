@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from calibration_files import WRITERS, dannce, jarvis, mc_calib, opencv_words, openpose, qualisys, to_json
+from calibration_files import WRITERS, dannce, jarvis, mc_calib, opencv_words, openpose, parts, qualisys, to_json
 from rigs import cameras, looking, ring
 from stated_poses import CONVENTIONS, stated
 
@@ -163,3 +163,42 @@ def test_five_hundred_cameras(tmp_path):
 def test_the_document_lists_the_table():
     text = (Path(__file__).resolve().parents[3] / "docs" / "recordings.md").read_text("utf-8")
     assert markdown_table() in text
+
+
+def halves():
+    """The lenses and the poses of a rig, by its cameras' names."""
+    lenses, poses = {}, {}
+    for c in cameras(ring(4)):
+        K, distortion, R, t = parts(c)
+        lenses[c.name], poses[c.name] = {"K": K, "dist": distortion, "size": c.size}, {"R": R, "t": t}
+    return lenses, poses, {name: lenses[name] | poses[name] for name in lenses}
+
+
+@pytest.mark.parametrize(
+    "lay",
+    [
+        lambda lenses, poses, _: {"intrinsics": lenses, "extrinsics": poses},
+        lambda lenses, poses, _: {"cameras": lenses, "poses": poses},
+        lambda *halves: {"results": {"cameras": halves[2]}},
+        lambda *halves: {"calibration": halves[2], "date": "2024"},
+        lambda lenses, poses, _: {
+            name: lenses[name] | {"c2w": rigid.inverse(rigid.transform(p["R"], p["t"])).ravel()}
+            for name, p in poses.items()
+        },
+    ],
+)
+def test_cameras_in_groups_of_other_names(tmp_path, lay):
+    entries = read_cameras(to_json(tmp_path / "c.json", lay(*halves()))).entries
+    assert [e.name for e in entries] == [c.name for c in cameras(ring(4))]
+    np.testing.assert_allclose([e.T_world_camera for e in entries], ring(4), atol=1e-6)
+
+
+def test_a_name_is_there_once(tmp_path):
+    rows = [{"name": "same", **row} for row in halves()[2].values()]
+    with pytest.raises(CalibrationError, match="two cameras are named 'same'"):
+        read_cameras(to_json(tmp_path / "c.json", rows))
+    text = to_json(tmp_path / "c.json", halves()[2]).read_text()
+    for path in (tmp_path / "c.json", tmp_path / "c.yml"):
+        path.write_text(("---\n" if path.suffix == ".yml" else "") + text.replace('"cam1"', '"cam0"'))
+        with pytest.raises(CalibrationError, match="'cam0' is there twice"):
+            read_cameras(path)

@@ -1,5 +1,6 @@
 """Words of lenses: all for a fisheye are one, and unknown ones are refused by name."""
 
+import json
 from dataclasses import replace
 
 import cv2
@@ -46,6 +47,10 @@ NO = [False, 0, 0.0, "0", "false", "no", None, "null"]
         {"distortionModel": "kannala-brandt"},
         {"camera_model": "pinhole", "distortion_model": "equidistant"},
         {"intrinsics": {"lens_model": "equi"}},
+        {"lens": {"type": "fisheye"}},
+        {"projection": "equidistant"},
+        {"calibration_type": "fisheye"},
+        {"intrinsics_model": "opencv_fisheye"},
     ],
     ids=str,
 )
@@ -100,6 +105,9 @@ def test_words_of_the_usual_lens(tmp_path, words):
         ({"handedness": "left"}, "'handedness'"),
         ({"s1": 0.1, "s2": 0.2}, "'s1'"),
         ({"tilt": [0.1, 0.1]}, "'tilt'"),
+        ({"method": "cv2.fisheye.calibrate"}, "'method' = 'cv2.fisheye.calibrate'"),
+        ({"comment": "an omnidirectional lens"}, "'comment'"),
+        ({"radial_terms": [0.1, 0.1]}, "'radial_terms'"),
         ({"D": [0.1] * 12}, "thin prism or a tilted sensor"),
     ],
     ids=str,
@@ -109,6 +117,38 @@ def test_what_is_not_understood_is_refused_by_name(tmp_path, words, named):
         read_cameras(with_words(tmp_path, words))
     assert named in str(caught.value)
     assert "camera 'cam0'" in str(caught.value) or "camera '0'" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        lambda rows: {"fisheye": True, **rows},
+        lambda rows: {"camera_model": "fisheye", "cameras": rows},
+        lambda rows: {"metadata": {"projection": "equidistant"}, **rows},
+    ],
+)
+def test_what_a_file_says_of_all_its_lenses(tmp_path, said):
+    path = with_words(tmp_path, {"size": [640, 480]})
+    rows = {row["name"]: row for row in json.loads(path.read_text())}
+    path.write_text(json.dumps(said(rows)))
+    assert all(entry.fisheye for entry in read_cameras(path).entries)
+    path.write_text(json.dumps({"convention": "opengl", "cameras": rows}))
+    with pytest.raises(CalibrationError, match="'convention' = 'opengl'"):
+        read_cameras(path)
+
+
+def test_coefficients_are_never_left_out(tmp_path):
+    rows = {
+        c.name: {"K": c.K, "size": c.size, "R": c.T_camera_world[:3, :3], "t": c.T_camera_world[:3, 3]} for c in RIG
+    }
+    lists = {"radial": [-0.3, 0.1, 0.01], "tangential": [0.001, 0.002]}
+    for lens in (lists, {"distortion": {"coefficients": [-0.3, 0.1, 0.001, 0.002, 0.01]}}):
+        path = to_json(tmp_path / "c.json", {name: row | lens for name, row in rows.items()})
+        np.testing.assert_array_equal(read_cameras(path).entries[0].distortion, [-0.3, 0.1, 0.001, 0.002, 0.01])
+    numbers = {"k1": 0.1, "k2": 0.1, "k3": 0.1, "k4": 0.1}
+    path = to_json(tmp_path / "c.json", {name: row | numbers for name, row in rows.items()})
+    with pytest.raises(CalibrationError, match="k1 to k4 alone, which are a fisheye's"):
+        read_cameras(path)
 
 
 @pytest.mark.parametrize("write", [anipose, caliscope, opencv_words])
@@ -153,3 +193,27 @@ def test_a_camera_without_a_pose_is_left_out(tmp_path, absent):
     path = to_json(path, {"new": {"K": RIG[0].K, "size": [640, 480], **absent}})
     with pytest.raises(CalibrationError, match=r"'new': expected its pose .*, found the lens alone"):
         read_cameras(path)
+
+
+@pytest.mark.parametrize("absent", [[], [None, None, None], [float("nan")] * 3])
+def test_a_pose_of_nan_is_an_absent_pose(tmp_path, absent):
+    rows = {c.name: dict(zip(("K", "D", "R", "t"), parts(c), strict=True)) | {"D": None} for c in RIG}
+    rows["cam1"] |= {"R": [absent] * 3, "t": absent}
+    assert read_cameras(to_json(tmp_path / "c.json", rows)).left_out.keys() == {"cam1"}
+
+
+def test_a_placeholder_is_no_pose(tmp_path):
+    rig = cameras(ring(4))
+    rows = {c.name: dict(zip(("K", "D", "R", "t"), parts(c), strict=True)) | {"D": None} for c in rig}
+    rows["cam2"] |= {"R": np.eye(3), "t": [0, 0, 0]}
+    with pytest.raises(CalibrationError, match="camera 'cam2': expected its pose, found no rotation"):
+        read_cameras(to_json(tmp_path / "c.json", rows))
+
+
+def test_rotations_in_degrees_are_refused(tmp_path):
+    rows = {}
+    for c in RIG:
+        K, _, R, t = parts(c)
+        rows[c.name] = {"K": K, "rvec": np.degrees(cv2.Rodrigues(R)[0].ravel()), "tvec": t}
+    with pytest.raises(CalibrationError, match="expected a Rodrigues vector in radians, found one of length"):
+        read_cameras(to_json(tmp_path / "c.json", rows))

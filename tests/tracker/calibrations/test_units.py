@@ -1,5 +1,7 @@
 """Units of translations: named by the distance to the point at which the cameras look."""
 
+import json
+
 import numpy as np
 import pytest
 from calibration_files import anipose, opencv_words
@@ -64,3 +66,37 @@ def test_parallel_cameras_have_no_point_but_an_extent(tmp_path):
     assert "within 0.065 m" in read_cameras(path, "mm").notes[0]
     with pytest.raises(CalibrationError, match="within 100 m from the origin"):
         read_cameras(opencv_words(tmp_path, in_units(10_000, row)))
+
+
+@pytest.mark.parametrize(("word", "per_metre"), [("cm", 100), ("millimeters", 1000), ("Inch", 1 / 0.0254)])
+@pytest.mark.parametrize("place", ["file", "metadata", "camera"])
+def test_the_unit_that_a_file_states(tmp_path, word, per_metre, place):
+    path = opencv_words(tmp_path, in_units(per_metre))
+    rows = json.loads(path.read_text())
+    said = {"units": word}
+    whole = {"file": {"cameras": rows, **said}, "metadata": {"cameras": rows, "metadata": said}}
+    path.write_text(json.dumps(whole.get(place, {name: row | said for name, row in rows.items()})))
+    found = read_cameras(path)
+    np.testing.assert_allclose([e.T_world_camera for e in found.entries], ring(4), atol=1e-9)
+    with pytest.raises(CalibrationError, match="unit is another"):  # the user's word goes before the file's
+        read_cameras(path, "mm" if word == "cm" else "m")
+
+
+def test_a_stated_unit_that_is_not_known_is_refused(tmp_path):
+    path = opencv_words(tmp_path, in_units(1))
+    rows = json.loads(path.read_text())
+    path.write_text(json.dumps({"cameras": rows, "units": "squares"}))
+    with pytest.raises(CalibrationError, match="ft, found 'squares'"):
+        read_cameras(path)
+    path.write_text(
+        json.dumps(
+            {name: row | {"unit": unit} for (name, row), unit in zip(rows.items(), ["m", "cm", "m", "m"], strict=True)}
+        )
+    )
+    with pytest.raises(CalibrationError, match="found 'cm' and 'm'"):
+        read_cameras(path)
+
+
+def test_metres_that_show_no_person_are_noted(tmp_path):
+    (note,) = read_cameras(opencv_words(tmp_path, in_units(0.001))).notes
+    assert "check that the unit is metres" in note

@@ -172,3 +172,15 @@ def test_footage_at_hand(data_folder, name, n_frames, n_points):
     assert len(table.names) == n_points
     heights = table.points[..., 2]
     assert -0.1 < np.nanmin(heights) < np.nanmax(heights) < 2.0
+
+
+def test_headers_with_spaces_and_without_axes(tmp_path):
+    path = tmp_path / "a.trc"
+    write_trc(path, ["a"], np.ones((3, 1, 3)), 30.0)
+    text = path.read_text()
+    path.write_text(text.replace("DataRate\tCameraRate", " datarate \tCameraRate").replace("Units", "UNITS "))
+    assert read_trc(path).rate == 30.0
+    lines = text.splitlines()
+    path.write_text("\n".join(lines[:4] + lines[6:]))
+    with pytest.raises(FormatError, match="line 5: expected X1, Y1, Z1"):
+        read_trc(path)
