@@ -128,7 +128,9 @@ async def place(hour):
             n_clicks = await hour.choose_person(person)
             user, turn = hour.user(hour.start, person), 0
             views = len(hour.session.cameras)
-            for joint in ORDER:
+            for n_dragged, joint in enumerate(ORDER):
+                if n_dragged == ORDER.count("torso"):
+                    await stranger.zoom_to_people()
                 for _ in range(views):
                     camera, turn = turn % views, turn + 1
                     missed = stage.missed

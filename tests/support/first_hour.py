@@ -178,6 +178,7 @@ class Hour:
         A drag after which more looks off is taken back.
         """
         stranger, user = self.stranger, self.user(frame, person)
+        await stranger.zoom_to_people()
         corrected = int(await stranger.tilt(user, person))
         done = set()
         for _ in range(most):

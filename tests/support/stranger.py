@@ -110,6 +110,11 @@ class Stranger:
         await self.until(f"quadrille.state.shown.frame === {frame} && quadrille.state.overlay.frame === {frame}")
         await self.until(SETTLED)
 
+    async def zoom_to_people(self):
+        """Zoom every view to the people: in whole images a pixel of the screen is centimetres of the room."""
+        await self.press("Shift+0")
+        await self.until("true")
+
     async def drag(self, camera, point, to_px, person=0, key=None):
         """Drag a joint to a place in a view, in undistorted px; whole pixels of the screen, as a mouse has them.
 
@@ -136,7 +141,15 @@ class Stranger:
         await page.mouse.up()
         if key:
             await page.keyboard.up(key)
-        await until(lambda: any(message["phase"] == "end" for message in self._sent[n_sent:]))
+        try:
+            await until(lambda: any(message["phase"] == "end" for message in self._sent[n_sent:]))
+        except TimeoutError:
+            under = await page.evaluate("([x, y]) => document.elementFromPoint(x, y)?.outerHTML", start.tolist())
+            phases = [message["phase"] for message in self._sent[n_sent:]]
+            raise AssertionError(
+                f"the drag of {point} in view {camera} from {start} to {end} has no end, only {phases}; "
+                f"at its start is {under}"
+            ) from None
         await self.until(f"quadrille.state.overlay.seq === {self._sent[-1]['seq']} && {SETTLED}")
         return True
 
