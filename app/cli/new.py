@@ -59,7 +59,7 @@ class NewArguments:
     up: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"
     """world axis that points up."""
     units: Annotated[Literal["m", "cm", "mm"] | None, tyro.conf.arg(metavar="{m,cm,mm}", help_behavior_hint="")] = None
-    """unit of the calibration's translations; by default the one that its layout fixes, else metres."""
+    """unit of the calibration's translations; by default as the file or its layout states, else metres."""
     poses: Annotated[PoseConvention | None, tyro.conf.arg(metavar="CONVENTION", help_behavior_hint="")] = None
     """convention of the calibration's poses, where the cameras contradict its layout: world-to-camera,
     camera-to-world, row-vectors or camera-position, each also with -opengl at its end."""
@@ -96,8 +96,6 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
     made = assemble(request, note=notes.append)
     print(f"made {made.folder}: {len(made.cameras)} cameras, {made.n_frames} frames at {made.fps:g} per second")
     print(summarize_rig([c.camera for c in made.cameras], made.up).sentence)
-    for sentence in notes:
-        print(f"note: {sentence}", file=sys.stderr)
     if not request.cameras and (without := unfilmed_cameras(request)):
         used = ", ".join(c.camera.name for c in made.cameras)
         print(f"used: {used}; calibrated cameras without footage are left out: {', '.join(without)}")
