@@ -84,6 +84,7 @@ export class Drawer {
     const { facts } = this.#store;
     const { drawer, connected } = facts;
     if (drawer === null || drawer === "doubts" || !connected || facts.session?.name !== this.#session) return;
+    if (drawer === "search" && !facts.searchRuns) return; // not known before the drawer has been open for a while
     if (!isEmpty(facts, drawer)) this.#needsContent = true;
     else if (this.#needsContent) this.#open(null);
   }
