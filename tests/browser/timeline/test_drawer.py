@@ -38,6 +38,26 @@ async def test_a_drawer_whose_content_is_gone_closes(page, endpoint):
     assert await page.locator("#drawer").is_visible()
 
 
+PRESSED = """(rooms) => new Promise((answer) => window.addEventListener("keydown", (event) => {
+  if (["Alt", "Control", "Shift"].includes(event.key)) return;
+  event.preventDefault();
+  event.stopImmediatePropagation();
+  answer(quadrille.bindings.filter(({ matches }) => matches(event)).map(({ label }) => label));
+}, { capture: true }))"""
+
+
+async def test_a_search_drawer_without_searches_stays_as_opened(page, endpoint):
+    """The list of searches comes only after the drawer has been opened."""
+    await page.keyboard.press("b")
+    await shows(page, "quadrille.state.drawer === 'search'")
+    await endpoint.broadcast(endpoint.state | {"undo": "drag torso, frame 12"})
+    await shows(page, "quadrille.state.state.undo !== null")
+    await endpoint.broadcast({"type": "search_runs", "runs": [], "replay": None, "compared": None})
+    await shows(page, "quadrille.state.searchRuns?.runs.length === 0")
+    await page.wait_for_timeout(300)
+    assert await page.locator("#drawer").is_visible()
+
+
 @pytest.mark.parametrize("endpoint", [{"n_people": 2}, {"n_people": 8}], indirect=True, ids=["2", "8"])
 @pytest.mark.parametrize("height", [720, 1080])
 async def test_no_lane_of_the_timeline_is_cut_off(page, endpoint, height):
