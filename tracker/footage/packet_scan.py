@@ -44,6 +44,8 @@ class TimeStamps(NamedTuple):
     where it is below a tick."""
     n_gaps: int
     """Number of intervals in which a frame may be missing: those longer than 1.5 usual ones."""
+    usual_rate: float
+    """Frame rate without these gaps, 1/s; 0 of fewer than three frames."""
 
 
 def list_frames(container: InputContainer, where: str, report: Callable[[PacketScan], None] | None = None) -> Index:
@@ -142,13 +144,15 @@ def time_stamps_of(index: Index, tick_s: float) -> TimeStamps:
     """Return start and regularity of the time stamps of a video; `tick_s` is their unit, s."""
     start_s, intervals = float(index.pts[0]) * tick_s, np.diff(index.pts)
     if len(intervals) < 2:
-        return TimeStamps(start_s, 0.0, 0)
+        return TimeStamps(start_s, 0.0, 0, 0.0)
     ticks, k = (index.pts - index.pts[0]).astype(np.float64), np.arange(len(index.pts))
     slope, ahead = np.polyfit(k, ticks, 1)
     apart = float(np.abs(ticks - (slope * k + ahead)).max())
-    usual = max(np.median(intervals), intervals.mean())  # of intervals that alternate, the median is the shorter
+    # Of intervals that alternate, the median may be the shorter; the mean over all is drawn out by gaps.
+    usual = max(np.median(intervals), intervals.mean())
+    usual = intervals[intervals <= 1.5 * usual].mean()
     n_gaps = int((intervals > 1.5 * usual).sum())
-    return TimeStamps(start_s, apart / slope if apart > 1 else 0.0, n_gaps)
+    return TimeStamps(start_s, apart / slope if apart > 1 else 0.0, n_gaps, float(1 / (usual * tick_s)))
 
 
 def _sorted(shown: list[int], keys: list[int], position: dict[int, int], before: int | None) -> Index:

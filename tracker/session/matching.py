@@ -74,9 +74,10 @@ def common_rate(footage: Mapping[str, Footage], fps: float | None) -> float:
     rates = {name: f.fps for name, f in footage.items() if f.fps is not None}
     for name, f in footage.items():
         if fps is None and not f.has_constant_rate:
+            assert f.stamps is not None
             raise RecordingError(
                 f"camera '{name}': {f.path} has a variable frame rate, expected a constant one: {_irregularity(f)}",
-                Remedy("give_constant_rate", fps=f"{usual_rate(rates[name]):g}"),
+                Remedy("give_constant_rate", fps=f"{usual_rate(f.stamps.usual_rate):g}"),
             )
     wanted = fps if fps is not None else next(iter(rates.values()), None)
     if wanted is None:

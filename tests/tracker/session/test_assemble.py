@@ -257,6 +257,8 @@ def test_small_jitter_explains_another_mean_rate(room):
 
 def test_gaps_are_named_though_the_rate_is_given(room):
     encode_stamped(room / "left.mp4", [3000 * k + 3000 * (k > 4) for k in range(9)])
+    # The rate is that between the gaps, not the mean.
+    assert_refused(room, RecordingError, "variable frame rate.*1 gaps", Remedy("give_constant_rate", fps="30"))
     _, notes = noted(room, fps=30.0)
     assert "1 gaps in which frames may be missing" in notes[0]
 
