@@ -12,8 +12,10 @@ import numpy as np
 
 from tracker.calibrations.document import Document, refuse
 from tracker.calibrations.lens_words import (
+    FISHEYE,
     UnknownLensError,
     is_fisheye,
+    is_fisheye_word,
     is_understood,
     is_unknown,
     names_lens,
@@ -146,8 +148,13 @@ def _flat(group: Mapping[str, Any], depth: int = 0) -> Iterator[tuple[str, Any]]
     """Yield keys and values of a group; those of groups inside come first, so that outer ones replace them."""
     inner = {k: v for k, v in group.items() if isinstance(v, Mapping) and spelled(k) not in _KEYS["size"].split()}
     if depth < 4:
-        for value in inner.values():
-            yield from _flat(value, depth + 1)
+        for key, value in inner.items():
+            found = list(_flat(value, depth + 1))
+            # A group of coefficients may say the model by its name alone.
+            has_lens = any(spelled(k) == "k1" or _MEANING.get(spelled(k)) == "distortions" for k, _ in found)
+            if has_lens and is_fisheye_word(key):
+                yield key, FISHEYE
+            yield from found
     yield from ((str(k), v) for k, v in group.items() if k not in inner)
 
 

@@ -53,6 +53,11 @@ def spelled(key: str) -> str:
     return "".join(c for c in key.lower() if c.isalnum())
 
 
+def is_fisheye_word(word: str) -> bool:
+    """Return whether a word names OpenCV's equidistant model."""
+    return spelled(word) in _FISHEYE_WORDS
+
+
 def names_lens(key: str, value: Any) -> bool:
     """Return whether a key names the model of a lens, or its value does under any other key."""
     plain = spelled(key)

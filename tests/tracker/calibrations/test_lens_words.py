@@ -63,6 +63,16 @@ def test_all_words_of_a_fisheye(tmp_path, words):
         np.testing.assert_allclose(entry.camera().project(point[0]), expected[0], atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["fisheye", "Equidistant", "intrinsics"])
+def test_the_name_of_a_group_of_coefficients_says_the_model(tmp_path, name):
+    rows = []
+    for c in RIG:
+        K, distortion, R, t = parts(c)
+        rows.append({"name": c.name, name: {"K": K, "D": distortion}, "R": R, "t": t, "size": c.size})
+    found = read_cameras(to_json(tmp_path / "cameras.json", rows)).entries
+    assert [entry.fisheye for entry in found] == [name != "intrinsics"] * len(RIG)
+
+
 @pytest.mark.parametrize(
     "words",
     [
