@@ -54,7 +54,7 @@ class Recording:
         )
         for source, footage in zip(self._cameras, self._footage, strict=True):
             check_size(source.camera.name, footage.path, footage.size, source.camera.size)
-        if self.listed_share is None:
+        if not in_background:
             self._check_offsets()
         self.fps = next((f.fps for f in self._footage if f.fps is not None), None)
         self._cache: OrderedDict[_Key, Image] = OrderedDict()
