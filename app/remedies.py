@@ -10,7 +10,7 @@ from tracker.errors import Remedy, TrackerError
 
 
 class Phrases(NamedTuple):
-    """What to do, each way as the end of a sentence."""
+    """Ends of a sentence that name the remedy, one for each program."""
 
     command_line: str
     page: str

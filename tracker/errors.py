@@ -8,7 +8,7 @@ command line prints message and remedy and exits with status 1; the page shows t
 
 
 class Remedy:
-    """What a user can do about an error or a warning, for a program to phrase."""
+    """A way out of an error or a warning, for a program to phrase."""
 
     def __init__(self, code: str, /, **fields: object) -> None:
         """Name a remedy.

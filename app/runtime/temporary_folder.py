@@ -13,7 +13,7 @@ _PREFIX = "quadrille-"
 
 
 class TemporaryFolder:
-    """A folder that only this user may enter. Its lock tells that the program still runs."""
+    """A folder that only this user may enter. It is locked while the program runs."""
 
     def __init__(self, parent: str) -> None:
         """Make it in a folder, such as that of the system for temporary files."""

@@ -1,4 +1,4 @@
-"""What the form of a new session asks for: folders, small pictures of footage, a survey, and the session itself.
+"""Serve the form of a new session: folders, small pictures of footage, a survey, and the session itself.
 
 A page names paths of this machine. `SessionRoutes` says where such requests are answered.
 """

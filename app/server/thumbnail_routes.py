@@ -66,7 +66,7 @@ class ThumbnailRoutes:
         return await self._answer(request, lambda: self._silhouette(camera, frame), missing)
 
     async def _answer(self, request: web.Request, make: Callable[[], bytes | None], missing: str) -> web.Response:
-        """Make a picture in the thread of the thumbnails; `missing` is said if there is none."""
+        """Make a picture in the thread of the thumbnails; answer 404 with `missing` if there is none."""
         # Without a token, an image in a foreign page could start the work, though never read the result.
         if request.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
             raise web.HTTPForbidden(text="Expected a request of this page, found one of another site.")

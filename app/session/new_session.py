@@ -25,7 +25,7 @@ _Offset = Annotated[int, Meta(ge=-10_000_000, le=10_000_000, title="Offset", des
 
 
 class CameraChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a user has chosen for one calibrated camera."""
+    """Choices of a user for one calibrated camera."""
 
     name: Name
     footage: TypedPath

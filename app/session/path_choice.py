@@ -47,7 +47,7 @@ class Entry(NamedTuple):
 
 
 class FolderContents(NamedTuple):
-    """What is in a folder."""
+    """Content of a folder."""
 
     folder: str
     parent: str | None

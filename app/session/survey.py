@@ -20,7 +20,7 @@ from tracker.session.rig_summary import RigSummary, summarize_rig
 
 
 class SurveyForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What to look at; a field that is still empty is null."""
+    """Paths to survey; a field that is still empty is null."""
 
     calibration: TypedPath | None = None
     footage: TypedPath | None = None
@@ -30,7 +30,7 @@ class SurveyForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Survey(msgspec.Struct, frozen=True):
-    """What the chosen files hold, for the page."""
+    """Content of the chosen files, for the page."""
 
     cameras: list[str]
     """Names of the calibrated cameras."""
@@ -39,7 +39,7 @@ class Survey(msgspec.Struct, frozen=True):
     assigned: dict[str, str]
     """Path of the footage that is named after a camera, by camera."""
     rig: dict[str, Any] | None
-    """Where the cameras stand and look (`RigSummary`); null without cameras."""
+    """Positions and directions of the cameras (`RigSummary`); null without cameras."""
     problems: list[str]
     """Sentences on what cannot be read."""
 

@@ -5,7 +5,7 @@
  * many quick ones must follow a change of pace.
  */
 const [WINDOW_S, STEPS] = [60, 10];
-/** Nothing is said before this time, s: the first step often compiles or reads ahead. */
+/** Shortest elapsed time for an estimate, s: the first step often compiles or reads ahead. */
 const FIRST_S = 2;
 
 export class TimeLeft {

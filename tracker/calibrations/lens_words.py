@@ -36,7 +36,7 @@ _SUSPICIOUS = re.compile(
     r"fisheye|lens|distor|model|omni|^xi$|convention|coordinates?ys|handed|axes|^s[1-4]$|^tau[xy]?$|thinprism|tilt"
     r"|radial|tangential|coef"
 )
-"""What keys of a lens, a model or a convention are made of, without case and separators."""
+"""Parts of keys of a lens, a model or a convention, without case and separators."""
 _HARMLESS = re.compile(r"error|(?<!te)rms|serial|modelname|modelnumber|count|flags|date|^distorted|undistort")
 _OTHER_LENS = re.compile(r"fisheye|equidist|kannala|omnidir")
 """Words of lenses other than the usual one, in text without case and separators."""

@@ -35,21 +35,21 @@ _OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 # Degrees; measured on simulated rigs of 2 to 8 cameras in rings, arcs, corners and rows, aimed up to 12 degrees beside
 # one point, level or turned by 90 degrees: tests/tracker/calibrations/test_pose_conventions.py.
 _FITS = 30.0
-"""Cost up to which a convention fits."""
+"""Cost up to which a convention fits, degrees. Checked, as all here, on rigs of test_pose_conventions.py."""
 _RATIO, _MARGIN = 1.3, 5.0
-"""A convention is doubted if it costs more than this many times another and that much more."""
+"""A convention is doubted if it costs more than this many times another, and this many degrees more."""
 _PAIR_RATIO, _PAIR_MARGIN = 2.0, 20.0
 """The same for two cameras, whose axes meet by chance more often."""
 _PARALLEL = 45.0
-"""Cost of axes that are all parallel: the cameras may look at one place, but nothing shows it."""
+"""Cost of axes that are all parallel, degrees: the cameras may look at one place, but nothing shows it."""
 _MAX_ANGLE = 60.0
-"""Largest cost of an axis: what points elsewhere counts alike."""
+"""Largest cost of an axis, degrees: what points elsewhere counts alike."""
 _LOOK_DOWN = 0.3
 """Part of the vertical in the picture below which a camera that looks down has no level (17 degrees)."""
 _UNKNOWN_ROLL = 22.5
-"""Cost of a roll that is not known: the mean of all."""
+"""Cost of a roll that is not known, degrees: the mean of all."""
 _MAX_COMPARED = 24
-"""Most cameras that are compared in pairs; of more, some are chosen evenly."""
+"""Most cameras that are compared in pairs, which bounds time; of more, some are chosen evenly."""
 
 
 def read_pose(T_stated: Array, convention: PoseConvention) -> Array:

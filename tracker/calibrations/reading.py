@@ -25,7 +25,7 @@ from tracker.validation import quoted, same_form
 _SUFFIXES = (".toml", ".json", ".yml", ".yaml", ".xml", ".xcp", ".txt")
 """Files of a folder that may hold a calibration; the others are not opened."""
 _MAX_FILES = 1000
-"""Most files of a folder that are looked at."""
+"""Most files of a folder that are looked at, which bounds time."""
 
 
 @dataclass(frozen=True, eq=False)

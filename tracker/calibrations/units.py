@@ -10,7 +10,8 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.camera_rig import axes_point
 
 MAX_STUDIO_M = 100.0
-"""Distance from the point at which cameras look, or from the origin, at which none shows a person."""
+"""Distance from the point at which cameras look, or from the origin, at which none shows a person:
+1.7 m are 15 px high there in a picture of 1,000 px and 60 degrees."""
 MIN_STUDIO_M = 0.5
 """Distance nearer than which cameras show no person: at it, a lens of 60 degrees sees 58 cm."""
 _MIN_APART_M = 0.02

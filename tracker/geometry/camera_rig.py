@@ -1,4 +1,4 @@
-"""Where the cameras of a rig stand and look: the point that all of them see, and its distance."""
+"""Arrangement of the cameras of a rig: the point that all of them see, and its distance."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

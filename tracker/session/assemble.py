@@ -84,7 +84,7 @@ class NewSession:
 
 @dataclass(frozen=True)
 class SessionParts:
-    """What a session is made of, checked: all of it fits together."""
+    """Checked parts of a session, which fit together."""
 
     request: NewSession
     cameras: tuple[CameraSource, ...]

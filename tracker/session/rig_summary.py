@@ -31,9 +31,9 @@ class RigSummary:
     names: tuple[str, ...]
     """Names of the cameras."""
     centers_world: Array
-    """Where they stand, (N, 3), metres."""
+    """Optical centres, (N, 3), metres."""
     axes_world: Array
-    """Where they look, unit vectors, (N, 3)."""
+    """Optical axes, unit vectors, (N, 3)."""
     viewed_point_world: Array | None
     """The point at which all look, (3,), metres; None if they look at none, or are parallel."""
     distances_m: Array | None
@@ -92,7 +92,7 @@ def _far_doubts(cameras: Sequence[Camera], distances_m: Array | None) -> list[st
 
 def _floor_doubts(names: Sequence[str], centers_world: Array, heights_m: Array, up: str) -> list[str]:
     below = [name for name, height in zip(names, heights_m, strict=True) if height < -_UNDER_FLOOR_M]
-    # Where a camera is the origin, the calibration knows no floor.
+    # If a camera is the origin, the calibration knows no floor.
     if not below or np.linalg.norm(centers_world, axis=1).min() < _UNDER_FLOOR_M:
         return []
     return [

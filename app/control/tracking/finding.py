@@ -138,7 +138,7 @@ class FindingPeople:
     def _show(self, frame: int, found: FirstPoses | None) -> None:
         """Draw the first poses of a frame that was tried. Go there unless the user looks or works elsewhere.
 
-        What was found stays in sight while the next frames are tried.
+        Candidates stay in sight while the next frames are tried.
         """
         session_state = self._session_state
         self._first_tried = frame if self._first_tried is None else self._first_tried

@@ -76,7 +76,7 @@ class Tracking:
         session_state.set(settings=settings, run_choices=choices)
         self._run: _Run | None = None
         self.after_run: Callable[[range], None] = lambda frames: None
-        """Is told the frames of each run that ended. It must return quickly."""
+        """Called with the frames of each run that ended; must return quickly."""
         session_state.unwritten.append(lambda: self._run is not None and self._run.session.has_unsaved)
 
     @property
@@ -108,7 +108,7 @@ class Tracking:
             backward: towards the first frame.
             until: last frame to track; None for the end of the recording.
             edit: entry of the history that the run belongs to; None for one of its own.
-            on_end: is told at the end whether the run did all its work. It must return quickly.
+            on_end: called at the end with whether the run did all its work; must return quickly.
 
         Raises:
             TrackerError: no person has been placed, or there is no frame to track.
