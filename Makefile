@@ -12,6 +12,9 @@ PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sy
 QUICK := $(wildcard tests/test_*.py) $(addprefix tests/,tracker/compute tracker/geometry tracker/body tracker/motion \
 	tracker/formats tracker/session tracker/store tracker/evaluation tracker/images app/runtime app/state app/drawing)
 
+# Tests start hundreds of programs: each would compile the library again if none may keep its bytecode.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: install run test test-all test-quick test-library test-page test-slow kernels bench check lint types \
 	page-types format clean
 

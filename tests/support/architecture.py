@@ -2,6 +2,7 @@
 
 import ast
 import re
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -98,8 +99,22 @@ def imported(tree, known):
     return found
 
 
-IMPORTS = {name: imported(ast.parse(path.read_text("utf-8")), FILES) for name, path in FILES.items()}
-OWN = {name: sorted(found & FILES.keys()) for name, found in IMPORTS.items()}
+@cache
+def trees():
+    """Syntax tree of each module; not made while tests are collected."""
+    return {name: ast.parse(path.read_text("utf-8")) for name, path in FILES.items()}
+
+
+@cache
+def imports():
+    """What each module imports."""
+    return {name: imported(tree, FILES) for name, tree in trees().items()}
+
+
+@cache
+def own_imports():
+    """Modules of the project that each module imports."""
+    return {name: sorted(found & FILES.keys()) for name, found in imports().items()}
 
 
 PAGE_ROOMS = [

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
 from tracker.geometry.lens_tables import Lens, lens_of
 
@@ -22,6 +22,8 @@ _MAX_ENTRIES = 4096
 BEYOND_LENS = -32000
 """Column and row of points beyond the lens, which it does not show."""
 _BORDER_SAMPLES = 64
+_ROWS_AT_ONCE = 64
+"""Rows of the table that are filled at a time: all rows of a wide lens would take gigabytes."""
 
 
 class SensorLookup(NamedTuple):
@@ -52,13 +54,19 @@ def lookup_of_lens(lens: Lens) -> SensorLookup:
     low, high = _border(camera)
     step = max(1 / (_STEPS_PER_PX * max(camera.K[0, 0], camera.K[1, 1])), float((high - low).max()) / _MAX_ENTRIES)
     n_columns, n_rows = (int(np.ceil(n)) + 1 for n in (high - low) / step)
-    x, y = np.meshgrid(low[0] + step * np.arange(n_columns), low[1] + step * np.arange(n_rows))
-    points = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3)
+    x, rows = low[0] + step * np.arange(n_columns), low[1] + step * np.arange(n_rows)
+    exact = np.concatenate([_exact_pixels(camera, x, y) for y in np.array_split(rows, -(-n_rows // _ROWS_AT_ONCE))])
+    pixels = np.round(np.clip(exact, BEYOND_LENS, -BEYOND_LENS)).astype(np.int16)
+    return SensorLookup(pixels, low, step, _steepest(exact) / step)
+
+
+def _exact_pixels(camera: Camera, x: Array, y: Array) -> FloatArray:
+    """Return the raw pixel of each point of a grid of sensor coordinates, (len(y), len(x), 2)."""
+    points = np.stack([*np.meshgrid(x, y), np.ones((len(y), len(x)))], axis=-1).reshape(-1, 3)
     exact = camera.project(points)
     # Beyond the lens the polynomial bends back: nothing is seen there.
     exact[~camera.within_lens(camera.pinhole.project(points)) | np.isnan(exact).any(axis=-1)] = BEYOND_LENS
-    pixels = np.round(np.clip(exact, BEYOND_LENS, -BEYOND_LENS)).astype(np.int16).reshape(n_rows, n_columns, 2)
-    return SensorLookup(pixels, low, step, _steepest(exact.reshape(n_rows, n_columns, 2)) / step)
+    return exact.astype(np.float32).reshape(len(y), len(x), 2)
 
 
 def _border(camera: Camera) -> tuple[Array, Array]:
@@ -72,7 +80,7 @@ def _border(camera: Camera) -> tuple[Array, Array]:
     return xy.min(axis=0), xy.max(axis=0)
 
 
-def _steepest(pixels: Array) -> float:
+def _steepest(pixels: FloatArray) -> float:
     """Return the largest change of a pixel coordinate per step of the table, for a step in any direction of a box."""
     valid = np.asarray((pixels > BEYOND_LENS).all(axis=-1), dtype=bool)
     along_x = np.abs(np.diff(pixels, axis=1))[valid[:, 1:] & valid[:, :-1]].max(axis=0)
