@@ -8,10 +8,6 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := app tracker tests
 PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
-# The library's rooms that need neither kernels nor sessions.
-QUICK := $(wildcard tests/test_*.py) $(addprefix tests/,tracker/compute tracker/geometry tracker/body tracker/motion \
-	tracker/formats tracker/session tracker/store tracker/evaluation tracker/images app/runtime app/state app/drawing)
-
 # Tests start hundreds of programs: each would compile the library again if none may keep its bytecode.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -25,8 +21,9 @@ run: install
 
 # What must hold on every change: at most five minutes on two cores. The steps run beside one another. The kernels, for
 # which others wait, have the highest priority. Tests of the page wait a lot: those of the library take what they leave.
+# All steps run to their end: one run shows all that fails.
 test: $(VENV)/.tested $(VENV)/.typescript
-	$(PARALLEL) kernels test-page test-library check
+	$(PARALLEL) --keep-going kernels test-page test-library check
 
 # And what is long and rarely broken.
 test-all: test
@@ -34,11 +31,11 @@ test-all: test
 
 # The inner loop: under a minute.
 test-quick: $(VENV)/.tested
-	nice -n 19 $(PYTEST) -m "not slow" $(QUICK)
+	nice -n 19 $(PYTEST) -m "not slow and not kernels" --ignore=tests/browser tests
 
-# The rooms that need no kernels come first, while the kernels are compiled.
-test-library: test-quick kernels
-	nice -n 19 $(PYTEST) -m "not slow" $(addprefix --ignore=,tests/browser $(QUICK)) tests
+# Tests of rooms that need no kernels come first (tests/conftest.py), while the kernels are compiled.
+test-library: $(VENV)/.tested
+	nice -n 19 $(PYTEST) --no-loadscope-reorder -m "not slow" --ignore=tests/browser tests
 
 # Starts at once: only the files of tests/browser/live, which come last, wait for the kernels. Three processes, because
 # these tests wait more than they compute.

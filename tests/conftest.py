@@ -17,7 +17,25 @@ settings.register_profile("quadrille", deadline=None, database=None, derandomize
 settings.load_profile("quadrille")
 configuration.set_hypothesis_home_dir(Path(tempfile.gettempdir()) / "quadrille-hypothesis")
 
-DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+TESTS = Path(__file__).resolve().parent
+DATA = TESTS.parents[1] / "shared" / "data"
+
+
+WITHOUT_KERNELS = {
+    *(f"tracker/{room}" for room in "compute geometry body motion formats session store evaluation images".split()),
+    *(f"app/{room}" for room in "runtime state drawing".split()),
+}
+"""Rooms whose tests call no compiled kernels, or few."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark the tests of the library that need kernels, and run them last: the kernels are compiled meanwhile."""
+    for item in items:
+        folder = item.path.relative_to(TESTS).parent
+        if folder.as_posix() != "." and folder.parts[0] != "browser" and folder.as_posix() not in WITHOUT_KERNELS:
+            item.add_marker("kernels")
+    items.sort(key=lambda item: item.get_closest_marker("kernels") is not None)
 
 
 @pytest.fixture(scope="session")

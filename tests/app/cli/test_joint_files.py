@@ -101,13 +101,13 @@ def test_both_say_that_a_file_was_resampled(run, session, tmp_path):
 
 
 def test_an_exported_range_comes_back_to_its_frames(run, session, tmp_path):
-    for frame in range(20, 27):
+    for frame in range(20, 23):
         assert run("init", session, "--joints", TRUTH, "--frame", frame)[0] == 0
-    out = run("export", session, "--format", "trc", "--out", tmp_path / "a.trc", "--frames", "20:27")[1]
+    out = run("export", session, "--format", "trc", "--out", tmp_path / "a.trc", "--frames", "20:23")[1]
     assert "Frame# counts from 1: frame 20 of the session is Frame# 21" in out
     status, out, _ = run("evaluate", session, "--reference", tmp_path / "a.trc", "--json")
     found = json.loads(out)
-    assert (status, found["frames"], found["missing_reference_values"]) == (0, 7, 0)
+    assert (status, found["frames"], found["missing_reference_values"]) == (0, 3, 0)
     assert found["mpjpe_mm"] < 1e-3
     assert found["notes"] == ["the first row of the file, Frame# 21 at 0.800 s, is frame 20"]
 

@@ -101,6 +101,7 @@ def test_shoes_that_a_shadow_hides_do_not_make_a_person_smaller():
     assert found == pytest.approx(top[2] - floor_m - 0.10, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_figure_with_a_large_hand_has_two_possible_heads():
     voxels, joints = figure(arms_deg=45)
     points = voxels.grid.centers(np.argwhere(np.ones(voxels.grid.shape, dtype=bool)))

@@ -91,6 +91,7 @@ def test_nobody_in_the_silhouettes(session, silhouettes):
         find(session)
 
 
+@pytest.mark.slow
 def test_two_people_where_one_was_announced(session, silhouettes):
     people = [ellipsoid((0.0, -0.6, 0.9), HALF), ellipsoid((0.0, 0.6, 0.9), HALF)]
     silhouettes += silhouettes_of(people, CAMERAS)
@@ -114,6 +115,7 @@ def test_several_cameras_that_moved_are_an_error(session, silhouettes):
         find(session)
 
 
+@pytest.mark.slow
 def test_a_person_cut_off_by_the_image(session, silhouettes, fits):
     views = silhouettes_of_figure(figure()[0], CAMERAS)
     bottom = int(views[0].mask.any(axis=1).nonzero()[0][-1])
@@ -150,6 +152,7 @@ def test_another_start_takes_its_place(session, silhouettes, monkeypatch):
     assert not any("share little" in note for note in found.notes)
 
 
+@pytest.mark.slow
 def test_legs_that_look_like_shadows_are_found(session, silhouettes, monkeypatch):
     voxels, joints = figure(noise=0.1)
     legs = ("left_knee", "right_knee", "left_ankle", "right_ankle")

@@ -187,6 +187,7 @@ def test_the_program_calls_the_kernels_and_marks_them_compiled(empty_cache, monk
     assert not list(empty_cache.glob("stage-*"))
 
 
+@pytest.mark.slow
 def test_kernels_that_find_people_and_track_voxels_are_called_too(monkeypatch):
     called = []
     for module, name in ((carving, "carve_blocks"), (labels, "label_and_sum"), (silhouette_overlap, "_add")):

@@ -51,6 +51,7 @@ def test_a_person_of_another_shape_is_followed(model):
     assert np.all(np.linalg.eigvalsh(estimates[-1].covariances[0]) > 0)
 
 
+@pytest.mark.slow
 def test_legs_that_look_like_shadows_are_followed(monkeypatch):
     """One view takes the legs for a shadow, the others show them."""
     body, frames = load_model("gavrila34", 1.72), range(3)
@@ -115,6 +116,7 @@ def test_a_person_who_has_gone_is_lost():
     assert "check that no camera has moved" in estimates[-1].notes[0] or "outside" in estimates[-1].notes[0]
 
 
+@pytest.mark.slow
 def test_a_camera_that_moved_is_left_out():
     def moved(k, views):
         return [views[0]._replace(mask=np.roll(views[0].mask, 45, axis=1)), *views[1:]] if k > 2 else views
