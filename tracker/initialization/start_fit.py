@@ -101,7 +101,8 @@ class StartFitter:
     def _estimates(self, start: PosedBody, frames: Sequence[int]) -> Iterator[PoseEstimate]:
         people = (start, *self.others)
         subjects = Subjects.of([b.model for b in people], [0])
-        run = TrackingRun(self.observer, subjects, [b.values for b in people], frames)
+        # A pose and the same one before it are a prediction: the tracker does not search around it a second time.
+        run = TrackingRun(self.observer, subjects, [[b.values, b.values] for b in people], frames)
         return ChamferTracker(_SETTINGS).estimates(run)
 
 

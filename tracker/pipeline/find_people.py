@@ -13,7 +13,6 @@ from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.pipeline.body_acquisition import SIZES_EDITS, PosedFrames, acquire_body, with_sizes_changed
 from tracker.pipeline.first_pose import (
-    AXIS_FRAMES,
     ENOUGH_FRAMES,
     FirstPose,
     FirstPoses,
@@ -77,7 +76,9 @@ def frames_to_try(frames: range, first: int | None) -> list[int]:
         first: frame to try first; None for the middle one.
     """
     begin = frames[len(frames) // 2] if first is None else first
-    indices = np.linspace(0, len(frames) - 1, min(_FRAMES, len(frames))).astype(int)
+    # Midpoints of equal parts: on the first and last frame a start is tracked in one direction only.
+    n = min(_FRAMES, len(frames))
+    indices = ((np.arange(n) + 0.5) * len(frames) / n).astype(int)
     spread = sorted({frames[i] for i in indices} - {begin})
     order = [begin]
     while spread:
@@ -95,8 +96,7 @@ def expected_steps(n_frames: int, done: int, good: int) -> int:
         done: number of frames and methods that were tried.
         good: number of them that gave good first poses.
     """
-    voxels = min(n_frames, done + max(0, ENOUGH_FRAMES - good))
-    return max(done, voxels + AXIS_FRAMES)
+    return max(done, min(n_frames, done + max(0, ENOUGH_FRAMES - good)))
 
 
 def find_people(

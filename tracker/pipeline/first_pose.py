@@ -6,6 +6,7 @@ The cheapest track is kept. It is doubtful where another start costs as much, or
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
@@ -37,8 +38,13 @@ VOXEL_M = 0.025
 """Edge of a voxel, metres."""
 _MOTION_FRAMES = 6
 """Frames over which the motion of a figure is measured."""
-ENOUGH_FRAMES, AXIS_FRAMES = 5, 2
-"""Number of frames with good starts from voxels, and with starts on the axis, among which `auto` chooses."""
+ENOUGH_FRAMES = 2
+"""Number of frames with good starts whose heights agree that end the trial of `auto`."""
+_OTHER_METHOD_FRAMES = 5
+"""Frames on which `auto` tries another method where voxels gave no good start, the cheapest first."""
+_HEIGHTS_AGREE = 0.06
+"""Share by which the heights of a person on two such frames differ at most: two standard deviations of their difference
+(`find_people.MEASURED`)."""
 _SURE_RATIO = 1.05
 """Ratio of the cost of the cheapest track that faces the other way above which left and right are known."""
 _LARGER = 0.02
@@ -122,20 +128,21 @@ def find_first_poses_anywhere(
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever method and on whatever of some frames tracks best; see `find_first_poses`.
 
-    Voxels are tried until their starts are good on enough frames. The axis is tried on the best of these, and a search
-    along the figure where neither finds a good start. `show` receives each frame and what was found on it.
+    Voxels are tried until the starts of two frames are good and agree on the heights. The axis is tried where no start
+    is good, the cheapest frames first, and then a search along the figure. `show` receives each frame and what was
+    found on it.
     """
     with _Trial(session, observer, people, size_m, say, show) as trial:
         for frame in frames:
-            if sum(f.is_good for f in trial.found) < ENOUGH_FRAMES:
-                trial.add(frame, ("voxels",))
-        by_cost = sorted(trial.found, key=lambda f: f.cost_px)
-        chosen = [f.frame for f in by_cost[:AXIS_FRAMES]] or list(frames)[:ENOUGH_FRAMES]
-        for frame in chosen:
-            trial.add(frame, ("axis",))
-        for frame in chosen:
-            if not any(f.is_good for f in trial.found):
-                trial.add(frame, ("search",))
+            if trial.is_settled:
+                break
+            trial.add(frame, ("voxels",))
+        by_cost = [f.frame for f in sorted(trial.found, key=lambda f: f.cost_px)] or list(frames)
+        for method in ("axis", "search"):
+            for frame in by_cost[:_OTHER_METHOD_FRAMES]:
+                if any(f.is_good for f in trial.found):
+                    break
+                trial.add(frame, (method,))
         return trial.best()
 
 
@@ -192,6 +199,14 @@ class _Trial:
         statuses = ", ".join(p.fitted.status for p in own.values())
         cost = f"cost {self.found[-1].cost_px:.2f} px over a short track"
         self._say(f"frame {frame}, {' and '.join(methods)}: {statuses}, {cost}")
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether two frames have good starts that agree on the heights of all."""
+        heights = [[p.model.height_m for p in f.poses.values()] for f in self.found if f.is_good]
+        return any(
+            bool(np.all(np.abs(np.log(np.divide(a, b))) < _HEIGHTS_AGREE)) for a, b in combinations(heights, ENOUGH_FRAMES)
+        )
 
     def best(self) -> FirstPoses:
         """Return the first poses that cost least; those whose fits are good go before.
