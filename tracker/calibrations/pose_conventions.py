@@ -128,11 +128,10 @@ def check_convention(
     cost = costs(Ts_stated)
     stated = cost.pop(STATED)
     best = min(cost.values())
-    ratio, margin = (_PAIR_RATIO, _PAIR_MARGIN) if len(Ts_stated) == 2 else (_RATIO, _MARGIN)
     others = _distinct([c for c in cost if cost[c] <= min(_FITS, max(_RATIO * best, best + _MARGIN))], Ts_stated)
-    if best < _FITS and stated > ratio * best + margin:
+    if is_clearly_worse(stated, best, len(Ts_stated)):
         rewrite = _rewrite(others[0])
-        condition = f"if R and t, as read, are changed ({rewrite})" if is_turned else f"if {_in_words(others[0])}"
+        condition = f"if R and t, as read, are changed ({rewrite})" if is_turned else f"if {in_words(others[0])}"
         misfit = f"expected {expected}, by which the cameras see no one place"
         if len(others) == 1:
             raise CalibrationError(
@@ -140,7 +139,7 @@ def check_convention(
                 Remedy("give_poses", poses=others[0], rewrite="likewise" if is_turned else rewrite),
             )
         raise CalibrationError(
-            f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({_in_words(c)})' for c in others)}",
+            f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({in_words(c)})' for c in others)}",
             Remedy("choose_poses"),
         )
     others = [c for c in others if cost[c] <= _RATIO * stated + _MARGIN]
@@ -150,6 +149,19 @@ def check_convention(
         f"The file is read with {expected}; {' or '.join(others)} would fit these cameras as well. Check with "
         "the pictures that the cameras stand where they should."
     )
+
+
+def is_clearly_worse(cost: float, best: float, n_cameras: int) -> bool:
+    """Return whether the best of several readings fits some cameras, and another, of a given cost, does not."""
+    ratio, margin = (_PAIR_RATIO, _PAIR_MARGIN) if n_cameras == 2 else (_RATIO, _MARGIN)
+    return best < _FITS and cost > ratio * best + margin
+
+
+def best_cost(Ts_stated: Sequence[Array], convention: PoseConvention | None = None) -> tuple[float, PoseConvention]:
+    """Return the cost of a convention; of the one that fits best, if None is given."""
+    cost = costs(Ts_stated)
+    best = convention or min(cost, key=lambda c: cost[c])
+    return cost[best], best
 
 
 def _distinct(conventions: Sequence[PoseConvention], Ts_stated: Sequence[Array]) -> list[PoseConvention]:
@@ -169,7 +181,8 @@ def _from_first(Ts_stated: Sequence[Array], convention: PoseConvention) -> Array
     return Ts @ rigid.inverse(Ts[0])
 
 
-def _in_words(convention: PoseConvention) -> str:
+def in_words(convention: PoseConvention) -> str:
+    """Return what R and t of a convention mean."""
     kind = convention.removesuffix("-opengl")
     axes = ", with the camera's axes of OpenGL (y up, z backwards)" if kind != convention else ""
     return _MEANING[kind] + axes

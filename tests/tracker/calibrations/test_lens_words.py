@@ -177,7 +177,8 @@ def test_unknown_keys_in_other_layouts(tmp_path, write):
     ("pose", "named"),
     [
         ({"R": np.eye(3), "position": [1, 2, 3]}, "'position' alone"),
-        ({"quaternion": [1, 0, 0, 0], "t": [1, 2, 3]}, "'quaternion' alone"),
+        ({"quaternion": [1, 0, 0, 0]}, "the rotation alone"),
+        ({"rx": 1, "ry": 0, "rz": 0, "t": [1, 2, 3]}, "'rx', 'ry', 'rz' alone"),
         ({"pose": np.eye(4)}, "'pose' alone"),
         ({"R": np.eye(3)}, "the rotation alone"),
         ({"t": [1, 2, 3]}, "the translation alone"),
