@@ -70,7 +70,7 @@ _NUMBERS = (
 _POSE = {"matrix_R", "rodrigues", "quaternion", "qw", "translation", "tx", "T_camera_world", "T_world_camera"}
 """Meanings that belong to a pose."""
 _OTHER_POSES = (
-    "pose", "camerapose", "position", "cameraposition", "center", "centre", "cameracenter", "quaternion", "q", "quat",
+    "pose", "camerapose", "position", "cameraposition", "center", "centre", "cameracenter",
     "orientation", "euler", "eulerangles", "transform", "transformmatrix", "location", "worldposition", "axisangle",
     "p", "projectionmatrix", "roll", "pitch", "yaw", "rx", "ry", "rz", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "c",
 )  # fmt: skip

@@ -3,6 +3,7 @@
 import csv
 import re
 from array import array
+from collections.abc import Mapping
 
 import msgspec
 import numpy as np
@@ -85,11 +86,15 @@ class NumberRows:
             raise FormatError(f"{where}: expected {self._n_columns} columns, found {len(row)}; export it again")
         return row + [np.nan] * (self._n_columns - len(row))
 
-    def table(self, limit: float) -> tuple[NDArray[np.int64], Array]:
+    def table(self, limit: float, limits: Mapping[int, float] | None = None) -> tuple[NDArray[np.int64], Array]:
         """Return the frame numbers, (n,), and the other columns, (n, n_columns - 1), which the caller may change.
 
+        Args:
+            limit: largest absolute value.
+            limits: other ones of some columns, by their number from 1.
+
         Raises:
-            FormatError: there is no row, the frames do not rise, or a value is infinite, beyond `limit`, or missing
+            FormatError: there is no row, the frames do not rise, or a value is infinite, beyond its limit, or missing
                 where it is required.
         """
         if not self._lines:
@@ -103,13 +108,14 @@ class NumberRows:
                 "row; sort the rows and remove doubles"
             )
         for i, column in enumerate(values.T, 2):  # by column: a mask of all would take much memory
-            wrong = ~(np.abs(column) <= limit)
+            most = (limits or {}).get(i, limit)
+            wrong = ~(np.abs(column) <= most)
             if i > self._n_required:
                 wrong &= ~np.isnan(column)
             if wrong.any():
                 row = int(np.argmax(wrong))
                 raise FormatError(
-                    f"{self._where}, line {self._lines[row]}, column {i}: expected a finite number within {limit:g}, "
+                    f"{self._where}, line {self._lines[row]}, column {i}: expected a finite number within {most:g}, "
                     f"found {column[row]:g}; correct it"
                 )
         return frames, values
