@@ -77,9 +77,13 @@ def costs(Ts_stated: Sequence[Array]) -> dict[PoseConvention, float]:
         The root mean square angle between the axes and the point that all see, plus that between the sides of the
         pictures and the vertical that levels them best; turns by 90 degrees count as level.
     """
-    n = len(Ts_stated)
-    chosen = np.unique(np.linspace(0, n - 1, min(n, _MAX_COMPARED)).astype(int))
+    chosen = _chosen(len(Ts_stated))
     return {c: _cost([rigid.inverse(read_pose(Ts_stated[i], c)) for i in chosen]) for c in CONVENTIONS}
+
+
+def _chosen(n: int) -> list[int]:
+    """Return the indices of the cameras that are compared, ascending."""
+    return sorted({int(i) for i in np.linspace(0, n - 1, min(n, _MAX_COMPARED))})
 
 
 def _cost(Ts_world_camera: Sequence[Array]) -> float:
@@ -149,6 +153,21 @@ def check_convention(
         f"The file is read with {expected}; {' or '.join(others)} would fit these cameras as well. Check with "
         "the pictures that the cameras stand where they should."
     )
+
+
+def odd_camera(Ts_stated: Sequence[Array]) -> int | None:
+    """Return the index of the one camera that does not see the place that all others see; None if there is none.
+
+    Args:
+        Ts_stated: poses from world to camera, (4, 4), in any unit. Of fewer than four, no three agree without one.
+    """
+    chosen = _chosen(len(Ts_stated))
+    if len(chosen) < 4:
+        return None
+    without = {i: _cost([rigid.inverse(Ts_stated[k]) for k in chosen if k != i]) for i in chosen}
+    odd = min(without, key=lambda i: without[i])
+    is_odd = is_clearly_worse(best_cost(Ts_stated)[0], without[odd], len(chosen) - 1)
+    return odd if is_odd else None
 
 
 def is_clearly_worse(cost: float, best: float, n_cameras: int) -> bool:

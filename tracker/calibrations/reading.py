@@ -13,7 +13,7 @@ from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics
 from tracker.calibrations.document import Document, read_document, refuse
 from tracker.calibrations.foreign import foreign, named
 from tracker.calibrations.layouts import CalibrationLayout, find_layout
-from tracker.calibrations.pose_conventions import check_convention, read_pose
+from tracker.calibrations.pose_conventions import check_convention, odd_camera, read_pose
 from tracker.calibrations.rotation_forms import check_turned, refuse_angles, with_quaternions
 from tracker.calibrations.toml_layouts import board_square
 from tracker.calibrations.units import check_units
@@ -264,11 +264,22 @@ def _with_convention(
         is_turned = not layout.has_opencv_poses
         words = (where, layout.poses_in_words, layout.by_program, is_turned)
         refuse_angles(sections, stated, where)
+        odd = odd_camera(stated)
         try:
             notes = [check_convention(stated, *words), check_turned([entry.T_world_camera for entry in entries], where)]
         except CalibrationError:
             _refuse_placeholder(entries, stated, words)
+            if odd is not None:
+                raise CalibrationError(
+                    f"{where}, camera {quoted(entries[odd].name)}: expected its pose, found one by which it looks "
+                    "elsewhere than all others, which see one place; correct its pose, or remove the camera"
+                ) from None
             raise
+        if odd is not None:
+            notes.append(
+                f"Camera {quoted(entries[odd].name)} looks elsewhere than all others, which see one place: check its "
+                "pose."
+            )
         return entries, [note for note in notes if note is not None]
     changed = [rigid.inverse(read_pose(T, poses)) for T in stated]
     return tuple(replace(e, T_world_camera=T) for e, T in zip(entries, changed, strict=True)), []
