@@ -179,7 +179,7 @@ def is_clearly_worse(cost: float, best: float, n_cameras: int) -> bool:
 def best_cost(Ts_stated: Sequence[Array], convention: PoseConvention | None = None) -> tuple[float, PoseConvention]:
     """Return the cost of a convention; of the one that fits best, if None is given."""
     cost = costs(Ts_stated)
-    best = convention or min(cost, key=lambda c: cost[c])
+    best: PoseConvention = min(cost, key=lambda c: cost[c]) if convention is None else convention
     return cost[best], best
 
 

@@ -83,7 +83,7 @@ def place_rows(table: MarkerTable, where: str, fps: float, known: Placement | No
             start = _first_number(table, where, rates, ratio, known.n_frames) * ratio
         rows = start + ratio * (table.frames - table.frames[0])
     placed = _on_frames(table, rows, fps)
-    return replace(placed, notes=_notes(table, rows, placed, fps, known.first_frame is not None))
+    return replace(placed, notes=(*table.notes, *_notes(table, rows, placed, fps, known.first_frame is not None)))
 
 
 def _stamped_rates(table: MarkerTable) -> list[float]:

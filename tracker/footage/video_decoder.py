@@ -20,7 +20,7 @@ _FORMATS = (
     "mjpeg", "mpjpeg", "mjpeg_2000", "yuv4mpegpipe", "gif", "cine", "r3d", "ser", "dhav", "lxf", "rm", "apng",
 )  # fmt: skip
 """Containers whose frames lie in the file itself. Playlists (`hls`, `concat`, `dash`), numbered images, devices and
-streams are left out: they would read other files, or the network, for whoever made the file."""
+streams are left out: they read other files, or the network."""
 _CONTAINER_OPTIONS = _OPTIONS | {"protocol_whitelist": "file", "format_whitelist": ",".join(_FORMATS)}
 _REFUSED = "expected a video in one file, found a playlist or a format that is not read; convert it to MP4"
 

@@ -61,7 +61,7 @@ class MarkerTable:
     origin: int | None = None
     """OrigDataStartFrame of a file; None if it has none."""
     notes: tuple[str, ...] = ()
-    """Sentences on how the rows of a file were placed at frames of a session."""
+    """Sentences on what is odd about a file, and on how its rows were placed at frames of a session."""
 
     def __post_init__(self) -> None:
         n, m = len(self.frames), len(self.names)
@@ -76,8 +76,7 @@ def read_trc(path: str | Path) -> MarkerTable:
         FormatError: the file is missing or malformed; the message has the line.
     """
     where = f"TRC file {path}"
-    lines = enumerate(read_lines(Path(path), _KIND, keep_ends=True), 1)
-    head, lines = _read_head(lines)
+    head, lines = _read_head(enumerate(read_lines(Path(path), _KIND, keep_ends=True), 1))
     if len(head) < 5 or not head[0][1].startswith("PathFileType"):
         raise FormatError(f"{path} is not a TRC file: expected 'PathFileType' at its start; export it as TRC")
     (_, (_, keys), (n_values, cells), (n_names, points_line), (n_axes, axes)) = head
@@ -86,13 +85,22 @@ def read_trc(path: str | Path) -> MarkerTable:
         raise FormatError(f"{where}, line {n_axes}: expected X1, Y1, Z1, ..., found a row of numbers; export it again")
     scale = _scale(header, f"{where}, line {n_values}")
     rate = _rate(header.get("datarate"), f"{where}, line {n_values}, DataRate")
+    promised = _whole(header.get("numframes"))
     names = _names(points_line, f"{where}, line {n_names}")
-    frames, values = _read_rows(lines, where, 2 + 3 * len(names), _whole(header.get("numframes")))
+    frames, values = _read_rows(lines, where, 2 + 3 * len(names), promised)
     values[:, 1:] *= scale  # the three-dimensional view would be scaled in a copy
     points = values[:, 1:].reshape(len(frames), len(names), 3)
     # A point with a missing coordinate is missing.
     points[np.isnan(points).any(axis=-1)] = np.nan
-    return MarkerTable(names, frames, values[:, 0], points, rate, _whole(header.get("origdatastartframe")))
+    notes = list[str]()
+    if promised is not None and len(frames) < promised:
+        notes.append(f"its header promises {promised} rows, and it has {len(frames)}: check that it is complete")
+    is_zero = (points == 0).all(axis=-1)
+    if is_zero.any() and not is_zero.all():
+        points[is_zero] = np.nan
+        notes.append(f"{is_zero.sum()} of its points lie at 0, 0, 0 exactly, as missing ones: they are left out")
+    origin = _whole(header.get("origdatastartframe"))
+    return MarkerTable(names, frames, values[:, 0], points, rate, origin, tuple(notes))
 
 
 def write_trc(

@@ -135,8 +135,8 @@ def _lens_doubts(cameras: Sequence[Camera]) -> list[str]:
     doubts = []
     if aside:
         doubts.append(
-            f"The principal point lies far from the middle of the pictures of {', '.join(aside)}: check that the matrix "
-            "of the lens is of pictures of this size, in pixels from their corner."
+            f"The principal point lies far from the middle of the pictures of {', '.join(aside)}: check that the "
+            "matrix of the lens is of pictures of this size, in pixels from their corner."
         )
     if strong:
         doubts.append(

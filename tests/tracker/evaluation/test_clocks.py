@@ -108,6 +108,11 @@ def test_time_of_another_clock_places_no_row(start_s, number, rate):
     assert placed(file, rate, n_frames=60, first_frame=7).frames.tolist() == list(range(7, 37))
 
 
+def test_what_is_odd_about_the_file_is_said_too():
+    file = replace(line(5, 30), notes=("it is odd",))
+    assert placed(file, 30, n_frames=5).notes == ("it is odd",)
+
+
 def test_without_a_session_unix_time_places_no_row():
     file = table(1 + np.arange(30), 1.7e9 + np.arange(30) / 30, 30)
     assert placed(file, 30).frames.tolist() == list(range(30))

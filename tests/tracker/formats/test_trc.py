@@ -92,6 +92,18 @@ def test_a_file_that_was_cut_off(write, rows, n_frames, found):
     assert read_trc(write(complete, header=header)).frames.tolist() == [1]
 
 
+def test_rows_that_the_header_promises_are_missed(write):
+    (note,) = read_trc(write(ROW)).notes
+    assert "promises 2 rows, and it has 1" in note
+    assert read_trc(write(ROW + "2\t0.02\t1\t2\t3\t4\t5\t6\n")).notes == ()
+
+
+def test_points_at_zero_are_missing(write):
+    table = read_trc(write("1\t0\t0\t0\t0\t4\t5\t6\n2\t0.02\t0\t0\t1\t0.0\t-0.0\t0\n"))
+    assert np.isnan(table.points[:, :, 0]).tolist() == [[True, False], [False, True]]
+    assert table.notes == ("2 of its points lie at 0, 0, 0 exactly, as missing ones: they are left out",)
+
+
 def test_a_last_line_without_an_end_is_read_where_it_is_complete(write):
     assert read_trc(write(ROW + "2\t0.02\t1\t2\t3\t4\t5\t6")).frames.tolist() == [1, 2]
 
