@@ -128,7 +128,7 @@ def split_projection(value: Any) -> tuple[Array, Array]:
             f"expected the projection of a camera as 3x4 matrix, found focal lengths {fx:.4g} and {fy:.4g}, skew "
             f"{skew:.4g} and principal point {K[0, 2]:.4g}, {K[1, 2]:.4g}"
         )
-    t: Array = np.linalg.solve(K, P[:, 3] / depth)
+    t = np.asarray(np.linalg.solve(K, P[:, 3] / depth), dtype=np.float64)
     K[0, 1] = 0.0 if abs(skew) < _ROUNDING * fx else skew
     return K, rigid.transform(R, t)
 

@@ -1,6 +1,6 @@
 """Calibrations in JSON, YAML or OpenCV's XML, with all cameras in one file.
 
-Where the pose of a tool is another than `X_camera = R X_world + t`, its direction is that of the tool's own source:
+The direction of a pose other than `X_camera = R X_world + t` is that of the tool's own source:
 `export_json` of multical, `Calibration::saveCamerasParams` of MC-Calib, and the camchain of Kalibr's manual.
 """
 

@@ -1,7 +1,7 @@
 """Place the rows of a joint file at frames of a session, by Frame#, Time, DataRate and OrigDataStartFrame.
 
 Files count frames from 0 or from 1, and may begin within the recording. Programs round rates; cut files keep or restart
-their numbers and times. Where these agree on one reading, it is taken. A contradiction is refused with its readings,
+their numbers and times. A reading on which these agree is taken. A contradiction is refused with its readings,
 and `Placement` decides. Rows at another rate are resampled.
 """
 
