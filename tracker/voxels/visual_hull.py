@@ -71,7 +71,8 @@ def carve_people(
     if len(poor) > (broken >= 0):
         raise TrackerError(
             f"expected silhouettes that agree, found views of which little can be explained ({', '.join(poor)}); check "
-            "that no camera has moved, that the videos start at the same time, and the background"
+            "that no camera has moved, that the videos start at the same time, and the background",
+            camera=names[int(np.argmin(found))],
         )
     by_name = dict(zip(names, found, strict=True))
     of_views = np.array([by_name.get(s.camera.name, np.nan) for s in silhouettes])

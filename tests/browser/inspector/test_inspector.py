@@ -243,7 +243,7 @@ async def test_people_are_found_with_progress_and_a_stop(page, endpoint):
     await section.get_by_role("button", name="Find people").click()
     await until(lambda: endpoint.heard("find_people") == [{"type": "find_people", "action": "start"}])
     work = {"type": "finding", "running": True, "stage": "acquiring sizes", "share": 0.6, "notes": ["frame 7: good"]}
-    ends = {"message": "", "failed": False, "tried": None, "frame": None, "axes": []}
+    ends = {"message": "", "failed": False, "tried": None, "camera": None, "frame": None, "axes": []}
     await endpoint.broadcast(work | ends)
     await shows(page, "document.querySelector('[data-section=find] progress').value === 0.6")
     assert "acquiring sizes" in await section.get_by_role("status").inner_text()

@@ -60,6 +60,17 @@ def test_no_view_is_left_out_where_several_could_be():
         carve_people([views[0], turned(views[1], 0.15), views[2]], SIZE_M)
 
 
+def test_the_silhouette_that_is_explained_least_is_named():
+    views = silhouettes_of([MAN], CAMERAS)
+    for i, margin in ((1, 20), (4, 10)):
+        mask = np.zeros_like(views[i].mask)
+        mask[margin:-margin, margin:-margin] = True
+        views[i] = views[i]._replace(mask=mask)
+    with pytest.raises(TrackerError, match=r"little can be explained \(c1 \d+%, c4 \d+%\)") as error:
+        carve_people(views, SIZE_M)
+    assert error.value.camera == "c4"
+
+
 def test_nothing_of_the_size_of_a_person():
     with pytest.raises(TrackerError, match="a figure of at least 8 litres"):
         carve_people(silhouettes_of([ellipsoid((0, 0, 0), np.full(3, 0.1))], CAMERAS), SIZE_M)
