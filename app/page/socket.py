@@ -199,7 +199,7 @@ class PageConnection:
                         await self._send(news)
                 if sent is None or sent.timeline_version != state.timeline_version:  # after the text, which names cells
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
-                if self._view is not None:
+                if self._view is not None and self._view.cameras:
                     await self._send_drawn(state, self._view)
                 await self._send_checks(sent, state)
                 await self._send_curves(state)

@@ -372,6 +372,22 @@ async def test_what_a_page_sees_anew_is_sent_and_nothing_else(controller):
         assert len([m for m in page.told[count:] if m["type"] == "image"]) <= 4  # the rest of the first set
 
 
+async def test_a_page_without_visible_panes_gets_no_view_until_it_shows_one(controller):
+    async with visiting(controller) as page:
+        await page.shows("image", "contours")
+        await page.hear("image")
+        await page.shows("image", "contours", reductions=(0, 0, 0, 0))
+        await page.send("seek", frame=3)
+        await page.hear("state", lambda m: m["frame"] == 3)
+        await page.send("history", limit=1)
+        await page.hear("history")
+        assert not [m for m in page.told if m["type"] in ("image", "overlay") and m["frame"] == 3]
+        await page.shows("image", "contours", reductions=(0, 2, 0, 0))
+        assert (await page.hear("image", lambda m: m["frame"] == 3))["camera"] == 1
+        overlay = next(m for m in page.told if m["type"] == "overlay" and m["frame"] == 3)
+        assert {path["camera"] for path in overlay["paths"]} == {1}
+
+
 async def test_a_view_that_is_not_understood_is_a_notice(controller, caplog):
     async with visiting(controller) as page:
         for layer, reductions in (("x-rays", (1, 1, 1, 1)), ("parts", (1, 1)), ("parts", (1, 1, 0.5, 0))):
