@@ -297,6 +297,7 @@ def _filling(
         raise TrackerError(
             f"expected a body that fills the silhouettes, found none: {checks[0].note}",
             Remedy("another_frame_or_place"),
+            checks[0].worst_camera,
         )
     return kept
 

@@ -21,6 +21,7 @@ from tracker.pipeline.find_people import AXES, FoundPeople, expected_steps, fram
 from tracker.pipeline.first_pose import FirstPose, FirstPoses, find_first_poses
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
+from tracker.voxels.visual_hull import VisualHull
 
 NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
 CAMERAS = [replace(c, name=n) for c, n in zip(cameras_about_a_figure(), NAMES, strict=True)]
@@ -238,3 +239,20 @@ def test_an_entry_of_one_person_is_read_as_before():
     edits = with_sizes_changed(with_sizes_changed({}, 4, changed[:1]), 5, changed)
     assert [sizes_changed(edits, edit) for edit in (4, 5)] == [changed[:1], changed]
     assert sizes_changed({"5": ["ann", 1, 2]}, 6) == []
+
+
+@pytest.mark.parametrize(
+    ("coverages", "camera", "remedy"),
+    [
+        ([1.0, 1.0, 0.85, 0.6], "LEFT", "another_frame_or_background"),
+        ([1.0, 0.99, np.nan, 0.97], None, "another_frame"),
+    ],
+)
+def test_a_figure_that_is_too_large_names_the_silhouette_that_shows_more_than_people(
+    session, coverages, camera, remedy
+):
+    figure = SimpleNamespace(volume_m3=0.35, points_world=np.zeros((1, 3)))
+    with pytest.raises(TrackerError, match="at most 250 litres, found a figure of 350") as error:
+        own_figure.own_figure(session, 0, VisualHull((figure,), np.array(coverages), ()), [])
+    assert (error.value.camera, error.value.remedy.code) == (camera, remedy)
+    assert camera is None or f"the silhouette in {camera}" in str(error.value)
