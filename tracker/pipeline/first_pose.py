@@ -124,7 +124,8 @@ def find_first_poses_anywhere(
 
     Voxels are tried until their starts are good on enough frames. The axis is tried on the best of these, and a search
     along the figure where neither finds a good start. `show` receives each frame and what was found on it.
-    `step` is called between fits and silhouettes, every second or so; what it raises ends the search.
+    `step` is called between fits and for each silhouette, every second or so and from several threads; what it raises
+    ends the search.
     """
     with _Trial(session, observer, people, size_m, say, show, step) as trial:
         for frame in frames:
@@ -154,7 +155,7 @@ class _Trial:
             )
         self._show, self._step = show, step
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
-        self._finder = SilhouetteFinder(session.cameras, observer.recording)
+        self._finder = SilhouetteFinder(session.cameras, observer.recording, step=step)
         floor = floor_plane(session.up, session.floor)
 
         def recovered(frame: int, person: int) -> Sequence[ViewSilhouette]:

@@ -47,7 +47,7 @@ def silhouettes(monkeypatch):
     """What is seen on every frame, a list that tests fill."""
     seen = []
     finder = SimpleNamespace(silhouettes=lambda k, person=None: tuple(seen), close=lambda: None)
-    monkeypatch.setattr(first_pose, "SilhouetteFinder", lambda cameras, recording: finder)
+    monkeypatch.setattr(first_pose, "SilhouetteFinder", lambda cameras, recording, step: finder)
     return seen
 
 
