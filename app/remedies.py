@@ -68,6 +68,14 @@ PHRASES = {
     "give_poses": Phrases(
         "say --poses {poses}, or rewrite them ({rewrite})", "choose {poses} as Poses, or rewrite them ({rewrite})"
     ),
+    "name_quaternion": Phrases(
+        "name the numbers qw, qx, qy and qz, say --poses if the convention is known, or rewrite them as 3x3 matrices",
+        "name the numbers qw, qx, qy and qz, choose Poses if the convention is known, or rewrite them as 3x3 matrices",
+    ),
+    "keep_rotations": Phrases(
+        "say --poses world-to-camera if all cameras are parallel, else give their rotations",
+        "choose world-to-camera as Poses if all cameras are parallel, else give their rotations",
+    ),
     "choose_poses": Phrases("say which with --poses", "choose one of them as Poses"),
     # files of a session that have moved
     "relink": Phrases(

@@ -22,8 +22,11 @@ DATA = TESTS.parents[1] / "shared" / "data"
 
 
 WITHOUT_KERNELS = {
-    *(f"tracker/{room}" for room in "compute geometry body motion formats session store evaluation images".split()),
-    *(f"app/{room}" for room in "runtime state drawing".split()),
+    *(
+        f"tracker/{room}"
+        for room in ["compute", "geometry", "body", "motion", "formats", "session", "store", "evaluation", "images"]
+    ),
+    *(f"app/{room}" for room in ["runtime", "state", "drawing"]),
 }
 """Rooms whose tests call no compiled kernels, or few."""
 

@@ -3,7 +3,6 @@
 import ast
 import re
 
-import pytest
 from architecture import (
     FILES,
     FLOOR,

@@ -4,7 +4,6 @@ import io
 import re
 import tokenize
 
-import pytest
 from architecture import FILES, ROOT, SCRIPTS, STATIC
 
 # Identifier today -> what took its place. Whole names, in all of Python, tests included.

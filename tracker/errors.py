@@ -36,15 +36,17 @@ class Remedy:
 class TrackerError(Exception):
     """Input of a user or a file cannot be used; the message, with the remedy if there is one, states what to do."""
 
-    def __init__(self, message: str, remedy: Remedy | None = None) -> None:
+    def __init__(self, message: str, remedy: Remedy | None = None, camera: str | None = None) -> None:
         """State what was expected and found.
 
         Args:
             message: one sentence. It ends with what to do, unless `remedy` is given.
             remedy: what to do, where the command line and the page offer different ways.
+            camera: name of the camera whose picture shows the fault best; None without one.
         """
         super().__init__(message)
         self.remedy = remedy
+        self.camera = camera
 
 
 class CalibrationError(TrackerError):

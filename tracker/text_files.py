@@ -75,8 +75,8 @@ def read_text(path: Path, kind: TextKind) -> str:
             return text
 
 
-def read_lines(path: Path, kind: TextKind) -> Iterator[str]:
-    """Yield the lines of a text file, without their ends. Only one line is in memory.
+def read_lines(path: Path, kind: TextKind, keep_ends: bool = False) -> Iterator[str]:
+    """Yield the lines of a text file, by default without their ends. Only one line is in memory.
 
     `LOST` stands for bytes that are not UTF-8.
 
@@ -97,7 +97,7 @@ def read_lines(path: Path, kind: TextKind) -> Iterator[str]:
                 )
             if LOST in line and _CONTROL.search(line):
                 raise ValueError(f"other bytes in line {number}")
-            yield line.rstrip("\n")
+            yield line if keep_ends else line.rstrip("\n")
 
 
 def read_toml(path: Path, kind: TextKind) -> dict[str, Any]:

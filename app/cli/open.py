@@ -53,7 +53,7 @@ def command(
     folder = session_folder(folder)
     serving = Serving(host, port, allow_host, browser, token)
     with SessionLock(folder), Doorway(serving) as doorway, closing(KernelCompiler()) as compiler:
-        # These imports take seconds: the doorway answers meanwhile, and kernels are compiled. What they make stays.
+        # These imports take seconds: the doorway answers meanwhile, and kernels are compiled. Objects made here stay.
         gc.disable()
         from tracker.session.relink import require_files
         from tracker.session.session import load_session

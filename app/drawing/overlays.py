@@ -66,10 +66,10 @@ class OutOfReach:
     person: int
     point: str
     u: float
-    """Where the pointer wants it, undistorted px."""
+    """Position of the pointer, undistorted px."""
     v: float
     point_u: float
-    """Where it is."""
+    """Position of the point, undistorted px."""
     point_v: float
     distance_m: float
     """Distance of the point from the line of sight."""
@@ -151,7 +151,12 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
                 out.append(Path(index, 0, "residual", KIND_COLORS["residual"], lines))
     if state.drag is not None and "epipolar" in view.layers:
         out += [line for line in _epipolar_lines(session, state) if line.camera in view.cameras]
-    return [p for p in out if p.kind not in _PERSON_KINDS or p.person not in state.visibility.hidden]
+    # A person who is sought and has no pose yet is drawn by candidates alone.
+    undrawn, hidden = state.undrawn, state.visibility.hidden
+    return [
+        p for p in out
+        if p.kind not in _PERSON_KINDS or p.person not in (hidden if p.kind == "candidate" else undrawn)
+    ]  # fmt: skip
 
 
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
@@ -159,6 +164,7 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     points = [b.points_world for b in bodies]
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
+    undrawn = state.undrawn
     if "contours" in state.compiled:
         occluded = part_edges.points_occluded_by_body(bodies, list(seen.values()), np.concatenate(points))
     else:  # the kernels are being compiled: every joint can be grabbed
@@ -171,7 +177,7 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
         for person, body in enumerate(bodies):
             px, held = camera.project(points[person]), state.held_points(person)
             for i, name in enumerate(body.model.point_names):
-                if person not in state.visibility.hidden and np.all(np.isfinite(px[i])):
+                if person not in undrawn and np.all(np.isfinite(px[i])):
                     u, v = float(px[i, 0]), float(px[i, 1])
                     is_visible, by, is_held = not hidden[first + i], occluders[first + i], name in held
                     out.append(Handle(index, person, name, u, v, is_visible, by, is_held, side_of(name)))

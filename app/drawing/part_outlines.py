@@ -19,7 +19,7 @@ class PartOutline(NamedTuple):
     person: int
     part: int
     depth: float
-    """Distance of the part, metres. Where hulls overlap, the nearest counts."""
+    """Distance of the part, metres. The nearest of overlapping hulls counts."""
     segments_px: FloatArray
     """Its closed outline as x0, y0, x1, y1, (N, 4), undistorted px."""
 
@@ -35,11 +35,11 @@ def part_hulls(session: Session, state: State, view: View) -> list[PartOutline]:
         return []
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
-    seen = sorted(view.cameras)
+    seen, undrawn = sorted(view.cameras), state.undrawn
     found = picking.part_hulls(bodies, [session.cameras[index].camera.pinhole for index in seen])
     for index, parts in zip(seen, found, strict=True):
         for one in parts:
-            if one.body in state.visibility.hidden:
+            if one.body in undrawn:
                 continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):
                 out.append(PartOutline(index, one.body, one.part, one.depth_m, _closed(one.polygon_px)))

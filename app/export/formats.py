@@ -22,9 +22,9 @@ class ExportFormat:
     name: str
     """By which the command line and the page refer to it."""
     title: str
-    """What it holds, for people."""
+    """Its content, for people."""
     suffixes: tuple[str, ...]
-    """What follows the name in the name of each file; the first names the format."""
+    """End of the name of each file; the first names the format."""
     write: Writer
     options: frozenset[str] = frozenset()
     """Options that it has: `axes`, `units`, `keypoints`, `view`, `character`."""
@@ -33,7 +33,7 @@ class ExportFormat:
     axes: "AxesName" = "calibration"
     """Axes by default, as programs that read it expect them."""
     gaps: str = "left empty"
-    """What happens to frames without a pose."""
+    """Treatment of frames without a pose."""
     numbering: str = ""
     """Sentence on its frame numbers where they are not the session's, of `{frame}` and `{number}`, 1 more."""
     one_body: bool = False

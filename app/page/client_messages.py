@@ -2,7 +2,7 @@
 
 `message_parsing` checks messages against these declarations, `protocol_docs` writes the page's types and
 docs/protocol.md from them.
-Those that change poses or run searches are in `pose_messages` and `search_messages`, those of the inspector in
+Messages that change poses or run searches are in `pose_messages` and `search_messages`, those of the inspector in
 `inspector_messages`.
 """
 

@@ -160,4 +160,4 @@ COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     **SEARCH_COMMANDS,
     **INSPECTOR_COMMANDS,
 }
-"""What each message does. The connection itself answers those that subscribe a page to something (`socket`)."""
+"""Action of each message. The connection itself carries out the subscriptions of its page (`socket`)."""

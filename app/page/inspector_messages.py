@@ -52,7 +52,7 @@ class SetTrackSettings(Command, frozen=True, tag="track_settings"):
 
 
 class View3dChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the 3-D view shows, to change; what is left out stays."""
+    """Change the content of the 3-D view; a field that is left out stays."""
 
     bodies: bool | UnsetType = UNSET
     colors: Literal["parts", "people"] | UnsetType = UNSET
@@ -131,7 +131,7 @@ class AcquireSizes(Command, frozen=True, tag="acquire"):
     action: Literal["start", "stop"]
     person: Index
     method: SizeMethod = "contours"
-    """What sizes are fitted to: contours alone, or voxels first and then contours."""
+    """Evidence that sizes are fitted to: contours alone, or voxels first and then contours."""
 
 
 class FindPeople(Command, frozen=True, tag="find_people"):
@@ -207,12 +207,12 @@ class FloorInfo(Part, frozen=True):
 
 
 class View3dMessage(Message, frozen=True, tag="view_3d"):
-    """What the 3-D view shows."""
+    """Content of the 3-D view."""
 
     view: View3d
     floor: FloorInfo
     prediction: str
-    """What the predicted pose was computed from, or why there is none; empty while it is not shown."""
+    """Origin of the predicted pose, or why there is none; empty while it is not shown."""
     trail_points: tuple[str, ...]
     """Names of the points whose trails can be shown."""
     characters: tuple[str, ...]
@@ -327,6 +327,8 @@ class FindingMessage(Message, frozen=True, tag="finding"):
     """Whether it ended with an error."""
     tried: int | None
     """The frame that is being tried, or that a failure is about."""
+    camera: int | None
+    """The camera whose silhouette a failure is about; null for no single one."""
     frame: int | None
     """The frame on which people were found last."""
     axes: tuple[SilhouetteAxes, ...]

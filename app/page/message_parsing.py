@@ -10,13 +10,16 @@ from app.page.message_types import Command
 from tracker.errors import TrackerError
 from tracker.validation import explain, quoted
 
+MISUNDERSTOOD = "expected a message that this program knows, found one of another version of the page; reload the page"
+"""Notice of a page that has sent a wrong message. Its user typed none of it, so that only the log has the details."""
+
 
 class MessageError(TrackerError):
-    """A message that the program does not understand."""
+    """A message that the program does not understand, by its keys: for the log, not for the page."""
 
     def __init__(self, expected: str, found: str) -> None:
         """Say what was expected and what was found."""
-        super().__init__(f"expected {expected}, found {found}; the page sent a wrong message, reload it")
+        super().__init__(f"expected {expected}, found {found}")
 
 
 def parse(data: str | bytes) -> ClientMessage:

@@ -1,4 +1,4 @@
-"""What all messages of the pane socket are declared with: their bases, and values that several hold.
+"""Bases of all messages of the pane socket, and types of values that several hold.
 
 Positions are in undistorted pixels, frames count from 0, cameras and people are indices into the session's lists.
 """

@@ -68,7 +68,7 @@ class PictureSets:
         if layer == "image":
             return frames.image(state.frame, camera, reduction), None
         if layer == "parts":
-            shown = [i for i in range(len(session.people)) if i not in state.visibility.hidden]
+            shown = [i for i in range(len(session.people)) if i not in state.undrawn]
             bodies = [PosedBody(session.people[i].model, state.drawn.poses[i]) for i in shown]
             colors = overlays.part_colors([session.people[i] for i in shown])
             return pictures.parts(bodies, session.cameras[camera].camera.pinhole, colors, reduction), None
@@ -85,10 +85,6 @@ def _wanted(state: State, view: View) -> dict[Key, tuple[object, ...]]:
         for camera in sorted(view.cameras):
             # Evidence has the scale of matching, whatever the size of the pane.
             content = () if layer in EVIDENCE else (view.reductions[camera],)
-            poses = (
-                (state.revisions, state.visibility.hidden, *map(Identity, state.drawn.poses))
-                if layer == "parts"
-                else ()
-            )
+            poses = (state.revisions, state.undrawn, *map(Identity, state.drawn.poses)) if layer == "parts" else ()
             wanted[layer, camera] = (state.frame, state.footage.recoveries, *content, *poses)
     return wanted

@@ -1,6 +1,6 @@
 """Text messages from the program to the page: the one declaration of their types and fields.
 
-Those about searches and poses that deserve a look are in `search_messages`, those for the inspector in
+Messages about searches and poses that deserve a look are in `search_messages`, the inspector's in
 `inspector_messages`. `messages` and the feeds make them, `protocol_docs` writes the page's types and docs/protocol.md
 from them.
 """
@@ -210,7 +210,7 @@ class Compared(Part, frozen=True):
     """By camera; empty where unknown."""
     after_view_costs_px: tuple[float | None, ...]
     warning: str
-    """Where the edges and the user's placement disagree by much, as a sentence; empty if nowhere."""
+    """Sentence on a large disagreement of the edges with the user's placement; empty without one."""
     moved: tuple[MovedLimb, ...]
     """Limbs that a fit moved although nobody had touched them, farthest first; their former places are drawn."""
     is_before_shown: bool
@@ -242,7 +242,7 @@ class FootageProgress(Part, frozen=True):
     listed: float | None
     """Share of the frames, 0 to 1; null when the scan is complete."""
     error: str | None
-    """What is wrong with a file."""
+    """Fault of a file, as a sentence; null without one."""
 
 
 class StateMessage(Message, frozen=True, tag="state"):
@@ -264,7 +264,7 @@ class StateMessage(Message, frozen=True, tag="state"):
     """Origin of the pose of the person worked on: `manual`, `pinned`, `searched`, `fitted`, `tracked`, ..."""
     status: Status
     remark: str
-    """What the tracker did on this frame."""
+    """Note of the tracker about this frame."""
     part_costs_px: tuple[float | None, ...]
     """By part; null for an unseen one, empty where unknown."""
     dofs: tuple[float, ...]

@@ -16,7 +16,7 @@ from app.page import client_messages as wire
 from app.page import commands, messages, picture_sets
 from app.page.encoding import encode_text
 from app.page.inspector_feed import InspectorFeed
-from app.page.message_parsing import MessageError, parse
+from app.page.message_parsing import MISUNDERSTOOD, MessageError, parse
 from app.page.message_types import Message
 from app.page.observability_feed import ObservabilityFeed
 from app.page.search_feed import SearchFeed
@@ -139,7 +139,7 @@ class PageConnection:
                 raise MessageError("a text message", f"a binary one of {len(received.data)} bytes")
             message = parse(received.data)
         except MessageError as error:
-            await self._notice(page_text(error))
+            await self._refuse(error)
             return
         last = self._waiting[-1] if self._waiting else None
         if last is not None and type(last) is type(message) and (_is_move(last, message) or type(last) in _COALESCED):
@@ -156,7 +156,7 @@ class PageConnection:
                 try:
                     await asyncio.to_thread(self._carry_out, message)
                 except TrackerError as error:
-                    await self._notice(page_text(error))
+                    await self._refuse(error)
                 except Exception as error:
                     _LOG.exception("a message of a page failed: %s", message)
                     await self._notice(f"expected to carry out '{type(message).__name__}', found a fault: {error!r}")
@@ -199,7 +199,7 @@ class PageConnection:
                         await self._send(news)
                 if sent is None or sent.timeline_version != state.timeline_version:  # after the text, which names cells
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
-                if self._view is not None:
+                if self._view is not None and self._view.cameras:
                     await self._send_drawn(state, self._view)
                 await self._send_checks(sent, state)
                 await self._send_curves(state)
@@ -322,6 +322,12 @@ class PageConnection:
             self._sent_history = message
             await self._send(message)
 
+    async def _refuse(self, error: TrackerError) -> None:
+        """Tell the page why a message was not carried out, in the words of the page."""
+        if isinstance(error, MessageError):
+            _LOG.warning("a page sent a wrong message: %s", error)
+        await self._notice(MISUNDERSTOOD if isinstance(error, MessageError) else page_text(error))
+
     async def _notice(self, text: str) -> None:
         await self._send(NoticeMessage("error", text))
 
@@ -365,7 +371,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         () if state.compared is None else state.compared.moved,
         state.drag,
         state.drag_seqs,
-        state.visibility.hidden,
+        state.undrawn,
         state.compiled,
         Identity(state.finding.candidates),
     )

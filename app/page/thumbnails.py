@@ -19,7 +19,7 @@ _PAUSE_S, _MAX_PAUSE_S = 0.02, 1.0
 
 
 class _Wanted(NamedTuple):
-    """What a thumbnail depends on. Bodies are compared by identity, so that a changed body or pose makes another."""
+    """Content of a thumbnail, for comparison. Bodies are compared by identity: a changed body makes another."""
 
     frame: int
     person: int

@@ -1,4 +1,4 @@
-"""Temporary folders of a running program. Those that a killed program left are removed when the next one makes one."""
+"""Temporary folders of a running program. Making one removes the folders that killed programs left."""
 
 import os
 import shutil

@@ -67,7 +67,7 @@ class CharacterLayer:
             self._meshes = PeopleMeshes(self._server, "/characters", cast)
 
     def _pose(self, state: State) -> None:
-        wanted = (*map(Identity, state.poses), state.models, state.floor, state.view_3d, state.visibility)
+        wanted = (*map(Identity, state.poses), state.models, state.floor, state.view_3d, state.undrawn)
         if self._meshes is None or wanted == self._drawn:
             return
         self._drawn = wanted
@@ -75,7 +75,7 @@ class CharacterLayer:
         poses = driven(state.models, state.poses, self._characters, state.floor, cameras)
         self._meshes.pose(poses)
         absent = frozenset(i for i, pose in enumerate(poses) if pose is None)
-        self._meshes.set_appearance(replace(state.view_3d, bodies=True), state.visibility.hidden | absent, frozenset())
+        self._meshes.set_appearance(replace(state.view_3d, bodies=True), state.undrawn | absent, frozenset())
 
 
 def driven(

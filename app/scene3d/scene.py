@@ -113,7 +113,7 @@ class SceneView:
 
     def _show_appearance(self, state: State) -> None:
         others = frozenset(range(len(state.people))) - {state.person}
-        appearance = (state.view_3d, state.visibility.hidden, others if state.visibility.solo else frozenset())
+        appearance = (state.view_3d, state.undrawn, others if state.visibility.solo else frozenset())
         if appearance == self._appearance:
             return
         self._appearance = appearance

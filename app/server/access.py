@@ -25,7 +25,7 @@ _DEFAULT_PORTS = {"http": "80", "https": "443"}
 
 @dataclass(frozen=True)
 class Access:
-    """What a request must show to be answered."""
+    """Requirements on a request that is answered."""
 
     hosts: frozenset[str] = frozenset()
     """Names of the server besides those of loopback; lower case, without port."""
@@ -150,7 +150,7 @@ def is_loopback(name: str) -> bool:
 
 
 def _equal(secret: str, found: str) -> bool:
-    """Compare in constant time. What a request brings may be any text, also no Unicode."""
+    """Compare in constant time. A request may bring any text, also no Unicode."""
     return secrets.compare_digest(secret.encode(), found.encode("utf-8", "surrogatepass"))
 
 

@@ -1,4 +1,4 @@
-"""Where the program listens, and the page's address. Imports little: the first page is served before all else."""
+"""The addresses of the program and of its page. Imports little: the first page is served before all else."""
 
 import errno
 import socket

@@ -63,7 +63,7 @@ class Doorway:
         self.serving = serving
         tokens = user_state_path("quadrille", appauthor=False)
         self.access = access_for(serving.host, serving.allow_hosts, serving.token, tokens)
-        """What the program asks for; the doorway asks for no token."""
+        """Requirements of the program; the doorway asks for no token."""
         self._without_token = replace(self.access, token=None, invitation=None)
         static = static_folder()
         self._icon = (static / _ICON).read_bytes()

@@ -28,7 +28,7 @@ _ADDRESS = re.compile(f"/{PREFIX}{_VERSION}/(?P<name>.+)")
 _TYPES = {".js": "text/javascript", ".css": "text/css"}
 _INDEX = "index.html"
 _NAMED = re.compile(f'"{PREFIX}([^"]+[.](?:js|css))"')
-"""What the page names, by path."""
+"""The files that the page names, by path."""
 
 
 def static_folder() -> Path:

@@ -18,7 +18,7 @@ _MAX_BYTES = 200
 def kept_token(folder: Path) -> str:
     """Return the token kept in a folder, or a new one, which is kept there.
 
-    A file that another account may read, or that is not this user's, is replaced. Where the folder cannot be written,
+    A file that another account may read, or that is not this user's, is replaced. If the folder cannot be written,
     the token holds for this start alone.
 
     Args:

@@ -8,7 +8,7 @@ from msgspec import Meta
 
 from app.remedies import page_text
 from app.session.camera_check import exchange_of
-from app.session.path_choice import TypedPath, typed_path
+from app.session.path_choice import TypedPath, TypedPaths, typed_path, typed_paths
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.errors import SessionError, TrackerError
 from tracker.formats.camera_section import Units
@@ -37,12 +37,12 @@ class CameraChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class NewSessionForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What makes a session, as a user types it."""
+    """Parts of a new session, as a user types them."""
 
     folder: TypedPath
     """Folder to make."""
-    calibration: TypedPath
-    """File of the cameras."""
+    calibration: TypedPaths
+    """File of the cameras, folder with a file for each, or these files."""
     footage: TypedPath
     """Folder with a video or a folder of images for each camera."""
     people: Annotated[list[Name], Meta(min_length=1, max_length=20, title="People", description="1 to 20 names")]
@@ -110,7 +110,7 @@ def _request(form: NewSessionForm) -> NewSession:
     cameras = {c.name: typed_path(c.footage) for c in form.cameras}
     return NewSession(
         typed_path(form.folder),
-        calibration=typed_path(form.calibration),
+        calibration=typed_paths(form.calibration),
         videos=() if cameras else footage_in(typed_path(form.footage)),
         camera_paths=cameras,
         cameras=tuple(c.name for c in form.cameras),

@@ -14,6 +14,8 @@ from tracker.session.assemble import VIDEO_SUFFIXES
 
 TypedPath = Annotated[str, Meta(min_length=1, max_length=4096, description="a path")]
 """A path as it comes from the page; `typed_path` checks it."""
+TypedPaths = Annotated[str, Meta(min_length=1, max_length=100_000, description="a path, or several")]
+"""One path, or several separated by semicolons; `typed_paths` checks them."""
 _MAX_READ = 5000
 """Largest number of entries of a folder that are looked at."""
 _MAX_SHOWN = 40
@@ -35,6 +37,23 @@ def typed_path(text: str) -> Path:
     if not path.is_absolute():
         raise SessionError(f"expected a path from the root or from ~, found '{text}'; type the whole path")
     return path
+
+
+def typed_paths(text: str) -> list[Path]:
+    """Return the paths that a user typed or marked: one, or several separated by semicolons.
+
+    A name without a folder lies beside the path before it.
+
+    Raises:
+        SessionError: one of them is relative, or no path.
+    """
+    whole = typed_path(text)
+    if ";" not in text or os.path.exists(whole):
+        return [whole]
+    paths: list[Path] = []
+    for part in filter(None, map(str.strip, text.split(";"))):
+        paths.append(paths[-1].parent / part if paths and "/" not in part else typed_path(part))
+    return paths
 
 
 class Entry(NamedTuple):

@@ -39,7 +39,7 @@ def recent_sessions(state_folder: Path) -> list[RecentSession]:
 
 
 def remember(state_folder: Path, folder: Path) -> None:
-    """Put a session first. Where the state folder cannot be written, nothing is remembered.
+    """Put a session first. If the state folder cannot be written, nothing is remembered.
 
     Args:
         state_folder: private to this user; made where it is missing.

@@ -9,7 +9,7 @@ from msgspec import Meta
 
 from app.remedies import page_text
 from app.session.new_session import MAX_CAMERAS, Up
-from app.session.path_choice import TypedPath, typed_path
+from app.session.path_choice import TypedPath, TypedPaths, typed_path, typed_paths
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import TrackerError
@@ -22,7 +22,7 @@ from tracker.session.rig_summary import RigSummary, summarize_rig
 class SurveyForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Paths to survey; a field that is still empty is null."""
 
-    calibration: TypedPath | None = None
+    calibration: TypedPaths | None = None
     footage: TypedPath | None = None
     up: Up = "z"
     units: Units | None = None
@@ -58,7 +58,7 @@ def survey(form: SurveyForm) -> Survey:
     by_name = {camera_name(path): str(path) for path in footage}
     try:
         if form.calibration is not None:
-            calibration = read_cameras(typed_path(form.calibration), form.units, form.poses, by_name)
+            calibration = read_cameras(typed_paths(form.calibration), form.units, form.poses, by_name)
             entries = calibration.entries
             rig = _rig(summarize_rig([e.camera(e.size or _likely_size(e)) for e in entries], form.up))
             rig["doubts"] = [*calibration.notes, *rig["doubts"]]

@@ -13,7 +13,7 @@ ComparedWork = Literal["fit", "search"]
 
 @dataclass(frozen=True, eq=False)
 class PoseComparison:
-    """What a fit or a search changed on a frame. It holds as long as its result is shown unchanged."""
+    """Changes of a fit or a search on a frame. They hold as long as its result is shown unchanged."""
 
     number: int
     """Identifies it while the program runs; a search that continues keeps it."""
@@ -32,7 +32,7 @@ class PoseComparison:
     after_px: float | None
     after_view_costs_px: tuple[float | None, ...]
     warning: str = ""
-    """Where edges and the user's placement disagree by much: a sentence for the user, or empty."""
+    """Sentence for the user on a large disagreement of edges and placement; empty without one."""
     moved: tuple[tuple[int, LimbMove], ...] = ()
     """Limbs that a fit moved although nobody had touched them, each after the index of its person; farthest first."""
     is_before_shown: bool = False

@@ -1,4 +1,4 @@
-"""What one page shows of the session: its layers and the sizes of its panes.
+"""The part of the session that one page shows: its layers and the sizes of its panes.
 
 Two windows on one session may show different layers, so this is no part of the `State`. A page sends it on connecting
 and whenever it changes (docs/protocol.md).
@@ -34,7 +34,7 @@ EVIDENCE = frozenset(("silhouette", "distance", "accepted", "rejected"))
 
 @dataclass(frozen=True)
 class View:
-    """What one page shows."""
+    """Layers and panes that one page shows."""
 
     layers: frozenset[str]
     """Names of the layers shown."""

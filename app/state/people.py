@@ -18,7 +18,7 @@ class ShownPose:
     values: Array
     """Pose, (n_values,)."""
     source: str | None
-    """Where it comes from; None for a draft that is not stored: the pose of the nearest frame that has one."""
+    """Its origin; None for a draft that is not stored: the pose of the nearest frame that has one."""
     status: str = ""
     """The tracker's assessment: `good`, `doubtful`, `lost`, or empty."""
     remark: str = ""
@@ -33,7 +33,7 @@ class ShownPose:
     alternatives: tuple[Array, ...] = ()
     """Alternatives that the tracker found, (n_values,) each, best first; empty for a keyframe."""
     seen: tuple[PointObservation, ...] = ()
-    """Where the user has just put points in a view, which is to be stored with the pose."""
+    """Positions of points that the user has just placed in a view, to be stored with the pose."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class DragState:
     short_m: float = 0.0
     """Distance between the dragged place and the line of sight that it should be on, metres."""
     wanted_px: tuple[float, float] | None = None
-    """Where the dragged place should be in the view, undistorted px; None before the first move."""
+    """Position of the pointer in the view, undistorted px; None before the first move."""
 
 
 class HeldPoint(NamedTuple):

@@ -55,6 +55,10 @@ class FindState:
     """Whether it ended with an error."""
     tried: int | None = None
     """Frame that is being tried; after a failure the one that the message is about. None otherwise."""
+    camera: int | None = None
+    """Index of the camera whose silhouette a failure is about; None for no single one."""
+    sought: frozenset[int] = frozenset()
+    """Indices of the people who are sought; empty when the search has ended."""
     candidates: Mapping[int, Mapping[int, PosedBody]] = field(default_factory=dict)
     """By frame and index of the person, the first poses found so far; empty when the search has ended."""
     frame: int | None = None
@@ -88,6 +92,6 @@ class FootageState:
     listed: float | None = None
     """Share of the footage, 0 to 1; None when all of it is indexed."""
     error: str | None = None
-    """What is wrong with a file; None if nothing is."""
+    """Fault of a file, as a sentence; None without one."""
     recoveries: int = 0
     """Number of times that unreadable footage could be read again. Its pictures are made again then."""

@@ -1,4 +1,4 @@
-"""What a user chooses for the next tracking run, besides the settings of the tracker."""
+"""Choices of a user for the next tracking run, besides the settings of the tracker."""
 
 from dataclasses import dataclass
 

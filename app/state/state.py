@@ -92,7 +92,7 @@ class State:
     """Numbers of the pages that render the 3-D view in software and pause it during a drag."""
     view_3d: View3d = field(default_factory=View3d)
     prediction_note: str = ""
-    """What the predicted pose of the 3-D view was computed from, or why there is none; empty while it is not shown."""
+    """Origin of the predicted pose in the 3-D view, or why there is none; empty while it is not shown."""
     floor: FloorState = field(default_factory=FloorState)
     footage: FootageState = field(default_factory=FootageState)
     compiled: frozenset[str] = frozenset(STAGES)
@@ -164,6 +164,12 @@ class State:
             costs = Costs(cost_px=compared.before_px, view_costs_px=compared.before_view_costs_px)
             return replace(self, people=compared.before, drag=None, **costs)
         return self
+
+    @property
+    def undrawn(self) -> frozenset[int]:
+        """Indices of the people whom no view draws: hidden ones, and those who are sought and have no pose yet."""
+        unplaced = (i for i in self.finding.sought if self.people[i].source is None)
+        return self.visibility.hidden.union(unplaced)
 
     @property
     def is_stored_drawn(self) -> bool:

@@ -1,4 +1,4 @@
-"""What the 3-D view shows, as one frozen value, and its form as a setting of the session."""
+"""Content of the 3-D view, as one frozen value, and its form as a setting of the session."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace

@@ -37,7 +37,7 @@ class RescueFile(NamedTuple):
 
     @property
     def offer(self) -> tuple[str, Remedy | None]:
-        """What it holds, and what to do with it."""
+        """Its content and the way to use it, as a sentence and a remedy."""
         if self.damage:
             return self.damage, None
         edits, are = ("1 edit", "is") if self.n_edits == 1 else (f"{self.n_edits} edits", "are")

@@ -25,10 +25,13 @@ export function findSection({ store, send }) {
   status.setAttribute("role", "status");
   const notes = document.createElement("ul");
   notes.className = "find-notes";
+  const details = document.createElement("details");
+  details.append(Object.assign(document.createElement("summary"), { textContent: "Details", title: "Each frame that was tried, and who was found" }), notes);
   const body = document.createElement("div");
   body.className = "acquisition";
-  body.append(start, work, status, notes);
+  body.append(start, work, status, details);
 
+  let wasRunning = false;
   const show = () => {
     const { finding } = store.facts;
     const running = finding?.running ?? false;
@@ -38,6 +41,9 @@ export function findSection({ store, send }) {
     status.textContent = !finding ? "" : running ? `${finding.stage} …` : finding.message;
     status.hidden = !status.textContent;
     status.classList.toggle("is-failed", finding?.failed ?? false);
+    details.hidden = !finding?.notes.length;
+    if (running !== wasRunning) details.open = !running && !finding?.failed; // sentences on the people who were found
+    wasRunning = running;
     notes.replaceChildren(
       ...(finding?.notes ?? []).slice(-SHOWN).map((text) => Object.assign(document.createElement("li"), { textContent: text })),
     );

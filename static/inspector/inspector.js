@@ -1,4 +1,4 @@
-/** Inspector: a column with collapsible sections beside the views. What is open is stored. */
+/** Inspector: a column with collapsible sections beside the views. Open sections are stored. */
 
 import { button, byId } from "../widgets/elements.js";
 

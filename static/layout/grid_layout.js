@@ -123,7 +123,7 @@ export function layOut({ isColumns }, shares, width, height) {
  */
 export function movedShares({ index, sizes, min }, size) {
   const both = sizes[index] + sizes[index + 1];
-  // Where there are many, panes are smaller than that by themselves.
+  // Many panes are smaller than that by themselves.
   const least = Math.min(min, sizes[index], sizes[index + 1]);
   const before = Math.max(least, Math.min(both - least, size));
   const moved = sizes.map((one, at) => (at === index ? before : at === index + 1 ? both - before : one));

@@ -1,4 +1,4 @@
-/** What the browser keeps of each session's views. */
+/** Views of each session that the browser keeps. */
 
 /**
  * @typedef {"views" | "filled-pane" | "pane-shares" | "drawer"} Kind zoom of each view by the name of its camera; name of the

@@ -1,4 +1,4 @@
-/** Borders between the panes, moved by pointer or arrow keys. Where borders meet, a corner moves all of them. */
+/** Borders between the panes, moved by pointer or arrow keys. A corner moves all borders that meet there. */
 
 import { makeSeparator, onDrag, showPosition } from "../widgets/separator.js";
 

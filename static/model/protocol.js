@@ -179,7 +179,7 @@
  *   result: AcquisitionResult | null}} AcquisitionMessage
  * @typedef {{camera: number, people: [number, number, number, number][][]}} SilhouetteAxes
  * @typedef {{type: "finding", running: boolean, stage: string, share: number, notes: string[], message: string, failed:
- *   boolean, tried: number | null, frame: number | null, axes: SilhouetteAxes[]}} FindingMessage
+ *   boolean, tried: number | null, camera: number | null, frame: number | null, axes: SilhouetteAxes[]}} FindingMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}

@@ -66,7 +66,7 @@ export function hasTrack(state) {
 }
 
 /**
- * What the Stop button of a search does.
+ * Effect of the Stop button of a search.
  *
  * @param {boolean} isRunning whether the search is running
  */

@@ -72,7 +72,7 @@ export function extent(curves) {
 }
 
 /**
- * Trace a curve. Where several frames share a pixel, trace their first, minimum, maximum and last value. Spikes remain
+ * Trace a curve. Of several frames that share a pixel, trace the first, minimum, maximum and last value. Spikes remain
  * visible, and the time is bounded by the width of the plot. Missing values leave gaps, and an isolated frame is a dot.
  *
  * @param {Path2D} path

@@ -1,4 +1,4 @@
-/** Tell the program which layers and image sizes this page shows. */
+/** Tell the program which layers and image sizes this page shows. A hidden tab shows no view. */
 
 export class ViewRequest {
   #store;
@@ -17,11 +17,14 @@ export class ViewRequest {
       if (changed.has("session")) this.#sent = "";
       if (changed.has("session") || changed.has("layers") || changed.has("reductions")) this.#ask();
     });
+    // The store waits for animation frames, which a hidden tab does not get.
+    document.addEventListener("visibilitychange", () => this.#ask());
   }
 
   #ask() {
-    const { session, layers, reductions } = this.#store.facts;
-    if (!session || reductions.length !== session.cameras.length) return;
+    const { session, layers, reductions: ofPanes } = this.#store.facts;
+    if (!session || ofPanes.length !== session.cameras.length) return;
+    const reductions = document.hidden ? ofPanes.map(() => 0) : ofPanes;
     const shown = /** @type {import("./protocol.js").Layer[]} */ (Object.keys(layers.shown)).filter(
       (id) => layers.shown[id],
     );

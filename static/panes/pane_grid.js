@@ -14,6 +14,8 @@ const MIN_SHARE = 0.4;
 const SECOND_DIGIT_MS = 700;
 /** Facts that change the marks over the overlay. @type {(keyof import("../model/store.js").Facts)[]} */
 const MARKED = ["hover", "hoverPart", "pinHover", "heldPin", "observability", "finding"];
+/** Facts after which views follow the people: overlay and state of a frame arrive in any order. @type {(keyof import("../model/store.js").Facts)[]} */
+const FOLLOWED = ["overlay", "state", "dragging"];
 /** Facts that change the pictures. @type {(keyof import("../model/store.js").Facts)[]} */
 const PICTURED = ["shown", "placeholder", "layers", "imageTones", "bare"];
 
@@ -235,7 +237,9 @@ export class PaneGrid {
     if (changed.has("filled")) this.#fill();
     if (changed.has("bare")) document.body.classList.toggle("is-bare", this.#store.facts.bare);
     if (changed.has("finding")) this.#expectPeople();
-    const isMoved = changed.has("overlay") && this.#follower.take(this.panes, this.#store.facts);
+    // Not under the hand: a view that is late waits for the end of the drag.
+    const isFollowed = FOLLOWED.some((fact) => changed.has(fact)) && !this.#store.facts.dragging;
+    const isMoved = isFollowed && this.#follower.take(this.panes, this.#store.facts);
     if (changed.has("overlay")) this.#frameAtOpening();
     if (changed.has("target")) this.#ask(this.panes.map((pane) => pane.reduction));
     if (changed.has("active") || changed.has("session")) this.#markActive();

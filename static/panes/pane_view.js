@@ -76,7 +76,7 @@ export class PaneView {
     return last.x > 0 && last.y > 0 && first.x < this.#pane.width && first.y < this.#pane.height;
   }
 
-  /** What the view shows, to be restored; null for the whole image. */
+  /** The part of the image that the view shows, to be restored; null for all of it. */
   get choice() {
     if (this.#framed) return { framed: this.#framed };
     return this.isReset ? null : { zoom: this.zoom, ...this.#center };
@@ -194,7 +194,7 @@ export class PaneView {
   }
 
   /**
-   * Move the centre with what the view shows. Where it would leave the image, the way back starts from there.
+   * Move the centre with the people. If it would leave the image, the way back starts beyond its border.
    *
    * @param {number} du
    * @param {number} dv

@@ -19,7 +19,7 @@ export class CostLandscape {
   #canvas = document.createElement("canvas");
   #choice = document.createElement("select");
   #legend = document.createElement("div");
-  /** What is shown until there is a landscape. */
+  /** Text shown until there is a landscape. */
   #waiting = document.createElement("p");
   #toMinimum;
   #hovered = /** @type {number | null} */ (null);

@@ -5,9 +5,10 @@
 
 import { button, byId } from "../widgets/elements.js";
 import { CameraCards } from "./camera_cards.js";
+import { makePathField } from "./path_field.js";
 import { PathPicker } from "./path_picker.js";
 import { drawRig } from "./rig_drawing.js";
-import { completePaths, postJson } from "./session_requests.js";
+import { postJson } from "./session_requests.js";
 
 /**
  * @typedef {{cameras: [string, string], with_backgrounds: boolean, text: string}} Exchanged
@@ -55,13 +56,8 @@ export class NewSession {
       this.#dialog.close();
       open(this.#made);
     });
-    for (const field of this.#form.querySelectorAll("input[list$='-paths']")) {
-      const input = /** @type {HTMLInputElement} */ (field);
-      completePaths(input, /** @type {HTMLDataListElement} */ (input.list));
-    }
-    for (const browse of this.#form.querySelectorAll("button[data-browse]")) {
-      const { browse: name = "", kind } = /** @type {HTMLElement} */ (browse).dataset;
-      browse.addEventListener("click", () => this.#browse(name, kind === "any" ? "any" : "folder"));
+    for (const input of /** @type {NodeListOf<HTMLInputElement>} */ (this.#form.querySelectorAll(".path-field input"))) {
+      makePathField(input, () => this.#browse(input));
     }
   }
 
@@ -80,13 +76,10 @@ export class NewSession {
     byId("new-model", HTMLInputElement).placeholder = usual;
   }
 
-  /**
-   * @param {string} name of a field
-   * @param {"folder" | "any"} kind
-   */
-  #browse(name, kind) {
-    const field = this.#field(name);
-    this.#picker.show(kind, field.value || this.#value("footage") || this.#value("calibration"), (path) => {
+  /** @param {HTMLInputElement} field */
+  #browse(field) {
+    const wanted = field.dataset.takes === "files" ? "files" : "folder";
+    this.#picker.show(wanted, field.value || this.#value("footage") || this.#value("calibration"), (path) => {
       field.value = path;
       field.dispatchEvent(new Event("input", { bubbles: true }));
     });

@@ -5,10 +5,11 @@ import { button, byId } from "../widgets/elements.js";
 /**
  * @typedef {{name: string, path: string, kind: "folder" | "session" | "video" | "file"}} Entry
  * @typedef {{folder: string, parent: string | null, entries: Entry[], is_cut_off: boolean}} FolderContents
- * @typedef {"folder" | "any" | "footage"} Wanted kind of the choice; footage is a video, or a folder of images
+ * @typedef {"folder" | "files" | "footage"} Wanted kind of the choice; files are one, several or their folder; footage is a
+ *   video, or a folder of images
  */
 
-const TITLES = { folder: "Choose a folder", any: "Choose a file or a folder", footage: "Choose a video or a folder of images" };
+const TITLES = { folder: "Choose a folder", files: "Choose a file, several files or a folder", footage: "Choose a video or a folder of images" };
 const MARKS = { folder: "▸", session: "▸", video: "", file: "" };
 
 export class PathPicker {
@@ -23,6 +24,8 @@ export class PathPicker {
   #wanted = "folder";
   /** @type {FolderContents | null} */
   #contents = null;
+  /** Files of the folder that are marked, by name. @type {Set<string>} */
+  #marked = new Set();
   #take = (/** @type {string} */ _path) => {};
 
   constructor() {
@@ -34,11 +37,11 @@ export class PathPicker {
     this.#list.addEventListener("keydown", (event) => {
       if (event.key === "Backspace") this.#up.click();
       else if (event.key === "ArrowDown" || event.key === "ArrowUp") moveFocus(this.#list, event.key === "ArrowDown" ? 1 : -1);
-      else return;
+      else if (event.key !== " " || !this.#mark(document.activeElement)) return;
       event.preventDefault();
     });
     button("path-picker-cancel", () => this.#dialog.close());
-    this.#choose.addEventListener("click", () => this.#contents && this.#finish(this.#contents.folder));
+    this.#choose.addEventListener("click", () => this.#contents && this.#finish(this.#chosen(this.#contents.folder)));
   }
 
   /**
@@ -74,7 +77,11 @@ export class PathPicker {
     this.#contents = contents;
     this.#path.value = contents.folder;
     this.#up.disabled = contents.parent === null;
-    this.#note.textContent = contents.is_cut_off ? "Not all entries are shown." : contents.entries.length ? "" : "This folder is empty.";
+    const isMarkable = this.#wanted === "files" && contents.entries.some(({ kind }) => kind === "file");
+    const hint = isMarkable ? "Ctrl+click or Space marks several files." : "";
+    this.#note.textContent = contents.is_cut_off ? "Not all entries are shown." : contents.entries.length ? hint : "This folder is empty.";
+    this.#marked.clear();
+    this.#showMarked();
     this.#list.replaceChildren(...contents.entries.map((entry) => this.#row(entry)));
     this.#list.scrollTop = 0;
     /** @type {HTMLElement} */ (this.#list.querySelector("button:not(:disabled)") ?? this.#list).focus();
@@ -102,9 +109,42 @@ export class PathPicker {
     }
     open.append(Object.assign(document.createElement("span"), { textContent: name }));
     if (kind === "session") open.append(Object.assign(document.createElement("small"), { textContent: "session" }));
-    open.addEventListener("click", () => (isFolder ? void this.#go(path) : this.#finish(path)));
+    open.dataset.name = isFolder ? "" : name;
+    open.addEventListener("click", (event) => {
+      if (isFolder) void this.#go(path);
+      else if (!(event.ctrlKey || event.metaKey) || !this.#mark(open)) this.#finish(path);
+    });
     item.append(open);
     return item;
+  }
+
+  /**
+   * Mark the file of an entry, or no longer. Returns whether it can be marked.
+   *
+   * @param {Element | null} entry
+   */
+  #mark(entry) {
+    const name = entry instanceof HTMLElement && this.#wanted === "files" ? entry.dataset.name : "";
+    if (!entry || !name) return false;
+    if (!this.#marked.delete(name)) this.#marked.add(name);
+    entry.setAttribute("aria-pressed", String(this.#marked.has(name)));
+    this.#showMarked();
+    return true;
+  }
+
+  #showMarked() {
+    const count = this.#marked.size;
+    this.#choose.textContent = count ? `Choose ${count} ${count === 1 ? "file" : "files"}` : "Choose this folder";
+    this.#choose.title = count ? "Choose the marked files" : "Choose the folder that is shown";
+  }
+
+  /**
+   * The folder, or the marked files in it: the path of the first, and the names of the others.
+   *
+   * @param {string} folder
+   */
+  #chosen(folder) {
+    return this.#marked.size ? `${folder.replace(/\/$/, "")}/${[...this.#marked].join("; ")}` : folder;
   }
 
   /** @param {string} path */

@@ -165,10 +165,11 @@ export class WorkList {
   }
 
   /** @param {import("../model/protocol.js").FindingMessage} finding */
-  #showFailure({ message, notes, tried }) {
+  #showFailure(finding) {
+    const { message, notes, tried } = finding;
     const [reason] = message.split(/;|\.$/);
     byId("failure-text", HTMLElement).textContent = `People were not found: ${reason.charAt(0).toLowerCase()}${reason.slice(1)}.`;
-    this.#showBadSilhouette();
+    this.#showBadSilhouette(finding);
     byId("failure-look", HTMLButtonElement).hidden = tried === null;
     byId("failure-look", HTMLButtonElement).textContent = `Show silhouettes of frame ${tried}`;
     byId("failure-details", HTMLDetailsElement).open = false;
@@ -179,33 +180,30 @@ export class WorkList {
     if (tried === this.#store.facts.target) this.#lookAtSilhouettes();
   }
 
-  /** Show the picture of the silhouette that the message names. Without such a view, or a silhouette, there is none. */
-  #showBadSilhouette() {
-    const { session, finding } = this.#store.facts;
-    const [picture, bad] = [byId("failure-silhouette", HTMLImageElement), this.#badView];
+  /**
+   * Show the picture of the silhouette that the failure is about. Without such a view, or a silhouette, there is none.
+   *
+   * @param {import("../model/protocol.js").FindingMessage} finding
+   */
+  #showBadSilhouette({ camera, tried }) {
+    const { session } = this.#store.facts;
+    const picture = byId("failure-silhouette", HTMLImageElement);
     picture.hidden = true;
     picture.removeAttribute("src");
-    if (!session || !finding || finding.tried === null || bad < 0) return;
-    picture.alt = picture.title = `Silhouette in ${session.cameras[bad].name} on frame ${finding.tried}`;
+    if (!session || tried === null || camera === null) return;
+    picture.alt = picture.title = `Silhouette in ${session.cameras[camera].name} on frame ${tried}`;
     picture.onload = () => (picture.hidden = false);
-    picture.src = `silhouette/${bad}/${finding.tried}`;
+    picture.src = `silhouette/${camera}/${tried}`;
   }
 
-  /** Index of the view that the message names; -1 without one. */
-  get #badView() {
-    const { finding, session } = this.#store.facts;
-    const words = finding?.message.split(/[^\w-]+/) ?? [];
-    return session?.cameras.findIndex(({ name }) => words.includes(name)) ?? -1;
-  }
-
-  /** Show the silhouettes of the frame that the message is about, and the view that it names. */
+  /** Show the silhouettes of the frame and the view that the failure is about. */
   #lookAtSilhouettes() {
     const { finding, layers } = this.#store.facts;
     if (!finding || finding.tried === null) return;
     this.#navigation.goTo(finding.tried);
     this.#hasSilhouettes ||= !layers.shown.silhouette;
     this.#layers.toggle(["silhouette"], true);
-    if (this.#badView >= 0) this.#store.set({ active: this.#badView });
+    if (finding.camera !== null) this.#store.set({ active: finding.camera });
   }
 
   #closeFailure() {

@@ -32,7 +32,7 @@ async function hasStarted() {
 
 /**
  * Let the program exchange the token in the address for a cookie and the page's own address, to which the cookie is
- * bound. Where it refuses the page, show its refusal.
+ * bound. If it refuses the page, show its refusal.
  */
 async function enter() {
   const answer = await fetch(location.href, { cache: "no-store" });

@@ -74,7 +74,7 @@ export class DoubtList {
       const focused = this.#list.contains(document.activeElement) ? document.activeElement : null;
       const at = focused ? [...this.#list.children].findIndex((row) => row.contains(focused)) : -1;
       this.#list.replaceChildren(...rows);
-      // Where the focused entry was resolved, the next one takes its place.
+      // If the focused entry was resolved, the next one takes its place.
       if (at >= 0) (focused?.isConnected ? /** @type {HTMLElement} */ (focused) : rows[Math.min(at, rows.length - 1)]?.querySelector("button"))?.focus();
     }
     const listed = hidden > 0 ? `, the ${count(shown.length)} most severe are listed` : ", most severe first";

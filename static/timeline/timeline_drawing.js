@@ -86,8 +86,8 @@ function drawName(context, axis, style, { name, color }, { top, bottom }) {
 }
 
 /**
- * Draw runs of equal neighbouring frames as rectangles. Where frames share a pixel, the number of rectangles is bounded by
- * the number of changes or pixels.
+ * Draw runs of equal neighbouring frames as rectangles. Their number is bounded by the number of changes, and by that of
+ * pixels.
  *
  * @param {FrameAxis} axis
  * @param {(frame: number) => number} look value of a frame; below 0 for nothing to draw
@@ -251,7 +251,7 @@ export function drawReviewed(context, axis, cells, style, { top, bottom }) {
 }
 
 /**
- * Draw statuses as bars, higher for worse ones. Where frames share a pixel, the worst is visible.
+ * Draw statuses as bars, higher for worse ones. The worst of the frames that share a pixel is visible.
  *
  * @param {CanvasRenderingContext2D} context
  * @param {FrameAxis} axis

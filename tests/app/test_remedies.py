@@ -5,7 +5,6 @@ import re
 import string
 from pathlib import Path
 
-import pytest
 from architecture import FILES, ROOT, trees
 
 from app.remedies import PHRASES, Phrases, command_line_text, page_text

@@ -143,10 +143,12 @@ class Hour:
         await self.stranger.until(f"{compared}?.work === '{kind}' && {compared}.number !== {number} && {DONE}", 240)
 
     async def take_back(self):
-        """Undo the last edit."""
+        """Undo the last edit, and wait until the views show it: the text comes first, and a joint may still move."""
         undone = (await state_of(self.page))["state"]["undo"]
+        await self.page.evaluate("window.overlayBefore = quadrille.state.overlay")
         await self.stranger.press("Control+z")
-        await self.stranger.until(f"quadrille.state.state.redo === {json.dumps(undone)} && {DONE}")
+        is_drawn = "quadrille.state.overlay !== window.overlayBefore"
+        await self.stranger.until(f"quadrille.state.state.redo === {json.dumps(undone)} && {is_drawn} && {DONE}")
 
     async def mark(self, first, last):
         """Mark a range on the timeline."""

@@ -10,6 +10,16 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from tracker.calibrations.camera_matrices import (
+    ProjectionError,
+    homogeneous,
+    is_projection,
+    lens_matrix,
+    plain_array,
+    reshaped,
+    rotation_of_quaternion,
+    split_projection,
+)
 from tracker.calibrations.document import Document, refuse
 from tracker.calibrations.lens_words import (
     FISHEYE,
@@ -23,7 +33,6 @@ from tracker.calibrations.lens_words import (
 )
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
 from tracker.validation import quoted
 
 Section: TypeAlias = dict[str, Any]
@@ -31,6 +40,9 @@ Section: TypeAlias = dict[str, Any]
 
 _KEYS = {
     "matrix": "matrix k cameramatrix cammatrix intrinsic intrinsics intrinsicmatrix intrinsicsmatrix mtx",
+    "focal": "focallength focallengths focallengthpx focallengthpixels",
+    "principal": "principalpoint principalpointpx principalpointpixels",
+    "projection": "p projectionmatrix projmatrix projmat",
     "distortions": "distortions distortion dist distcoef distcoefs distcoeff distcoeffs d "
     "distortioncoefficients distortioncoeffs distortionvector distortionparameters distortionparams coefficients "
     "coeffs coefs distortioncoefs",
@@ -38,6 +50,7 @@ _KEYS = {
     "tangential": "tdistort tangential tangentialdistortion tangentialcoefficients tangentialcoeffs",
     "matrix_R": "rotation r rot rotationmatrix rmat",
     "rodrigues": "rvec rotationvector rodrigues",
+    "quaternion": "quaternion q quat rotationquaternion orientationquaternion",
     "translation": "translation t tvec translationvector",
     "T_camera_world": "rt extrinsic extrinsics extrinsicmatrix extrinsicsmatrix worldtocamera worldtocam world2cam "
     "world2camera w2c tcameraworld tcamworld tcw",
@@ -50,13 +63,24 @@ _KEYS = {
     "ignore": "ignore",
 }
 _MEANING = {alias: meaning for meaning, aliases in _KEYS.items() for alias in aliases.split()}
-_NUMBERS = ("fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+_NUMBERS = (
+    "fx", "fy", "cx", "cy", "skew", "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6",
+    "qw", "qx", "qy", "qz", "tx", "ty", "tz",
+)  # fmt: skip
+_POSE = {"matrix_R", "rodrigues", "quaternion", "qw", "translation", "tx", "T_camera_world", "T_world_camera"}
+"""Meanings that belong to a pose."""
 _OTHER_POSES = (
-    "pose", "camerapose", "position", "cameraposition", "center", "centre", "cameracenter", "quaternion", "q", "quat",
+    "pose", "camerapose", "position", "cameraposition", "center", "centre", "cameracenter",
     "orientation", "euler", "eulerangles", "transform", "transformmatrix", "location", "worldposition", "axisangle",
     "p", "projectionmatrix", "roll", "pitch", "yaw", "rx", "ry", "rz", "tx", "ty", "tz", "qx", "qy", "qz", "qw", "c",
 )  # fmt: skip
 """Words of poses whose direction or order programs do not agree on."""
+_FORMS = {3: "rodrigues", 4: "quaternion"}
+"""Meanings of a rotation by the count of its numbers, where that is not 9: EasyMocap has both a vector R and a matrix
+Rot, which are equal."""
+_MIN_FOCAL = 0.25
+"""Smallest focal length as a share of the principal point, which lies near the middle: half of a view of 152 degrees.
+Wider lenses are fisheyes, whose focal lengths are longer at the same view."""
 _SHORTER = {14: 12, 12: 8, 8: 5}
 _UNIT = re.compile(r"^(length|translation|world|distance)?units?$|^units?(of)?(length|translation)s?$")
 """Keys, without case and separators, whose value is the unit of the translations."""
@@ -78,7 +102,7 @@ def camera_groups(data: Any) -> dict[str, Mapping[str, Any]]:
     for key in _LISTS:
         if isinstance(data.get(key), Mapping | list) and (found := camera_groups(data[key])):
             return _with_poses(found, {k: v for k, v in data.items() if k != key})
-    if any(_MEANING.get(spelled(key)) == "matrix" and not isinstance(v, Mapping) for key, v in data.items()):
+    if is_camera({key: value for key, value in data.items() if not isinstance(value, Mapping)}):
         return {"": data}
     for key, value in data.items():
         if isinstance(value, Mapping | list) and _holds_cameras(value):
@@ -106,8 +130,7 @@ def _with_poses(cameras: dict[str, Mapping[str, Any]], others: Mapping[str, Any]
 
 def has_pose(group: Mapping[str, Any]) -> bool:
     """Return whether a group has words of a pose."""
-    words = {"matrix_R", "rodrigues", "translation", "T_camera_world", "T_world_camera"}
-    return bool(words & known_values(group).keys())
+    return bool(_POSE & known_values(group).keys())
 
 
 def _by_suffix(data: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
@@ -124,9 +147,9 @@ def _by_suffix(data: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
 
 def is_camera(group: Mapping[str, Any]) -> bool:
-    """Return whether a group has the matrix of a camera."""
+    """Return whether a group has the lens of a camera, or its projection."""
     known = known_values(group)
-    return "matrix" in known or "fx" in known
+    return bool({"matrix", "fx", "focal"} & known.keys()) or is_projection(known.get("projection"))
 
 
 def known_values(group: Mapping[str, Any]) -> dict[str, Any]:
@@ -134,12 +157,13 @@ def known_values(group: Mapping[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for key, value in _flat(group):
         plain = spelled(key)
+        if is_absent(value):
+            continue
         if plain in _NUMBERS:
             found[plain] = value
-        elif (meaning := _MEANING.get(plain)) is not None and not is_absent(value):
-            # EasyMocap has both a vector R and a matrix Rot, which are equal.
-            if meaning == "matrix_R" and np.size(plain_array(value)) == 3:
-                meaning = "rodrigues"
+        elif (meaning := _MEANING.get(plain)) is not None:
+            if meaning == "matrix_R":
+                meaning = _FORMS.get(plain_array(value).size, meaning)
             found[meaning] = value
     return found
 
@@ -198,7 +222,12 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
     if not fisheye and "k4" in known and not {"distortions", "p1", "p2", "k5", "k6"} & known.keys():
         found = "k1 to k4 alone, which are a fisheye's"
         raise refuse(document, camera, "k1, k2, p1 and p2 of a lens", found, "say `fisheye: true`, or add p1 and p2")
+    matrix = lens_matrix(known)
+    if "projection" in known and not _POSE & known.keys():
+        matrix, pose = _split(known, matrix, camera, document)
+        known |= {} if pose is None else {"T_camera_world": pose}
     rotation, translation = _pose(known, group, camera, document)
+    _check_focal(matrix, camera, document)
     distortions = _distortions(known, fisheye)
     if not fisheye and isinstance(distortions, list) and len(distortions) in (12, 14):
         advice = "undistort the footage, or calibrate without this model"
@@ -206,7 +235,7 @@ def section_of(group: Mapping[str, Any], camera: str, document: Document) -> Sec
     return {
         "name": known.get("name"),
         "size": _size(known),
-        "matrix": _matrix(known),
+        "matrix": matrix,
         "distortions": distortions,
         "rotation": rotation,
         "translation": translation,
@@ -249,14 +278,53 @@ def _pair(key: str, value: Any) -> str:
     return f"{quoted(key)} = {quoted(value)}" if isinstance(value, str) else quoted(key)
 
 
+def _split(known: Mapping[str, Any], matrix: Any, camera: str, document: Document) -> tuple[Any, Any]:
+    """Return the matrix of the lens and the pose of a projection; the pose is None where the lens is another's.
+
+    Raises:
+        CalibrationError: it is the projection of no usable camera.
+    """
+    if not is_projection(known["projection"]):
+        return matrix, None
+    try:
+        K, T_camera_world = split_projection(known["projection"])
+    except ProjectionError as error:
+        raise CalibrationError(
+            f"{document.where}, camera {quoted(camera)}: {error}; give K, R and t of the camera instead"
+        ) from error
+    if matrix is not None and not np.allclose(plain_array(matrix), K, rtol=1e-3, atol=1e-3 * K[0, 0]):
+        return matrix, None  # that of rectified pictures, as ROS writes it
+    return (K.tolist() if matrix is None else matrix), T_camera_world
+
+
+def _check_focal(matrix: Any, camera: str, document: Document) -> None:
+    """Check that a focal length is in pixels.
+
+    Raises:
+        CalibrationError: no lens has so short a one.
+    """
+    K = plain_array(matrix)
+    if K.shape == (3, 3) and 0 < K[0, 0] < _MIN_FOCAL * K[0, 2]:
+        raise refuse(
+            document, camera, "a focal length in pixels",
+            f"{K[0, 0]:.4g} of pictures that are some {2 * K[0, 2]:.0f} pixels wide, as in millimetres",
+            "multiply it by the width of the pictures over that of the sensor",
+        )  # fmt: skip
+
+
 def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, document: Document) -> tuple[Any, Any]:
     """Return rotation and translation; None and None of a camera without a pose.
 
     Raises:
         CalibrationError: only one of them is there, or the pose lies under words whose meaning is not fixed.
     """
-    rotation = known.get("matrix_R", known.get("rodrigues"))
+    rotation = next((known[key] for key in ("matrix_R", "rodrigues", "quaternion") if key in known), None)
+    if rotation is None:
+        named = rotation_of_quaternion([known.get(key) for key in ("qw", "qx", "qy", "qz")])
+        rotation = None if named is None else named.tolist()
     translation = known.get("translation")
+    if translation is None and {"tx", "ty", "tz"} <= known.keys():
+        translation = [known[key] for key in ("tx", "ty", "tz")]
     if rotation is None and translation is None:
         for key in ("T_camera_world", "T_world_camera"):
             if (whole := homogeneous(known.get(key))) is not None:
@@ -271,29 +339,7 @@ def _pose(known: Mapping[str, Any], group: Mapping[str, Any], camera: str, docum
             expected = "its pose as R and t (X_camera = R X_world + t)"
             raise refuse(document, camera, expected, f"{', '.join(has)} alone", "rewrite the pose to R and t")
         return None, None
-    return reshaped(rotation, {3: (3,), 9: (3, 3)}), reshaped(translation, {3: (3,)})
-
-
-def homogeneous(value: Any) -> Array | None:
-    """Return a pose of shape (3, 4) or (4, 4) as (4, 4), also one written for row vectors; None for anything else."""
-    array = plain_array(reshaped(value, {12: (3, 4), 16: (4, 4)}))
-    if array.shape not in ((3, 4), (4, 4)) or not np.isfinite(array).all():
-        return None
-    whole = np.eye(4)
-    if array.shape == (4, 4) and np.any(array[3, :3]) and not np.any(array[:3, 3]):
-        array = array.T
-    whole[: len(array)] = array
-    return whole if np.allclose(whole[3], (0, 0, 0, 1)) else None
-
-
-def _matrix(known: Mapping[str, Any]) -> Any:
-    matrix = known.get("matrix")
-    if matrix is None and {"fx", "fy", "cx", "cy"} <= known.keys():
-        matrix = [known[k] for k in ("fx", "fy", "cx", "cy")]
-    if _shape(matrix) == (4,):  # as Kalibr writes it
-        fx, fy, cx, cy = plain_array(matrix).tolist()
-        return [[fx, known.get("skew", 0.0), cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
-    return reshaped(matrix, {9: (3, 3)})
+    return reshaped(rotation, {3: (3,), 4: (4,), 9: (3, 3)}), reshaped(translation, {3: (3,)})
 
 
 def _distortions(known: Mapping[str, Any], fisheye: bool) -> Any:
@@ -318,21 +364,3 @@ def _size(known: Mapping[str, Any]) -> Any:
     if size is None:
         return [known["width"], known["height"]] if {"width", "height"} <= known.keys() else None
     return reshaped(size, {2: (2,)})
-
-
-def reshaped(value: Any, shapes: Mapping[int, tuple[int, ...]]) -> Any:
-    """Give numbers the shape that belongs to their count; other data is returned as it is, to be refused by name."""
-    array = plain_array(value)
-    return value if array.size not in shapes else array.reshape(shapes[array.size]).tolist()
-
-
-def plain_array(value: Any) -> Array:
-    """Return an array of numbers; an empty one if it is none."""
-    try:
-        return np.array(value, dtype=np.float64)
-    except (ValueError, TypeError, OverflowError):
-        return np.zeros(0)
-
-
-def _shape(value: Any) -> tuple[int, ...]:
-    return () if value is None else tuple(plain_array(value).shape)

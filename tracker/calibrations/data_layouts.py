@@ -1,6 +1,6 @@
 """Calibrations in JSON, YAML or OpenCV's XML, with all cameras in one file.
 
-Where the pose of a tool is another than `X_camera = R X_world + t`, its direction is that of the tool's own source:
+The direction of a pose other than `X_camera = R X_world + t` is that of the tool's own source:
 `export_json` of multical, `Calibration::saveCamerasParams` of MC-Calib, and the camchain of Kalibr's manual.
 """
 
@@ -9,15 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from tracker.calibrations.camera_words import (
-    Section,
-    camera_groups,
-    homogeneous,
-    known_values,
-    plain_array,
-    plain_text,
-    section_of,
-)
+from tracker.calibrations.camera_matrices import homogeneous, is_transposed, plain_array
+from tracker.calibrations.camera_words import Section, camera_groups, known_values, plain_text, section_of
 from tracker.calibrations.document import Document, refuse
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
@@ -192,12 +185,6 @@ def read_row_vectors(document: Document) -> dict[str, Section]:
                 section["rotation"] = rotation.T.tolist()
         found[name] = section | ({"name": name} if name else {})
     return found
-
-
-def is_transposed(matrix: Any) -> bool:
-    """Return whether a matrix of a camera has its principal point in the last row."""
-    K = plain_array(matrix)
-    return K.shape == (3, 3) and not np.any(K[:2, 2]) and bool(np.all(K[2, :2] > 1))
 
 
 # --- OpenPose -------------------------------------------------------------------------------------------------------

@@ -34,9 +34,11 @@ _NUMBERS = {"0": PINHOLE, "1": FISHEYE}
 """MC-Calib's distortion_type: 0 is Brown's model, 1 Kannala's."""
 _SUSPICIOUS = re.compile(
     r"fisheye|lens|distor|model|omni|^xi$|convention|coordinates?ys|handed|axes|^s[1-4]$|^tau[xy]?$|thinprism|tilt"
-    r"|radial|tangential|coef"
+    r"|radial|tangential|coef|^scal(e|ing)|scal(e|ing)(factor)?$|binning"
 )
 """Parts of keys of a lens, a model or a convention, without case and separators."""
+_SCALE = re.compile("scal(e|ing)|binning")
+"""Keys, without case and separators, of which 0 and 1 change nothing."""
 _HARMLESS = re.compile(r"error|(?<!te)rms|serial|modelname|modelnumber|count|flags|date|^distorted|undistort")
 _OTHER_LENS = re.compile(r"fisheye|equidist|kannala|omnidir")
 """Words of lenses other than the usual one, in text without case and separators."""
@@ -76,6 +78,8 @@ def is_understood(key: str, value: Any) -> bool:
 def is_unknown(key: str, value: Any) -> bool:
     """Return whether a key, or text under it, may change the meaning of the others unheard."""
     plain = spelled(key)
+    if _SCALE.search(plain) and isinstance(value, int | float) and value in (0, 1):
+        return False
     if isinstance(value, str) and _OTHER_LENS.search(spelled(value)) and not _FREE_TEXT.search(plain):
         return True
     return bool(_SUSPICIOUS.search(plain)) and not _HARMLESS.search(plain)

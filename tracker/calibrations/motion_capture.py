@@ -8,16 +8,14 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from tracker.calibrations.camera_matrices import rotation_of_quaternion
 from tracker.calibrations.camera_words import Section
 from tracker.calibrations.document import Document, refuse
-from tracker.geometry.rigid import matrix_from_quaternion
 
 _FLIPPED = np.diag([1.0, -1.0, -1.0])
 """From Qualisys's axes of a camera (y up, z backwards) to OpenCV's."""
 _SUBPIXELS = 64.0
 """Qualisys counts the sensor in 64ths of a pixel."""
-_ROUNDING = 1e-3
-"""Error of the norm of a quaternion that is printed with four digits."""
 
 
 def is_qualisys(document: Document) -> bool:
@@ -119,10 +117,9 @@ def read_vicon(document: Document) -> dict[str, Section]:
             continue
         values = _Numbers(document, name, {**camera.attrib, **frame.attrib})
         quaternion = np.roll(values.row("ORIENTATION", 4), 1)
-        if abs(np.linalg.norm(quaternion) - 1) > _ROUNDING:
+        if (R := rotation_of_quaternion(quaternion)) is None:
             expected, found_norm = "a unit quaternion as ORIENTATION", f"a norm of {np.linalg.norm(quaternion):.3g}"
             raise refuse(document, name, expected, found_norm, "export the file again")
-        R = matrix_from_quaternion(quaternion)
         (focal,), (cu, cv) = values.row("FOCAL_LENGTH", 1), values.row("PRINCIPAL_POINT", 2)
         ratio = values.get("PIXEL_ASPECT_RATIO") or 1.0
         found[name] = {

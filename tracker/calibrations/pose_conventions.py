@@ -77,9 +77,13 @@ def costs(Ts_stated: Sequence[Array]) -> dict[PoseConvention, float]:
         The root mean square angle between the axes and the point that all see, plus that between the sides of the
         pictures and the vertical that levels them best; turns by 90 degrees count as level.
     """
-    n = len(Ts_stated)
-    chosen = np.unique(np.linspace(0, n - 1, min(n, _MAX_COMPARED)).astype(int))
+    chosen = _chosen(len(Ts_stated))
     return {c: _cost([rigid.inverse(read_pose(Ts_stated[i], c)) for i in chosen]) for c in CONVENTIONS}
+
+
+def _chosen(n: int) -> list[int]:
+    """Return the indices of the cameras that are compared, ascending."""
+    return sorted({int(i) for i in np.linspace(0, n - 1, min(n, _MAX_COMPARED))})
 
 
 def _cost(Ts_world_camera: Sequence[Array]) -> float:
@@ -128,11 +132,10 @@ def check_convention(
     cost = costs(Ts_stated)
     stated = cost.pop(STATED)
     best = min(cost.values())
-    ratio, margin = (_PAIR_RATIO, _PAIR_MARGIN) if len(Ts_stated) == 2 else (_RATIO, _MARGIN)
     others = _distinct([c for c in cost if cost[c] <= min(_FITS, max(_RATIO * best, best + _MARGIN))], Ts_stated)
-    if best < _FITS and stated > ratio * best + margin:
+    if is_clearly_worse(stated, best, len(Ts_stated)):
         rewrite = _rewrite(others[0])
-        condition = f"if R and t, as read, are changed ({rewrite})" if is_turned else f"if {_in_words(others[0])}"
+        condition = f"if R and t, as read, are changed ({rewrite})" if is_turned else f"if {in_words(others[0])}"
         misfit = f"expected {expected}, by which the cameras see no one place"
         if len(others) == 1:
             raise CalibrationError(
@@ -140,7 +143,7 @@ def check_convention(
                 Remedy("give_poses", poses=others[0], rewrite="likewise" if is_turned else rewrite),
             )
         raise CalibrationError(
-            f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({_in_words(c)})' for c in others)}",
+            f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({in_words(c)})' for c in others)}",
             Remedy("choose_poses"),
         )
     others = [c for c in others if cost[c] <= _RATIO * stated + _MARGIN]
@@ -150,6 +153,34 @@ def check_convention(
         f"The file is read with {expected}; {' or '.join(others)} would fit these cameras as well. Check with "
         "the pictures that the cameras stand where they should."
     )
+
+
+def odd_camera(Ts_stated: Sequence[Array]) -> int | None:
+    """Return the index of the one camera that does not see the place that all others see; None if there is none.
+
+    Args:
+        Ts_stated: poses from world to camera, (4, 4), in any unit. Of fewer than four, no three agree without one.
+    """
+    chosen = _chosen(len(Ts_stated))
+    if len(chosen) < 4:
+        return None
+    without = {i: _cost([rigid.inverse(Ts_stated[k]) for k in chosen if k != i]) for i in chosen}
+    odd = min(without, key=lambda i: without[i])
+    is_odd = is_clearly_worse(best_cost(Ts_stated)[0], without[odd], len(chosen) - 1)
+    return odd if is_odd else None
+
+
+def is_clearly_worse(cost: float, best: float, n_cameras: int) -> bool:
+    """Return whether the best of several readings fits some cameras, and another, of a given cost, does not."""
+    ratio, margin = (_PAIR_RATIO, _PAIR_MARGIN) if n_cameras == 2 else (_RATIO, _MARGIN)
+    return best < _FITS and cost > ratio * best + margin
+
+
+def best_cost(Ts_stated: Sequence[Array], convention: PoseConvention | None = None) -> tuple[float, PoseConvention]:
+    """Return the cost of a convention; of the one that fits best, if None is given."""
+    cost = costs(Ts_stated)
+    best: PoseConvention = min(cost, key=lambda c: cost[c]) if convention is None else convention
+    return cost[best], best
 
 
 def _distinct(conventions: Sequence[PoseConvention], Ts_stated: Sequence[Array]) -> list[PoseConvention]:
@@ -169,7 +200,8 @@ def _from_first(Ts_stated: Sequence[Array], convention: PoseConvention) -> Array
     return Ts @ rigid.inverse(Ts[0])
 
 
-def _in_words(convention: PoseConvention) -> str:
+def in_words(convention: PoseConvention) -> str:
+    """Return what R and t of a convention mean."""
     kind = convention.removesuffix("-opengl")
     axes = ", with the camera's axes of OpenGL (y up, z backwards)" if kind != convention else ""
     return _MEANING[kind] + axes

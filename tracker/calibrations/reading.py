@@ -1,18 +1,20 @@
 """Read calibrated cameras from files of any layout of the table; others are named, with a way to convert them."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from tracker.calibrations.camera_matrices import is_transposed
 from tracker.calibrations.camera_words import Section, is_absent, plain_text
 from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
-from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics, is_transposed
+from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics
 from tracker.calibrations.document import Document, read_document, refuse
 from tracker.calibrations.foreign import foreign, named
 from tracker.calibrations.layouts import CalibrationLayout, find_layout
-from tracker.calibrations.pose_conventions import check_convention, read_pose
+from tracker.calibrations.pose_conventions import check_convention, odd_camera, read_pose
+from tracker.calibrations.rotation_forms import check_turned, refuse_angles, with_quaternions
 from tracker.calibrations.toml_layouts import board_square
 from tracker.calibrations.units import check_units
 from tracker.errors import CalibrationError, Remedy
@@ -69,15 +71,16 @@ def read_cameras(
     left_out = {str(sections[key]["name"]): reason for key, reason in reasons.items()}
     if not usable:
         raise _nothing_usable(sections, documents[0][0])
+    usable = with_quaternions(usable, where, poses)
     stated = None if units else _stated_metres(usable, where)
     used: Units = units or (layout.unit if stated is None else None) or "m"
     metres = METRES[used] if stated is None else stated
     entries = tuple(_entry(name, section, where, metres, poses) for name, section in usable.items())
     notes = [f"Camera '{name}' is left out: {reason}." for name, reason in left_out.items()]
     notes += [layout.note] if layout.note else []
-    entries, note = _with_convention(entries, where, layout, poses)
-    notes += [] if note is None else [note]
+    entries, pose_notes = _with_convention(entries, usable, where, layout, poses)
     check_names(entries, where)
+    notes += [*pose_notes, *_alike([entry.name for entry in entries])]
     square = next((s for d, _ in documents if (s := board_square(d)) is not None), None)
     notes += check_units(entries, where, used, square)
     return CalibratedCameras(entries, left_out, tuple(notes))
@@ -249,20 +252,49 @@ def _entry(name: str, section: Section, where: str, metres: float, poses: PoseCo
 
 
 def _with_convention(
-    entries: tuple[CameraEntry, ...], where: str, layout: CalibrationLayout, poses: PoseConvention | None
-) -> tuple[tuple[CameraEntry, ...], str | None]:
-    """Return the cameras with their poses in the right convention, and a note where it is not sure."""
+    entries: tuple[CameraEntry, ...],
+    sections: Mapping[str, Section],
+    where: str,
+    layout: CalibrationLayout,
+    poses: PoseConvention | None,
+) -> tuple[tuple[CameraEntry, ...], list[str]]:
+    """Return the cameras with their poses in the right convention, and notes where it is not sure."""
     stated: list[Array] = [rigid.inverse(entry.T_world_camera) for entry in entries]
     if poses is None:
         is_turned = not layout.has_opencv_poses
         words = (where, layout.poses_in_words, layout.by_program, is_turned)
+        refuse_angles(sections, stated, where)
+        odd = odd_camera(stated)
         try:
-            return entries, check_convention(stated, *words)
+            notes = [check_convention(stated, *words), check_turned([entry.T_world_camera for entry in entries], where)]
         except CalibrationError:
             _refuse_placeholder(entries, stated, words)
+            if odd is not None:
+                raise CalibrationError(
+                    f"{where}, camera {quoted(entries[odd].name)}: expected its pose, found one by which it looks "
+                    "elsewhere than all others, which see one place; correct its pose, or remove the camera"
+                ) from None
             raise
+        if odd is not None:
+            notes.append(
+                f"Camera {quoted(entries[odd].name)} looks elsewhere than all others, which see one place: check its "
+                "pose."
+            )
+        return entries, [note for note in notes if note is not None]
     changed = [rigid.inverse(read_pose(T, poses)) for T in stated]
-    return tuple(replace(e, T_world_camera=T) for e, T in zip(entries, changed, strict=True)), None
+    return tuple(replace(e, T_world_camera=T) for e, T in zip(entries, changed, strict=True)), []
+
+
+def _alike(names: Sequence[str]) -> list[str]:
+    """Return sentences on names that differ in case or spaces alone."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault("".join(name.casefold().split()), []).append(quoted(name))
+    return [
+        f"Cameras {' and '.join(group)} differ in case or spaces alone: check that they are different cameras."
+        for group in groups.values()
+        if len(group) > 1
+    ]
 
 
 def _refuse_placeholder(

@@ -1,7 +1,7 @@
 """Place the rows of a joint file at frames of a session, by Frame#, Time, DataRate and OrigDataStartFrame.
 
 Files count frames from 0 or from 1, and may begin within the recording. Programs round rates; cut files keep or restart
-their numbers and times. Where these agree on one reading, it is taken. A contradiction is refused with its readings,
+their numbers and times. A reading on which these agree is taken. A contradiction is refused with its readings,
 and `Placement` decides. Rows at another rate are resampled.
 """
 
@@ -16,6 +16,7 @@ from tracker.footage.frame_rates import RATE_TOLERANCE, nominal_rate, same_clock
 from tracker.formats.number_rows import MAX_VALUES
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array, IntArray
+from tracker.validation import MAX_FRAMES
 
 Clock = Literal["frames", "time"]
 
@@ -67,6 +68,11 @@ def place_rows(table: MarkerTable, where: str, fps: float, known: Placement | No
     if known.clock == "time":
         if not (np.diff(table.times) > 0).all():
             raise FormatError(f"{where}: expected Time that rises from row to row", Remedy("count_frames"))
+        if known.first_frame is None and _has_own_clock(table, fps, known.n_frames):
+            raise FormatError(
+                f"{where}: Time begins at {table.times[0]:.6g} s, beyond the frames of the session",
+                Remedy("choose_first_frame", frames="N"),
+            )
         start = table.times[0] * fps if known.first_frame is None else known.first_frame
         rows = start + (table.times - table.times[0]) * fps
     else:
@@ -77,7 +83,7 @@ def place_rows(table: MarkerTable, where: str, fps: float, known: Placement | No
             start = _first_number(table, where, rates, ratio, known.n_frames) * ratio
         rows = start + ratio * (table.frames - table.frames[0])
     placed = _on_frames(table, rows, fps)
-    return replace(placed, notes=_notes(table, rows, placed, fps, known.first_frame is not None))
+    return replace(placed, notes=(*table.notes, *_notes(table, rows, placed, fps, known.first_frame is not None)))
 
 
 def _stamped_rates(table: MarkerTable) -> list[float]:
@@ -98,8 +104,10 @@ def _stamped_rates(table: MarkerTable) -> list[float]:
 
 def _rounding_s(table: MarkerTable) -> float:
     """Return how far the stamps of a file may be off by rounding or cutting, s."""
+    # Doubles of Unix time are exact to 0.2 microseconds.
+    seconds = table.times if table.times[0] < MAX_FRAMES else np.round(table.times - table.times[0], 6)
     for digits in (1, 2, 3):
-        if np.allclose(table.times, np.round(table.times, digits), rtol=0, atol=1e-7):
+        if np.allclose(seconds, np.round(seconds, digits), rtol=0, atol=1e-7):
             steps = 10**digits / table.rate
             return 0.0 if abs(steps - round(steps)) < 1e-6 * steps else 10.0**-digits
     return 1e-6
@@ -152,7 +160,8 @@ def _first_number(table: MarkerTable, where: str, rates: Sequence[float], ratio:
         FormatError: Frame#, Time and OrigDataStartFrame leave several ways open.
     """
     number, origin = int(table.frames[0]), table.origin
-    readings = _readings(table, rates)
+    last = None if n_frames is None else round(n_frames / ratio)
+    readings = _numbered(number) if _has_own_clock(table, table.rate, last) else _readings(table, rates)
     if n_frames is not None and readings.keys() == {number, number - 1}:
         # Counted from 0, the last row of a file that counts from 1 lies one frame beyond the footage.
         span = int(table.frames[-1]) - number
@@ -171,6 +180,20 @@ def _first_number(table: MarkerTable, where: str, rates: Sequence[float], ratio:
         f"{where}: its first row may be {listed}, counted from 0 as in the page",
         Remedy("choose_first_frame", frames=" or ".join(str(frames[at]) for at in readings)),
     )
+
+
+def _has_own_clock(table: MarkerTable, rate: float, n_frames: int | None) -> bool:
+    """Return whether Time counts from elsewhere, such as Unix time or that of day: beyond all frames, unlike Frame#."""
+    start = float(table.times[0]) * rate
+    is_beyond = start > (MAX_FRAMES if n_frames is None else n_frames)
+    return is_beyond and abs(start - table.frames[0]) > 1 + _MATTERS
+
+
+def _numbered(number: int) -> dict[int, str]:
+    """Return the numbers that the first row may have, counted from 0, by its Frame# alone; files begin at 0 or 1."""
+    if number in (0, 1):
+        return {0: f"Frame# {number}"}
+    return {number: f"Frame# {number}, counted from 0", number - 1: f"Frame# {number}, counted from 1"}
 
 
 def _readings(table: MarkerTable, rates: Sequence[float]) -> dict[int, str]:
@@ -251,7 +274,7 @@ def _notes(table: MarkerTable, rows: Array, placed: MarkerTable, fps: float, is_
     """Say how rows were placed where it is not one row for each frame from 0 on at the session's rate."""
     notes = []
     number, time_s, first = int(table.frames[0]), float(table.times[0]), float(rows[0])
-    begins_at_0 = first == 0 and (number == 0 or time_s == 0)
+    begins_at_0 = first == 0 and (time_s == 0 or (number == 0 and abs(time_s) * fps <= 1 + _AGREE))
     if is_chosen or not begins_at_0:
         notes.append(f"the first row of the file, Frame# {number} at {time_s:.3f} s, is frame {first:.6g}")
     if placed.points is not table.points:

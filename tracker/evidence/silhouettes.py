@@ -4,7 +4,7 @@ Silhouettes are in *raw* pixels: as filmed, lens distortion included, at working
 (`tracker.voxels.sensor_lookup`) leads from points in space to them (MTHC01 Sect. 2).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Literal, NamedTuple
@@ -68,7 +68,11 @@ class SilhouetteFinder:
     """Finds the silhouettes of a recording. Thread-safe."""
 
     def __init__(
-        self, cameras: Sequence[CameraSource], recording: Recording, shading: Shading = SHADOWS_AND_HIGHLIGHTS
+        self,
+        cameras: Sequence[CameraSource],
+        recording: Recording,
+        shading: Shading = SHADOWS_AND_HIGHLIGHTS,
+        step: Callable[[], None] = lambda: None,
     ) -> None:
         """Read the backgrounds, or learn them from the recording where there are none.
 
@@ -76,12 +80,14 @@ class SilhouetteFinder:
             cameras: the views, with their side files.
             recording: their footage.
             shading: changes of the light that are background.
+            step: called for each image whose background is learnt or subtracted, from several threads. What it raises
+                ends the work.
 
         Raises:
             RecordingError: a background is unreadable or of the wrong size.
         """
         self.cameras, self.recording = tuple(cameras), recording
-        self._shading = shading
+        self._shading, self._step = shading, step
         # Without a lens, a camera's working view is the footage itself, reduced.
         self._views = [WorkingView(replace(c.camera, distortion=np.zeros(0), fisheye=False)) for c in self.cameras]
         self._pool = ThreadPoolExecutor(2, "silhouettes", initializer=cv2.setNumThreads, initargs=(1,))
@@ -130,6 +136,7 @@ class SilhouetteFinder:
         return subtract_background(smooth, background, threshold, self._shading, model.noise)
 
     def _smooth(self, i: int, frame: Image) -> Image:
+        self._step()
         view = self._views[i]
         return smooth_image(view.image(frame, view.whole))
 

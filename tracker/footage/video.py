@@ -21,7 +21,7 @@ from tracker.footage.display import display_turn, displayed_size
 from tracker.footage.frame_index import FileVersion, Index
 from tracker.footage.image_folder import ImageFolder
 from tracker.footage.packet_scan import PacketScan, TimeStamps
-from tracker.footage.video_decoder import VideoDecoder
+from tracker.footage.video_decoder import VideoDecoder, open_container
 from tracker.geometry.arrays import Image
 
 _NOWHERE = 2**62  # as the number of the next frame that the decoder gives: unknown, so that the next read seeks
@@ -330,7 +330,7 @@ class VideoFile:
             av.FFmpegError: it cannot be read.
         """
         version = self._present_version()
-        with av.open(str(self.path)) as container:
+        with open_container(self.path, self._where) as container:
             index = packet_scan.list_frames(container, self._where, report)
         if self._present_version() != version:
             raise RecordingError(f"{self._where} is being written; wait until it is complete")

@@ -5,6 +5,7 @@ from itertools import chain
 from pathlib import Path
 
 import av
+from av.container import InputContainer
 from av.packet import Packet
 from av.video.frame import VideoFrame
 
@@ -13,6 +14,33 @@ from tracker.footage.image_file import MAX_PIXELS, check_pixels
 
 _OPTIONS = {"max_pixels": str(MAX_PIXELS)}
 """A stream can have other sizes than its header: the decoder refuses them as well."""
+_FORMATS = (
+    "mov,mp4,m4a,3gp,3g2,mj2", "matroska,webm", "avi", "mpegts", "mpeg", "mpegvideo", "asf", "flv", "live_flv", "ogg",
+    "mxf", "gxf", "wtv", "dv", "nut", "ivf", "obu", "av1", "h261", "h263", "h264", "hevc", "vvc", "m4v", "vc1", "dnxhd",
+    "mjpeg", "mpjpeg", "mjpeg_2000", "yuv4mpegpipe", "gif", "cine", "r3d", "ser", "dhav", "lxf", "rm", "apng",
+)  # fmt: skip
+"""Containers whose frames lie in the file itself. Playlists (`hls`, `concat`, `dash`), numbered images, devices and
+streams are left out: they read other files, or the network."""
+_CONTAINER_OPTIONS = _OPTIONS | {"protocol_whitelist": "file", "format_whitelist": ",".join(_FORMATS)}
+_REFUSED = "expected a video in one file, found a playlist or a format that is not read; convert it to MP4"
+
+
+def open_container(path: Path, where: str) -> InputContainer:
+    """Open a file that holds its own frames.
+
+    Args:
+        path: the file.
+        where: begins the message.
+
+    Raises:
+        RecordingError: it is a list of other files, or of a format that is not read.
+        av.FFmpegError: it cannot be opened.
+    """
+    try:
+        # Without its protocol, a name such as `concat:a|b` would be an address.
+        return av.open(f"file:{path}", options=_CONTAINER_OPTIONS)
+    except av.ArgumentError as error:
+        raise RecordingError(f"{where}: {_REFUSED}") from error
 
 
 class VideoDecoder:
@@ -30,10 +58,10 @@ class VideoDecoder:
             where: begins the message.
 
         Raises:
-            RecordingError: it has no video, or frames that are too large.
+            RecordingError: it has no video, frames that are too large, or is a list of other files.
             av.FFmpegError: it cannot be opened.
         """
-        self._container = av.open(str(path), options=_OPTIONS)
+        self._container = open_container(path, where)
         try:
             if not self._container.streams.video:
                 raise RecordingError(f"{where}: expected a video, found a file without a video stream")

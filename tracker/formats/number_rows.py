@@ -1,7 +1,9 @@
 """Rows of numbers from the lines of a table file: a frame number first, the same number of columns in each."""
 
 import csv
+import re
 from array import array
+from collections.abc import Mapping
 
 import msgspec
 import numpy as np
@@ -13,6 +15,12 @@ from tracker.validation import MAX_FRAMES, quoted
 
 MAX_VALUES = 40_000_000
 """Largest number of values of a table, 320 MB: an hour of 30 points at 120 Hz."""
+_MISSING = {
+    "", "nan", "-nan", "+nan", "n/a", "#n/a", "na", "null", "none", "-", "--", "1.#qnan", "-1.#qnan", "1.#ind",
+    "-1.#ind", "1.#snan", "-nan(ind)", "nan(ind)", "nan(snan)",
+}  # fmt: skip
+"""Words for a missing value, in lower case: of spreadsheets, of Python, R and MATLAB, and of Microsoft's C library."""
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.I)
 _NUMBERS = msgspec.json.Decoder(list[float])
 
 
@@ -68,21 +76,25 @@ class NumberRows:
         where = f"{self._where}, line {line}"
         try:
             fields = next(csv.reader([text], delimiter=self._separator))
-            row = [float(f) if f and not f.isspace() else np.nan for f in fields]
+            row = [np.nan if f.strip().lower() in _MISSING else float(f) for f in fields]
         except csv.Error as error:
             raise FormatError(f"{where}: {error}; export it again") from error
         except ValueError as error:
             wrong = next(f for f in fields if not _is_number(f))
-            raise FormatError(f"{where}: expected numbers, found {quoted(wrong)}; correct it") from error
+            raise FormatError(f"{where}: {not_a_number(wrong)}") from error
         if not self._n_required <= len(row) <= self._n_columns:
             raise FormatError(f"{where}: expected {self._n_columns} columns, found {len(row)}; export it again")
         return row + [np.nan] * (self._n_columns - len(row))
 
-    def table(self, limit: float) -> tuple[NDArray[np.int64], Array]:
+    def table(self, limit: float, limits: Mapping[int, float] | None = None) -> tuple[NDArray[np.int64], Array]:
         """Return the frame numbers, (n,), and the other columns, (n, n_columns - 1), which the caller may change.
 
+        Args:
+            limit: largest absolute value.
+            limits: other ones of some columns, by their number from 1.
+
         Raises:
-            FormatError: there is no row, the frames do not rise, or a value is infinite, beyond `limit`, or missing
+            FormatError: there is no row, the frames do not rise, or a value is infinite, beyond its limit, or missing
                 where it is required.
         """
         if not self._lines:
@@ -96,21 +108,32 @@ class NumberRows:
                 "row; sort the rows and remove doubles"
             )
         for i, column in enumerate(values.T, 2):  # by column: a mask of all would take much memory
-            wrong = ~(np.abs(column) <= limit)
+            most = (limits or {}).get(i, limit)
+            wrong = ~(np.abs(column) <= most)
             if i > self._n_required:
                 wrong &= ~np.isnan(column)
             if wrong.any():
                 row = int(np.argmax(wrong))
                 raise FormatError(
-                    f"{self._where}, line {self._lines[row]}, column {i}: expected a finite number within {limit:g}, "
+                    f"{self._where}, line {self._lines[row]}, column {i}: expected a finite number within {most:g}, "
                     f"found {column[row]:g}; correct it"
                 )
         return frames, values
 
 
+def not_a_number(field: str) -> str:
+    """Return what was expected and found, and what to do, of text that is no number."""
+    if _DECIMAL_COMMA.fullmatch(field.strip()):
+        return (
+            f"expected a point in decimal numbers, found a comma in {quoted(field)}; export it again with the number "
+            "format of English"
+        )
+    return f"expected numbers, found {quoted(field)}; correct it"
+
+
 def _is_number(field: str) -> bool:
     try:
-        float(field or "nan")
+        float(field)
     except ValueError:
-        return field.isspace()
+        return field.strip().lower() in _MISSING
     return True

@@ -2,21 +2,22 @@
 
 Tab-separated: three lines of header, one of point names (each above its X, Y, Z), one of X1 Y1 Z1 ..., and rows of
 Frame#, Time and coordinates. Lengths are in the header's Units. Blank coordinates are missing points, written as empty
-fields, spaces or NaN. Some writers leave a blank line below the header; some drop the tabs at the end of a row.
+fields, spaces or a word such as NaN. Some writers leave blank lines in or below the header; some drop the tabs at the
+end of a row.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import chain
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
-from tracker.formats.number_rows import NumberRows
+from tracker.formats.number_rows import NumberRows, not_a_number
 from tracker.geometry.arrays import Array
 from tracker.text_files import LOST, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_FRAMES, FrameRate, check, quoted
@@ -34,9 +35,13 @@ METRES_BY_WORD = {
 }
 """Metres per unit, by the words that OpenSim (`Units`) and others write, in any case."""
 _KIND = TextKind("TRC file", 1_000_000_000, FormatError, "export it again")
+_Line: TypeAlias = tuple[int, str]
+"""Number of a line in its file, from 1, and its text with its end."""
 _MAX_POINTS = 1000
 _MAX_COORDINATE = 1e9
-"""Largest coordinate and time of a file, in its own units."""
+"""Largest coordinate of a file, in its own units."""
+_MAX_TIME = 1e13
+"""Largest time of a file, s: Unix time in milliseconds, which is named as a contradiction to DataRate, is some 2e12."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +61,7 @@ class MarkerTable:
     origin: int | None = None
     """OrigDataStartFrame of a file; None if it has none."""
     notes: tuple[str, ...] = ()
-    """Sentences on how the rows of a file were placed at frames of a session."""
+    """Sentences on what is odd about a file, and on how its rows were placed at frames of a session."""
 
     def __post_init__(self) -> None:
         n, m = len(self.frames), len(self.names)
@@ -71,34 +76,31 @@ def read_trc(path: str | Path) -> MarkerTable:
         FormatError: the file is missing or malformed; the message has the line.
     """
     where = f"TRC file {path}"
-    lines = read_lines(Path(path), _KIND)
-    head = list(islice(lines, 5))
-    if len(head) < 5 or not head[0].startswith("PathFileType"):
+    head, lines = _read_head(enumerate(read_lines(Path(path), _KIND, keep_ends=True), 1))
+    if len(head) < 5 or not head[0][1].startswith("PathFileType"):
         raise FormatError(f"{path} is not a TRC file: expected 'PathFileType' at its start; export it as TRC")
-    keys = [key.strip().lower() for key in head[1].split("\t")]
-    header = dict(zip(keys, head[2].split("\t"), strict=False))
-    if _is_row(head[4]):
-        raise FormatError(f"{where}, line 5: expected X1, Y1, Z1, ..., found a row of numbers; export it again")
-    scale = _scale(header, where)
-    rate = check(_number(header.get("datarate")), FrameRate, f"{where}, line 3, DataRate", FormatError)
-    names = tuple(n.strip() for n in head[3].split("\t")[2:] if n.strip())
-    if LOST in head[3]:  # in the first line there is a path, which nobody needs
-        refuse_lost(list(names), f"{where}, line 4", _KIND)
-    if not 1 <= len(names) <= _MAX_POINTS or len(set(names)) != len(names):
-        raise FormatError(
-            f"{where}, line 4: expected 1 to {_MAX_POINTS} point names, each once, found {quoted(list(names))}; "
-            "rename them"
-        )
-    rows = NumberRows(where, "\t", 2 + 3 * len(names), n_required=2)
-    for number, line in enumerate(lines, 6):
-        if text := line.rstrip():  # some writers end rows with tabs, some drop them
-            rows.add(text, number)
-    frames, values = rows.table(_MAX_COORDINATE)
+    (_, (_, keys), (n_values, cells), (n_names, points_line), (n_axes, axes)) = head
+    header = {k.strip().lower(): v.strip() for k, v in zip(keys.split("\t"), cells.split("\t"), strict=False)}
+    if _is_row(axes):
+        raise FormatError(f"{where}, line {n_axes}: expected X1, Y1, Z1, ..., found a row of numbers; export it again")
+    scale = _scale(header, f"{where}, line {n_values}")
+    rate = _rate(header.get("datarate"), f"{where}, line {n_values}, DataRate")
+    promised = _whole(header.get("numframes"))
+    names = _names(points_line, f"{where}, line {n_names}")
+    frames, values = _read_rows(lines, where, 2 + 3 * len(names), promised)
     values[:, 1:] *= scale  # the three-dimensional view would be scaled in a copy
     points = values[:, 1:].reshape(len(frames), len(names), 3)
     # A point with a missing coordinate is missing.
     points[np.isnan(points).any(axis=-1)] = np.nan
-    return MarkerTable(names, frames, values[:, 0], points, rate, _whole(header.get("origdatastartframe")))
+    notes = list[str]()
+    if promised is not None and len(frames) < promised:
+        notes.append(f"its header promises {promised} rows, and it has {len(frames)}: check that it is complete")
+    is_zero = (points == 0).all(axis=-1)
+    if is_zero.any() and not is_zero.all():
+        points[is_zero] = np.nan
+        notes.append(f"{is_zero.sum()} of its points lie at 0, 0, 0 exactly, as missing ones: they are left out")
+    origin = _whole(header.get("origdatastartframe"))
+    return MarkerTable(names, frames, values[:, 0], points, rate, origin, tuple(notes))
 
 
 def write_trc(
@@ -143,6 +145,83 @@ def write_trc(
     write_text_atomic(path, "\n".join(lines) + "\n")
 
 
+def _read_head(lines: Iterator[_Line]) -> tuple[list[_Line], Iterator[_Line]]:
+    """Return the first five lines that are not blank, and the others; a blank line may stand for the names of axes."""
+    head: list[_Line] = []
+    is_after_blank = False
+    for number, line in lines:
+        if len(head) == 4 and is_after_blank and _is_row(line):
+            return [*head, (number - 1, "")], chain([(number, line)], lines)
+        is_after_blank = not line.strip()
+        if not is_after_blank:
+            head.append((number, line.rstrip("\r\n")))
+        if len(head) == 5:
+            break
+    return head, lines
+
+
+def _names(line: str, where: str) -> tuple[str, ...]:
+    """Return the names of the points.
+
+    Raises:
+        FormatError: there is none, there are too many, or two are equal.
+    """
+    if "\t" not in line:
+        raise FormatError(f"{where}: expected columns separated by tabs, found {quoted(line)}; export it again as TRC")
+    names = tuple(n.strip() for n in line.split("\t")[2:] if n.strip())
+    if LOST in line:  # in the first line there is a path, which nobody needs
+        refuse_lost(list(names), where, _KIND)
+    if not 1 <= len(names) <= _MAX_POINTS or len(set(names)) != len(names):
+        raise FormatError(
+            f"{where}: expected 1 to {_MAX_POINTS} point names, each once, found {quoted(list(names))}; rename them"
+        )
+    return names
+
+
+def _read_rows(
+    lines: Iterator[_Line], where: str, n_columns: int, n_promised: int | None
+) -> tuple[NDArray[np.int64], Array]:
+    """Return the frame numbers, (n,), and the other columns, (n, n_columns - 1).
+
+    Args:
+        lines: below the header.
+        where: names the file in messages.
+        n_columns: number of columns.
+        n_promised: NumFrames of the header; None if it has none.
+
+    Raises:
+        FormatError: a row is malformed, or the file ends within one.
+    """
+    rows = NumberRows(where, "\t", n_columns, n_required=2)
+    n_rows = 0
+    for number, line in lines:
+        if not (text := line.rstrip()):
+            continue
+        n_rows += 1
+        n_found = line.count("\t") + 1
+        if not line.endswith("\n") and (n_found < n_columns or n_rows < (n_promised or 0)):
+            of_rows = f" of {n_promised}" if n_promised else ""
+            raise FormatError(
+                f"{where}, line {number}: expected the end of a line, found that of the file, after {n_found} of "
+                f"{n_columns} columns in row {n_rows}{of_rows}, so that it may be cut off; copy or export it again, or "
+                "end the line if it is complete"
+            )
+        rows.add(text, number)  # some writers end rows with tabs, some drop them
+    return rows.table(_MAX_COORDINATE, {2: _MAX_TIME})
+
+
+def _rate(text: str | None, where: str) -> float:
+    """Return a header's frame rate.
+
+    Raises:
+        FormatError: it is none, or has a decimal comma.
+    """
+    number = _number(text)
+    if isinstance(number, str) and "," in number:
+        raise FormatError(f"{where}: {not_a_number(number)}")
+    return float(check(number, FrameRate, where, FormatError))
+
+
 def _is_row(line: str) -> bool:
     """Return whether a line begins with a number, as rows do and headers do not."""
     return isinstance(_number(line.partition("\t")[0].strip()), float)
@@ -152,7 +231,7 @@ def _scale(header: dict[str, str], where: str) -> float:
     units = header.get("units", "").strip()
     if units.lower() not in METRES_BY_WORD:
         raise FormatError(
-            f"{where}, line 3: expected Units to be m, cm, mm, in, ft or a whole word such as millimeters, found "
+            f"{where}: expected Units to be m, cm, mm, in, ft or a whole word such as millimeters, found "
             f"{quoted(units)}; correct it"
         )
     return METRES_BY_WORD[units.lower()]

@@ -24,7 +24,7 @@ def euler_matrix(angles: Array, order: Order) -> Array:
 def continuous_euler_angles(R: Array, order: Order) -> Array:
     """Return the Euler angles of rotations that follow one another, each as near as possible to the ones before.
 
-    Every rotation has two triples of angles within a turn. Where the middle angle is a quarter turn, only the sum or
+    Every rotation has two triples of angles within a turn. At a quarter turn of the middle angle, only the sum or
     difference of the others is determined; the third one then keeps its value.
 
     Args:

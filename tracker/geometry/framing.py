@@ -1,4 +1,4 @@
-"""Where a set of points lies with respect to cameras: how far, and how much of it is in the picture."""
+"""Distance of a set of points from cameras, and the share of it that is in the picture."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

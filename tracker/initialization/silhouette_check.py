@@ -30,6 +30,11 @@ class SilhouetteCheck(NamedTuple):
         return bool(len(self.overlaps)) and float(np.median(self.overlaps)) < _MIN_OVERLAP
 
     @property
+    def worst_camera(self) -> str | None:
+        """Name of the view that contradicts the body most; None if no view shows the person alone."""
+        return self.cameras[int(np.argmin(self.overlaps))] if self.cameras else None
+
+    @property
     def note(self) -> str:
         """A sentence on the views that contradict the body; empty if none does."""
         if not self.cameras:

@@ -4,7 +4,7 @@ In a wrong local minimum a limb keeps its place only until it moves. A short tra
 right pose, which is another start.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import NamedTuple
@@ -68,6 +68,8 @@ class StartFitter:
     """For each direction the frames of a short track, without the first."""
     others: tuple[PosedBody, ...]
     """The other people on that frame."""
+    step: Callable[[], None] = lambda: None
+    """Called after each frame that is fitted and before each search. What it raises ends the work."""
 
     def fit(self, start: PosedBody) -> FittedStart:
         """Fit a start to the frame."""
@@ -76,6 +78,7 @@ class StartFitter:
 
     def search(self, start: PosedBody) -> FittedStart:
         """Search around a start, and fit the result twice."""
+        self.step()
         fitted = self.fit(search_around(self.observer, (start, *self.others), self.frame, _SETTINGS))
         # A fit reaches only as far as its prior and the edges around its start.
         again = self.fit(PosedBody(start.model, fitted.pose))
@@ -103,7 +106,9 @@ class StartFitter:
         subjects = Subjects.of([b.model for b in people], [0])
         # A pose and the same one before it are a prediction: the tracker does not search around it a second time.
         run = TrackingRun(self.observer, subjects, [[b.values, b.values] for b in people], frames)
-        return ChamferTracker(_SETTINGS).estimates(run)
+        for estimate in ChamferTracker(_SETTINGS).estimates(run):
+            self.step()
+            yield estimate
 
 
 def short_tracks(frame: int, n_frames: int) -> list[list[int]]:

@@ -131,8 +131,11 @@ def find_people(
         share = max(share, min(0.95, done / expected_steps(len(tried), done, good)))
         report("finding first poses", end * share, text)
 
-    report("finding first poses", 0.0, "")
-    first = find_first_poses_anywhere(session, observer, people, tried, say=say, show=count)
+    def go_on() -> None:
+        report("finding first poses", end * share, "")
+
+    go_on()
+    first = find_first_poses_anywhere(session, observer, people, tried, say=say, show=count, step=go_on)
     bodies = {i: p.model for i, p in first.poses.items()}
     poses = {i: p.fitted.pose for i, p in first.poses.items()}
     acquired: dict[int, Acquisition] = {}

@@ -6,7 +6,7 @@ The cheapest track is kept. It is doubtful where another start costs as much, or
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import combinations
+from itertools import combinations, product
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
 
@@ -124,25 +124,27 @@ def find_first_poses(
 
 def find_first_poses_anywhere(
     session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int], size_m: float = VOXEL_M,
-    say: Say = lambda text: None, show: Show = lambda frame, found: None,
+    say: Say = lambda text: None, show: Show = lambda frame, found: None, step: Callable[[], None] = lambda: None,
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever method and on whatever of some frames tracks best; see `find_first_poses`.
 
     Voxels are tried until the starts of two frames are good and agree on the heights. The axis is tried where no start
     is good, the cheapest frames first, and then a search along the figure. `show` receives each frame and what was
     found on it.
+    `step` is called between fits and for each silhouette, every second or so and from several threads; what it raises
+    ends the search.
     """
-    with _Trial(session, observer, people, size_m, say, show) as trial:
+    with _Trial(session, observer, people, size_m, say, show, step) as trial:
         for frame in frames:
             if trial.is_settled:
                 break
             trial.add(frame, ("voxels",))
         by_cost = [f.frame for f in sorted(trial.found, key=lambda f: f.cost_px)] or list(frames)
-        for method in ("axis", "search"):
-            for frame in by_cost[:_OTHER_METHOD_FRAMES]:
-                if any(f.is_good for f in trial.found):
-                    break
-                trial.add(frame, (method,))
+        others: tuple[StartMethod, ...] = ("axis", "search")
+        for method, frame in product(others, by_cost[:_OTHER_METHOD_FRAMES]):
+            if any(f.is_good for f in trial.found):
+                break
+            trial.add(frame, (method,))
         return trial.best()
 
 
@@ -151,16 +153,16 @@ class _Trial:
 
     def __init__(
         self, session: Session, observer: Observer, people: Sequence[int], size_m: float, say: Say,
-        show: Show = lambda frame, found: None,
+        show: Show = lambda frame, found: None, step: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         if len(session.cameras) < 2:
             raise TrackerError(
                 f"expected two cameras or more to find people, found '{session.cameras[0].camera.name}' alone, which "
                 "shows no depth; place the body by hand, or set it from known joints"
             )
-        self._show = show
+        self._show, self._step = show, step
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
-        self._finder = SilhouetteFinder(session.cameras, observer.recording)
+        self._finder = SilhouetteFinder(session.cameras, observer.recording, step=step)
         floor = floor_plane(session.up, session.floor)
 
         def recovered(frame: int, person: int) -> Sequence[ViewSilhouette]:
@@ -177,6 +179,7 @@ class _Trial:
 
     def _source(self, silhouettes: Silhouettes, floor: GroundPlane) -> "_Source":
         def scenes(frame: int, person: int) -> list[PersonScene]:
+            self._step()
             views = silhouettes(frame, person)
             return [PersonScene(f, views, (), floor, None) for f in carve_people(views, self._size_m).figures]
 
@@ -188,7 +191,7 @@ class _Trial:
         self._show(frame, None)
         try:
             for person in self._people:
-                task = _Task(self._session, self._observer, self._sources, person, self._size_m)
+                task = _Task(self._session, self._observer, self._sources, person, self._size_m, self._step)
                 own[person] = _best_on_frame(task, frame, methods, own)
         except TrackerError as error:
             self._errors.append(error)
@@ -236,6 +239,7 @@ class _Task(NamedTuple):
     """The silhouettes as each view finds them, then those with what looks like shadows."""
     person: int
     size_m: float
+    step: Callable[[], None]
 
 
 def _best_on_frame(
@@ -268,7 +272,7 @@ def _on_frame(
     task: _Task, frame: int, source: _Source, silhouettes: Sequence[ViewSilhouette],
     methods: Sequence[StartMethod], found: Mapping[int, FirstPose],
 ) -> FirstPose:  # fmt: skip
-    session, observer, _, person, size_m = task
+    session, observer, _, person, size_m, step = task
     hull = carve_people(silhouettes, size_m)
     known = {i: PosedBody(pose.model, pose.fitted.pose) for i, pose in found.items()}
     others = others_on_frame(session, person, frame, known)
@@ -279,7 +283,7 @@ def _on_frame(
     model = session.people[person].model
     height_m = source.heights.around(scene, frame, person) if has_preset_sizes(model) else None
     candidates = _candidates(scene, model if height_m is None else model.with_height(height_m), methods)
-    fitter = StartFitter(observer, frame, short_tracks(frame, session.n_frames), tuple(others))
+    fitter = StartFitter(observer, frame, short_tracks(frame, session.n_frames), tuple(others), step)
     searched, tracked, is_lost = compare_starts(fitter, candidates, lambda runs: _filling(runs, silhouettes, masks))
     best, fit = tracked[0]
     # Starts whose tracks were not worth it cost much more on the frame alone.
@@ -312,6 +316,7 @@ def _filling(
         raise TrackerError(
             f"expected a body that fills the silhouettes, found none: {checks[0].note}",
             Remedy("another_frame_or_place"),
+            checks[0].worst_camera,
         )
     return kept
 

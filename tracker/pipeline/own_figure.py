@@ -60,11 +60,16 @@ def own_figure(session: Session, person: int, hull: VisualHull, others: Sequence
             Remedy("another_frame", condition="people do not touch"),
         )
     if free[0].volume_m3 > _MAX_HULL_M3:
+        least = hull.least_explained
+        camera = None if least is None else session.cameras[least].camera.name
+        reason = "views may be too few" if camera is None else f"the silhouette in {camera} may show more than people"
         raise TrackerError(
             f"expected one person of at most {1000 * _MAX_HULL_M3:.0f} litres, found a figure of "
-            f"{1000 * free[0].volume_m3:.0f}: several people may touch, or views may be too few",
-            Remedy("another_frame", condition="people do not touch"),
-        )
+            f"{1000 * free[0].volume_m3:.0f}: several people may touch, or {reason}",
+            Remedy("another_frame", condition="people do not touch") if camera is None
+            else Remedy("another_frame_or_background"),
+            camera,
+        )  # fmt: skip
     return free[0]
 
 

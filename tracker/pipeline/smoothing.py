@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
+from tracker.errors import DamagedStoreError
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
@@ -59,9 +60,17 @@ class TrackedRows:
         return {str(f): [base64.b64encode(a.tobytes()).decode() for a in some] for f, some in arrays.items()}
 
     def restore(self, change: PoseChange, texts: Sequence[str] | str) -> None:
-        """Add a row of an interrupted run with its texts from `record`; older versions stored no features."""
+        """Add a row of an interrupted run with its texts from `record`; older versions stored no features.
+
+        Raises:
+            ValueError: the texts are not those of a row.
+        """
         known = [texts] if isinstance(texts, str) else texts
         covariance, *features = [np.frombuffer(base64.b64decode(text), np.float32) for text in known]
+        n_dofs = int(np.sqrt(2 * covariance.size))
+        is_triangle = 2 * covariance.size == n_dofs * (n_dofs + 1) > 0
+        if not is_triangle or not all(np.isfinite(numbers).all() for numbers in (covariance, *features)):
+            raise ValueError("expected the upper triangle of a covariance, and finite features")
         self._changes[change.frame], self._covariances[change.frame] = change, covariance
         if features and change.pose is not None:
             self._features[change.frame] = features[0].reshape(len(change.pose.limbs_lost), -1)
@@ -133,13 +142,22 @@ def resumed_rows(
     Args:
         rows: stored rows by index of the person.
         records: texts from `TrackedRows.record`, by index of the person as text.
+
+    Raises:
+        DamagedStoreError: texts are not those of a row.
     """
     out = {}
     for person, changes in rows.items():
         out[person], known = TrackedRows(), records.get(str(person), {})
         for change in changes:
             if str(change.frame) in known:
-                out[person].restore(change, known[str(change.frame)])
+                try:
+                    out[person].restore(change, known[str(change.frame)])
+                except ValueError as error:
+                    raise DamagedStoreError(
+                        f"the setting of the interrupted run: expected the covariance and features of frame "
+                        f"{change.frame}, found other bytes; track again with other settings, or from another frame"
+                    ) from error
     return out
 
 

@@ -246,10 +246,15 @@ def _describe(holder: Holder | None, path: Path) -> str:
     here = _this_system()
     if (holder.host, holder.boot, holder.namespace) == here[:3] and holder.process == os.getpid():
         return f"in this program since {holder.since}; go on there"
-    return (
-        f"in process {holder.process} on {holder.host} since {holder.since}; close it there, "
-        f"or delete {path} if that program no longer runs"
-    )
+    who = f"in process {holder.process} on {holder.host} since {holder.since}"
+    if holder.host == here.host and holder.boot and holder.boot != here.boot:
+        return (
+            f"{who}, by a program from before this system was started, or of another machine or container of that "
+            f"name; delete {path} if it is from before, else close it there"
+        )
+    if holder.host == here.host and holder.boot and holder.namespace != here.namespace:
+        return f"{who}, in another container; close it there, or delete {path} if that container has ended"
+    return f"{who}; close it there, or delete {path} if that program no longer runs"
 
 
 def _is_alive(holder: Holder) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -22,6 +23,16 @@ _AGREEMENT = 0.8
 """Mean cosine of the pictures' up direction and an axis above which the cameras stand upright to it (37 degrees)."""
 _DISAGREEMENT = 0.5
 """The same mean, below which the stated up axis is doubted (60 degrees)."""
+_MIN_RIG_M = 0.5
+"""Extent of a rig below which distances between its cameras mean nothing, metres: another unit, or a stereo pair."""
+_MIN_APART_M = 0.01
+"""Distance of two cameras below which one pose is a copy, metres: bodies of cameras are wider."""
+_MAX_OFFSET = 0.25
+"""Distance of a principal point from the middle, as a share of the picture's side: lenses are mounted in the middle,
+and pictures are seldom cropped to a half."""
+_MAX_TANGENTIAL = 0.05
+"""Largest tangential coefficient: at 45 degrees it moves a point by a seventh of the focal length. Radial ones are
+often larger, and stand in its place where programs write k1, k2, k3, p1, p2."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +77,7 @@ def summarize_rig(cameras: Sequence[Camera], up: str = "z") -> RigSummary:
         sentence = f"The cameras stand {_interval(distances)} from the point at which they look"
     sentence += f"; their heights over the floor (origin, {up} up) are {_interval(heights)}."
     doubts = _far_doubts(cameras, distances) + _floor_doubts(names, centers, heights, up) + _up_doubts(Ts, up)
+    doubts += _place_doubts(names, centers) + _lens_doubts(cameras)
     return RigSummary(
         names, centers, axes, point.position if meet else None, distances, heights, sentence, tuple(doubts)
     )
@@ -99,6 +111,39 @@ def _floor_doubts(names: Sequence[str], centers_world: Array, heights_m: Array, 
         f"Under the floor (origin, {up} up): {', '.join(below)}. Another axis may point up, or the origin does not lie "
         "on the floor."
     ]
+
+
+def _place_doubts(names: Sequence[str], centers_world: Array) -> list[str]:
+    """Doubt cameras that stand at one place, as copied poses do."""
+    apart = np.linalg.norm(centers_world[:, None] - centers_world, axis=-1)
+    if apart.max() < _MIN_RIG_M:  # another unit, which is noted
+        return []
+    return [
+        f"Cameras '{names[i]}' and '{names[j]}' stand {100 * apart[i, j]:.2g} cm apart: check that the pose of one is "
+        "not a copy of the other's."
+        for i, j in combinations(range(len(names)), 2)
+        if apart[i, j] < _MIN_APART_M
+    ]
+
+
+def _lens_doubts(cameras: Sequence[Camera]) -> list[str]:
+    """Doubt principal points and tangential distortion that no usual lens has."""
+    offsets = [np.abs((c.K[:2, 2] + 0.5) / c.size - 0.5).max() for c in cameras]
+    tangential = [0.0 if c.fisheye else np.abs(np.append(c.distortion[2:4], 0.0)).max() for c in cameras]
+    aside = [f"'{c.name}'" for c, offset in zip(cameras, offsets, strict=True) if offset > _MAX_OFFSET]
+    strong = [f"'{c.name}'" for c, size in zip(cameras, tangential, strict=True) if size > _MAX_TANGENTIAL]
+    doubts = []
+    if aside:
+        doubts.append(
+            f"The principal point lies far from the middle of the pictures of {', '.join(aside)}: check that the "
+            "matrix of the lens is of pictures of this size, in pixels from their corner."
+        )
+    if strong:
+        doubts.append(
+            f"The tangential distortion of {', '.join(strong)} is up to {max(tangential):.2g}, that of no usual lens: "
+            "check that the coefficients are in OpenCV's order k1, k2, p1, p2, k3."
+        )
+    return doubts
 
 
 def _up_doubts(Ts_world_camera: Array, up: str) -> list[str]:

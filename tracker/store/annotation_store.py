@@ -26,6 +26,7 @@ from tracker.store.records import (
     Pin,
     PoseRecord,
 )
+from tracker.store.settings import checked_setting
 
 T = TypeVar("T")
 
@@ -238,11 +239,11 @@ class AnnotationStore:
                 )
 
     def setting(self, key: str, default: Any = None) -> Any:
-        """Return a setting of the session, any JSON value."""
+        """Return a setting of the session, checked against its declaration; the default where it is not stored."""
         found = self._connection.one(
             "SELECT value FROM settings WHERE key = ?",
             (key,),
-            lambda row: (rows.decoded_json(row[0], f"setting '{key}'"),),
+            lambda row: (checked_setting(key, rows.decoded_json(row[0], f"setting '{key}'")),),
         )
         return default if found is None else found[0]
 

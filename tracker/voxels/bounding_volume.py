@@ -47,11 +47,12 @@ def bounding_volume(silhouettes: Sequence[ViewSilhouette], missing: int = 0) -> 
     """
     seen = [s for s in silhouettes if not s.is_empty]
     if len(seen) < 2:
-        empty = ", ".join(s.camera.name for s in silhouettes if s.is_empty)
-        found = f"nobody in {empty}" if seen else "none"
+        empty = [s.camera.name for s in silhouettes if s.is_empty]
+        found = f"nobody in {', '.join(empty)}" if seen else "none"
         raise TrackerError(
             f"expected somebody in the silhouettes of at least 2 views, found {found}; choose a frame that shows the "
-            "person, and check the background"
+            "person, and check the background",
+            camera=next(iter(empty), None),
         )
     around = [s.camera for s in seen]
     middle = viewed_point(around)

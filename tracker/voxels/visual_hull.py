@@ -22,6 +22,8 @@ _MIN_NEEDED = 0.15
 where there is no person: such a figure explains nothing by itself."""
 _MIN_COVERAGE = 0.6
 """Share of its silhouette that the hull explains in a view that agrees with the others."""
+_NEARLY_ALL = 0.95
+"""Share of its silhouette that the hull explains in a view that shows people alone, simulated (`test_visual_hull`)."""
 _MIN_GAIN = 0.15
 """Gain of the others' mean coverage above which a view is left out as broken."""
 _MIN_LEAD = 0.05
@@ -37,6 +39,12 @@ class VisualHull(NamedTuple):
     """Share of each view's silhouette that the hull explains, (n_views,); NaN for an empty silhouette."""
     broken: tuple[str, ...]
     """Names of the views that were left out, because the others agree without them."""
+
+    @property
+    def least_explained(self) -> int | None:
+        """Index of the view whose silhouette the hull explains least; None if it explains nearly all of each."""
+        least = int(np.nanargmin(self.coverages))
+        return least if self.coverages[least] < _NEARLY_ALL else None
 
 
 def carve_people(
@@ -71,7 +79,8 @@ def carve_people(
     if len(poor) > (broken >= 0):
         raise TrackerError(
             f"expected silhouettes that agree, found views of which little can be explained ({', '.join(poor)}); check "
-            "that no camera has moved, that the videos start at the same time, and the background"
+            "that no camera has moved, that the videos start at the same time, and the background",
+            camera=names[int(np.argmin(found))],
         )
     by_name = dict(zip(names, found, strict=True))
     of_views = np.array([by_name.get(s.camera.name, np.nan) for s in silhouettes])

@@ -289,7 +289,7 @@ class SessionState:
         goes_on = gesture is not None and (self.open_edit_owner is gesture or self.open_edit_owner == gesture)
         amend = self._edit if goes_on else None
         self._edit = self.saver.save(self.state, label, source, amend, vouched)
-        # What was seen is stored now, or waits in the saver's queue.
+        # Points that were seen are stored now, or wait in the saver's queue.
         people = tuple(replace(p, seen=()) if p.seen else p for p in self.saver.with_stored_sources(self.state))
         if any(shown is not before for shown, before in zip(people, self.state.people, strict=True)):
             self.set(people=people)

@@ -32,6 +32,8 @@ from tracker.store.records import PoseChange
 _LOG = logging.getLogger(__name__)
 _STEPS = 100
 """Progress is shown in so many steps."""
+_ENDED: dict[str, Any] = {"running": False, "candidates": {}, "sought": frozenset()}
+"""Fields of a search that found nobody."""
 
 
 class _StoppedError(Exception):
@@ -82,12 +84,11 @@ class FindingPeople:
                     "expected a person without a pose, found that all are placed; track from here (T), or clear a "
                     "person's frames first"
                 )
-            finding = session_state.state.finding
-            session_state.set(
-                finding=replace(
-                    finding, running=True, stage="starting", share=0.0, notes=(), message="", failed=False, tried=None
-                )
+            before = session_state.state.finding
+            finding = FindState(
+                running=True, stage="starting", sought=frozenset(people), frame=before.frame, axes=before.axes
             )
+            session_state.set(finding=finding)
             self._shown, self._first_tried = session_state.state.frame, None
         self._stopping.clear()
         self._thread = threading.Thread(target=self._work, args=(people, acquire), name="find people", daemon=True)
@@ -118,13 +119,11 @@ class FindingPeople:
             is_done = self._track(found, edit)
             self._set(running=False, message="Done." if is_done else "Stopped; what was tracked stays.")
         except _StoppedError:
-            self._set(running=False, message="Stopped; nothing was changed.", tried=None, candidates={})
+            self._set(**_ENDED, message="Stopped; nothing was changed.", tried=None)
         except Exception as error:
             if not isinstance(error, TrackerError):
                 _LOG.exception("a search for people failed")
-            text = page_text(error)
-            message = f"{text[:1].upper()}{text[1:]}."
-            self._show_failure(message)
+            self._show_failure(error)
 
     def _report(self, stage: str, share: float, text: str) -> None:
         if self._stopping.is_set():
@@ -155,13 +154,16 @@ class FindingPeople:
             else:
                 session_state.set(finding=finding)
 
-    def _show_failure(self, message: str) -> None:
-        """End with a message, and go to the frame that it is about if the user still watches."""
-        session_state, frame = self._session_state, self._first_tried
+    def _show_failure(self, error: Exception) -> None:
+        """End with an error, and go to the frame that it is about if the user still watches."""
+        session_state, frame, text = self._session_state, self._first_tried, page_text(error)
+        names = [c.camera.name for c in session_state.session.cameras]
+        named = error.camera if isinstance(error, TrackerError) else None
         with session_state.lock:
             finding = replace(
-                session_state.state.finding, running=False, message=message, failed=True, tried=frame, candidates={}
-            )
+                session_state.state.finding, **_ENDED, message=f"{text[:1].upper()}{text[1:]}.", failed=True,
+                tried=frame, camera=names.index(named) if named in names else None,
+            )  # fmt: skip
             if frame is not None and self._is_watched() and frame != self._shown:
                 session_state.show_frame(frame, finding=finding)
             else:
@@ -204,7 +206,9 @@ class FindingPeople:
                 saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, sizes))
                 self._runs.clear()
             frame, lines = _axes(axes)
-            finding = replace(session_state.state.finding, frame=frame, axes=lines, tried=None, candidates={})
+            finding = replace(
+                session_state.state.finding, frame=frame, axes=lines, tried=None, candidates={}, sought=frozenset()
+            )
             session_state.show_frame(found.frame, finding=finding)
             session_state.refresh_saving()
             return edit

@@ -53,7 +53,7 @@ class _SaverSink:
         self._session_state, self._first_edit = session_state, edit
 
     def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
-        """See `Sink.write`. What cannot be written waits in the saver's queue."""
+        """See `Sink.write`. Poses that cannot be written wait in the saver's queue."""
         self._session_state.last_save = time.monotonic()
         amended = self._first_edit if edit is None else edit
         return self._session_state.saver.write(label, changes, amended, by_program=True)

@@ -28,7 +28,8 @@ def footage(tmp_path_factory):
     """Two cameras' small videos of six frames, and their calibration."""
     folder = tmp_path_factory.mktemp("footage")
     K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
-    poses = [rigid.transform(t=np.array([float(i), 0.5, 1.0])) for i in range(2)]
+    turns = [rigid.so3_exp(np.array([0.0, 0.01 * i, 0.0])) for i in range(2)]
+    poses = [rigid.transform(turn, np.array([float(i), 0.5, 1.0])) for i, turn in enumerate(turns)]
     names = ("front", "left")
     write_calibration(
         folder / "Calib.toml", [Camera(n, SIZE, K, np.zeros(0), T) for n, T in zip(names, poses, strict=True)]

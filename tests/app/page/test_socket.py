@@ -9,6 +9,7 @@ from gestures import drag
 from page_visits import visiting
 
 from app.page import messages
+from app.page.message_parsing import MISUNDERSTOOD
 
 
 @pytest.fixture
@@ -106,14 +107,15 @@ async def go_on_slowly(tracker):
         tracker.let_go(1)
 
 
-async def test_what_cannot_be_tracked_is_a_notice(controller):
+async def test_what_cannot_be_tracked_is_a_notice(controller, caplog):
     async with visiting(controller) as page:
         await page.send("track", action="backward", until=40)
         notice = await page.hear("notice")
         assert notice["level"] == "error"
         assert "frames to track before frame 2" in notice["text"]
         await page.send("curves", group="ears")
-        assert "as 'group', found 'ears'" in (await page.hear("notice"))["text"]
+        assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
+    assert "as 'group', found 'ears'" in caplog.text
 
 
 async def test_a_tracker_that_fails_is_a_notice_once(controller, tracker):
@@ -216,7 +218,7 @@ async def test_a_range_is_worked_on_and_told(controller):
         await page.send("range", action="reviewed", first=3, last=4, person=0)
         assert set((await page.hear("timeline"))["cells"]) == {"3", "4"}
         await page.send("range", action="fold", first=3, last=4, person=0)
-        assert "found 'fold'" in (await page.hear("notice"))["text"]
+        assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
         await page.send("range", action="interpolate", first=10, last=12, person=None)
         assert "poses at both ends" in (await page.hear("notice"))["text"]
 
@@ -241,7 +243,7 @@ async def test_what_is_not_understood_is_refused_and_nothing_has_happened(contro
     before = controller.state
     async with visiting(controller) as page:
         await page.send(kind, **({"phase": "start"} if kind == "pin" else {}), **fields)
-        assert "the page sent a wrong message" in (await page.hear("notice"))["text"]
+        assert (await page.hear("notice"))["text"] == MISUNDERSTOOD  # whose user typed no key of it
     now = controller.state
     assert (now.pins, now.people, now.undo, now.visibility) == (
         before.pins,
@@ -263,11 +265,12 @@ async def test_a_wrong_message_is_one_notice_and_the_socket_stays_open(controlle
     async with visiting(controller) as page:
         await page.hear("timeline")
         await page.send_raw(data, binary)
-        assert (await page.hear("notice"))["text"].startswith("expected ")
+        assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
         await page.send("seek", frame=7)
         await page.hear("state", lambda m: m["frame"] == 7)
         assert len([m for m in page.told if m["type"] == "notice"]) == 1
-    assert not caplog.records
+    (record,) = caplog.records
+    assert record.getMessage().startswith("a page sent a wrong message: expected ")
 
 
 async def test_a_fault_of_the_program_is_a_notice(controller, monkeypatch):
@@ -369,14 +372,30 @@ async def test_what_a_page_sees_anew_is_sent_and_nothing_else(controller):
         assert len([m for m in page.told[count:] if m["type"] == "image"]) <= 4  # the rest of the first set
 
 
-async def test_a_view_that_is_not_understood_is_a_notice(controller):
+async def test_a_page_without_visible_panes_gets_no_view_until_it_shows_one(controller):
     async with visiting(controller) as page:
-        await page.shows("image", "x-rays")
-        assert "as 'layers[1]', found 'x-rays'" in (await page.hear("notice"))["text"]
-        await page.shows("image", reductions=(1, 1))
-        assert "for each of 4 cameras" in (await page.hear("notice"))["text"]
-        await page.shows("image", reductions=(1, 1, 0.5, 0))
-        assert "expected 0 or a reduction from 1 to 64" in (await page.hear("notice"))["text"]
+        await page.shows("image", "contours")
+        await page.hear("image")
+        await page.shows("image", "contours", reductions=(0, 0, 0, 0))
+        await page.send("seek", frame=3)
+        await page.hear("state", lambda m: m["frame"] == 3)
+        await page.send("history", limit=1)
+        await page.hear("history")
+        assert not [m for m in page.told if m["type"] in ("image", "overlay") and m["frame"] == 3]
+        await page.shows("image", "contours", reductions=(0, 2, 0, 0))
+        assert (await page.hear("image", lambda m: m["frame"] == 3))["camera"] == 1
+        overlay = next(m for m in page.told if m["type"] == "overlay" and m["frame"] == 3)
+        assert {path["camera"] for path in overlay["paths"]} == {1}
+
+
+async def test_a_view_that_is_not_understood_is_a_notice(controller, caplog):
+    async with visiting(controller) as page:
+        for layer, reductions in (("x-rays", (1, 1, 1, 1)), ("parts", (1, 1)), ("parts", (1, 1, 0.5, 0))):
+            await page.shows("image", layer, reductions=reductions)
+            assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
+    reasons = [record.getMessage() for record in caplog.records]
+    assert "as 'layers[1]', found 'x-rays'" in reasons[0]
+    assert all("0 or a reduction from 1 to 64 for each of 4 cameras" in reason for reason in reasons[1:])
 
 
 def size_of(picture):

@@ -1,10 +1,13 @@
 """Memory that was freed goes back to the system."""
 
+import os
 import platform
 import subprocess
 import sys
 
 import pytest
+
+pytestmark = pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="it is glibc's heaps that are trimmed")
 
 FREED = """
 import sys, time
@@ -29,12 +32,64 @@ if sys.argv[1] == "given back":
 print(kept, resident_pages() - before)
 """
 
+HUGE_PAGES = """
+import sys
+from pathlib import Path
+import numpy as np
+from app.runtime.malloc_trim import give_back_freed_memory
 
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="it is glibc's heaps that are trimmed")
+if sys.argv[1] == "given back":
+    give_back_freed_memory()
+image = np.ones(32 << 20, np.uint8)
+lines = Path("/proc/self/smaps_rollup").read_text().splitlines()
+print(*(line.split()[1] for line in lines if line.startswith("AnonHugePages")))
+"""
+
+HEAPS = """
+import ctypes, os, sys, threading
+from app.runtime.malloc_trim import give_back_freed_memory
+
+if sys.argv[1] == "given back":
+    give_back_freed_memory()
+libc = ctypes.CDLL(None)
+libc.malloc.restype = libc.fopen.restype = ctypes.c_void_p
+n = 4 * os.cpu_count() + 8
+all_at_work = threading.Barrier(n)
+
+def work():
+    all_at_work.wait()
+    libc.malloc(ctypes.c_size_t(1000))
+    all_at_work.wait()
+
+threads = [threading.Thread(target=work) for _ in range(n)]
+for each in threads:
+    each.start()
+for each in threads:
+    each.join()
+libc.malloc_info(0, ctypes.c_void_p(libc.fopen(b"/dev/stdout", b"w")))
+libc.fflush(None)
+"""
+
+
+def output(program, how):
+    run = subprocess.run([sys.executable, "-c", program, how], capture_output=True, check=True, text=True)
+    return run.stdout
+
+
 @pytest.mark.parametrize("how", ["given back", "kept"])
 def test_images_that_are_freed_are_given_back(how):
-    words = [sys.executable, "-c", FREED, how]
-    run = subprocess.run(words, capture_output=True, check=True, text=True)
-    kept, now = map(int, run.stdout.split())
+    kept, now = map(int, output(FREED, how).split())
     assert kept > 29 * 2**20 / 4096
     assert (now < 0.2 * kept) == (how == "given back")
+
+
+def test_no_huge_page_fills_again_what_was_trimmed():
+    if output(HUGE_PAGES, "kept").split() in ([], ["0"]):
+        pytest.skip("this system gives numpy no huge pages")
+    assert output(HUGE_PAGES, "given back").split() == ["0"]
+
+
+@pytest.mark.parametrize("how", ["given back", "kept"])
+def test_threads_share_as_many_heaps_as_there_are_processors(how):
+    n_heaps = output(HEAPS, how).count("<heap nr=")
+    assert (n_heaps <= os.cpu_count()) == (how == "given back")

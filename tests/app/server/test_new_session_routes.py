@@ -137,6 +137,34 @@ async def test_nothing_is_made_while_two_cameras_seem_exchanged(serve, form, tmp
     assert [next(iter(line)) for line in lines[-2:]] == ["warning", "made"]
 
 
+async def test_a_calibration_of_a_file_for_each_camera_is_given_by_these_files(folders, serve, form):
+    client, walk = await serve(), folders[0]
+    (walk / "LEFT.mp4").unlink()
+    cameras = [source.camera for source in load_session(walk).cameras[:3]]
+    for camera in cameras:
+        T = np.linalg.inv(camera.T_world_camera)
+        stated = {"K": camera.K.tolist(), "R": T[:3, :3].tolist(), "t": T[:3, 3].tolist(), "size": list(camera.size)}
+        for name in (f"cam {camera.name}.json", f"cam;{camera.name}.json"):
+            (walk / name).write_text(json.dumps({camera.name: stated}))
+    files = [f"cam {camera.name}.json" for camera in cameras]
+    for text in (f"{walk}/{'; '.join(files)}", f"{';'.join(f' {walk}/{name} ' for name in files)};"):
+        found = json.loads((await client.open({"calibration": text}, "/sessions/survey"))[1])
+        assert (found["cameras"], found["problems"]) == (["FRONT", "RIGHT", "BACK"], [])
+    alone = json.loads((await client.open({"calibration": f"{walk}/cam;RIGHT.json"}, "/sessions/survey"))[1])
+    assert alone["cameras"] == ["RIGHT"]  # a name with a semicolon
+    lines = await client.make(form | {"calibration": f"{walk}/{'; '.join(files)}"})
+    assert "made" in lines[-1], lines
+    assert [c.camera.name for c in load_session(form["folder"]).cameras] == ["FRONT", "RIGHT", "BACK"]
+    a_path = "expected a path from the root or from ~"
+    for text, why in (
+        (f"{walk}/{files[0]}; gone", f"{walk}/gone not found"),
+        (f"{walk}/a; ./b", a_path),
+        (";", a_path),
+    ):
+        (line,) = await client.make(form | {"calibration": text, "folder": form["folder"] + "2"})
+        assert why in line["failed"]
+
+
 async def test_poses_of_another_convention_are_named_as_a_choice_of_the_form(folders, serve, form):
     """A file that does not state the size of its pictures is surveyed too."""
     client, entries = await serve(), {}

@@ -243,10 +243,12 @@ async def test_people_are_found_with_progress_and_a_stop(page, endpoint):
     await section.get_by_role("button", name="Find people").click()
     await until(lambda: endpoint.heard("find_people") == [{"type": "find_people", "action": "start"}])
     work = {"type": "finding", "running": True, "stage": "acquiring sizes", "share": 0.6, "notes": ["frame 7: good"]}
-    ends = {"message": "", "failed": False, "tried": None, "frame": None, "axes": []}
+    ends = {"message": "", "failed": False, "tried": None, "camera": None, "frame": None, "axes": []}
     await endpoint.broadcast(work | ends)
     await shows(page, "document.querySelector('[data-section=find] progress').value === 0.6")
     assert "acquiring sizes" in await section.get_by_role("status").inner_text()
+    assert await section.locator("li").is_hidden()
+    await section.locator("details summary").click()
     assert await section.locator("li").all_inner_texts() == ["frame 7: good"]
     assert await section.get_by_role("button", name="Find people").is_hidden()
     await section.get_by_role("button", name="Stop").click()
@@ -255,6 +257,11 @@ async def test_people_are_found_with_progress_and_a_stop(page, endpoint):
     await endpoint.broadcast(work | ends | {"running": False, "message": text, "failed": True})
     await section.get_by_role("button", name="Find people").wait_for()
     assert await section.get_by_role("status").inner_text() == text
+    assert await section.locator("li").is_hidden()
+    await endpoint.broadcast(work | ends)
+    await shows(page, "quadrille.state.finding.running")
+    await endpoint.broadcast(work | ends | {"running": False, "message": "Done."})
+    await section.locator("li").wait_for()  # who was found
 
 
 async def test_the_palette_finds_people(page, endpoint):

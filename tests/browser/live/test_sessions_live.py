@@ -64,6 +64,7 @@ async def test_a_session_is_made_of_footage_with_two_names_exchanged(browser, tm
         page = await context.new_page()
         await page.add_init_script(WITHOUT_3D)
         await page.goto(program.address, timeout=120_000)
+        await page.wait_for_url(lambda url: "token" not in url)  # the page exchanges it for a cookie
         await shows(page, "window.quadrille?.state.overlay", 120)
         await page.click("#first-new-session")
         await page.fill("#new-footage", str(mixed))

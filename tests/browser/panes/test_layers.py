@@ -252,7 +252,7 @@ async def test_the_axes_of_the_silhouettes_are_drawn_on_their_frame_alone(page, 
     line = [u, v - 40, u, v + 40]
     found = {
         "type": "finding", "running": False, "stage": "", "share": 1.0, "notes": [], "message": "Done.",
-        "failed": False, "tried": None,
+        "failed": False, "tried": None, "camera": None,
         "axes": [{"camera": camera, "people": [[[u + 30, v - 40, u + 30, v + 40], line]]}],
     }  # fmt: skip
     frame = await page.evaluate("quadrille.state.state.frame")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from page_driver import OPENED, handle_of, shows, state_of, to_client
+from page_driver import OPENED, handle_of, shows, state_of, to_client, until
 
 PORTRAIT = ((1080, 1920),)
 STEPPED = "quadrille.state.shown.frame === {0} && quadrille.state.overlay.frame === {0}"
@@ -61,6 +61,40 @@ async def test_a_zoomed_view_follows_the_person_from_frame_to_frame(page, endpoi
 
 
 @pytest.mark.endpoint(walk_m=0.1)
+async def test_a_view_follows_although_the_state_comes_after_the_picture(page, endpoint, monkeypatch):
+    """Else it would follow with the next overlay: that of a drag, under the hand."""
+    x, y = await to_client(page, 0, *await handle_of(page, 0, "head"))
+    await page.mouse.move(x, y)
+    await page.mouse.wheel(0, -700)
+    await shows(page, "quadrille.state.views[0].zoom > 2")
+    before = await place_in_pane(page, 0, "head")
+
+    async def nothing(_):
+        pass
+
+    with monkeypatch.context() as late:
+        late.setattr(endpoint, "broadcast", nothing)
+        await step(page, 13)
+    assert (await state_of(page))["state"]["frame"] == 12
+    await endpoint.broadcast(endpoint.state)
+    await shows(page, "quadrille.state.state.frame === 13")
+    assert await place_in_pane(page, 0, "head") == pytest.approx(before, abs=0.01)
+
+
+async def test_a_hidden_tab_asks_for_no_view(page, endpoint):
+    hide = """(hidden) => {
+      Object.defineProperty(document, "hidden", { get: () => hidden, configurable: true });
+      document.dispatchEvent(new Event("visibilitychange"));
+    }"""
+    before = endpoint.views[-1]
+    assert all(before["reductions"])
+    await page.evaluate(hide, True)
+    await until(lambda: endpoint.views[-1] == before | {"reductions": [0, 0, 0, 0]})
+    await page.evaluate(hide, False)
+    await until(lambda: endpoint.views[-1] == before)
+
+
+@pytest.mark.endpoint(walk_m=0.1)
 async def test_framed_people_stay_framed_and_an_edit_moves_no_view(page, endpoint):
     await page.keyboard.press("Shift+0")
     await shows(page, "quadrille.state.views[0].zoom > 1.05")
@@ -101,7 +135,7 @@ async def test_a_session_opens_framed_on_the_people_where_they_are_now(page, end
 async def test_people_who_are_found_are_framed(page, endpoint):
     finding = {
         "type": "finding", "running": True, "stage": "tracking", "share": 1.0, "notes": [], "message": "",
-        "failed": False, "tried": None, "frame": None, "axes": [],
+        "failed": False, "tried": None, "camera": None, "frame": None, "axes": [],
     }  # fmt: skip
     endpoint.state["people"][0]["source"] = None
     await endpoint.broadcast(endpoint.state)

@@ -131,6 +131,33 @@ async def test_files_are_chosen_in_a_dialog(form):
     assert not await page.locator("#new-session").is_visible()
 
 
+async def test_several_files_of_one_calibration_are_marked(form):
+    page, program = form
+    await page.fill("#new-footage", "/data/videos")
+    await page.fill("#new-calibration", "/data/")
+    await page.click("[data-browse=calibration]")
+    choose = page.locator("#path-picker-choose")
+    first, second = (page.locator(f"#path-picker-entries button:has-text('{n}')") for n in ("cameras", "notes"))
+    await first.click(modifiers=["Control"])
+    assert await choose.inner_text() == "Choose 1 file"
+    await first.press("Space")
+    assert await choose.inner_text() == "Choose this folder"
+    await second.press("Space")
+    await first.click(modifiers=["Control"])
+    assert await page.locator("#path-picker-entries [aria-pressed=true]").count() == 2
+    await choose.click()
+    assert await page.locator("#new-calibration").input_value() == "/data/notes.txt; cameras.toml"
+    await until(lambda: program.surveyed[-1]["calibration"] == "/data/notes.txt; cameras.toml")
+    await page.click("[data-browse=calibration]")  # begins in their folder, with nothing marked
+    await shows(page, "document.querySelector('#path-picker-path').value === '/data'")
+    assert await choose.inner_text() == "Choose this folder"
+    await page.keyboard.press("Escape")
+    await page.click("[data-browse=footage]")  # takes a folder alone
+    await page.locator("#path-picker-entries button").first.wait_for()
+    await page.locator("#path-picker-entries button").first.press("Space")
+    assert await choose.inner_text() == "Choose this folder"
+
+
 async def test_each_camera_shows_its_footage_and_the_rig_is_drawn(form):
     page, program = form
     await choose_files(page)

@@ -5,13 +5,13 @@ from page_driver import shows, state_of, until
 
 FINDING = {
     "type": "finding", "running": True, "stage": "finding first poses", "share": 0.0, "notes": [], "message": "",
-    "failed": False, "tried": None, "frame": None, "axes": [],
+    "failed": False, "tried": None, "camera": None, "frame": None, "axes": [],
 }  # fmt: skip
 ACQUISITION = {
     "type": "acquisition", "person": 0, "running": True, "stage": "fitting sizes", "share": 0.4, "message": "",
     "result": None,
 }  # fmt: skip
-REASON = "xpected silhouettes that agree, found views of which little can be explained (BACK 12%)"
+REASON = "xpected silhouettes that agree, found views of which little can be explained (cam 2.left 12%)"
 FAILURE = f"E{REASON}; check the background."
 NOTES = ["frame 30, voxels: expected silhouettes that agree", "frame 60, voxels: expected silhouettes that agree"]
 
@@ -112,12 +112,12 @@ async def test_a_failure_is_a_sentence_with_its_silhouettes_and_a_way_on(page, e
     await endpoint.broadcast(FINDING | {"tried": 12})
     await shows(page, "quadrille.state.finding?.running")
     await endpoint.broadcast(
-        FINDING | {"running": False, "failed": True, "message": FAILURE, "notes": NOTES, "tried": 12}
+        FINDING | {"running": False, "failed": True, "message": FAILURE, "notes": NOTES, "tried": 12, "camera": 2}
     )
     await failure.wait_for()
     sentence = await page.locator("#failure-text").inner_text()
     assert sentence == f"People were not found: e{REASON}."
-    await shows(page, "document.querySelector('#failure-silhouette').naturalWidth > 0")  # of the view that it names
+    await shows(page, "document.querySelector('#failure-silhouette').naturalWidth > 0")  # of the view that it is about
     assert endpoint.thumbnails == ["silhouette/2/12"]
     assert await page.get_by_alt_text("Silhouette in BACK on frame 12").is_visible()
     await shows(page, "'silhouette 2' in quadrille.state.shown.pictures && quadrille.state.active === 2")
@@ -131,15 +131,18 @@ async def test_a_failure_is_a_sentence_with_its_silhouettes_and_a_way_on(page, e
     assert "Drag the square" in await page.locator(".notice.is-info").inner_text()
 
 
-async def test_a_failure_that_names_no_view_has_no_picture(page, endpoint):
-    for message in (FAILURE, "Expected a head that stands out of the silhouettes, found none."):
+async def test_a_failure_of_no_single_view_has_no_picture(page, endpoint):
+    """Not even where its sentence happens to hold the name of a view."""
+    for camera, message in ((2, FAILURE), (None, "Expected the FRONT of a head in the silhouettes, found none.")):
         endpoint.thumbnails.clear()
         await endpoint.broadcast(FINDING | {"tried": 60})
         await shows(page, "quadrille.state.finding?.running")
-        await endpoint.broadcast(FINDING | {"running": False, "failed": True, "message": message, "tried": 60})
+        await endpoint.broadcast(
+            FINDING | {"running": False, "failed": True, "message": message, "tried": 60, "camera": camera}
+        )
         await shows(page, "!document.querySelector('#find-failure').hidden")
         picture = page.locator("#failure-silhouette")
-        if message == FAILURE:
+        if camera is not None:
             await picture.wait_for()
         else:
             assert await picture.is_hidden()

@@ -4,7 +4,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from rigs import looking, on_circle
+from rigs import looking, on_circle, random_rig
 from stated_poses import CONVENTIONS, stated
 
 from tracker.calibrations.pose_conventions import STATED, check_convention, costs, read_pose
@@ -13,35 +13,6 @@ from tracker.geometry import rigid
 
 EXPECTED = "poses that map world to camera"
 KINDS = ("ring", "arc", "corners", "row", "pair", "turned by 90 degrees")
-
-
-def random_rig(rng, kind):
-    """Poses of cameras that look beside one point by up to 12 degrees, in a world of any orientation."""
-    n, radius, height = int(rng.integers(3, 9)), rng.uniform(2, 6), rng.uniform(0.5, 3)
-    beside_m = 2.0 * np.tan(np.radians(rng.choice([0, 3, 8, 12])))
-    if kind in ("ring", "turned by 90 degrees"):
-        places = [
-            on_circle(2 * np.pi * i / n + rng.normal() / 10, radius * rng.uniform(0.8, 1.2), height) for i in range(n)
-        ]
-    elif kind == "arc":
-        span = rng.uniform(0.7, 2.5)
-        places = [on_circle(span * i / (n - 1) + rng.normal() / 20, radius, height) for i in range(n)]
-    elif kind == "corners":
-        places = [np.array([x, y, height]) for x in (-radius, radius) for y in (-0.7 * radius, 0.7 * radius)]
-    elif kind == "row":
-        places = [np.array([x, -radius, height]) for x in np.linspace(-2, 2, n)]
-    else:
-        places = [on_circle(a, radius * rng.uniform(0.8, 1.2), height) for a in (0.0, rng.uniform(0.3, 2.5))]
-    rolls = (
-        rng.choice([0, 0.5, 1, 1.5], len(places)) * np.pi
-        if kind.startswith("turned")
-        else rng.normal(size=len(places)) * 0.03
-    )
-    world = rigid.transform(rigid.so3_exp(2 * rng.normal(size=3)), rng.normal(size=3))
-    return [
-        world @ looking(place, np.array([0, 0, 1]) + rng.normal(size=3) * beside_m, roll)
-        for place, roll in zip(places, rolls, strict=True)
-    ]
 
 
 @pytest.mark.parametrize("kind", KINDS)

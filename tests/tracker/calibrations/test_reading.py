@@ -1,11 +1,10 @@
 """Calibrations of many programs: the same cameras from each layout, and names for what is not read."""
 
-import json
-
+import calibration_files
 import numpy as np
 import pytest
 import tomli_w
-from calibration_files import to_storage
+from calibration_files import to_json, to_storage
 
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import CalibrationError
@@ -35,11 +34,6 @@ def opencv_rows(c):
     return {"K": c.K, "dist": c.distortion, "R": R, "rvec": rigid.so3_log(R), "t": t, "size": list(c.size)}
 
 
-def write_json(path, data):
-    path.write_text(json.dumps(data, default=lambda a: a.tolist()))
-    return path
-
-
 def easymocap(folder, suffix="yml"):
     """Intrinsics and poses in two files; the size is not stated."""
     columns = {c.name: opencv_rows(c) for c in CAMERAS}
@@ -66,35 +60,17 @@ def opencv(suffix):
 
 
 def panoptic(folder):
-    rows = [opencv_rows(c) | {"name": c.name} for c in CAMERAS]
-    cameras = [
-        {"name": r["name"], "type": "hd", "panel": 0, "node": i, "resolution": r["size"], "K": r["K"],
-         "distCoef": r["dist"], "R": r["R"], "t": 100 * r["t"][:, None]}
-        for i, r in enumerate(rows)
-    ]  # fmt: skip
-    return write_json(folder / "calibration_160422.json", {"calibDataSource": "x", "cameras": cameras})
+    return calibration_files.panoptic(folder, CAMERAS)
 
 
 def kalibr(folder):
     """A chain of cameras; the first one defines the world."""
-    lines, before = ["%YAML 1.2", "---"], None
-    for c in CAMERAS:
-        fx, _, cx, _, fy, cy = c.K.ravel()[:6]
-        lines += [f"{c.name}:", "  camera_model: pinhole", "  distortion_model: radtan", f"  rostopic: /{c.name}"]
-        lines += [f"  intrinsics: [{fx}, {fy}, {cx}, {cy}]", "  resolution: [640, 480]"]
-        lines += [f"  distortion_coeffs: {c.distortion[:4].tolist()}"]
-        if before is not None:
-            lines += ["  T_cn_cnm1:"]
-            lines += [f"  - {row}" for row in (c.T_camera_world @ before.T_world_camera).tolist()]
-        before = c
-    path = folder / "camchain.yaml"
-    path.write_text("\n".join(lines))
-    return path
+    return calibration_files.kalibr(folder, CAMERAS)
 
 
 def rows_json(folder):
     rows = [{"camera_name": c.name, **opencv_rows(c)} for c in CAMERAS]
-    return write_json(folder / "rows.json", [{k: v for k, v in r.items() if k != "rvec"} for r in rows])
+    return to_json(folder / "rows.json", [{k: v for k, v in r.items() if k != "rvec"} for r in rows])
 
 
 def halves_json(folder):
@@ -110,7 +86,7 @@ def halves_json(folder):
         }
         for c in CAMERAS
     }
-    return write_json(folder / "halves.json", {"cameras": cameras})
+    return to_json(folder / "halves.json", {"cameras": cameras})
 
 
 def flat_json(folder):
@@ -121,7 +97,7 @@ def flat_json(folder):
                  "k3": c.distortion[4], "rvec": opencv_rows(c)["rvec"], "tvec": opencv_rows(c)["t"]}
         for c in CAMERAS
     }  # fmt: skip
-    return write_json(folder / "flat.json", rows)
+    return to_json(folder / "flat.json", rows)
 
 
 def anipose(folder):
@@ -209,12 +185,12 @@ def inverted(folder):
     rows = {
         c.name: {"K": c.K, "R": c.T_world_camera[:3, :3], "t": c.T_world_camera[:3, 3], "size": c.size} for c in CAMERAS
     }
-    return write_json(folder / "inverted.json", rows)
+    return to_json(folder / "inverted.json", rows)
 
 
 def fisheye(folder):
     rows = {c.name: opencv_rows(c) | {"fisheye": True} for c in CAMERAS}
-    return write_json(folder / "fisheye.json", rows)
+    return to_json(folder / "fisheye.json", rows)
 
 
 def text(name, content):

@@ -63,7 +63,7 @@ def test_squares_of_the_board_are_noted_and_no_unit_is_advised(tmp_path):
 def test_parallel_cameras_have_no_point_but_an_extent(tmp_path):
     row = [looking([x, 0, 0], [x, 4.0, 0]) for x in (0.0, 0.065)]
     path = opencv_words(tmp_path, in_units(1000, row))
-    assert "within 0.065 m" in read_cameras(path, "mm").notes[0]
+    assert "within 0.065 m" in read_cameras(path, "mm").notes[-1]
     with pytest.raises(CalibrationError, match="within 100 m from the origin"):
         read_cameras(opencv_words(tmp_path, in_units(10_000, row)))
 

@@ -90,6 +90,34 @@ def test_cut_files_of_plain_writers_are_placed_without_a_question(start, rate, f
     assert any(f"is frame {start}" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("start_s", [1.7e9, 1.732e9 + 0.123456, 45_000.0, 120.5, 1e8])
+@pytest.mark.parametrize("number", [0, 1, 20])
+@pytest.mark.parametrize("rate", [25, 30000 / 1001, 60])
+def test_time_of_another_clock_places_no_row(start_s, number, rate):
+    """Unix time, the time of day, or seconds since a camera was switched on."""
+    file = table(number + np.arange(30), start_s + np.round(np.arange(30) / rate, 6), rate)
+    if number < 2:
+        found = placed(file, rate, n_frames=60)
+        assert found.frames.tolist() == list(range(30))
+        assert any("is frame 0" in note for note in found.notes)
+        return
+    with pytest.raises(FormatError, match=r"first row may be frame 20 .* or frame 19"):
+        placed(file, rate, n_frames=60)
+    with pytest.raises(FormatError, match=r"Time begins at .* beyond the frames"):
+        placed(file, rate, n_frames=60, clock="time")
+    assert placed(file, rate, n_frames=60, first_frame=7).frames.tolist() == list(range(7, 37))
+
+
+def test_what_is_odd_about_the_file_is_said_too():
+    file = replace(line(5, 30), notes=("it is odd",))
+    assert placed(file, 30, n_frames=5).notes == ("it is odd",)
+
+
+def test_without_a_session_unix_time_places_no_row():
+    file = table(1 + np.arange(30), 1.7e9 + np.arange(30) / 30, 30)
+    assert placed(file, 30).frames.tolist() == list(range(30))
+
+
 @pytest.mark.parametrize(("nominal", "fps"), NTSC.items())
 def test_rates_of_television_are_one_clock(nominal, fps):
     for rate, session in ((nominal, fps), (fps, nominal)):

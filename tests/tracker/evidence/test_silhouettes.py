@@ -123,3 +123,16 @@ def test_large_footage_is_reduced(tmp_path):
     silhouette = found(CameraSource(large, footage, background=tmp_path / "empty.png"), k=0)
     assert silhouette.mask.shape == (480, 640) == silhouette.camera.size[::-1]
     assert jaccard(silhouette.mask, cv2.resize(person(2).astype(np.uint8), (640, 480)) > 0) > 0.9
+
+
+def test_learning_the_background_can_be_broken_off(camera):
+    read = []
+
+    def step():
+        read.append(len(read))
+        if len(read) == 3:
+            raise InterruptedError
+
+    with Recording([camera]) as recording, pytest.raises(InterruptedError):
+        SilhouetteFinder([replace(camera, background=None)], recording, step=step)
+    assert len(read) == 3

@@ -43,6 +43,71 @@ def test_ways_to_leave_a_point_out(write, row):
     assert np.isnan(points[0, 1]).all()
 
 
+@pytest.mark.parametrize(
+    "word",
+    ["NaN", "nan", "-nan", "N/A", "#N/A", "null", "None", "-", "--", "1.#QNAN", "-1.#IND", "1.#IND", "-nan(ind)"],
+)
+def test_words_for_a_missing_value(write, word):
+    points = read_trc(write(f"1\t0\t1\t2\t3\t{word}\t {word} \t{word}\n")).points
+    assert points[0, 0].tolist() == [1, 2, 3]
+    assert np.isnan(points[0, 1]).all()
+    with pytest.raises(FormatError, match="line 6, column 2: expected a finite number"):
+        read_trc(write(f"1\t{word}\t1\t2\t3\t4\t5\t6\n"))
+
+
+def test_decimal_commas_are_named(write):
+    with pytest.raises(FormatError, match=r"line 6: expected a point in decimal numbers, found a comma in '0,033'"):
+        read_trc(write("1\t0,033\t1,5\t2\t3\t4\t5\t6\n"))
+    with pytest.raises(FormatError, match=r"line 3, DataRate: expected a point in decimal numbers.*'29,97'"):
+        read_trc(write(ROW, header=HEADER.replace("\n50\t50", "\n29,97\t29,97", 1)))
+
+
+@pytest.mark.parametrize("after", range(1, 6))
+@pytest.mark.parametrize("blank", ["\n", "\n\n", "\t\t\n", "\r\n"])
+def test_blank_lines_in_the_header(write, after, blank):
+    lines = HEADER.splitlines(keepends=True)
+    table = read_trc(write(ROW, header="".join([*lines[:after], blank, *lines[after:]])))
+    assert (table.names, table.rate, table.frames.tolist()) == (("Knee", "Heel"), 50, [1])
+
+
+def test_a_blank_line_in_place_of_the_axes(write):
+    table = read_trc(write(ROW + "2\t0.02\t1\t2\t3\n", header="".join(HEADER.splitlines(keepends=True)[:4]) + "\n"))
+    assert table.frames.tolist() == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("rows", "n_frames", "found"),
+    [
+        ("1\t0\t1\t2\t3\t4\t5\t6\n2\t0.02\t1\t2\t3\t4.1", 2, "line 7: .*6 of 8 columns in row 2 of 2"),
+        ("1\t0\t1\t2\t3\t4\t5\t6\n2\t0.02\t1\t2\t3", 2, "5 of 8 columns in row 2 of 2"),
+        ("1\t0\t1\t2\t3\t4\t5\t6\n2\t0.02\t1\t2\t3\t4\t5\t6", 9, "8 of 8 columns in row 2 of 9"),
+        ("1\t0\t1\t2\t3\t4\t5\t6\n2", 9, "1 of 8 columns in row 2 of 9"),
+    ],
+)
+def test_a_file_that_was_cut_off(write, rows, n_frames, found):
+    header = HEADER.replace("50\t50\t2\t", f"50\t50\t{n_frames}\t")
+    with pytest.raises(FormatError, match=f"expected the end of a line.*{found}|{found}.*cut off"):
+        read_trc(write(rows, header=header))
+    complete = "\n".join(rows.split("\n")[:1]) + "\n"
+    assert read_trc(write(complete, header=header)).frames.tolist() == [1]
+
+
+def test_rows_that_the_header_promises_are_missed(write):
+    (note,) = read_trc(write(ROW)).notes
+    assert "promises 2 rows, and it has 1" in note
+    assert read_trc(write(ROW + "2\t0.02\t1\t2\t3\t4\t5\t6\n")).notes == ()
+
+
+def test_points_at_zero_are_missing(write):
+    table = read_trc(write("1\t0\t0\t0\t0\t4\t5\t6\n2\t0.02\t0\t0\t1\t0.0\t-0.0\t0\n"))
+    assert np.isnan(table.points[:, :, 0]).tolist() == [[True, False], [False, True]]
+    assert table.notes == ("2 of its points lie at 0, 0, 0 exactly, as missing ones: they are left out",)
+
+
+def test_a_last_line_without_an_end_is_read_where_it_is_complete(write):
+    assert read_trc(write(ROW + "2\t0.02\t1\t2\t3\t4\t5\t6")).frames.tolist() == [1, 2]
+
+
 @pytest.mark.parametrize(("units", "metres"), [
     ("m", 1.0), ("meter", 1.0), ("meters", 1.0), ("Metres", 1.0), ("mm", 0.001), ("MM", 0.001), ("millimeters", 0.001),
     ("millimetre", 0.001), ("cm", 0.01), ("centimeters", 0.01), ("centimetre", 0.01), ("in", 0.0254), ("inch", 0.0254),
@@ -122,6 +187,7 @@ def test_malformed(write, rows, units, expected):
         ("50\t50\t2", "inf\t50\t2", "line 3, DataRate"),
         ("Knee", "\t\t\t".join(f"p{i}" for i in range(1001)), "line 4: expected 1 to 1000 point names"),
         ("PathFileType", "Path", "not a TRC file"),
+        ("Frame#\tTime\tKnee\t\t\tHeel\t\t", "Frame# Time Knee Heel", "line 4: expected columns separated by tabs"),
     ],
 )
 def test_malformed_header(write, old, new, expected):

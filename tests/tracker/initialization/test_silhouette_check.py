@@ -41,6 +41,7 @@ def test_a_body_beside_the_person_is_refused(scene, name):
     check = check_against_silhouettes(changed(body, **{place: 0.5}), *views)
     assert check.is_refused
     assert check.note.startswith("the body and the silhouette share little of their area in view c")
+    assert check.worst_camera == check.cameras[np.argmin(check.overlaps)]
 
 
 def test_a_body_out_of_all_images_is_refused(scene):
@@ -56,3 +57,4 @@ def test_without_a_view_of_the_person_alone_nothing_is_checked(scene):
     assert not check.is_refused
     assert check.note.startswith("no view shows the person alone")
     assert np.size(check.overlaps) == 0
+    assert check.worst_camera is None

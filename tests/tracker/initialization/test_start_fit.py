@@ -1,5 +1,6 @@
 """Starts are fitted again while that pays, tracked there and back, and a fit that costs more is not taken."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from tracker.body.model import PosedBody
 from tracker.formats.model_toml import load_model
 from tracker.initialization import start_fit
-from tracker.initialization.start_fit import StartFitter, short_tracks, track_back
+from tracker.initialization.start_fit import FittedStart, StartFitter, short_tracks, track_back
 
 MODEL = load_model("gavrila34")
 START = PosedBody(MODEL, MODEL.neutral())
@@ -57,6 +58,29 @@ def test_a_start_is_searched_and_fitted_again(fits):
     assert runs == [[5], [5]]
     assert found.pose[0] == 12
     assert found.cost_px == 3.0
+
+
+def test_a_stop_is_heard_after_each_frame_and_before_a_search(fits):
+    costs, runs, _ = fits
+    costs[:] = [4.0]
+    heard = []
+
+    def stop_at(n):
+        def step():
+            heard.append(len(heard))
+            if len(heard) == n:
+                raise InterruptedError
+
+        return step
+
+    with pytest.raises(InterruptedError):
+        replace(fitter(), step=stop_at(1)).search(START)
+    assert runs == []
+    heard.clear()
+    one_way = replace(fitter([7, 9, 11]), step=stop_at(3))
+    with pytest.raises(InterruptedError):
+        one_way.track(START, FittedStart(START.values, "good", 4.0))
+    assert runs == [[5, 7, 9]]
 
 
 def test_a_fit_that_costs_more_is_not_taken(fits):

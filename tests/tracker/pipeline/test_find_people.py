@@ -17,10 +17,19 @@ from tracker.initialization.candidates import StartCandidate
 from tracker.initialization.start_fit import FittedStart
 from tracker.pipeline import first_pose, own_figure
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_sizes_changed
-from tracker.pipeline.find_people import AXES, FoundPeople, expected_steps, frames_to_try, store_found
+from tracker.pipeline.find_people import (
+    AXES,
+    FindSettings,
+    FoundPeople,
+    expected_steps,
+    find_people,
+    frames_to_try,
+    store_found,
+)
 from tracker.pipeline.first_pose import FirstPose, FirstPoses, find_first_poses
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
+from tracker.voxels.visual_hull import VisualHull
 
 NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
 CAMERAS = [replace(c, name=n) for c, n in zip(cameras_about_a_figure(), NAMES, strict=True)]
@@ -39,7 +48,7 @@ def silhouettes(monkeypatch):
     """What is seen on every frame, a list that tests fill."""
     seen = []
     finder = SimpleNamespace(silhouettes=lambda k, person=None: tuple(seen), close=lambda: None)
-    monkeypatch.setattr(first_pose, "SilhouetteFinder", lambda cameras, recording: finder)
+    monkeypatch.setattr(first_pose, "SilhouetteFinder", lambda cameras, recording, step: finder)
     return seen
 
 
@@ -83,6 +92,31 @@ def test_the_share_that_is_done_counts_the_frames_that_will_be_tried():
     assert [expected_steps(12, done, done) for done in range(6)] == [7, 7, 7, 7, 7, 7]
     assert [expected_steps(12, done, 0) for done in (0, 4, 12, 14)] == [7, 11, 14, 14]
     assert expected_steps(2, 2, 1) == 4
+
+
+def test_a_stop_is_heard_between_two_fits_of_a_frame(session, silhouettes, monkeypatch):
+    silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
+    is_stopping = False
+    fitted = []
+
+    def starts(observer, frame, later, others, step=lambda: None):
+        def fit(start):
+            nonlocal is_stopping
+            fitted.append(start)
+            is_stopping = True
+            step()
+            return FittedStart(start.values, "good", 1.0)
+
+        return SimpleNamespace(fit=fit, search=fit, track=lambda start, found: found)
+
+    def report(stage, share, text):
+        if is_stopping:
+            raise InterruptedError
+
+    monkeypatch.setattr(first_pose, "StartFitter", starts)
+    with pytest.raises(InterruptedError):
+        find_people(session, OBSERVER, [0], range(3, 4), FindSettings(), report)
+    assert len(fitted) == 1
 
 
 def test_nobody_in_the_silhouettes(session, silhouettes):
@@ -238,3 +272,20 @@ def test_an_entry_of_one_person_is_read_as_before():
     edits = with_sizes_changed(with_sizes_changed({}, 4, changed[:1]), 5, changed)
     assert [sizes_changed(edits, edit) for edit in (4, 5)] == [changed[:1], changed]
     assert sizes_changed({"5": ["ann", 1, 2]}, 6) == []
+
+
+@pytest.mark.parametrize(
+    ("coverages", "camera", "remedy"),
+    [
+        ([1.0, 1.0, 0.85, 0.6], "LEFT", "another_frame_or_background"),
+        ([1.0, 0.99, np.nan, 0.97], None, "another_frame"),
+    ],
+)
+def test_a_figure_that_is_too_large_names_the_silhouette_that_shows_more_than_people(
+    session, coverages, camera, remedy
+):
+    figure = SimpleNamespace(volume_m3=0.35, points_world=np.zeros((1, 3)))
+    with pytest.raises(TrackerError, match="at most 250 litres, found a figure of 350") as error:
+        own_figure.own_figure(session, 0, VisualHull((figure,), np.array(coverages), ()), [])
+    assert (error.value.camera, error.value.remedy.code) == (camera, remedy)
+    assert camera is None or f"the silhouette in {camera}" in str(error.value)

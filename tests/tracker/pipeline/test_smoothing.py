@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from tracker.body.limbs import limbs
+from tracker.errors import DamagedStoreError
 from tracker.formats.model_toml import format_model, load_model
 from tracker.motion import smoothing
 from tracker.pipeline.methods import METHODS
-from tracker.pipeline.smoothing import TrackedRows
+from tracker.pipeline.smoothing import TrackedRows, resumed_rows
 from tracker.pipeline.stored_run import TrackTask, stored_run
 from tracker.pipeline.track_session import SmoothedRows
 from tracker.session.session import load_session
@@ -232,3 +233,11 @@ def test_an_interrupted_run_of_an_older_version_keeps_its_statuses():
         old.restore(PoseChange("person", frame, pose), rows.record()[str(frame)][0])
     assert [c.pose.status for c in old.finished(Subjects.of([model]), 0, 25.0)] == ["doubtful"] * 4
     assert [c.pose.status for c in rows.finished(Subjects.of([model]), 0, 25.0)] == ["good"] * 4
+
+
+@pytest.mark.parametrize("texts", [["AA=="], [""], ["AADAfwAAwH8AAMB/"], ["x"], []], ids=str)
+def test_odd_texts_of_an_interrupted_run_are_refused(texts):
+    model = load_model("gavrila34")
+    change = PoseChange("person", 3, PoseRecord(model.neutral(), (), 1))
+    with pytest.raises(DamagedStoreError, match="covariance and features of frame 3"):
+        resumed_rows({0: (change,)}, {"0": {"3": texts}})

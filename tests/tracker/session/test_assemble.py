@@ -23,15 +23,17 @@ from tracker.session.session import load_session
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])
 
 
+def place(i):
+    """Pose of a camera in a row of nearly parallel ones."""
+    return rigid.transform(rigid.so3_exp(np.array([0.0, 0.01 * i, 0.0])), np.array([0.0, i, 1.0]))
+
+
 @pytest.fixture
 def room(tmp_path):
     """A calibration of two cameras and their videos of 9 frames."""
     write_calibration(
         tmp_path / "Calib.toml",
-        [
-            Camera(name, SIZE, K, np.zeros(0), rigid.transform(t=np.array([0.0, i, 1.0])))
-            for i, name in enumerate(("front", "left"))
-        ],
+        [Camera(name, SIZE, K, np.zeros(0), place(i)) for i, name in enumerate(("front", "left"))],
     )
     for name in ("front", "left"):
         encode(tmp_path / f"{name}.mp4", n=9)
@@ -338,7 +340,7 @@ def calibrate_at(room, size):
     scale = np.array([size[0] / SIZE[0], size[1] / SIZE[1]])
     scaled = K * [[scale[0]], [scale[1]], [1]]
     scaled[:2, 2] += (scale - 1) / 2
-    Ts = [rigid.transform(t=np.array([0.0, i, 1.0])) for i in range(2)]
+    Ts = [place(i) for i in range(2)]
     rig = [Camera(name, size, scaled, np.zeros(0), T) for name, T in zip(("front", "left"), Ts, strict=True)]
     write_calibration(room / "Calib.toml", rig)
 
@@ -366,14 +368,14 @@ def test_only_whole_multiples_of_the_same_shape_are_scaled(room):
 
 
 def test_a_size_written_as_height_and_width(room):
-    rows = [Camera(name, SIZE[::-1], K, np.zeros(0), rigid.transform(t=np.ones(3))) for name in ("front", "left")]
-    write_calibration(room / "Calib.toml", [replace(c, T_world_camera=np.eye(4)) for c in rows])
+    rows = [Camera(name, SIZE[::-1], K, np.zeros(0), place(i)) for i, name in enumerate(("front", "left"))]
+    write_calibration(room / "Calib.toml", rows)
     assert_refused(room, RecordingError, "its size is height and width: exchange them")
 
 
 def test_names_are_equal_in_both_unicode_forms(room):
     composed, apart = (unicodedata.normalize(form, "Büro") for form in ("NFC", "NFD"))
-    rig = [Camera(name, SIZE, K, np.zeros(0), rigid.transform(t=np.array([0, 0, 1.0]))) for name in (composed, "left")]
+    rig = [Camera(name, SIZE, K, np.zeros(0), place(i)) for i, name in enumerate((composed, "left"))]
     for named in (apart, composed):
         write_calibration(room / "Calib.toml", [replace(c, name=named) if c is rig[0] else c for c in rig])
         for filmed in (apart, composed):

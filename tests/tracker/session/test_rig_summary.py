@@ -1,5 +1,7 @@
 """Numbers by which a user sees whether the cameras of a calibration stand as in the studio."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rigs import cameras, looking, on_circle, ring
@@ -59,3 +61,30 @@ def test_a_person_of_few_pixels_lets_the_unit_be_doubted():
 def test_point_of_the_axes_is_free_of_scale():
     a, b = axes_point(ring(3)), axes_point(ring(3, 4000, 1500, target=[0, 0, 1000]))
     np.testing.assert_allclose(a.position * 1000, b.position, atol=1e-6)
+
+
+def test_copied_poses_are_noted():
+    rig = ring(4)
+    rig[2] = rig[0]
+    (doubt,) = summarize_rig(cameras(rig)).doubts
+    assert "Cameras 'cam0' and 'cam2' stand 0 cm apart" in doubt
+    near = [looking([x, 4.0, 1.5]) for x in (0.0, 0.065)]
+    assert summarize_rig(cameras(near)).doubts == ()  # a stereo camera
+
+
+@pytest.mark.parametrize("place", [(1.5, -2.5), (959.5, 539.5), (0.5, 0.5)])
+def test_a_principal_point_far_from_the_middle_is_noted(place):
+    rig = cameras(ring(3))
+    K = rig[1].K.copy()
+    K[:2, 2] = place
+    (doubt,) = summarize_rig([rig[0], replace(rig[1], K=K), rig[2]]).doubts
+    assert "principal point lies far from the middle of the pictures of 'cam1':" in doubt
+
+
+def test_distortion_in_another_order_is_noted():
+    rig = cameras(ring(3), (-0.3, 0.1, -0.2, 0.001, 0.0005))
+    (doubt,) = summarize_rig(rig).doubts
+    assert "tangential distortion of 'cam0', 'cam1', 'cam2' is up to 0.2, that of no usual lens" in doubt
+    assert summarize_rig(cameras(ring(3), (-0.3, 0.1, 0.002, 0.001, -0.2))).doubts == ()
+    fisheyes = [replace(c, distortion=np.array([0.1, 0.1, -0.2, 0.1]), fisheye=True) for c in rig]
+    assert summarize_rig(fisheyes).doubts == ()

@@ -143,6 +143,50 @@ def read_all(path):
             store.frames_of(edit.edit)
 
 
+SETTINGS = {
+    "store_id": [7, "", "a\u202eb", ["x"]],
+    "locked": [[1], {"ann": "left_wrist.twist"}, {"ann": [1]}, {"": []}, None],
+    "sizes_edits": [[1], {"x": []}, {"4": [["ann", 1]]}, {"4": [["ann", "1", 2]]}, {"4": [["ann", -1, 2]]}],
+    "confirmed_keyframes": [[1], {"ann": [1]}, {"ann": {"x": 1}}, {"ann": {"3": "1"}}, {"ann": {"3": -1}}],
+    "silhouette_axes": [[1], {}, {"frame": -1, "lines": {}}, {"frame": 1, "lines": {"a": [[[1, 2]]]}}],
+    "find people": [[1], {"frame": "3", "done": []}, {"frame": 3, "done": ["sideways"]}, {"frame": 10**9, "done": []}],
+    "former_floor": [
+        "z",
+        {"up": "w"},
+        {"up": "z", "normal": [0, 1], "offset_m": 0},
+        {"up": "z", "normal": [0, 1, 0]},
+        {"up": "z", "normal": [0, 0, 0], "offset_m": 0},
+    ],
+    "unfinished track": [[1], {"task": []}, {"task": [0, 9, 10, [0], {}], "next": -3}, {"task": 3, "next": None}],
+}
+FLOOR = {"up": "z", "normal": [0.0, 0.0, 1.0], "offset_m": 0.1}
+GOOD_SETTINGS = {
+    "store_id": "3f", "locked": {"ann": ["x.y"]}, "sizes_edits": {"4": [["ann", 1, 2]], "5": ["ann", 1, 2]},
+    "confirmed_keyframes": {"ann": {"3": 12}}, "silhouette_axes": {"frame": 1, "lines": {"a": [[[[1, 2], [3, 4]]]]}},
+    "find people": {"frame": 3, "done": ["forward"]}, "former_floor": FLOOR, "unknown": {"any": [1]},
+    "unfinished track": {"task": [0, 9, 10, [0], ["cam"], {"a": 1}], "next": 4, "rows": {"0": {"3": ["AA=="]}}},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in SETTINGS.items() for value in values])
+def test_odd_settings_are_named(path, name, value):
+    with closing(AnnotationStore(path)) as store:
+        store.set_setting(name, GOOD_SETTINGS[name])
+        assert store.setting(name) == GOOD_SETTINGS[name]
+        store.set_setting(name, value)
+        with pytest.raises(
+            DamagedStoreError, match=rf"annotations .* are damaged: setting '{name}'.*expected"
+        ) as caught:
+            store.setting(name)
+        assert str(caught.value).isprintable()
+
+
+def test_settings_of_other_names_are_any_json(path):
+    with closing(AnnotationStore(path)) as store:
+        store.set_setting("unknown", GOOD_SETTINGS["unknown"])
+        assert store.setting("unknown") == {"any": [1]}
+
+
 @pytest.mark.parametrize("statement", ODD)
 def test_odd_rows_are_named(path, statement):
     read_all(path)

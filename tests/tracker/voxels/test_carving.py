@@ -126,8 +126,9 @@ def test_a_person_cut_off_by_an_image_is_not_cut_off_in_space():
 def test_nobody_and_nothing_in_common():
     views = silhouettes_of([ellipsoid((0, 0, 0), AXES)], cameras_around(4))
     empty = [v._replace(mask=np.zeros_like(v.mask)) for v in views]
-    with pytest.raises(TrackerError, match="at least 2 views, found nobody in c1, c2, c3"):
+    with pytest.raises(TrackerError, match="at least 2 views, found nobody in c1, c2, c3") as error:
         bounding_volume(views[:1] + empty[1:])
+    assert error.value.camera == "c1"
     aside = silhouettes_of([ellipsoid((0.3, 0.3, 0.3), np.full(3, 0.03))], cameras_around(4))
     with pytest.raises(TrackerError, match="none in common"):
         bounding_volume(views[:2] + aside[2:])

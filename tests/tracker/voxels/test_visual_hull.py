@@ -29,7 +29,18 @@ def test_a_broken_view_is_left_out():
     hull = carve_people([*views[:2], views[2]._replace(mask=holed), *views[3:]], SIZE_M)
     whole = carve_people(views, SIZE_M)
     assert hull.broken == ("c2",)
+    assert hull.least_explained is None
     assert 0.9 < hull.figures[0].volume_m3 / whole.figures[0].volume_m3 < 1.3
+
+
+def test_a_silhouette_that_shows_more_than_people_is_explained_least():
+    views = silhouettes_of([MAN], CAMERAS)
+    for i, extra in ((1, 1), (4, 2)):
+        mask = views[i].mask.copy()
+        rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+        mask[rows[0] : rows[-1], columns[-1] : columns[-1] + extra * (columns[-1] - columns[0]) // 4] = True
+        views[i] = views[i]._replace(mask=mask)
+    assert carve_people(views, SIZE_M).least_explained == 4
 
 
 def turned(view, radians):
@@ -58,6 +69,17 @@ def test_no_view_is_left_out_where_several_could_be():
     views = silhouettes_of([MAN], cameras_around(101, focal=250.0)[49:52])
     with pytest.raises(TrackerError, match="no camera has moved"):
         carve_people([views[0], turned(views[1], 0.15), views[2]], SIZE_M)
+
+
+def test_the_silhouette_that_is_explained_least_is_named():
+    views = silhouettes_of([MAN], CAMERAS)
+    for i, margin in ((1, 20), (4, 10)):
+        mask = np.zeros_like(views[i].mask)
+        mask[margin:-margin, margin:-margin] = True
+        views[i] = views[i]._replace(mask=mask)
+    with pytest.raises(TrackerError, match=r"little can be explained \(c1 \d+%, c4 \d+%\)") as error:
+        carve_people(views, SIZE_M)
+    assert error.value.camera == "c4"
 
 
 def test_nothing_of_the_size_of_a_person():

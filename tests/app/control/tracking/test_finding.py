@@ -151,9 +151,11 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
     state = controller.state
     assert (state.frame, state.finding.tried) == (2, 2)
     view = View(frozenset({"contours"}), (1,) * len(controller.session.cameras), False)
-    drawn = [p for p in overlays.paths(controller.session_of(state), state, view, None) if p.kind == "candidate"]
+    drawn = overlays.paths(controller.session_of(state), state, view, None)
+    assert {p.kind for p in drawn} == {"candidate"}  # not the body that nobody has placed
     assert {p.camera for p in drawn} == set(range(len(controller.session.cameras)))
     assert all(len(p.segments_px) > 0 for p in drawn)
+    assert overlays.handles(controller.session_of(state), state, view.cameras) == []
     go[0].set()
     wait_for(lambda: controller.state.frame == 3)
     assert set(controller.state.finding.candidates) == {2, 3}
@@ -168,6 +170,7 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
     wait_for(lambda: not controller.state.finding.running)
     found = controller.state.finding
     assert (found.failed, found.tried, dict(found.candidates)) == (True, 2, {})  # the message is about the first frame
+    assert overlays.handles(controller.session_of(state), controller.state, view.cameras)  # to be placed by hand
 
 
 def test_an_error_is_one_sentence(opened, monkeypatch):
@@ -175,12 +178,14 @@ def test_an_error_is_one_sentence(opened, monkeypatch):
         for frame in (2, 4):
             show(frame, None)
             wait_for(lambda: controller.state.frame == frame)  # noqa: B023
-        raise TrackerError("expected somebody in the silhouettes, found none")
+        raise TrackerError("expected somebody in the silhouettes, found none", camera=camera)
 
     monkeypatch.setattr(finding, "find_people", fail)
     controller = opened()
+    camera = controller.session.cameras[1].camera.name
     controller.finding.start()
     wait_for(lambda: not controller.state.finding.running)
     assert controller.state.finding.message == "Expected somebody in the silhouettes, found none."
     assert controller.state.finding.failed
+    assert controller.state.finding.camera == 1
     assert (controller.state.frame, controller.state.finding.tried) == (2, 2)  # the message is about the first frame
