@@ -143,7 +143,7 @@ def _call_others(session: Session) -> None:
     from tracker.contours.label_image import part_labels
     from tracker.evidence.silhouettes import SilhouetteFinder
     from tracker.geometry.cameras import viewed_point
-    from tracker.initialization.silhouette_overlap import SilhouetteOverlap
+    from tracker.initialization.generators.silhouette_overlap import SilhouetteOverlap
     from tracker.simulate.people.model_figure import ModelFigure
     from tracker.simulate.stage.camera_rig import make_cameras
     from tracker.simulate.stage.film import film, freeze

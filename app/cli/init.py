@@ -134,7 +134,7 @@ def init_from_joints(at: Target, frame: int, joints: "MarkerTable", sizes: bool)
     from tracker.acquisition.from_joints import height_from_joints
     from tracker.fitting.gauss_newton import fit_to_points
     from tracker.formats.joint_maps import LIMB_JOINTS
-    from tracker.pipeline.body_acquisition import has_preset_sizes
+    from tracker.formats.model_toml import has_preset_sizes
     from tracker.session.lock import SessionLock
     from tracker.session.session import save_session
 

@@ -9,7 +9,7 @@ from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.pipeline.first_pose import FirstPoses
+    from tracker.initialization.first_pose import FirstPoses
     from tracker.session.session import Session
     from tracker.store.annotation_store import AnnotationStore
 
@@ -36,8 +36,8 @@ def init_from_silhouettes(
     """
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
+    from tracker.initialization.first_pose import find_first_poses, find_first_poses_anywhere
     from tracker.pipeline.find_people import FoundPeople, frames_to_try, store_found
-    from tracker.pipeline.first_pose import find_first_poses, find_first_poses_anywhere
     from tracker.session.lock import SessionLock
     from tracker.session.relink import require_files
     from tracker.store.annotation_store import AnnotationStore
@@ -59,7 +59,7 @@ def init_from_silhouettes(
             tried = frames_to_try(range(session.n_frames), frame)
             first = find_first_poses_anywhere(session, observer, people, tried, voxel_m, progress.say)
         else:
-            first = find_first_poses(session, observer, people, [frame], (method,), voxel_m)  # type: ignore[arg-type]
+            first = find_first_poses(session, observer, people, [frame], (method,), voxel_m)
         bodies = {i: p.model for i, p in first.poses.items()}
         poses = {i: p.fitted.pose for i, p in first.poses.items()}
         store_found(session, store, FoundPeople(first, bodies, poses, {}), f"init from {method}")
@@ -76,7 +76,7 @@ def first_poses_record(session: "Session", first: "FirstPoses") -> dict[str, Any
     people = [
         {
             "person": session.people[i].name,
-            "method": p.candidate.method,
+            "method": p.candidate.generator,
             "height_m": p.model.height_m,
             "status": p.fitted.status,
             "cost_px": p.fitted.cost_px,

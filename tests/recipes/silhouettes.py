@@ -16,7 +16,7 @@ from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.recording import Recording, background_frames
 from tracker.geometry.ground_plane import floor_plane
 from tracker.images.background_subtraction import SHADOWS, SHADOWS_AND_HIGHLIGHTS, Shading
-from tracker.pipeline.first_pose import VOXEL_M
+from tracker.initialization.first_pose import VOXEL_M
 from tracker.session.session import load_session
 from tracker.voxels.shadows import recover_from_shadows
 

@@ -17,10 +17,10 @@ from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.ground_plane import floor_plane
-from tracker.initialization.body_axis import find_body_axes
-from tracker.initialization.head_template import find_head
-from tracker.initialization.silhouette_axis import major_axis
-from tracker.pipeline.first_pose import VOXEL_M, find_first_poses
+from tracker.initialization.first_pose import VOXEL_M, find_first_poses
+from tracker.initialization.generators.body_axis import find_body_axes
+from tracker.initialization.generators.head_template import find_head
+from tracker.initialization.generators.silhouette_axis import major_axis
 from tracker.session.session import load_session
 from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.shadows import recover_from_shadows
@@ -74,7 +74,8 @@ def _row(found, references, frame):
     listed = " ".join(found.notes)
     print(f"{frame:4d} before {best[0]:4.0f} after {best[1]:4.0f} left {'right' if best[2] else 'WRONG'}", end=" ")
     print(
-        f"{found.candidate.method} {'sure' if found.is_facing_sure else 'unsure'} {found.candidate.cues:.1f}", end=" "
+        f"{found.candidate.generator} {'sure' if found.is_facing_sure else 'unsure'} {found.candidate.cues:.1f}",
+        end=" ",
     )
     print(f"{found.model.height_m:.2f} m {found.fitted.status} {found.fitted.cost_px:.2f} px {listed[:150]}")
     return best

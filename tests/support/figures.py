@@ -5,8 +5,8 @@ from staging import camera_at
 
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.ground_plane import GroundPlane
-from tracker.initialization.candidates import PersonScene
-from tracker.initialization.voxel_start import locate_parts, possible_heads
+from tracker.initialization.generators.person_scene import PersonScene
+from tracker.initialization.generators.voxel_start import locate_parts, possible_heads
 from tracker.voxels.figure_masks import figure_masks, paint
 from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels

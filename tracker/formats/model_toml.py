@@ -329,3 +329,8 @@ def _search_groups(model: BodyModel, groups: Sequence[_GroupRow], where: str) ->
             raise ModelError(f"{where}: search group '{group.name}' names '{min(doubles)}' twice; leave one out")
         out.append(SearchGroup(group.name, tuple(dofs)))
     return tuple(out)
+
+
+def has_preset_sizes(model: BodyModel) -> bool:
+    """Return whether a body still has all sizes of its preset, so that the height of the person is not known."""
+    return model.name in PRESETS and format_model(model) == format_model(load_model(model.name))

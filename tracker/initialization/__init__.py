@@ -1,5 +1,6 @@
 """Find first poses automatically, from the voxels and the silhouettes of a frame (MTHC01 Sect. 3, GD96 Sect. 4.1).
 
-May import the rooms below it, up to `tracking.chamfer`. Callers take starts from `candidates.METHODS`, fit them by
-`start_fit.StartFitter` and check them by `silhouette_check.check_against_silhouettes`.
+May import the rooms below it, up to `tracking.chamfer`. Callers ask `first_pose.find_first_poses` for the poses of
+people on given frames, and `first_pose.find_first_poses_anywhere` for those on the best of them. Generators propose
+(`tracker.initialization.generators`). This room fits, searches, tracks and compares (`start_choice.compare_starts`).
 """

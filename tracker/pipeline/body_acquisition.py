@@ -15,7 +15,7 @@ from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock, pin_block
-from tracker.formats.model_toml import PRESETS, format_model, load_model
+from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.seen_points import seen_points
@@ -111,11 +111,6 @@ def _acquire(
     if not known.has_known_joints:
         settings = replace(settings, priors=settings.priors.anatomical())
     return acquire_from_contours(observer, known.bodies, 0, known.placed, settings, report, known.seen)
-
-
-def has_preset_sizes(model: BodyModel) -> bool:
-    """Return whether a body still has all sizes of its preset, so that the height of the person is not known."""
-    return model.name in PRESETS and format_model(model) == format_model(load_model(model.name))
 
 
 def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedFrames:

@@ -11,14 +11,14 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
-from tracker.pipeline.body_acquisition import SIZES_EDITS, PosedFrames, acquire_body, with_sizes_changed
-from tracker.pipeline.first_pose import (
+from tracker.initialization.first_pose import (
     ENOUGH_FRAMES,
     FirstPose,
     FirstPoses,
     Show,
     find_first_poses_anywhere,
 )  # fmt: skip
+from tracker.pipeline.body_acquisition import SIZES_EDITS, PosedFrames, acquire_body, with_sizes_changed
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
@@ -89,11 +89,11 @@ def frames_to_try(frames: range, first: int | None) -> list[int]:
 
 
 def expected_steps(n_frames: int, done: int, good: int) -> int:
-    """Return how many frames and methods will have been tried if all that follow are good.
+    """Return how many trials of frames there will have been tried if all that follow are good.
 
     Args:
         n_frames: frames that may be tried.
-        done: number of frames and methods that were tried.
+        done: number of them so far.
         good: number of them that gave good first poses.
     """
     return max(done, min(n_frames, done + max(0, ENOUGH_FRAMES - good)))
@@ -182,7 +182,7 @@ def first_record(found: FoundPeople, person: int, revision: int) -> PoseRecord:
     """
     first: FirstPose = found.first.poses[person]
     pose = found.poses[person]
-    settings: dict[str, Any] = {"method": first.candidate.method}
+    settings: dict[str, Any] = {"method": first.candidate.generator}
     return PoseRecord(
         pose, ("searched",) * len(pose), revision, status=first.fitted.status, settings=settings,
         remark="; ".join(first.notes),
@@ -230,8 +230,8 @@ def sentences(session: Session, found: FoundPeople) -> list[str]:
     for person, first in found.first.poses.items():
         name = session.people[person].name
         out.append(
-            f"{name}: started on frame {found.frame} by {first.candidate.method}, {first.model.height_m:.2f} m tall, "
-            f"{first.fitted.status}, cost {first.fitted.cost_px:.2f} px over a short track"
+            f"{name}: started on frame {found.frame} by {first.candidate.generator}, "
+            f"{first.model.height_m:.2f} m tall, {first.fitted.status}, cost {first.fitted.cost_px:.2f} px over a short track"
         )
         out += [f"{name}: {note}" for note in first.notes]
         if person in found.acquired:

@@ -15,6 +15,7 @@ from app.state.progress import FindState, Line
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
+from tracker.initialization.first_pose import FirstPoses
 from tracker.pipeline.body_acquisition import SIZES_EDITS, with_sizes_changed
 from tracker.pipeline.find_people import (
     AXES,
@@ -25,7 +26,6 @@ from tracker.pipeline.find_people import (
     first_record,
     sentences,
 )
-from tracker.pipeline.first_pose import FirstPoses
 from tracker.session.session import save_model
 from tracker.store.records import PoseChange
 

@@ -9,11 +9,11 @@ import pytest
 from app.cli.target import load_target
 from app.cli.track_found import track_found
 from tracker.errors import TrackerError
-from tracker.initialization.candidates import StartCandidate
+from tracker.initialization.first_pose import FirstPose, FirstPoses
+from tracker.initialization.generators.start_generators import StartCandidate
 from tracker.initialization.start_fit import FittedStart
 from tracker.pipeline import find_people as finding
 from tracker.pipeline.find_people import FoundPeople
-from tracker.pipeline.first_pose import FirstPose, FirstPoses
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 

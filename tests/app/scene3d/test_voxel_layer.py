@@ -12,7 +12,7 @@ from app.drawing.overlay_colors import rgb
 from app.scene3d import voxel_layer
 from app.scene3d.voxel_layer import VoxelLayer, part_colors
 from tracker.formats.model_toml import load_model
-from tracker.initialization.voxel_start import start_pose
+from tracker.initialization.generators.voxel_start import start_pose
 from tracker.tracking.voxel.body_pose import state_of
 from tracker.tracking.voxel.figure import figure_of
 from tracker.tracking.voxel.settings import VoxelSettings

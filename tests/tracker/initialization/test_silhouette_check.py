@@ -6,8 +6,8 @@ from figures import cameras_about_a_figure, figure, parts_of, silhouettes_of_fig
 
 from tracker.body.model import PosedBody
 from tracker.formats.model_toml import load_model
+from tracker.initialization.generators.voxel_start import start_pose
 from tracker.initialization.silhouette_check import check_against_silhouettes
-from tracker.initialization.voxel_start import start_pose
 from tracker.voxels.figure_masks import figure_masks
 
 

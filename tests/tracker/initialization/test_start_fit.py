@@ -30,7 +30,7 @@ def fits(monkeypatch):
 
         def estimates(self, run):
             runs.append(own := [])
-            pose = run.start[0]
+            pose = run.start[0][-1]
             for frame in run.frames:
                 own.append(frame)
                 cost = costs[min(len(runs), len(costs)) - 1] if frame == 5 else 2.0

@@ -13,9 +13,10 @@ from solids import ellipsoid, silhouettes_of
 from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.formats.model_toml import format_model
-from tracker.initialization.candidates import StartCandidate
+from tracker.initialization import first_pose, own_figure
+from tracker.initialization.first_pose import FirstPose, FirstPoses, find_first_poses, find_first_poses_anywhere
+from tracker.initialization.generators.start_generators import GENERATORS, StartCandidate, from_voxels
 from tracker.initialization.start_fit import FittedStart
-from tracker.pipeline import first_pose, own_figure
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_sizes_changed
 from tracker.pipeline.find_people import (
     AXES,
@@ -26,7 +27,6 @@ from tracker.pipeline.find_people import (
     frames_to_try,
     store_found,
 )
-from tracker.pipeline.first_pose import FirstPose, FirstPoses, find_first_poses
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.voxels.visual_hull import VisualHull
@@ -81,17 +81,17 @@ def find(session, size_m=0.05):
 
 def test_frames_are_tried_far_from_one_another():
     tried = frames_to_try(range(100), None)
-    assert tried[:3] == [50, 0, 99]
+    assert tried[:3] == [50, 4, 95]
     assert len(tried) == len(set(tried)) == 12
     assert frames_to_try(range(10, 14), 12) == [12, 10, 11, 13]
     assert set(frames_to_try(range(0, 60, 3), None)) <= set(range(0, 60, 3))
 
 
 def test_the_share_that_is_done_counts_the_frames_that_will_be_tried():
-    """Five good frames are enough of twelve, so that the first good one is a seventh of the work, not a fourteenth."""
-    assert [expected_steps(12, done, done) for done in range(6)] == [7, 7, 7, 7, 7, 7]
-    assert [expected_steps(12, done, 0) for done in (0, 4, 12, 14)] == [7, 11, 14, 14]
-    assert expected_steps(2, 2, 1) == 4
+    """Two good frames are enough of twelve, so that the first good one is half the work, not a twelfth."""
+    assert [expected_steps(12, done, done) for done in range(4)] == [2, 2, 2, 3]
+    assert [expected_steps(12, done, 0) for done in (0, 4, 12, 14)] == [2, 6, 12, 14]
+    assert expected_steps(2, 2, 1) == 2
 
 
 def test_a_stop_is_heard_between_two_fits_of_a_frame(session, silhouettes, monkeypatch):
@@ -117,6 +117,42 @@ def test_a_stop_is_heard_between_two_fits_of_a_frame(session, silhouettes, monke
     with pytest.raises(InterruptedError):
         find_people(session, OBSERVER, [0], range(3, 4), FindSettings(), report)
     assert len(fitted) == 1
+
+
+def test_a_generator_is_added_by_an_entry_and_tried_where_the_others_propose_nothing(
+    session, silhouettes, fits, monkeypatch
+):
+    silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
+
+    def proposed(scene, model, is_known):
+        return [c._replace(generator="mine") for c in from_voxels(scene, model, is_known)]
+
+    def nothing(scene, model, is_known):
+        raise TrackerError("expected a head, found none")
+
+    for name in GENERATORS:
+        monkeypatch.setitem(GENERATORS, name, nothing)
+    monkeypatch.setitem(GENERATORS, "mine", proposed)
+    said = []
+    found = find_first_poses_anywhere(session, OBSERVER, [0], [3], 0.05, said.append)
+    assert found.poses[0].candidate.generator == "mine"
+    assert [text.split(":")[0] for text in said] == [f"frame 3, {name}" for name in GENERATORS]
+
+
+def test_two_frames_that_agree_end_the_trial(session, silhouettes, fits, monkeypatch):
+    silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
+    tried = list[int]()
+    frames = [20, 10, 30, 15]
+    find_first_poses_anywhere(
+        session, OBSERVER, [0], frames, 0.05, show=lambda frame, found: found is None and tried.append(frame)
+    )
+    assert tried == [20, 10]
+    monkeypatch.setattr(first_pose, "_HEIGHTS_AGREE", 0.0)
+    tried.clear()
+    find_first_poses_anywhere(
+        session, OBSERVER, [0], frames, 0.05, show=lambda frame, found: found is None and tried.append(frame)
+    )
+    assert tried == frames
 
 
 def test_nobody_in_the_silhouettes(session, silhouettes):

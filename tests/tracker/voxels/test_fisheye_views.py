@@ -12,7 +12,7 @@ from staging import camera_at
 from tracker.body.model import PosedBody
 from tracker.contours.body_silhouette import body_silhouette
 from tracker.geometry.ground_plane import GroundPlane
-from tracker.initialization.silhouette_axis import major_axis
+from tracker.initialization.generators.silhouette_axis import major_axis
 from tracker.voxels.bounding_volume import bounding_volume
 from tracker.voxels.carving import Carver, CarveSettings
 from tracker.voxels.figure_masks import _px_per_m, paint

@@ -19,7 +19,7 @@ from app.state.page_view import View
 from tracker.compute import kernel_cache
 from tracker.compute.interpretation import is_interpreted
 from tracker.compute.kernel_cache import STAGES, compiled_mark, compiled_stages, record_compiled, record_stage
-from tracker.initialization import silhouette_overlap
+from tracker.initialization.generators import silhouette_overlap
 from tracker.session.session import load_session
 from tracker.tracking.voxel import labels
 from tracker.voxels import carving

@@ -11,10 +11,10 @@ from app.drawing import overlays
 from app.page import inspector_feed
 from app.state.page_view import View
 from tracker.errors import TrackerError
-from tracker.initialization.candidates import StartCandidate
+from tracker.initialization.first_pose import FirstPose, FirstPoses
+from tracker.initialization.generators.start_generators import StartCandidate
 from tracker.initialization.start_fit import FittedStart
 from tracker.pipeline.find_people import FoundPeople
-from tracker.pipeline.first_pose import FirstPose, FirstPoses
 
 FRAME = 1
 

@@ -5,7 +5,12 @@ import pytest
 
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.geometry import rigid
-from tracker.initialization.limb_poses import changes_around, changes_within_limits, moving_limbs, trunk_parts
+from tracker.initialization.generators.limb_poses import (
+    changes_around,
+    changes_within_limits,
+    moving_limbs,
+    trunk_parts,
+)
 
 MODEL = load_model("gavrila34")
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.geometry.arrays import Array
-from tracker.initialization.candidates import StartCandidate
+from tracker.initialization.generators.start_generators import StartCandidate
 from tracker.initialization.start_fit import FittedStart, StartFitter, track_back
 
 _N_TRACKED = 4

@@ -1,6 +1,6 @@
 """Find the first pose of a person in a session with nobody's help, and store it.
 
-On each frame that is tried every method gives start poses (`tracker.initialization.candidates`), one for each way of
+On each frame that is tried generators propose start poses (`tracker.initialization.generators`), one for each way of
 facing. Each is fitted to the contours. The best are searched around and tracked over a few frames in both directions.
 The cheapest track is kept. It is doubtful where another start costs as much, or where it loses the person.
 """
@@ -16,17 +16,18 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
+from tracker.formats.model_toml import has_preset_sizes
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
-from tracker.initialization.candidates import METHODS, PersonScene, StartCandidate, StartMethod, silhouette_axes
+from tracker.initialization.generators.person_scene import PersonScene, silhouette_axes
+from tracker.initialization.generators.start_generators import GENERATORS, StartCandidate
+from tracker.initialization.generators.voxel_start import SURE
+from tracker.initialization.own_figure import figure_motion, others_on_frame, own_figure
 from tracker.initialization.silhouette_check import check_against_silhouettes
+from tracker.initialization.standing_heights import StandingHeights
+from tracker.initialization.start_choice import Start, compare_starts, face_opposite, weighed_px
 from tracker.initialization.start_fit import FittedStart, StartFitter, short_tracks
 from tracker.initialization.start_rivals import rivals_note
-from tracker.initialization.voxel_start import SURE
-from tracker.pipeline.body_acquisition import has_preset_sizes
-from tracker.pipeline.own_figure import figure_motion, others_on_frame, own_figure
-from tracker.pipeline.standing_heights import StandingHeights
-from tracker.pipeline.start_choice import Start, compare_starts, face_opposite, weighed_px
 from tracker.session.session import Session
 from tracker.tracking.confidence import worst
 from tracker.voxels.figure_masks import FigureMask, figure_masks
@@ -40,8 +41,8 @@ _MOTION_FRAMES = 6
 """Frames over which the motion of a figure is measured."""
 ENOUGH_FRAMES = 2
 """Number of frames with good starts whose heights agree that end the trial of `auto`."""
-_OTHER_METHOD_FRAMES = 5
-"""Frames on which `auto` tries another method where voxels gave no good start, the cheapest first."""
+_OTHER_FRAMES = 5
+"""Frames on which `auto` tries another generator where the first gave no good start."""
 _HEIGHTS_AGREE = 0.06
 """Share by which the heights of a person on two such frames differ at most: two standard deviations of their difference
 (`find_people.MEASURED`)."""
@@ -98,7 +99,7 @@ class FirstPoses(NamedTuple):
 
 def find_first_poses(
     session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int],
-    methods: Sequence[StartMethod] = ("voxels",), size_m: float = VOXEL_M, say: Say = lambda text: None,
+    generators: Sequence[str] = ("voxels",), size_m: float = VOXEL_M, say: Say = lambda text: None,
 ) -> FirstPoses:  # fmt: skip
     """Find the poses of some people on one of some frames, on which all stand apart.
 
@@ -109,7 +110,7 @@ def find_first_poses(
         observer: of its recording.
         people: indices of the people. Others are where their stored poses are.
         frames: the frames to try; at least one.
-        methods: to try on each frame.
+        generators: to try on each frame.
         size_m: edge of a voxel, metres.
         say: receives a sentence on each frame that is tried. What it raises ends the search.
 
@@ -118,7 +119,7 @@ def find_first_poses(
     """
     with _Trial(session, observer, people, size_m, say) as trial:
         for frame in frames:
-            trial.add(frame, methods)
+            trial.add(frame, generators)
         return trial.best()
 
 
@@ -126,25 +127,24 @@ def find_first_poses_anywhere(
     session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int], size_m: float = VOXEL_M,
     say: Say = lambda text: None, show: Show = lambda frame, found: None, step: Callable[[], None] = lambda: None,
 ) -> FirstPoses:  # fmt: skip
-    """Find first poses by whatever method and on whatever of some frames tracks best; see `find_first_poses`.
+    """Find first poses by whatever generator and on whatever of some frames tracks best; see `find_first_poses`.
 
-    Voxels are tried until the starts of two frames are good and agree on the heights. The axis is tried where no start
-    is good, the cheapest frames first, and then a search along the figure. `show` receives each frame and what was
-    found on it.
-    `step` is called between fits and for each silhouette, every second or so and from several threads; what it raises
-    ends the search.
+    The cheapest generator is tried until the starts of two frames are good and agree on the heights. The others are
+    tried where no start is good, one after the other, on the frames that cost least. `show` receives each frame and
+    what was found on it. `step` is called between fits and for each silhouette, every second or so and from several
+    threads; what it raises ends the search.
     """
+    cheapest, *others = GENERATORS
     with _Trial(session, observer, people, size_m, say, show, step) as trial:
         for frame in frames:
             if trial.is_settled:
                 break
-            trial.add(frame, ("voxels",))
+            trial.add(frame, (cheapest,))
         by_cost = [f.frame for f in sorted(trial.found, key=lambda f: f.cost_px)] or list(frames)
-        others: tuple[StartMethod, ...] = ("axis", "search")
-        for method, frame in product(others, by_cost[:_OTHER_METHOD_FRAMES]):
+        for name, frame in product(others, by_cost[:_OTHER_FRAMES]):
             if any(f.is_good for f in trial.found):
                 break
-            trial.add(frame, (method,))
+            trial.add(frame, (name,))
         return trial.best()
 
 
@@ -185,30 +185,31 @@ class _Trial:
 
         return _Source(silhouettes, StandingHeights(scenes, self._session.n_frames, len(self._session.people)))
 
-    def add(self, frame: int, methods: Sequence[StartMethod]) -> None:
+    def add(self, frame: int, generators: Sequence[str]) -> None:
         """Try a frame."""
         own: dict[int, FirstPose] = {}
         self._show(frame, None)
         try:
             for person in self._people:
                 task = _Task(self._session, self._observer, self._sources, person, self._size_m, self._step)
-                own[person] = _best_on_frame(task, frame, methods, own)
+                own[person] = _best_on_frame(task, frame, generators, own)
         except TrackerError as error:
             self._errors.append(error)
-            self._say(f"frame {frame}, {' and '.join(methods)}: {error}")
+            self._say(f"frame {frame}, {' and '.join(generators)}: {error}")
             return
         self.found.append(FirstPoses(frame, own))
         self._show(frame, self.found[-1])
         statuses = ", ".join(p.fitted.status for p in own.values())
         cost = f"cost {self.found[-1].cost_px:.2f} px over a short track"
-        self._say(f"frame {frame}, {' and '.join(methods)}: {statuses}, {cost}")
+        self._say(f"frame {frame}, {' and '.join(generators)}: {statuses}, {cost}")
 
     @property
     def is_settled(self) -> bool:
         """Whether two frames have good starts that agree on the heights of all."""
         heights = [[p.model.height_m for p in f.poses.values()] for f in self.found if f.is_good]
         return any(
-            bool(np.all(np.abs(np.log(np.divide(a, b))) < _HEIGHTS_AGREE)) for a, b in combinations(heights, ENOUGH_FRAMES)
+            bool(np.all(np.abs(np.log(np.divide(a, b))) < _HEIGHTS_AGREE))
+            for a, b in combinations(heights, ENOUGH_FRAMES)
         )
 
     def best(self) -> FirstPoses:
@@ -243,7 +244,7 @@ class _Task(NamedTuple):
 
 
 def _best_on_frame(
-    task: _Task, frame: int, methods: Sequence[StartMethod], found: Mapping[int, FirstPose]
+    task: _Task, frame: int, generators: Sequence[str], found: Mapping[int, FirstPose]
 ) -> FirstPose:  # fmt: skip
     """Return the pose on a frame; where it is not good, that with what looks like shadows if it is better."""
     poses, errors, before = list[FirstPose](), list[TrackerError](), None
@@ -253,7 +254,7 @@ def _best_on_frame(
             break
         before = silhouettes
         try:
-            poses.append(_on_frame(task, frame, source, silhouettes, methods, found))
+            poses.append(_on_frame(task, frame, source, silhouettes, generators, found))
         except TrackerError as error:
             errors.append(error)
         if poses and poses[-1].fitted.status == "good":
@@ -270,7 +271,7 @@ def _are_larger(silhouettes: Sequence[ViewSilhouette], before: Sequence[ViewSilh
 
 def _on_frame(
     task: _Task, frame: int, source: _Source, silhouettes: Sequence[ViewSilhouette],
-    methods: Sequence[StartMethod], found: Mapping[int, FirstPose],
+    generators: Sequence[str], found: Mapping[int, FirstPose],
 ) -> FirstPose:  # fmt: skip
     session, observer, _, person, size_m, step = task
     hull = carve_people(silhouettes, size_m)
@@ -282,7 +283,7 @@ def _on_frame(
     scene = PersonScene(figure, silhouettes, masks, floor_plane(session.up, session.floor), motion)
     model = session.people[person].model
     height_m = source.heights.around(scene, frame, person) if has_preset_sizes(model) else None
-    candidates = _candidates(scene, model if height_m is None else model.with_height(height_m), methods)
+    candidates = _candidates(scene, model if height_m is None else model.with_height(height_m), generators)
     fitter = StartFitter(observer, frame, short_tracks(frame, session.n_frames), tuple(others), step)
     searched, tracked, is_lost = compare_starts(fitter, candidates, lambda runs: _filling(runs, silhouettes, masks))
     best, fit = tracked[0]
@@ -321,13 +322,13 @@ def _filling(
     return kept
 
 
-def _candidates(scene: PersonScene, model: BodyModel, methods: Sequence[StartMethod]) -> list[StartCandidate]:
-    """Return the starts of all methods; those that fail are left out unless all do."""
+def _candidates(scene: PersonScene, model: BodyModel, generators: Sequence[str]) -> list[StartCandidate]:
+    """Return the starts of all generators; those that fail are left out unless all do."""
     found, errors = list[StartCandidate](), list[TrackerError]()
     is_known = not has_preset_sizes(model)
-    for method in methods:
+    for name in generators:
         try:
-            found += METHODS[method](scene, model, is_known)
+            found += GENERATORS[name](scene, model, is_known)
         except TrackerError as error:
             errors.append(error)
     if not found:

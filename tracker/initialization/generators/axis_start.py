@@ -16,9 +16,14 @@ from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import fit_to_points, value_mask
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.initialization.body_axis import SHOULDERS, BodyAxis
-from tracker.initialization.limb_poses import changes_around, changes_within_limits, moving_limbs, trunk_parts
-from tracker.initialization.silhouette_overlap import SilhouetteOverlap
+from tracker.initialization.generators.body_axis import SHOULDERS, BodyAxis
+from tracker.initialization.generators.limb_poses import (
+    changes_around,
+    changes_within_limits,
+    moving_limbs,
+    trunk_parts,
+)
+from tracker.initialization.generators.silhouette_overlap import SilhouetteOverlap
 
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _N_TWISTS = 12

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array, IntArray
-from tracker.initialization.torso_template import Torso
+from tracker.initialization.generators.torso_template import Torso
 from tracker.voxels.paths import VoxelGraph, path_lengths
 from tracker.voxels.voxel_grid import Voxels
 

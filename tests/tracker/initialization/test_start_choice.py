@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tracker.formats.model_toml import load_model
-from tracker.initialization.candidates import StartCandidate
+from tracker.initialization import start_choice
+from tracker.initialization.generators.start_generators import StartCandidate
+from tracker.initialization.start_choice import compare_starts
 from tracker.initialization.start_fit import FittedStart
-from tracker.pipeline import start_choice
-from tracker.pipeline.start_choice import compare_starts
 
 MODEL = load_model("gavrila34")
 AHEAD = np.array([1.0, 0.0, 0.0])
@@ -86,4 +86,4 @@ def test_a_start_that_costs_much_more_on_the_frame_is_not_tracked(on_frame, n_tr
 
 def test_starts_that_end_at_the_same_pose_are_one():
     fits = [(candidate(x, name=n), FittedStart(at(x), "good", 1.0)) for n, x in (("a", 0.0), ("b", 0.02), ("c", 0.2))]
-    assert [c.method for c, _ in start_choice._distinct(fits)] == ["a", "c"]
+    assert [c.generator for c, _ in start_choice._distinct(fits)] == ["a", "c"]

@@ -10,9 +10,9 @@ from tracker.errors import Remedy, TrackerError
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
-from tracker.initialization.head_template import Head, find_head, find_upper_head
-from tracker.initialization.limb_regions import LimbRegion, find_limbs
-from tracker.initialization.torso_template import Torso, find_torso
+from tracker.initialization.generators.head_template import Head, find_head, find_upper_head
+from tracker.initialization.generators.limb_regions import LimbRegion, find_limbs
+from tracker.initialization.generators.torso_template import Torso, find_torso
 from tracker.voxels.paths import VoxelGraph
 from tracker.voxels.voxel_grid import Voxels
 

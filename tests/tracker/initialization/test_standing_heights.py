@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tracker.errors import TrackerError
-from tracker.pipeline import standing_heights
-from tracker.pipeline.standing_heights import StandingHeights
+from tracker.initialization import standing_heights
+from tracker.initialization.standing_heights import StandingHeights
 
 
 def scene(x_m, height_m=None):

@@ -8,15 +8,10 @@ from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.geometry.ground_plane import GroundPlane
-from tracker.initialization.candidates import (
-    from_axis,
-    from_search,
-    from_voxels,
-    silhouette_axes,
-    standing_height,
-    upright_height,
-)
-from tracker.initialization.head_template import find_head
+from tracker.initialization.generators.head_template import find_head
+from tracker.initialization.generators.person_scene import silhouette_axes
+from tracker.initialization.generators.start_generators import from_axis, from_search, from_voxels
+from tracker.initialization.generators.stature import standing_height, upright_height
 from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.voxel_grid import Voxels
 

@@ -6,8 +6,8 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import PRESETS, load_model
-from tracker.initialization.head_template import find_head
-from tracker.initialization.voxel_start import start_pose, turned_round
+from tracker.initialization.generators.head_template import find_head
+from tracker.initialization.generators.voxel_start import start_pose, turned_round
 from tracker.voxels.paths import neighbor_graph
 from tracker.voxels.voxel_grid import Voxels
 

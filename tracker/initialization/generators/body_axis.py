@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.errors import Remedy, TrackerError
 from tracker.geometry.arrays import Array
-from tracker.initialization.silhouette_axis import MajorAxis
+from tracker.initialization.generators.silhouette_axis import MajorAxis
 
 _MAX_OFF_RAD = np.radians(20)
 """Largest angle between the axis and the plane of a view that agrees with the others."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
-from tracker.initialization.candidates import PersonScene, upright_height
+from tracker.initialization.generators.person_scene import PersonScene
+from tracker.initialization.generators.stature import upright_height
 
 _STEP = 6
 """Distance of the frames on which heights are measured."""

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from staging import camera_at
 
-from tracker.initialization.silhouette_axis import major_axis
+from tracker.initialization.generators.silhouette_axis import major_axis
 
 CAMERA = camera_at("c", (4.0, 0.0, 0.0))
 

@@ -8,8 +8,8 @@ from figures import UP, cameras_about_a_figure, figure, silhouettes_of_figure
 
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
-from tracker.initialization.body_axis import find_body_axes
-from tracker.initialization.silhouette_axis import major_axis
+from tracker.initialization.generators.body_axis import find_body_axes
+from tracker.initialization.generators.silhouette_axis import major_axis
 
 CAMERAS = cameras_about_a_figure()
 TOP_M = 1.62 + 0.125

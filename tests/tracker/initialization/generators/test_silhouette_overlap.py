@@ -8,7 +8,7 @@ from tracker.body.model import PosedBody
 from tracker.contours.body_silhouette import body_silhouette
 from tracker.formats.model_toml import load_model
 from tracker.geometry.arrays import intersection_over_union
-from tracker.initialization.silhouette_overlap import SilhouetteOverlap
+from tracker.initialization.generators.silhouette_overlap import SilhouetteOverlap
 
 MODEL = load_model("gavrila34")
 POSE = MODEL.neutral() + np.eye(len(MODEL.neutral()))[2] * 1.3
