@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.geometry.arrays import Array, FloatArray
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.lens_tables import Lens, lens_of
 
@@ -60,13 +60,13 @@ def lookup_of_lens(lens: Lens) -> SensorLookup:
     return SensorLookup(pixels, low, step, _steepest(exact) / step)
 
 
-def _exact_pixels(camera: Camera, x: Array, y: Array) -> FloatArray:
+def _exact_pixels(camera: Camera, x: Array, y: Array) -> Array:
     """Return the raw pixel of each point of a grid of sensor coordinates, (len(y), len(x), 2)."""
     points = np.stack([*np.meshgrid(x, y), np.ones((len(y), len(x)))], axis=-1).reshape(-1, 3)
     exact = camera.project(points)
     # Beyond the lens the polynomial bends back: nothing is seen there.
     exact[~camera.within_lens(camera.pinhole.project(points)) | np.isnan(exact).any(axis=-1)] = BEYOND_LENS
-    return exact.astype(np.float32).reshape(len(y), len(x), 2)
+    return exact.reshape(len(y), len(x), 2)
 
 
 def _border(camera: Camera) -> tuple[Array, Array]:
@@ -80,7 +80,7 @@ def _border(camera: Camera) -> tuple[Array, Array]:
     return xy.min(axis=0), xy.max(axis=0)
 
 
-def _steepest(pixels: FloatArray) -> float:
+def _steepest(pixels: Array) -> float:
     """Return the largest change of a pixel coordinate per step of the table, for a step in any direction of a box."""
     valid = np.asarray((pixels > BEYOND_LENS).all(axis=-1), dtype=bool)
     along_x = np.abs(np.diff(pixels, axis=1))[valid[:, 1:] & valid[:, :-1]].max(axis=0)
