@@ -38,7 +38,7 @@ HOUSE = {
         ["acquisition", "initialization"],
         ["tracking/chamfer, tracking/contour, tracking/voxel"],
         ["tracking/estimation"],
-        ["tracking"],
+        ["tracking", "initialization/generators"],
         ["search", "appearance", "fitting", "voxels"],
         ["evidence"],
         ["contours", "images", "store"],

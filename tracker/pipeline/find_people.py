@@ -231,7 +231,8 @@ def sentences(session: Session, found: FoundPeople) -> list[str]:
         name = session.people[person].name
         out.append(
             f"{name}: started on frame {found.frame} by {first.candidate.generator}, "
-            f"{first.model.height_m:.2f} m tall, {first.fitted.status}, cost {first.fitted.cost_px:.2f} px over a short track"
+            f"{first.model.height_m:.2f} m tall, {first.fitted.status}, "
+            f"cost {first.fitted.cost_px:.2f} px over a short track"
         )
         out += [f"{name}: {note}" for note in first.notes]
         if person in found.acquired:

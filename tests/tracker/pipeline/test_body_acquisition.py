@@ -14,14 +14,13 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
-from tracker.formats.model_toml import format_model, load_model
+from tracker.formats.model_toml import format_model, has_preset_sizes, load_model
 from tracker.geometry.triangulation import sigma_px
 from tracker.pipeline import body_acquisition
 from tracker.pipeline.body_acquisition import (
     PLACED_M,
     SIZES_EDITS,
     acquire_body,
-    has_preset_sizes,
     posed_frames,
     store_body,
 )
