@@ -137,7 +137,7 @@ class _Step(NamedTuple):
     declared: Any
     """Its type, of `msgspec.inspect`."""
     description: str
-    """What it is expected to be; empty if the declaration does not describe it."""
+    """Description of what is expected; empty if the declaration does not describe it."""
     title: str
     """Name of the field in which a user enters it; empty for what a file holds, whose keys the user sees."""
 

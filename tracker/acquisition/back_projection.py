@@ -57,7 +57,7 @@ class OccludingContour(NamedTuple):
     points_world: Array
     """Points of the contour, (N, 3), metres, in the plane."""
     plane: PolarPlane
-    """Where the lines of sight were cut off."""
+    """Ends at which the lines of sight were cut off."""
 
 
 def back_project_contours(person: SightedPerson) -> list[OccludingContour]:

@@ -70,7 +70,7 @@ def search_shapes(
         parameters: the sizes; 0 is the body to begin with.
         person: the person in two near-orthogonal views, in the pose that is taken as given.
         settings: of the search.
-        report: is given the share of the work that is done, 0 to 1. What it raises ends the search.
+        report: is given the share of the work that is done, 0 to 1. An exception that it raises ends the search.
     """
     sizes, before = np.zeros(len(parameters.names)), np.nan
     groups = _groups(parameters)

@@ -38,7 +38,7 @@ from tracker.tracking.view_regions import read_views, visible_pieces_px
 SizeMethod = Literal["contours", "voxels"]
 """Whether the fit to contours starts at the body before, or at a fit to voxels."""
 Report = Callable[[str, float], None]
-"""Is given a stage and the share of all work that is done, 0 to 1. What it raises ends the acquisition."""
+"""Is given a stage and the share of all work that is done, 0 to 1. An exception that it raises ends the acquisition."""
 _CHOOSING, _OBSERVING, _VOXELS = 0.1, 0.25, 0.5
 """Shares of the work up to the ends of the stages before the fit."""
 
@@ -52,7 +52,7 @@ class AcquisitionSettings:
     candidates: int = 24
     """Number of frames, evenly spread, from which they are chosen."""
     rounds: int = 1
-    """Where frames are tracked for it: largest number of times that they are tracked and sizes are fitted. Each round
+    """Largest number of times that frames are tracked for it and sizes are fitted. Each round
     tracks with the body of the one before. It is the last where most frames are good."""
     coupled: bool = True
     """Whether left and right have the same sizes."""

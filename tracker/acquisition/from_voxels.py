@@ -101,7 +101,7 @@ def fit_sizes_to_voxels(
         parameters: the sizes; their prior has the mean 0.
         frames: the frames, with the initial poses in the body of the parameters.
         settings: of the fit.
-        report: receives the share of the work that is done, 0 to 1. What it raises ends the fit.
+        report: receives the share of the work that is done, 0 to 1. An exception that it raises ends the fit.
 
     Raises:
         TrackerError: the body lacks the joints of ten parts, or no frame shows voxels near it.

@@ -152,7 +152,7 @@ def fit_sizes_to_contours(
         frames: the frames, with the initial poses.
         settings: of the fit.
         start: initial sizes and poses; by default those of the frames. Without rounds they are returned as they are.
-        report: is given the share of the work that is done, 0 to 1. What it raises ends the fit.
+        report: is given the share of the work that is done, 0 to 1. An exception that it raises ends the fit.
     """
     n = len(parameters.names)
     if start is None:

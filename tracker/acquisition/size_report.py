@@ -30,7 +30,7 @@ class SizeChange(NamedTuple):
 
 
 def size_changes(acquisition: Acquisition) -> list[SizeChange]:
-    """List all sizes, those that changed most, by share, first. Where the sides are coupled, one stands for both."""
+    """List all sizes, those that changed most, by share, first. One side stands for both if they are coupled."""
     parameters, fit = acquisition.parameters, acquisition.fit
     before, after = (_measured(parameters, b) for b in (parameters.body(np.zeros_like(fit.sizes)), fit.body))
     J = np.empty((len(after), len(fit.sizes)))

@@ -129,7 +129,7 @@ def stature_m(model: BodyModel) -> float:
 def with_height_of_stature(model: BodyModel, like: BodyModel) -> BodyModel:
     """Return the very same body with its height stated as its stature, in the ratio of another body's.
 
-    A body's height is the unit of its fractions. Where parts have other lengths, it no longer is how tall the body is.
+    A body's height is the unit of its fractions. With other lengths of parts it no longer is how tall the body is.
     """
     height_m = like.height_m * stature_m(model) / stature_m(like)
     by = model.height_m / height_m

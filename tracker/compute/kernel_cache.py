@@ -27,7 +27,7 @@ STAGES = ("posing", "contours", "evidence", "cost", "tracking")
 """Groups of kernels in the order in which a new user needs them; each needs some of the groups before it."""
 _MARK, _KEYS, _STAGE = "compiled-", "keys-", "stage-"
 _ORDINARY = _PACKAGE / "__pycache__"
-"""Where numba keeps kernels by itself."""
+"""Folder in which numba keeps kernels by itself."""
 _OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO")
 """Environment variables of numba, without their prefix, that change compiled code."""
 _N_STATES = 12

@@ -36,7 +36,7 @@ class _Node(NamedTuple):
     """One place of the sources."""
 
     text: bytes
-    """What it contributes to a key."""
+    """Its contribution to a key."""
     names: tuple[_Place, ...]
     """The places that it names."""
 

@@ -29,7 +29,7 @@ def revolved_generator(
     At the profile point (r, z) with normal (1, b) the condition is `|e_xy| cos d = r + b (z - e_z)`, with d the angle
     about the axis from the eye's direction. On a cone r + b z and b are constant, hence d: the generator is the two
     rulings of KRH08 Eq. 8-13, by the arc cosine that keeps both roots. Between neighbouring profile points, point and
-    normal are interpolated. Where neighbours share r and z, around the rim of a flat end, interpolation is exact too.
+    normal are interpolated. Around the rim of a flat end neighbours share r and z, and interpolation is exact too.
 
     Args:
         part: index of the part.

@@ -66,7 +66,7 @@ def part_edges(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[F
     shown = []
     for camera in cameras:
         pieces, points = _cut(curves, camera)
-        # Where both surfaces face the camera, a small step towards it leaves both parts.
+        # If both surfaces face the camera, a small step towards it leaves both parts.
         towards = camera.center_world - points
         lifted = points + _LIFT_M * towards / np.linalg.norm(towards, axis=-1, keepdims=True)
         nothing = np.zeros((len(Ts), len(points)), dtype=bool)

@@ -1,7 +1,7 @@
 """Mark the contour points of a part that another part occludes.
 
 A line of sight runs from a point (s = 0) to the eye (s = 1) in the unit coordinates of the possible occluder. Its
-intersection with the enclosing quadric has a closed form, computed for many points at once without branches. Where the
+intersection with the enclosing quadric has a closed form, computed for many points at once without branches. If the
 part does not fill its quadric, its own shape is tested on the common interval.
 """
 
@@ -21,7 +21,7 @@ LANES = 16
 _TINY, _FAR = np.float32(1e-9), np.float32(1e9)
 _ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote the kernels' arithmetic to float64
 _TRIES = (0.5, 0.25, 0.75, 0.001)
-"""Where in the common interval of line and quadric the shape is tested, from its far end (0) to the near one (1)."""
+"""Places in the common interval of line and quadric at which the shape is tested, far end (0) to near one (1)."""
 
 
 @njit(inline="always", **FAST_MATH)

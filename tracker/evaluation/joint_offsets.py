@@ -1,7 +1,7 @@
 """Split joint errors into a constant offset of each joint and the rest.
 
-Where a model's joint lies beside the anatomical one, it does so in every frame by the same vector in the body, not in
-the world. The offset is therefore the mean difference in the frame of the proximal part, in which body files state
+A model's joint that lies beside the anatomical one does so by the same vector in the body in every frame, not in the
+world. The offset is therefore the mean difference in the frame of the proximal part, in which body files state
 joint centres too (`BodyModel.proximal_parts`): the pelvis for a hip, the thigh for a knee.
 """
 

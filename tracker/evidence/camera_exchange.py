@@ -167,7 +167,7 @@ class _Footage(NamedTuple):
     """None where there is no mask."""
 
     foregrounds: list[Mask | None]
-    """Where each frame differs from the background; None where it is damaged."""
+    """Pixels of each frame that differ from the background; None where it is damaged."""
 
 
 def _foregrounds(

@@ -34,7 +34,7 @@ from tracker.images.silhouette_cleaning import clean_silhouette
 from tracker.images.working_view import WorkingView
 
 SilhouetteSource = Literal["mask", "background", "recording", "none"]
-"""Where a silhouette comes from: the user's mask, an empty scene, the recording's own median, or a damaged frame."""
+"""Source of a silhouette: the user's mask, an empty scene, the recording's own median, or a damaged frame."""
 
 N_LEARNED = 25
 """Number of frames from which the empty scene is learnt where the session has none."""
@@ -54,9 +54,9 @@ class ViewSilhouette(NamedTuple):
     quality: float
     """How cleanly the silhouette was found, 0 to 1, see `CleanSilhouette`; 1 for a user's mask."""
     source: SilhouetteSource
-    """Where it comes from."""
+    """Its source."""
     shadow: Mask | None = None
-    """What else has changed, (H, W): shadows, highlights, and clothes that look like them. None for a user's mask."""
+    """Other changes, (H, W): shadows, highlights, and clothes that look like them. None for a user's mask."""
 
     @property
     def is_empty(self) -> bool:
@@ -80,8 +80,8 @@ class SilhouetteFinder:
             cameras: the views, with their side files.
             recording: their footage.
             shading: changes of the light that are background.
-            step: called for each image whose background is learnt or subtracted, from several threads. What it raises
-                ends the work.
+            step: called for each image whose background is learnt or subtracted, from several threads. An exception
+                that it raises ends the work.
 
         Raises:
             RecordingError: a background is unreadable or of the wrong size.

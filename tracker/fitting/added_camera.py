@@ -1,4 +1,4 @@
-"""Where another camera would help most: candidate positions around a person, judged by the standard deviations."""
+"""Places for another camera: candidate positions around a person, judged by the standard deviations."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,7 +18,7 @@ ELEVATIONS_RAD = tuple(float(np.radians(d)) for d in (0.0, 30.0, 60.0))
 
 
 class AddedCamera(NamedTuple):
-    """What one more camera would tell of a person."""
+    """Information that one more camera would add on a person."""
 
     camera: Camera
     """The camera, which looks at the person."""

@@ -171,7 +171,7 @@ def iterate(
     """Minimize as `solve`, one iteration at a time.
 
     Yields:
-        The start, then the pose after each iteration that lowers the cost. Where the last iteration does not, the pose
+        The start, then the pose after each iteration that lowers the cost. If the last iteration does not, the pose
         before it comes once more, with that iteration counted.
     """
     is_active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
@@ -313,7 +313,7 @@ def fit_to_points(
 def _by_other_angles(model: BodyModel, pose: Array, joint: int) -> Array:
     """Return the same pose by the other three angles of a joint that give the same rotation, within its limits.
 
-    Where a joint's three axes are at right angles, (a, b, c) and (a + pi, pi - b, c + pi) are one rotation.
+    About three axes at right angles, (a, b, c) and (a + pi, pi - b, c + pi) are one rotation.
     """
     out = np.array(pose)
     at = model.dof_value[model.dof_joint == joint]

@@ -1,6 +1,6 @@
 """Penetration terms: residual blocks that push parts out of each other, within one body or between several.
 
-Flesh gives way and shapes are coarse, so only deep penetration counts. Where two limbs claim one contour in the images,
+Flesh gives way and shapes are coarse, so only deep penetration counts. If two limbs claim one contour in the images,
 these terms show that one of them belongs elsewhere.
 """
 

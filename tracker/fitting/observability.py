@@ -53,7 +53,7 @@ EXACT_1PX = ContourNoise(1.0, PIECE_PX, 0.0)
 
 
 class ViewInformation(NamedTuple):
-    """What each view sees of a person's contours."""
+    """Information of each view on a person's pose, and the contours that it sees."""
 
     cameras: tuple[str, ...]
     matrices: Array

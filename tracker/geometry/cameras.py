@@ -57,7 +57,7 @@ class Camera:
     K: Array
     """Pinhole matrix, (3, 3), px."""
     distortion: Array
-    """OpenCV coefficients k1, k2, p1, p2[, k3[, k4, k5, k6]]; (0,), (4,), (5,) or (8,). Those of a fisheye lens are
+    """OpenCV coefficients k1, k2, p1, p2[, k3[, k4, k5, k6]]; (0,), (4,), (5,) or (8,). A fisheye lens has
     k1, k2, k3, k4 of the equidistant model, or none; (0,) or (4,)."""
     T_world_camera: Array
     """Pose, (4, 4), metres: maps camera coordinates to world coordinates."""

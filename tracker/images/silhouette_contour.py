@@ -71,8 +71,8 @@ def _trace_normals(points: NDArray[np.int32], soft: NDArray[np.uint8], out: Silh
 def contour_trust(contour: SilhouetteContour, silhouette: Mask, edges: Edges) -> float:
     """Estimate from the image alone how far a silhouette can be trusted, 0 to 1.
 
-    The contour of a person is an image edge of the same direction. Where the background is wrong or the camera has
-    moved, the silhouette ends where the image has no edge. Where the light has changed, it fills the region.
+    The contour of a person is an image edge of the same direction. If the background is wrong or the camera has
+    moved, the silhouette ends where the image has no edge. If the light has changed, it fills the region.
 
     Args:
         contour: the silhouette's contour.

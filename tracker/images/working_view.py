@@ -107,7 +107,7 @@ class WorkingView:
 
     @cached_property
     def shown(self) -> Mask | None:
-        """Where the picture of a fisheye lens shows footage, (H, W), but for its border; None for other lenses.
+        """Pixels of a fisheye's picture that show footage, (H, W), but for its border; None for other lenses.
 
         Elsewhere it repeats the border of the footage, whose edges are nobody's.
         """

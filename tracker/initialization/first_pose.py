@@ -112,7 +112,7 @@ def find_first_poses(
         frames: the frames to try; at least one.
         generators: to try on each frame.
         size_m: edge of a voxel, metres.
-        say: receives a sentence on each frame that is tried. What it raises ends the search.
+        say: receives a sentence on each frame that is tried. An exception that it raises ends the search.
 
     Raises:
         TrackerError: no frame shows the people well enough. The message is that of the first frame.
@@ -132,7 +132,7 @@ def find_first_poses_anywhere(
     The cheapest generator is tried until the starts of two frames are good and agree on the heights. The others are
     tried where no start is good, one after the other, on the frames that cost least. `show` receives each frame and
     what was found on it. `step` is called between fits and for each silhouette, every second or so and from several
-    threads; what it raises ends the search.
+    threads; an exception that it raises ends the search.
     """
     cheapest, *others = GENERATORS
     with _Trial(session, observer, people, size_m, say, show, step) as trial:

@@ -15,7 +15,7 @@ _N_TRACKED = 4
 _SAME_M = 0.03
 """Mean distance of the joints up to which two fits are the same, metres."""
 _CUES_PX = 0.05
-"""What a cue for the direction counts against the cost of a track, px."""
+"""Reduction of the cost of a track for each cue for its direction, px."""
 _TRACKED_RATIO = 1.25
 """Ratio of the costs on the frame of the start above which a start is not tracked."""
 _OPPOSITE = 0.0
@@ -30,7 +30,7 @@ class ComparedStarts(NamedTuple):
     searched: list[Start]
     """The starts that were searched, with their costs on the frame."""
     tracked: list[Start]
-    """Those that were tracked and fill the silhouettes, the cheapest first."""
+    """The starts that were tracked and fill the silhouettes, the cheapest first."""
     is_lost: bool
     """Whether the person is lost on a short track from the cheapest."""
 
@@ -38,7 +38,7 @@ class ComparedStarts(NamedTuple):
 def compare_starts(
     fitter: StartFitter, candidates: Sequence[StartCandidate], filling: Callable[[Sequence[Start]], list[Start]]
 ) -> ComparedStarts:
-    """Fit, search and track starts. Where the best track comes back to another pose, that is a start too."""
+    """Fit, search and track starts. A different pose after tracking there and back is another start."""
 
     def tracked(candidate: StartCandidate, fit: FittedStart) -> Start:
         return candidate, fitter.track(PosedBody(candidate.model, fit.pose), fit)

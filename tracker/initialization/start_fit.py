@@ -24,7 +24,7 @@ from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
 _LOST_PX, _DOUBTFUL_PX = 2.0, 0.5
-"""What a lost and a doubtful frame of a short track add to its cost, px."""
+"""Penalties for a lost and for a doubtful frame of a short track, px."""
 _RETURNED_M = 0.05
 """A track comes back to another pose if a joint of a limb is farther from the start, metres."""
 _TRACK_STEPS = (2, 4, 6)
@@ -51,7 +51,7 @@ class Returned(NamedTuple):
     """The ends of short tracks that came back to the frame of a start."""
 
     poses: list[Array]
-    """Those that are not the start, (n_values,) each."""
+    """End poses that differ from the start, (n_values,) each."""
     is_lost: bool
     """Whether the person was lost on a short track, there or back."""
 
@@ -69,7 +69,7 @@ class StartFitter:
     others: tuple[PosedBody, ...]
     """The other people on that frame."""
     step: Callable[[], None] = lambda: None
-    """Called after each frame that is fitted and before each search. What it raises ends the work."""
+    """Called after each frame that is fitted and before each search. An exception that it raises ends the work."""
 
     def fit(self, start: PosedBody) -> FittedStart:
         """Fit a start to the frame."""

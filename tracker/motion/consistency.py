@@ -1,6 +1,6 @@
 """Find frames whose pose is inconsistent with the neighbouring frames, from the motion alone.
 
-Where a tracking run meets a keyframe or another run, their poses may disagree, so that the body jumps. It jumps too if
+A tracking run may disagree with a keyframe or another run where they meet, so that the body jumps. It jumps too if
 the pose of a single frame is wrong. Each step between frames is compared with the steps before and after it:
 
     off(f) = max over joints of |s(f) - (s(f-1) + s(f+1)) / 2|,  s(f) = p(f+1) - p(f)

@@ -63,7 +63,7 @@ class PoseTrack:
     fixed: NDArray[np.bool_]
     """Whether a pose is exact, (T,): a keyframe."""
     trusted: NDArray[np.bool_]
-    """Whether a degree of freedom is measured, (T, n_dofs): not in a lost limb. Those of a fixed pose all are."""
+    """Whether a degree of freedom is measured, (T, n_dofs): not in a lost limb. All of a fixed pose are."""
 
 
 def smooth_poses(track: PoseTrack) -> Array:

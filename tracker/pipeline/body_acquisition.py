@@ -75,7 +75,7 @@ def acquire_body(
         person: index of the person.
         frames: the frames that may be used, ascending.
         settings: of the acquisition; their type is the method.
-        report: shows progress. What it raises ends the acquisition.
+        report: shows progress. An exception that it raises ends the acquisition.
         known: poses to begin from, in the present bodies; those that the session stores by default.
 
     Raises:

@@ -36,8 +36,8 @@ AXES = "silhouette_axes"
 For each person these are the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
 
 Report = Callable[[str, float, str], None]
-"""Is given a stage, the share of all work that is done, 0 to 1, and a sentence, which may be empty. What it raises ends
-the work."""
+"""Is given a stage, the share of all work that is done, 0 to 1, and a sentence, which may be empty. An exception
+that it raises ends the work."""
 
 
 @dataclass(frozen=True)

@@ -153,7 +153,7 @@ class TrackSession:
     def take(self, step: Step) -> None:
         """Keep the results of a step.
 
-        What the backward pass improves is saved at once: a whole interval or nothing of it.
+        An interval that the backward pass improves is saved at once, as a whole or not at all.
         """
         if isinstance(step, BackwardStep):
             self._take_improved(step)

@@ -20,14 +20,14 @@ from tracker.geometry.triangulation import PointObservation
 from tracker.posing.picking import point_on_part
 
 Role: TypeAlias = Literal["body", "heading", "lean", "trunk", "limb"]
-"""What a dragged point moves: the whole body, its heading (a turn about the vertical), its lean (any turn), the bend of
-the trunk, or one limb."""
+"""Parts that a dragged point moves: the whole body, its heading (a turn about the vertical), its lean (any turn), the bend
+of the trunk, or one limb."""
 _UP = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Constraints:
-    """What a drag leaves alone."""
+    """Points and angles that a drag leaves alone."""
 
     active_dofs: NDArray[np.bool_] | None = None
     """Degrees of freedom that may change, (n_dofs,); None: all."""
@@ -35,7 +35,7 @@ class Constraints:
     """Points that stay where they are in space as far as the drag allows (see `holdable_points`), with the views in
     which they were placed. A point that was placed in one view may still move along its line of sight."""
     seen: tuple[PointObservation, ...] = ()
-    """Where the user put points in the views by hand, undistorted px. A fit, not a drag, draws the held ones there."""
+    """Points that the user placed in the views, undistorted px. A fit, not a drag, draws the held ones there."""
     up_world: tuple[float, float, float] = _UP
     """The vertical, a unit vector in the world."""
 
@@ -104,7 +104,7 @@ class Grab:
     offset_px: Array
     """From the pointer to the point at the grab, (2,), px; kept, so that the point does not jump."""
     role: Role
-    """What the point moves."""
+    """Parts that the point moves."""
     active_dofs: NDArray[np.bool_]
     """Degrees of freedom that follow the point, (n_dofs,)."""
     unlocked_dofs: NDArray[np.bool_]

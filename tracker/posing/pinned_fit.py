@@ -75,7 +75,7 @@ def fit_frame(
     active = [c.active_dofs for c in constraints]
     blocks = [pin_block(m, cameras, p) if p else None for m, p in zip(models, pins, strict=True)]
     pinned = [np.zeros(len(m.value_names), dtype=bool) for m in models]
-    # Where they were placed: pins of the trunk must not carry placed limbs away.
+    # At their placed positions: pins of the trunk must not carry placed limbs away.
     held = [
         _held_blocks(PosedBody(m, v), cameras, c, {pin.point for pin in p})
         for m, v, c, p in zip(models, now, constraints, pins, strict=True)
@@ -105,7 +105,7 @@ def _held_blocks(
 ) -> list[ResidualBlock]:
     """Return the residuals of the held points that no pin overrules.
 
-    Those that were put somewhere in some views belong there, because a later drag may have moved them. The others
+    Points that were placed in some views belong there, because a later drag may have moved them. The others
     belong where they are.
     """
     held = {name: views for name, views in constraints.held.items() if name not in pinned}

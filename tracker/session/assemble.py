@@ -44,7 +44,7 @@ class NewSession:
     """A request for a new session."""
 
     folder: Path
-    """Where the session goes; must not exist, or be empty."""
+    """Folder of the session; must not exist, or be empty."""
     calibration: Path | Sequence[Path]
     """A file or folder, or a file for each camera (`tracker.calibrations`)."""
     videos: Sequence[Path] = ()

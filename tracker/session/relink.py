@@ -43,7 +43,7 @@ class Relinked(NamedTuple):
 
 @dataclass(frozen=True)
 class Places:
-    """Where files of a session are now."""
+    """Present paths of the files of a session."""
 
     search: Sequence[Path] = ()
     """Folders in which missing files are searched by name, with all folders inside."""

@@ -31,7 +31,7 @@ class Restored(NamedTuple):
 
 
 def backups_of(path: Path) -> list[Path]:
-    """List the backups of a store, newest first. Those of older programs, without a counter, are the oldest."""
+    """List the backups of a store, newest first. Backups of older programs, without a counter, are the oldest."""
     found = (path.parent / FOLDER).glob(f"{path.stem}-*{path.suffix}")
     return sorted(filter(Path.is_file, found), key=lambda backup: (_counter(backup), backup.name), reverse=True)
 

@@ -32,7 +32,7 @@ Connect = Callable[[Path, str], sqlite3.Connection]
 def open_reader(path: Path, connect: Connect) -> sqlite3.Connection:
     """Open a store that is only read, as the last commit left it.
 
-    The journal is rolled back under the session's lock. Where the folder cannot be written, or another program holds
+    The journal is rolled back under the session's lock. If the folder cannot be written, or another program holds
     the lock, a copy is rolled back, which is gone when the connection is closed.
 
     Args:

@@ -43,7 +43,7 @@ class PoseLabel(NamedTuple):
 
 
 class _Summary(msgspec.Struct):
-    """What rows of poses have in common, by the names of their columns."""
+    """Fields that all rows of poses share, by the names of their columns."""
 
     frame: _Frame
     sources: Annotated[bytes, Meta(min_length=1)]

@@ -12,7 +12,7 @@ _BROKEN = (
 """Primary codes of errors that show damage while a store is checked; other errors concern the disk or its users."""
 
 UNDECODABLE = (UnicodeDecodeError, OverflowError, MemoryError)
-"""What Python raises instead of an error of SQLite where names, texts or lengths in a damaged file are nonsense."""
+"""Errors that Python raises instead of those of SQLite if names, texts or lengths in a damaged file are nonsense."""
 
 
 def damage(db: sqlite3.Connection) -> str | None:

@@ -40,7 +40,7 @@ class PoseEstimate(NamedTuple):
     statuses: tuple[Status, ...]
     """How sure the tracker is of each person."""
     notes: tuple[str, ...]
-    """What was unusual about each person; empty where nothing was."""
+    """Note on each person; empty where nothing was unusual."""
     part_costs_px: tuple[Array, ...]
     """Mean distance of the contour of each part to the edges, (n_parts,) each, px; NaN where hidden."""
     covariances: tuple[Array, ...]
@@ -56,7 +56,7 @@ class PoseEstimate(NamedTuple):
 
 
 class TrackedFrame(NamedTuple):
-    """What a backward pass needs to know of a tracked frame. Tuples are indexed by person."""
+    """A tracked frame as a backward pass needs it. Tuples are indexed by person."""
 
     frame: int
     poses: tuple[Array, ...]

@@ -86,8 +86,8 @@ class PersonMemory:
         """Return the limbs to search now. After each failed search a limb's back-off doubles.
 
         A single person's limb that is lost, or more likely elsewhere than not, does not back off. A fast limb is
-        elsewhere in each frame, and predictions from a wrong pose get worse. Nor does one that the frame contradicts
-        much more than that of the last search.
+        elsewhere in each frame, and predictions from a wrong pose get worse. A limb does not wait
+        either if the frame contradicts it much more than that of the last search.
 
         With several people, an unexplained part of the silhouette alone makes no limb due while another limb of the
         person seems lost.

@@ -1,7 +1,7 @@
 """Compiled kernels of voxel carving: each voxel alone, and blocks that are divided where a silhouette's edge is.
 
 A block is enclosed in a sphere. The sphere's pixels in a view lie within a square, whose number of silhouette pixels
-an integral image gives. Where all squares are uniform the block is decided as a whole (an octree, Szeliski 1993).
+an integral image gives. If all squares are uniform the block is decided as a whole (an octree, Szeliski 1993).
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.voxels.sensor_lookup import BEYOND_LENS
 
 _UNSEEN, _OUTSIDE, _INSIDE, _MIXED_SEEN, _MIXED = 0, 1, 2, 3, 4
-"""What a view says of a block: out of the image, out of the silhouette, within it, or different things of its voxels
+"""Class of a block in a view: out of the image, out of the silhouette, within it, or different things of its voxels
 (with `_MIXED_SEEN` some may be within the silhouette, with `_MIXED` none)."""
 
 

@@ -24,7 +24,7 @@ class FigureMask(NamedTuple):
     mask: Mask
     """(H, W), raw pixels at working scale."""
     is_apart: bool
-    """Whether no other figure covers it. Where one does, its outline is not that of the figure alone."""
+    """Whether no other figure covers it. A covered outline is not that of the figure alone."""
 
     @property
     def shows_figure_alone(self) -> bool:

@@ -37,7 +37,7 @@ def recover_from_shadows(
     """Return silhouettes with the parts of people that look like shadows.
 
     Args:
-        silhouettes: of all views. Those without a shadow stay as they are.
+        silhouettes: of all views. Silhouettes without a shadow stay as they are.
         floor: the floor.
         size_m: edge of the voxels by which the views are compared, metres.
     """
@@ -51,7 +51,7 @@ def recover_standing(silhouettes: Sequence[ViewSilhouette], floor: GroundPlane) 
     that place, or that do not show it, do not count.
 
     Args:
-        silhouettes: of all views. Those without a shadow stay as they are.
+        silhouettes: of all views. Silhouettes without a shadow stay as they are.
         floor: the floor.
     """
     shadows = [s.shadow for s in silhouettes]

@@ -43,7 +43,7 @@ class LimbRegion(NamedTuple):
     kind: str
     """`arm` or `leg`."""
     proximal: Array
-    """Where it leaves the torso, (3,), metres."""
+    """Place at which it leaves the torso, (3,), metres."""
     middle: Array
     """Elbow or knee, (3,), metres."""
     distal: Array
@@ -115,7 +115,7 @@ def _connected(figure: Voxels, own: IntArray) -> list[IntArray]:
 
 
 def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso) -> LimbRegion:
-    """Return the limb of a branch. Where it does not stand out yet it runs straight from the torso."""
+    """Return the limb of a branch. Its hidden first stretch is assumed straight."""
     region, from_torso, half = points[branch.own], distances[branch.own], torso.half_axes[2]
     # Voxels of a child who is enlarged to an adult are wide: there may be none this near.
     first = region[from_torso <= max(branch.begins_m + 0.05, from_torso.min())].mean(axis=0)

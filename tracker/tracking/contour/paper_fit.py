@@ -26,7 +26,7 @@ class FitIteration(NamedTuple):
     """A pose on the way of a minimization."""
 
     name: str
-    """What moved: "iteration 3", or a step of an incremental fit, such as "left arm"; "start" before the first."""
+    """Name: "start", then "iteration 3", or a step of an incremental fit, such as "left arm"."""
     pose: Array
     """(n_values,)."""
     rms_px: float

@@ -23,7 +23,7 @@ class PersonEstimate(NamedTuple):
 
     status: Status
     note: str
-    """What was unusual, for people to read; empty where nothing was."""
+    """Note for people to read; empty where nothing was unusual."""
     part_costs_px: Array
     """Mean distance of each part's contour to the edges, (n_parts,), px of the footage; NaN where hidden."""
     covariance: Array

@@ -1,7 +1,7 @@
 """Track people backward through intervals in which they were lost, from the first trusted poses after them.
 
 A limb that is lost in fast motion is found again where the motion slows down. Tracked backward from there, it is often
-found on frames where it was lost. Where it is lost in both directions, the two passes are seldom wrong on the same
+found on frames where it was lost. If it is lost in both directions, the two passes are seldom wrong on the same
 frames. Therefore the candidates of both are propagated to neighbouring frames, and one path through all frames of the
 interval is selected (`pose_paths`).
 """

@@ -25,7 +25,7 @@ _SCALE = 2.0
 _FREE = 3.0
 """Factor of the standard deviations of a refinement, with which its start hardly counts in the covariance."""
 _MAX_STEP = 1.2
-"""Largest change of a degree of freedom, rad or metres. What no contour determines would turn freely otherwise."""
+"""Largest change of a degree of freedom, rad or metres. It limits degrees of freedom that no contour determines."""
 
 
 def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array, draw: int = 0) -> Fit:

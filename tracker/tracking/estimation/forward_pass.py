@@ -96,7 +96,7 @@ def track_forward(
         estimator = make_estimator(views, memories, predicted, settings, contours)
         estimates = estimator.estimate([p for p in subjects.tracked if p not in keyframes])
         statuses: list[Status] = [estimates[p].status if p in estimates else "good" for p in range(len(models))]
-        # What is learnt of a keyframe that its frame contradicts is learnt from the settled pose.
+        # If a frame contradicts its keyframe, colours are learnt from the settled pose.
         learnt = tuple(settled.get(p, b) if p in keyframes else b for p, b in enumerate(estimator.bodies))
         _remember(memories, estimator, learnt, statuses, keyframes)
         cost_of = chamfer_cost(views, estimator.bodies, settings)

@@ -34,7 +34,7 @@ Bodies = tuple[PosedBody, ...]
 
 
 class PersonPrior(NamedTuple):
-    """What is known of a person before a frame."""
+    """Knowledge of a person before a frame."""
 
     model: BodyModel
     predicted: Array
@@ -69,7 +69,7 @@ class PersonFit(NamedTuple):
     evaluations: int = 0
     """Number of poses that the best-first search scored."""
     notes: tuple[str, ...] = ()
-    """What was done to find the person, for people to read."""
+    """Notes for people to read on how the person was found."""
     alternatives: tuple[Array, ...] = ()
     """Poses that are about as good, (n_values,) each, best first."""
     is_predicted: bool = True

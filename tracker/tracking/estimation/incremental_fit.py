@@ -18,7 +18,7 @@ class FitStep(NamedTuple):
     """A step of an incremental fit."""
 
     name: str
-    """What moved: "root", "trunk", "left arm", ..., "whole body"."""
+    """Name of the chain that moved: "root", "trunk", "left arm", ..., "whole body"."""
     fit: Fit
     """The pose after the step."""
 

@@ -82,7 +82,7 @@ def pose_of(
 ) -> BodyPose:
     """Return the pose of a body that comes closest to the joints of a state, within the limits of the body.
 
-    Each joint counts by its own covariance. What joints do not determine stays near another pose.
+    Each joint counts by its own covariance. Degrees of freedom that joints do not determine stay near another pose.
 
     Args:
         model: the body.

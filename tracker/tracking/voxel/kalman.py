@@ -9,7 +9,7 @@ from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.state import FilterState
 
 _MAX_MULTIPLICATIONS = 2**17
-"""Multiplications of a product that BLAS does on the calling thread. Where all cores are busy, its other threads make a
+"""Multiplications of a product that BLAS does on the calling thread. If all cores are busy, its other threads make a
 product of two 96x96 matrices a hundred times slower."""
 
 

@@ -1,4 +1,4 @@
-"""What labelled voxels measure of a figure: centre, orientation and sizes of its parts (MTHC01 Sect. 4)."""
+"""Measure a figure by its labelled voxels: centre, orientation and sizes of its parts (MTHC01 Sect. 4)."""
 
 import itertools
 from typing import NamedTuple
