@@ -20,8 +20,8 @@ from tracker.geometry.triangulation import PointObservation
 from tracker.posing.picking import point_on_part
 
 Role: TypeAlias = Literal["body", "heading", "lean", "trunk", "limb"]
-"""Parts that a dragged point moves: the whole body, its heading (a turn about the vertical), its lean (any turn), the bend
-of the trunk, or one limb."""
+"""Parts that a dragged point moves: the whole body, its heading (a turn about the vertical), its lean (any turn), the
+bend of the trunk, or one limb."""
 _UP = (0.0, 0.0, 1.0)
 
 

@@ -24,8 +24,8 @@ class ContourSettings(EstimationSettings):
     incremental_start: bool = True
     """Whether a start that does not fit is fitted chain by chain."""
     image_contours: ImageContours = "edges"
-    """Evidence that contours are compared with: `edges`, together with silhouettes in the default mode, or `silhouettes`
-    alone. A view without a silhouette keeps its edges."""
+    """Evidence that contours are compared with: `edges`, together with silhouettes in the default mode, or
+    `silhouettes` alone. A view without a silhouette keeps its edges."""
     paper: bool = False
     """Whether KRH08 Eq. 60 is minimized alone: model to image, without robust weights, prior and recovery."""
 
