@@ -18,7 +18,8 @@ const STYLE = `
 export function loadScene(scene, store) {
   const paint = () => {
     const stage = getComputedStyle(document.documentElement).getPropertyValue("--stage");
-    scene.contentDocument?.documentElement.style.setProperty("--page-stage", stage);
+    // A frame that loads or leaves has a document without an element.
+    scene.contentDocument?.documentElement?.style.setProperty("--page-stage", stage);
   };
   scene.addEventListener("load", () => {
     const target = scene.contentDocument;
