@@ -1,8 +1,7 @@
 """`quadrille track`: track people and store the poses; the same command resumes an interrupted run."""
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -11,11 +10,14 @@ import tyro
 from app.cli.arguments import Names, OptionalName, OptionalNumber, OptionalRange, OptionalWhole, SessionArg
 from app.cli.json_output import format_json
 from app.cli.target import Target, check_stride, load_target, parse_frames
+from app.cli.track_report import format_summary, summarize
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.pipeline.track_session import TrackSession
+    from tracker.pipeline.find_people import FindSettings
+    from tracker.pipeline.stored_run import TrackPlan
+    from tracker.session.session import Session
     from tracker.tracking.estimation.settings import EstimationSettings
     from tracker.tracking.tracker import TrackerSettings
 
@@ -76,6 +78,9 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
 
     Ctrl+C stops it and keeps the poses found so far; run it again to resume.
     """
+    from tracker.pipeline.stored_run import TrackPlan
+    from tracker.session.matching import check_names
+
     at = load_target(arguments.session, arguments.person, several=True)
     ascending = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
     frames = ascending[::-1] if arguments.backward else ascending
@@ -83,23 +88,19 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     settings = _SETTINGS[arguments.method](arguments)
     if arguments.paper:
         _require_paper_body(at, arguments.method)
-    progress = Reporter(silent=arguments.json)
-    if arguments.init is None:
-        found = track(at, frames, settings, progress, arguments.cameras)
-    else:
-        from app.cli.track_found import track_found
-
-        try:
-            found = track_found(
-                at, ascending, arguments.acquire, progress,
-                lambda people, own: track(people, own, settings, progress, arguments.cameras),
-            )  # fmt: skip
-        except KeyboardInterrupt:
-            print("stopped before anybody was found; nothing was stored", file=sys.stderr)
-            sys.exit(130)
-    print(format_json(found) if arguments.json else _format(found))
+    used = check_names(arguments.cameras, [c.camera.name for c in at.session.cameras], "camera", "--cameras")
+    plan = TrackPlan(frames, at.people, settings, tuple(used))
+    found = track(at.session, plan, Reporter(silent=arguments.json), _found_by(arguments))
+    print(format_json(found) if arguments.json else format_summary(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
+
+
+def _found_by(arguments: TrackArguments) -> "FindSettings | None":
+    """Return how people without a pose are found; None where nobody is looked for."""
+    from tracker.pipeline.find_people import FindSettings
+
+    return None if arguments.init is None else FindSettings(acquire=arguments.acquire)
 
 
 def _check_chain(arguments: TrackArguments) -> None:
@@ -195,11 +196,7 @@ _SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {
 
 
 def track(
-    at: Target,
-    frames: Sequence[int],
-    settings: "TrackerSettings",
-    progress: Reporter,
-    cameras: Sequence[str] = (),
+    session: "Session", plan: "TrackPlan", progress: Reporter, find: "FindSettings | None" = None
 ) -> dict[str, Any]:
     """Track people and store their poses as one entry of the history.
 
@@ -207,121 +204,33 @@ def track(
     to resume.
 
     Args:
-        at: the session and the people to track.
-        frames: in the order of tracking.
-        settings: of the tracker, which name its method.
+        session: the session.
+        plan: what to track.
         progress: shows how far it is.
-        cameras: names of those to track with; all if empty.
+        find: how people without a pose are found, from whom the run goes out in both directions; None: a run from the
+            first frame of the plan to its last.
 
     Returns:
-        A summary. `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of
-        poses that the backward pass improved. `normal_matrices` has rank and conditioning by person, for methods that
-        compute them.
+        See `track_report.summarize`.
 
     Raises:
-        SessionError: a person has no pose at or before the first frame, or a camera is unknown.
+        SessionError: a person has no pose at or before the first frame.
     """
-    import numpy as np
-
+    from app.cli.chain_progress import ChainProgress
     from tracker.compute.kernel_cache import compiled_mark
-    from tracker.evidence.observer import Observer
-    from tracker.footage.recording import Recording
-    from tracker.pipeline.stored_run import TrackTask, stored_run
-    from tracker.session.lock import SessionLock
-    from tracker.session.matching import check_names
-    from tracker.session.relink import require_files
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.pipeline.chain import open_stored_session, run_chain
 
-    session, stopped = at.session, False
-    used = check_names(cameras, [c.camera.name for c in session.cameras], "camera", "--cameras")
-    task = TrackTask(frames, at.people, settings, tuple(used))
-    sources = task.sources(session)
-    require_files(session)
-    with (
-        SessionLock(session.folder),
-        closing(AnnotationStore(session.annotations_path)) as store,
-        Recording(sources) as recording,
-        stored_run(session, store, Observer(sources, recording), task) as run,
-    ):
-        if store.backup_error is not None:
-            progress.say(store.backup_error)
+    is_stopped = False
+    with open_stored_session(session) as opened, ChainProgress(progress) as sink:
+        if opened.backup_error is not None:
+            progress.say(opened.backup_error)
         if not compiled_mark().exists():
             progress.say("kernels that are not compiled yet are compiled first, once: it may take a minute or two")
         try:
-            _work(run, progress)
+            plan = opened.track(plan, sink) if find is None else run_chain(plan, find, opened, sink)
         except KeyboardInterrupt:
-            stopped = True
-    left, stopped_at = run.run.frames, run.next_frame
-    if stopped_at is None:
-        stopped_at = frames[-1] if run.visited is None else run.visited
-    statuses, costs = run.status_counts(), [c for c in run.costs_px.values() if np.isfinite(c)]
-    return {
-        "frames": len(run.costs_px),
-        "resumed_at": None if len(left) == len(frames) else left[0] if left else frames[-1],
-        "stopped_at": stopped_at if stopped else None,
-        "improved_backward": run.n_improved,
-        "people": [session.people[i].name for i in at.people],
-        "mean_cost_px": float(np.mean(costs)) if costs else None,
-        "statuses": {session.people[i].name: dict(statuses[i]) for i in at.people},
-        "normal_matrices": _summarize_matrices(at, run),
-    }
-
-
-def _summarize_matrices(at: Target, run: "TrackSession") -> dict[str, Any]:
-    """Return the lowest rank of the normal matrix and its median condition number, by person (KRH08 Sect. 5.4)."""
-    import numpy as np
-
-    out = dict[str, Any]()
-    for i in at.people:
-        found = [m for of_frame in run.normal_matrices.values() if (m := of_frame[i]) is not None]
-        if found:
-            lowest = min(found, key=lambda m: m.rank - m.n_dofs)
-            condition = float(np.median([m.condition for m in found]))
-            out[at.session.people[i].name] = {
-                "lowest_rank": lowest.rank,
-                "n_dofs": lowest.n_dofs,
-                "median_condition": condition if np.isfinite(condition) else None,
-            }
-    return out
-
-
-def _work(run: "TrackSession", progress: Reporter) -> None:
-    """Do both passes, show the progress of each, and smooth the poses."""
-    if run.run.frames:
-        with progress.over(len(run.run.frames), "tracking") as tick:
-            for estimate in run.first_pass():
-                run.take(estimate)
-                tick()
-    run.save()
-    steps = run.backward_pass()
-    first = next(steps, None)
-    if first is not None:
-        with progress.over(first.total, "tracking back") as tick:
-            run.take(first)
-            tick()
-            for step in steps:
-                run.take(step)
-                tick()
-    for smoothed in run.smoothing():
-        run.take(smoothed)
-
-
-def _format(found: dict[str, Any]) -> str:
-    resumed = "" if found["resumed_at"] is None else f", resumed at frame {found['resumed_at']}"
-    lines = [f"tracked {', '.join(found['people'])} over {found['frames']} frames{resumed}"]
-    if found["mean_cost_px"] is not None:
-        lines[0] += f", mean cost {found['mean_cost_px']:.2f} px"
-    for name, statuses in found["statuses"].items():
-        counts = [f"{statuses[s]} {s}" for s in ("good", "doubtful", "lost") if statuses.get(s)]
-        lines.append(f"{name}: {', '.join(counts)}")
-    for name, matrix in found["normal_matrices"].items():
-        condition = "unbounded" if matrix["median_condition"] is None else f"{matrix['median_condition']:.1e}"
-        lines.append(
-            f"{name}: normal matrix of rank {matrix['lowest_rank']} of {matrix['n_dofs']} or more, "
-            f"condition number {condition} in the median"
-        )
-    if found["improved_backward"]:
-        lines.append(f"the backward pass replaced {found['improved_backward']} poses of frames with lost people")
-    if found["stopped_at"] is not None:
-        lines.append(f"stopped before frame {found['stopped_at']}; run it again to resume")
-    return "\n".join(lines)
+            is_stopped = True
+    if opened.run is None or opened.plan is None:
+        print("stopped before anybody was found; nothing was stored", file=sys.stderr)
+        sys.exit(130)
+    return summarize(opened.session, opened.plan, opened.run, is_stopped)

@@ -1,4 +1,4 @@
-"""Numba options, the kernel cache, thread pools and quantiles of small arrays. Imports no other room.
+"""Numba options, the kernel cache, thread pools and quantiles of small arrays; reports of progress. Imports no other room.
 
-Public: `numba_options`, `threads`, `quantiles`, and of `kernel_cache` which kernels are compiled.
+Public: `numba_options`, `threads`, `quantiles`, `progress`, and of `kernel_cache` which kernels are compiled.
 """

@@ -11,7 +11,7 @@ from tracker.formats.model_toml import format_model, load_model
 from tracker.motion import smoothing
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.smoothing import TrackedRows
-from tracker.pipeline.stored_run import TrackTask, stored_run
+from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.pipeline.track_session import SmoothedRows
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
@@ -77,7 +77,7 @@ def store(session):
 
 def track(session, store, settings=SETTINGS, n=None):
     """Take so many steps, or all."""
-    with stored_run(session, store, None, TrackTask(range(N), (0,), settings)) as run:
+    with stored_run(session, store, None, TrackPlan(range(N), (0,), settings)) as run:
         for k, step in enumerate(run.steps(), start=1):
             run.take(step)
             if k == n:
@@ -152,7 +152,7 @@ def test_a_resumed_run_ends_like_one_without_a_break(session, store, n):
     assert not run.finished
     assert x_of_tracked(store, n) == pytest.approx([tracked_x(k) for k in range(n) if k not in (0, 6)])
     run = track(session, store)
-    assert len(run.run.frames) == N - n
+    assert len(run.frames) == N - n
     np.testing.assert_array_equal([r.values for r in records(store)], whole)
 
 
@@ -165,7 +165,7 @@ def x_of_tracked(store, n):
 
 
 def test_a_run_interrupted_before_its_smoothed_poses_are_written_is_not_smoothed_in_part(session, store):
-    with stored_run(session, store, None, TrackTask(range(N), (0,), SETTINGS)) as run:
+    with stored_run(session, store, None, TrackPlan(range(N), (0,), SETTINGS)) as run:
         for step in run.steps():
             if isinstance(step, SmoothedRows):
                 break
