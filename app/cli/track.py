@@ -1,37 +1,35 @@
 """`quadrille track`: track people and store the poses; the same command resumes an interrupted run."""
 
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, make_dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from app.cli.arguments import Names, OptionalName, OptionalNumber, OptionalRange, OptionalWhole, SessionArg
 from app.cli.json_output import format_json
-from app.cli.target import Target, check_stride, load_target, parse_frames
+from app.cli.target import check_stride, load_target, parse_frames
 from app.cli.track_report import format_summary, summarize
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
+from tracker.pipeline.methods import METHODS, all_options
+from tracker.tracking.method import OptionValue, PaperMode
 
 if TYPE_CHECKING:
     from tracker.pipeline.find_people import FindSettings
     from tracker.pipeline.stored_run import TrackPlan
     from tracker.session.session import Session
-    from tracker.tracking.estimation.settings import EstimationSettings
     from tracker.tracking.tracker import TrackerSettings
 
 
 @dataclass(frozen=True)
-class TrackArguments:
-    """Arguments of `quadrille track`."""
+class TrackWords:
+    """Arguments of `quadrille track` that all methods share."""
 
     session: SessionArg
     """session folder."""
-    method: Literal["chamfer", "contour", "voxel"] = "chamfer"
-    """chamfer: edges; predicted, refined by Gauss-Newton, and searched if that does not suffice. contour: extremal
-    contours, refined by Gauss-Newton until it converges, without a search of whole bodies. voxel: a Kalman filter on
-    the parts of the body, measured by the voxels of the silhouettes."""
+    method: str = ""
+    """how people are tracked."""
     init: Literal["auto"] | None = None
     """auto finds people who have no pose first, on the frame where they track best, and tracks from there in both
     directions."""
@@ -47,30 +45,43 @@ class TrackArguments:
     """name of the person to track; all people by default."""
     backward: bool = False
     """from the last frame of the range to the first."""
-    theta: OptionalNumber = None
-    """outlier distance in pixels; 3% of the longer side of the image by default."""
-    order: OptionalWhole = None
-    """degree of the motion model: 0 stays, 1 constant velocity (default), 2 constant acceleration (with --paper)."""
-    window: OptionalWhole = None
-    """past frames that the motion is estimated from; 3 by default, 8 with --paper."""
     paper: bool = False
-    """as the method's paper: chamfer as Gavrila and Davis 1996, in a session made with --model gavrila22; contour as
-    Knossow, Ronfard and Horaud 2008; voxel as Mikic and others 2001, in a session made with --model mikic10. See
-    docs/trackers.md."""
-    image_contours: Literal["edges", "silhouettes"] | None = None
-    """contour: what the model's contours are compared with; edges by default, silhouettes with --paper."""
-    sliding: bool = True
-    """contour: whether the Jacobian has the term of contours that slide on the surface."""
-    voxel_size: OptionalNumber = None
-    """voxel: edge of a voxel, mm; 30 by default, 50 with --paper."""
-    sizes: Literal["frozen", "first", "always"] | None = None
-    """voxel: when part sizes are estimated: never, on the first frame (default), or on all frames (with --paper)."""
-    backward_pass: bool = True
-    """at the end, track lost people backward from the first trusted poses after the loss."""
-    smooth: bool = True
-    """at the end, smooth the poses over time; keyframes stay."""
+    """as the method's paper."""
     json: bool = False
     """print one JSON object."""
+
+
+def arguments_class() -> type[TrackWords]:
+    """Return the arguments of `quadrille track`, with all methods and their options."""
+    papers = [f"{m.name} as {_paper_text(m.paper)}" for m in METHODS.values() if m.paper is not None]
+    methods = " ".join(f"{m.name}: {m.help}." for m in METHODS.values())
+    own = [
+        _field("method", next(iter(METHODS)), Literal[tuple(METHODS)], methods),
+        _field("paper", False, bool, f"as the method's paper: {'; '.join(papers)}. See docs/trackers.md."),
+    ]
+    for option in all_options().values():
+        owners = [m.name for m in METHODS.values() if option in m.options]
+        prefix = "" if len(owners) == len(METHODS) else f"{', '.join(owners)}: "
+        text = f"{prefix}{option.help}{'; ' * bool(option.defaults)}{option.defaults}."
+        kinds = {"switch": bool, "whole": OptionalWhole, "number": OptionalNumber}
+        kind = kinds.get(option.kind) or Literal[tuple(option.choices or ())] | None
+        own.append(_field(option.name, True if option.kind == "switch" else None, kind, text))
+    return make_dataclass("TrackArguments", own, bases=(TrackWords,), frozen=True)
+
+
+def _field(name: str, default: object, kind: Any, text: str) -> tuple[str, Any, Any]:
+    hint = {"help_behavior_hint": ""} if default is None else {}
+    return name, Annotated[kind, tyro.conf.arg(help=text, **hint)], field(default=default)
+
+
+def _paper_text(paper: PaperMode) -> str:
+    return paper.source + (f", in a session made with --model {paper.body}" if paper.body else "")
+
+
+if TYPE_CHECKING:
+    TrackArguments = TrackWords
+else:
+    TrackArguments = arguments_class()
 
 
 def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> None:
@@ -85,9 +96,9 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     ascending = parse_frames(arguments.frames, at.session)[:: check_stride(arguments.stride)]
     frames = ascending[::-1] if arguments.backward else ascending
     _check_chain(arguments)
-    settings = _SETTINGS[arguments.method](arguments)
-    if arguments.paper:
-        _require_paper_body(at, arguments.method)
+    paper, settings = METHODS[arguments.method].paper, settings_of(arguments)
+    if arguments.paper and paper is not None:
+        paper.require_body({p.name: p.model for p in (at.session.people[i] for i in at.people)})
     used = check_names(arguments.cameras, [c.camera.name for c in at.session.cameras], "camera", "--cameras")
     plan = TrackPlan(frames, at.people, settings, tuple(used))
     found = track(at.session, plan, Reporter(silent=arguments.json), _found_by(arguments))
@@ -113,86 +124,30 @@ def _check_chain(arguments: TrackArguments) -> None:
         )
 
 
-def _chamfer_settings(arguments: TrackArguments) -> "TrackerSettings":
-    from tracker.tracking.chamfer.paper import paper_settings
-    from tracker.tracking.chamfer.settings import TrackSettings
-
-    if arguments.image_contours is not None or not arguments.sliding:
-        raise TrackerError(
-            "expected --image-contours and --no-sliding with the contour method, found the method 'chamfer'; "
-            "add --method contour, or leave them out"
-        )
-    _reject(arguments, "chamfer", voxel_size=arguments.voxel_size, sizes=arguments.sizes)
-    settings = paper_settings() if arguments.paper else TrackSettings(backward_pass=arguments.backward_pass)
-    return _shared_settings(settings, arguments)
-
-
-def _contour_settings(arguments: TrackArguments) -> "TrackerSettings":
-    from tracker.tracking.contour.paper import paper_settings
-    from tracker.tracking.contour.settings import ContourSettings, with_sliding
-
-    _reject(arguments, "contour", voxel_size=arguments.voxel_size, sizes=arguments.sizes)
-    wanted = arguments.image_contours
-    if arguments.paper:
-        return _shared_settings(paper_settings(wanted or "silhouettes", arguments.sliding), arguments)
-    settings = ContourSettings(backward_pass=arguments.backward_pass, image_contours=wanted or "edges")
-    return _shared_settings(with_sliding(settings, arguments.sliding), arguments)
-
-
-def _shared_settings(settings: "EstimationSettings", arguments: TrackArguments) -> "TrackerSettings":
-    from tracker.tracking.estimation.settings import at_stride
-
-    motion, order, window = settings.predict, arguments.order, arguments.window
-    motion = replace(
-        motion, order=motion.order if order is None else order, window=motion.window if window is None else window
-    )
-    chosen = replace(
-        settings, predict=motion, theta_px=arguments.theta, smooth=arguments.smooth and not arguments.paper
-    )
-    return at_stride(chosen, arguments.stride)
-
-
-def _voxel_settings(arguments: TrackArguments) -> "TrackerSettings":
-    from tracker.tracking.voxel.paper import paper_settings
-    from tracker.tracking.voxel.settings import VoxelSettings
-
-    _reject(arguments, "voxel", theta=arguments.theta, order=arguments.order, window=arguments.window)
-    settings = paper_settings() if arguments.paper else VoxelSettings(smooth=arguments.smooth)
-    if arguments.voxel_size is not None:
-        settings = replace(settings, voxel_m=arguments.voxel_size / 1000)
-    return settings if arguments.sizes is None else replace(settings, sizes=arguments.sizes)
-
-
-def _reject(arguments: TrackArguments, method: str, **values: object) -> None:
-    """Refuse options that a method does not have.
+def settings_of(arguments: TrackWords) -> "TrackerSettings":
+    """Return the settings of the tracker that the arguments name.
 
     Raises:
-        TrackerError: one of them is given.
+        TrackerError: an option belongs to another method, or its value is invalid.
     """
-    given = ", ".join(f"--{name.replace('_', '-')}" for name, value in values.items() if value is not None)
-    if given:
+    method, chosen = METHODS[arguments.method], dict[str, OptionValue]()
+    for name, option in all_options().items():
+        value = getattr(arguments, name)
+        if value is not None and not (option.kind == "switch" and value):
+            chosen[name] = value
+    names = {option.name for option in method.options}
+    foreign = [_flag(name, value) for name, value in chosen.items() if name not in names]
+    if foreign:
         raise TrackerError(
-            f"expected options of the method '{method}', found {given}; leave them out, or choose another --method"
+            f"expected options of the method '{method.name}', found {', '.join(foreign)}; leave them out, or choose "
+            "another --method"
         )
+    settings = method.paper.settings() if arguments.paper and method.paper is not None else method.settings()
+    return method.at_stride(method.with_options(settings, chosen), arguments.stride)
 
 
-def _require_paper_body(at: Target, method: str) -> None:
-    from tracker.tracking.chamfer import paper as chamfer
-    from tracker.tracking.voxel import paper as voxel
-
-    bodies = {p.name: p.model for p in (at.session.people[i] for i in at.people)}
-    if method == "chamfer":
-        chamfer.require_paper_body(bodies)
-    elif method == "voxel":
-        voxel.require_paper_body(bodies)
-
-
-_SETTINGS: Mapping[str, "Callable[[TrackArguments], TrackerSettings]"] = {
-    "chamfer": _chamfer_settings,
-    "contour": _contour_settings,
-    "voxel": _voxel_settings,
-}
-"""Makes the settings of each method (`METHODS`) from the arguments."""
+def _flag(name: str, value: OptionValue) -> str:
+    return f"--{'no-' if value is False else ''}{name.replace('_', '-')}"
 
 
 def track(

@@ -2,11 +2,13 @@
 
 import threading
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 
 from tracker.pipeline.methods import METHODS
+from tracker.tracking.chamfer.method import CHAMFER
 from tracker.tracking.estimate import PoseEstimate
 
 STEP_M = 0.01
@@ -44,7 +46,7 @@ class FakeTracker:
     """Frame 4 is doubtful, frames divisible by 7 are lost, and the second view sees no edge."""
 
     def __init__(self, monkeypatch):
-        monkeypatch.setitem(METHODS, "chamfer", self.with_settings)
+        monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=self.with_settings))
         self.steps = threading.Semaphore(0)
         self.settings = None
         self.run = None

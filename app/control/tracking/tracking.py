@@ -73,8 +73,8 @@ class Tracking:
         self._session_state, self._activities = session_state, activities
         activities.add_job(self, on_shown_frame=True)
         kept = session_state.saver.setting(track_settings.SETTING)
-        settings, choices = track_settings.restored(kept, session_state.session.camera_names)
-        session_state.set(settings=settings, run_choices=choices)
+        choices = track_settings.restored(kept, session_state.session.camera_names)
+        session_state.set(settings=track_settings.changed(session_state.state.settings, choices), run_choices=choices)
         self._run: _Run | None = None
         self.after_run: Callable[[range], None] = lambda frames: None
         """Called with the frames of each run that ended; must return quickly."""
@@ -91,8 +91,7 @@ class Tracking:
         Raises:
             TrackerError: the session's settings cannot be written.
         """
-        state = self._session_state.state
-        settings = track_settings.stored(state.settings, state.run_choices)
+        settings = track_settings.stored(self._session_state.state.run_choices)
         self._session_state.saver.store_setting(track_settings.SETTING, settings)
 
     def choose(self, choices: RunChoices) -> None:

@@ -3,6 +3,7 @@
 import re
 import shutil
 from contextlib import closing
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -22,6 +23,7 @@ from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
+from tracker.tracking.chamfer.method import CHAMFER
 from tracker.tracking.chamfer.settings import TrackSettings
 
 FRAME = 3
@@ -75,7 +77,7 @@ def walkers(monkeypatch):
         made.append(Walker(settings))
         return made[-1]
 
-    monkeypatch.setitem(METHODS, "chamfer", make)
+    monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=make))
     return made
 
 

@@ -16,6 +16,7 @@ from tracker.pipeline.track_session import SmoothedRows
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
+from tracker.tracking.chamfer.method import CHAMFER
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.confidence import LimbFeatures, PoseQuality
 from tracker.tracking.estimate import AlternativePose, PoseEstimate
@@ -55,7 +56,7 @@ class Jittery:
 
 @pytest.fixture
 def session(tmp_path, sample_folder, monkeypatch):
-    monkeypatch.setitem(METHODS, "chamfer", Jittery)
+    monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=Jittery))
     monkeypatch.setattr(smoothing, "_ITERATIONS", 3)
     return load_session(shutil.copytree(sample_folder, tmp_path / "session"))
 
@@ -179,7 +180,11 @@ def test_a_run_interrupted_before_its_smoothed_poses_are_written_is_not_smoothed
 @pytest.fixture
 def with_a_leap(monkeypatch):
     """The person is 40 cm ahead on frame 9, where the frame does not contradict that."""
-    monkeypatch.setitem(METHODS, "chamfer", lambda settings: Jittery(settings, CLEAR._replace(limbs=CLEAR.limbs[:4])))
+
+    def fewer_limbs(settings):
+        return Jittery(settings, CLEAR._replace(limbs=CLEAR.limbs[:4]))
+
+    monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=fewer_limbs))
     monkeypatch.setitem(globals(), "tracked_x", lambda frame: 0.05 * frame)
 
 

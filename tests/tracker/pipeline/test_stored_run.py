@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
+from tracker.tracking.chamfer.method import CHAMFER
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
@@ -51,7 +52,7 @@ class Walker:
 
 @pytest.fixture
 def session(tmp_path, sample_folder, monkeypatch):
-    monkeypatch.setitem(METHODS, "chamfer", Walker)
+    monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=Walker))
     return load_session(shutil.copytree(sample_folder, tmp_path / "session"))
 
 
