@@ -70,8 +70,8 @@ def arguments_class() -> type[TrackWords]:
 
 
 def _field(name: str, default: object, kind: Any, text: str) -> tuple[str, Any, Any]:
-    hint = {"help_behavior_hint": ""} if default is None else {}
-    return name, Annotated[kind, tyro.conf.arg(help=text, **hint)], field(default=default)
+    argument = tyro.conf.arg(help=text, help_behavior_hint="" if default is None else None)
+    return name, Annotated[kind, argument], field(default=default)
 
 
 def _paper_text(paper: PaperMode) -> str:

@@ -62,9 +62,10 @@ class Option:
             expected = f"one of {', '.join(self.choices)}"
         else:
             low, high = self.limits or (0.0, float("inf"))
-            is_number = isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high
-            if is_number and value != 0 and (self.kind == "number" or float(value).is_integer()):
-                return value
+            if not isinstance(value, bool) and isinstance(value, int | float) and value != 0 and low <= value <= high:
+                is_whole = float(value).is_integer()
+                if self.kind == "number" or is_whole:
+                    return value
             expected = f"{'a whole number' if self.kind == 'whole' else 'a number'} "
             expected += "above 0" if self.limits is None else f"from {low:g} to {high:g}"
         raise TrackerError(f"expected {expected} as '{self.name}', found {value!r}; correct it")
