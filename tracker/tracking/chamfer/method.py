@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from tracker.tracking.chamfer.constants import PAPER_BODY
 from tracker.tracking.estimation.options import BACKWARD_PASS, ORDER, RECOVER, SMOOTH, THETA, WINDOW
 from tracker.tracking.method import Method, Option, PaperMode
 
@@ -11,9 +12,6 @@ if TYPE_CHECKING:
     from tracker.body.model import BodyModel
     from tracker.tracking.chamfer.settings import TrackSettings
     from tracker.tracking.chamfer.tracker import ChamferTracker
-
-PAPER_BODY = "gavrila22"
-"""Body of 22 degrees of freedom with tapered superquadrics (GD96 Sect. 3)."""
 
 
 def _settings() -> "TrackSettings":

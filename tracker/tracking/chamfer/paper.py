@@ -15,7 +15,7 @@ from tracker.formats.model_toml import load_model
 from tracker.geometry.shapes import TaperedSuperquadric
 from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings
-from tracker.tracking.chamfer.method import PAPER_BODY
+from tracker.tracking.chamfer.constants import PAPER_BODY
 from tracker.tracking.chamfer.settings import TrackSettings
 
 _POSES = 8

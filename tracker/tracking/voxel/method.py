@@ -6,16 +6,12 @@ from typing import TYPE_CHECKING
 
 from tracker.tracking.estimation.options import SMOOTH
 from tracker.tracking.method import Method, Option, PaperMode
+from tracker.tracking.voxel.constants import MAX_VOXEL_M, MIN_VOXEL_M, PAPER_BODY
 
 if TYPE_CHECKING:
     from tracker.body.model import BodyModel
     from tracker.tracking.voxel.settings import VoxelSettings
     from tracker.tracking.voxel.tracker import VoxelTracker
-
-PAPER_BODY = "mikic10"
-"""Body of ten parts on ball joints (MTHC01 Fig. 5)."""
-MIN_VOXEL_M, MAX_VOXEL_M = 0.01, 0.10
-"""Smallest and largest edge of a voxel, metres: a forearm is no wider than the largest."""
 
 
 def _settings() -> "VoxelSettings":

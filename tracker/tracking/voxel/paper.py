@@ -9,8 +9,8 @@ from functools import cache
 from tracker.body.model import BodyModel
 from tracker.errors import Remedy, TrackerError
 from tracker.formats.model_toml import load_model
+from tracker.tracking.voxel.constants import PAPER_BODY
 from tracker.tracking.voxel.measurement import MeasurementNoise
-from tracker.tracking.voxel.method import PAPER_BODY
 from tracker.tracking.voxel.motion_model import ProcessNoise
 from tracker.tracking.voxel.settings import VoxelSettings
 

@@ -6,9 +6,9 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from tracker.errors import TrackerError
+from tracker.tracking.voxel.constants import MAX_VOXEL_M, MIN_VOXEL_M
 from tracker.tracking.voxel.labels import LabelRule
 from tracker.tracking.voxel.measurement import MeasurementNoise
-from tracker.tracking.voxel.method import MAX_VOXEL_M, MIN_VOXEL_M
 from tracker.tracking.voxel.motion_model import ProcessNoise
 
 SizeEstimation = Literal["frozen", "first", "always"]
