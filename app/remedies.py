@@ -122,6 +122,9 @@ PHRASES = {
     "place_body": Phrases(
         "place the body in the page, or use quadrille init", "place the body by hand, or press Find people"
     ),
+    "common_start": Phrases(
+        "clear those of one person, or track without --init", "clear those of one person, or track from here (T)"
+    ),
     # bodies and joints
     "paper_body": Phrases(
         "make a session of it with 'quadrille new --model {body}', or track without --paper",

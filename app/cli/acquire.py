@@ -139,7 +139,7 @@ def acquire(
     with SessionLock(session.folder), Recording(session.cameras) as recording:
         with progress.share("acquiring") as advance:
 
-            def report(stage: str, share: float) -> None:
+            def report(stage: str, share: float, text: str = "", /) -> None:
                 advance(share)
 
             found = acquire_body(session, Observer(session.cameras, recording), person, frames, settings, report)

@@ -17,8 +17,8 @@ from tracker.validation import quoted
 
 def _track_settings(controller: Controller, _: int, message: wire.SetTrackSettings) -> None:
     before, changes = controller.state, msgspec.to_builtins(message.changes)
-    after = track_settings.changed(before.settings, changes)
     choices = track_settings.with_choices(before.run_choices, changes, controller.session.camera_names)
+    after = track_settings.changed(before.settings, choices)
     if after != before.settings:
         controller.search.set_settings(after)
     controller.tracking.choose(choices)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.control.controller import Controller
+from app.control.tracking import track_settings
 from app.page import inspector_messages as wire
 from app.page.message_types import Message
 from app.state.floor_picking import FloorState
@@ -15,6 +16,7 @@ from app.state.run_choices import RunChoices
 from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
 from tracker.formats.model_toml import PRESETS
+from tracker.pipeline.methods import METHODS
 from tracker.posing.grab import minor_points
 from tracker.tracking.chamfer.settings import TrackSettings
 
@@ -57,16 +59,33 @@ def settings(found: TrackSettings, choices: RunChoices) -> wire.SettingsMessage:
     """Describe the settings of tracker and search."""
     default = TrackSettings()
     return wire.SettingsMessage(
-        track_values(found, choices), search_values(found), track_values(default, RunChoices()), search_values(default)
+        track_values(choices), search_values(found), track_values(RunChoices()), search_values(default), methods()
     )
 
 
-def track_values(found: TrackSettings, choices: RunChoices) -> wire.TrackValues:
-    """Describe the settings of the tracker."""
-    return wire.TrackValues(
-        choices.method, choices.stride, choices.cameras, found.estimate, found.predict.order, found.predict.window,
-        found.recover is not None,        found.backward_pass, found.smooth,
-    )  # fmt: skip
+def track_values(choices: RunChoices) -> wire.TrackValues:
+    """Describe the choices for a run."""
+    return wire.TrackValues(choices.method, choices.stride, choices.cameras, dict(choices.options))
+
+
+def methods() -> tuple[wire.MethodInfo, ...]:
+    """Describe the tracking methods and their options."""
+    found = []
+    for method in METHODS.values():
+        default = track_settings.defaults(method)
+        options = tuple(
+            wire.OptionInfo(
+                o.name, o.label, _sentence(o.help), o.kind, dict(o.choices or {}), o.limits, o.step, default[o.name]
+            )
+            for o in method.options
+            if o.is_on_page
+        )
+        found.append(wire.MethodInfo(method.name, method.label, _sentence(method.help), options))
+    return tuple(found)
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def search_values(found: TrackSettings) -> wire.SearchValues:

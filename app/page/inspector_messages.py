@@ -10,13 +10,8 @@ from app.page.search_messages import OutlierMode
 from app.state.run_choices import MAX_STRIDE
 from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
 from tracker.acquisition.from_contours import SizeMethod
-from tracker.motion.prediction import MAX_ORDER
-from tracker.pipeline.methods import MethodName
+from tracker.tracking.method import OptionKind
 
-MAX_PAST_POSES = 8
-"""Largest number of poses from which a page may let the motion be predicted."""
-
-EstimationMode: TypeAlias = Literal["refine", "search"]
 _Metres: TypeAlias = Annotated[float, Meta(gt=0, le=10)]
 
 
@@ -26,23 +21,14 @@ _Metres: TypeAlias = Annotated[float, Meta(gt=0, le=10)]
 class TrackChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Settings of the tracker to change; what is left out stays."""
 
-    method: MethodName | UnsetType = UNSET
-    """The tracking method."""
+    method: Name | UnsetType = UNSET
+    """Name of the tracking method."""
     stride: Annotated[int, Meta(ge=1, le=MAX_STRIDE)] | UnsetType = UNSET
     """Every so many frames are tracked."""
     cameras: Annotated[list[Name], Meta(max_length=1000)] | UnsetType = UNSET
     """Names of the cameras to track with; all if empty."""
-    estimate: EstimationMode | UnsetType = UNSET
-    """How the pose of a frame is found."""
-    order: Annotated[int, Meta(ge=0, le=MAX_ORDER)] | UnsetType = UNSET
-    """Degree of the motion model: 0 stays, 1 is constant velocity, 2 is constant acceleration."""
-    past_poses: Annotated[int, Meta(ge=1, le=MAX_PAST_POSES)] | UnsetType = UNSET
-    """Number of poses from which the motion is taken."""
-    recover: bool | UnsetType = UNSET
-    """Whether lost limbs are searched."""
-    backward_pass: bool | UnsetType = UNSET
-    smooth: bool | UnsetType = UNSET
-    """Whether the poses are smoothed at the end of a run."""
+    options: dict[Name, bool | float | Name | None] | UnsetType = UNSET
+    """Options of methods by name, see `MethodInfo`; null for the default."""
 
 
 class SetTrackSettings(Command, frozen=True, tag="track_settings"):
@@ -146,24 +132,39 @@ class FindPeople(Command, frozen=True, tag="find_people"):
 class TrackValues(Part, frozen=True):
     """Settings of the tracker."""
 
-    method: MethodName
-    """The tracking method: chamfer matching, or extremal contours."""
+    method: str
+    """Name of the tracking method."""
     stride: int
     """Every so many frames are tracked; the frames between get no pose."""
     cameras: tuple[str, ...]
     """Names of the cameras to track with; all if empty."""
-    estimate: EstimationMode
-    """How chamfer matching finds the pose of a frame: refined, and searched where that does not suffice; or searched
-    alone."""
-    order: int
-    """Degree of the motion model: 0 stays, 1 is constant velocity, 2 is constant acceleration."""
-    past_poses: int
-    """Number of poses from which the motion is taken."""
-    recover: bool
-    """Whether lost limbs are searched."""
-    backward_pass: bool
-    smooth: bool
-    """Whether the poses are smoothed at the end of a run."""
+    options: dict[str, bool | float | str]
+    """Options that differ from the default, by name."""
+
+
+class OptionInfo(Part, frozen=True):
+    """An option of a tracking method."""
+
+    name: str
+    label: str
+    help: str
+    kind: OptionKind
+    choices: dict[str, str]
+    """Of a choice, the labels by value; else empty."""
+    limits: tuple[float, float] | None
+    """Of a number, its least and largest value; null where it is positive."""
+    step: float
+    default: bool | float | str | None
+
+
+class MethodInfo(Part, frozen=True):
+    """A tracking method."""
+
+    name: str
+    label: str
+    help: str
+    options: tuple[OptionInfo, ...]
+    """In the order in which they are shown."""
 
 
 class SearchValues(Part, frozen=True):
@@ -191,6 +192,8 @@ class SettingsMessage(Message, frozen=True, tag="settings"):
     search: SearchValues
     track_default: TrackValues
     search_default: SearchValues
+    methods: tuple[MethodInfo, ...]
+    """The tracking methods, the default first."""
 
 
 class FloorInfo(Part, frozen=True):

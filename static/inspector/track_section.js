@@ -2,28 +2,26 @@
 
 import { checkRow, choiceRow, numberRow, textButton } from "./rows.js";
 
-/** @typedef {import("../model/protocol.js").TrackValues} TrackValues */
-
-/** @type {Record<"0" | "1" | "2", string>} by degree of the motion model */
-const ORDERS = { 0: "Stays in place", 1: "Constant velocity", 2: "Constant acceleration" };
+/** @typedef {import("../model/protocol.js").TrackChanges} TrackChanges */
+/** @typedef {import("../model/protocol.js").OptionInfo} OptionInfo */
+/** @typedef {import("../model/protocol.js").MethodInfo} MethodInfo */
+/** @typedef {boolean | number | string | null} OptionValue */
+/** @typedef {{ element: HTMLElement, show: (value: OptionValue, isChanged: boolean) => void }} OptionRow */
 
 /**
  * @param {import("../model/index.js").Context} context
  * @returns {import("./inspector.js").Section}
  */
 export function trackSection({ store, send, notify }) {
-  const set = (/** @type {Partial<TrackValues>} */ changes) => send({ type: "track_settings", changes });
+  const set = (/** @type {TrackChanges} */ changes) => send({ type: "track_settings", changes });
   const refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
-  const method = choiceRow({
-    label: "Method",
-    title: "Chamfer matching searches whole bodies where refinement fails. Extremal contours (KRH08) refine until they converge. Voxels (MTHC01) are carved from the silhouettes and filtered over time",
-    options: [
-      ["chamfer", "Chamfer matching"],
-      ["contour", "Extremal contours"],
-      ["voxel", "Voxels"],
-    ],
-    change: (value) => set({ method: value }),
-  });
+  const choices = document.createElement("div");
+  const options = document.createElement("div");
+  /** @type {ReturnType<typeof choiceRow> | null} */
+  let method = null;
+  let shown = "";
+  /** @type {Map<string, OptionRow>} */
+  const rows = new Map();
   const stride = numberRow({
     label: "Stride",
     title: "Track every Nth frame alone. The frames between get no pose, and can be interpolated",
@@ -34,71 +32,45 @@ export function trackSection({ store, send, notify }) {
     refuse,
   });
   const cameras = cameraChoices((names) => set({ cameras: names }), refuse);
-  const estimate = choiceRow({
-    label: "Estimation",
-    title: "How the pose of a frame is found from its prediction. Refinement fits contours to edges and searches only what it cannot fit",
-    options: [
-      ["refine", "Refine, then search"],
-      ["search", "Search only (GD96)"],
-    ],
-    change: (value) => set({ estimate: value }),
-  });
-  const order = choiceRow({
-    label: "Prediction",
-    title: "Motion model that predicts the pose of the next frame. GD96 uses constant acceleration, which overshoots on noisy poses",
-    options: [
-      ["0", ORDERS[0]],
-      ["1", ORDERS[1]],
-      ["2", ORDERS[2]],
-    ],
-    change: (value) => set({ order: Number(value) }),
-  });
-  const past = numberRow({
-    label: "Past poses",
-    title: "Number of poses from which the motion is predicted, 1 to 8",
-    low: 1,
-    high: 8,
-    step: 1,
-    change: (value) => set({ past_poses: Math.round(value ?? 1) }),
-    refuse,
-  });
-  const recover = checkRow({
-    label: "Search lost limbs",
-    title: "Search for a limb that is not where edges and colours are",
-    change: (on) => set({ recover: on }),
-  });
-  const backward = checkRow({
-    label: "Backward pass",
-    title: "At the end of a run, track lost people backward from the frame where they were found again",
-    change: (on) => set({ backward_pass: on }),
-  });
-  const smooth = checkRow({
-    label: "Smooth",
-    title: "At the end of a run, smooth the poses over time. Keyframes stay, lost limbs are not trusted",
-    change: (on) => set({ smooth: on }),
-  });
   const reset = textButton("Reset", "Restore the default track settings", () => {
     const { settings } = store.facts;
-    if (settings) set(settings.track_default);
+    if (!settings) return;
+    const { method: name, stride: every, cameras: all } = settings.track_default;
+    set({ method: name, stride: every, cameras: all, options: Object.fromEntries([...rows.keys()].map((key) => [key, null])) });
   });
   const body = document.createElement("div");
-  body.append(method.element, stride.element, cameras.element, estimate.element, order.element, past.element, recover.element, backward.element, smooth.element, reset);
+  body.append(choices, stride.element, cameras.element, options, reset);
+
+  /** @param {MethodInfo[]} methods */
+  const build = (methods) => {
+    method = choiceRow({
+      label: "Method",
+      title: methods.map((each) => `${each.label}: ${each.help.charAt(0).toLowerCase()}${each.help.slice(1)}`).join(". "),
+      options: methods.map((each) => [each.name, each.label]),
+      change: (value) => set({ method: value }),
+    });
+    choices.replaceChildren(method.element);
+    for (const option of methods.flatMap((each) => each.options)) {
+      if (!rows.has(option.name)) rows.set(option.name, optionRow(option, (value) => set({ options: { [option.name]: value } }), refuse));
+    }
+  };
 
   const show = () => {
     const { settings } = store.facts;
     if (!settings) return;
-    const { track, track_default: initial } = settings;
-    method.show(track.method, track.method !== initial.method);
+    const { track, track_default: initial, methods } = settings;
+    if (!method) build(methods);
+    method?.show(track.method, track.method !== initial.method);
     stride.show(track.stride, track.stride !== initial.stride);
     cameras.show(store.facts.session?.cameras.map((camera) => camera.name) ?? [], track.cameras);
-    estimate.element.hidden = track.method !== "chamfer";
-    for (const row of [order, past, recover, backward]) row.element.hidden = track.method === "voxel";
-    estimate.show(track.estimate, track.estimate !== initial.estimate);
-    order.show(/** @type {"0"} */ (String(track.order)), track.order !== initial.order);
-    past.show(track.past_poses, track.past_poses !== initial.past_poses);
-    recover.show(track.recover, track.recover !== initial.recover);
-    backward.show(track.backward_pass, track.backward_pass !== initial.backward_pass);
-    smooth.show(track.smooth, track.smooth !== initial.smooth);
+    const own = methods.find((each) => each.name === track.method)?.options ?? [];
+    if (shown !== track.method) {
+      shown = track.method;
+      options.replaceChildren(...own.map((option) => rows.get(option.name)?.element ?? ""));
+    }
+    for (const option of own) {
+      rows.get(option.name)?.show(track.options[option.name] ?? option.default, option.name in track.options);
+    }
     reset.disabled = JSON.stringify(track) === JSON.stringify(initial);
   };
   return {
@@ -108,6 +80,29 @@ export function trackSection({ store, send, notify }) {
     body,
     update: (changed) => (changed.has("settings") || changed.has("session")) && show(),
   };
+}
+
+/**
+ * The control of an option of a method.
+ *
+ * @param {OptionInfo} option
+ * @param {(value: OptionValue) => void} change
+ * @param {(text: string) => void} refuse
+ * @returns {OptionRow}
+ */
+function optionRow({ label, help, kind, choices, limits, step }, change, refuse) {
+  if (kind === "switch") {
+    const row = checkRow({ label, title: help, change });
+    return { element: row.element, show: (value, isChanged) => row.show(value === true, isChanged) };
+  }
+  if (kind === "choice") {
+    const row = choiceRow({ label, title: help, options: Object.entries(choices), change });
+    return { element: row.element, show: (value, isChanged) => row.show(String(value), isChanged) };
+  }
+  const [low, high] = limits ?? [0, Infinity];
+  const whole = (/** @type {number | null} */ value) => (kind === "whole" && value !== null ? Math.round(value) : value);
+  const row = numberRow({ label, title: `${help}, ${low} to ${high}`, low, high, step, change: (value) => change(whole(value)), refuse });
+  return { element: row.element, show: (value, isChanged) => row.show(typeof value === "number" ? value : null, isChanged) };
 }
 
 /**

@@ -70,9 +70,8 @@
  * @typedef {{type: "mark", toggle: "keyframe" | "reviewed"}} ToggleMark
  * @typedef {{type: "confirm_keyframe", person: number, frame: number}} ConfirmKeyframe
  * @typedef {{type: "follow", follow: boolean}} FollowTracking
- * @typedef {{method?: "chamfer" | "contour" | "voxel", stride?: number, cameras?: string[], estimate?: "refine" |
- *   "search", order?: number, past_poses?: number, recover?: boolean, backward_pass?: boolean, smooth?: boolean}}
- *   TrackChanges
+ * @typedef {{method?: string, stride?: number, cameras?: string[], options?: Record<string, boolean | number | string |
+ *   null>}} TrackChanges
  * @typedef {{type: "track_settings", changes: TrackChanges}} SetTrackSettings
  * @typedef {{bodies?: boolean, colors?: "parts" | "people", opacity?: number, cameras?: boolean, images?: boolean,
  *   floor?: boolean, gizmos?: boolean, ghost?: boolean, voxels?: boolean, character?: string, trail_points?: string[],
@@ -153,13 +152,17 @@
  * @typedef {{run: number, step: number, stage: string | null, candidate_px: number | null, best_px: number | null,
  *   evaluations: number}} Replay
  * @typedef {{type: "search_runs", runs: SearchRun[], replay: Replay | null, compared: number | null}} SearchRunsMessage
- * @typedef {{method: "chamfer" | "contour" | "voxel", stride: number, cameras: string[], estimate: "refine" | "search",
- *   order: number, past_poses: number, recover: boolean, backward_pass: boolean, smooth: boolean}} TrackValues
+ * @typedef {{method: string, stride: number, cameras: string[], options: Record<string, boolean | number | string>}}
+ *   TrackValues
  * @typedef {{theta_px: number | null, outliers: "truncated" | "paper", passes: number[], patience: number,
  *   max_expansions: number, limbs_apart: boolean, bound_rad: number, bound_m: number, step_rad: number, step_m:
  *   number}} SearchValues
+ * @typedef {{name: string, label: string, help: string, kind: "switch" | "choice" | "whole" | "number", choices:
+ *   Record<string, string>, limits: [number, number] | null, step: number, default: boolean | number | string | null}}
+ *   OptionInfo
+ * @typedef {{name: string, label: string, help: string, options: OptionInfo[]}} MethodInfo
  * @typedef {{type: "settings", track: TrackValues, search: SearchValues, track_default: TrackValues, search_default:
- *   SearchValues}} SettingsMessage
+ *   SearchValues, methods: MethodInfo[]}} SettingsMessage
  * @typedef {{bodies: boolean, colors: "parts" | "people", opacity: number, cameras: boolean, images: boolean, floor:
  *   boolean, gizmos: boolean, ghost: boolean, voxels: boolean, character: string, trail_points: string[], trail_frames:
  *   number}} View3d

@@ -24,6 +24,7 @@ from tracker.evaluation.references import read_joints
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.footage.video_writer import VideoWriter
+from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import Session, load_session, save_session
 from tracker.tracking.chamfer.settings import TrackSettings
 
@@ -107,7 +108,7 @@ def main() -> None:
         init_from_joints(at, 0, read_joints(words.joints, session.fps), sizes=False)
         print(f"before the first frame: {resident_mb():.0f} MB")
         watch = Watch()
-        found = track(at, range(session.n_frames), TrackSettings(), watch)
+        found = track(at.session, TrackPlan(range(session.n_frames), at.people, TrackSettings()), watch)
         stored = session.annotations_path.stat().st_size
     print(f"{found['frames']} frames, {found['statuses']}; the store has {stored / found['frames']:.0f} bytes a frame")
     if len(watch.figures_mb) >= 4:

@@ -15,10 +15,12 @@ import sys
 from dataclasses import dataclass, field
 
 import cv2
+import msgspec
 import numpy as np
 from aiohttp import WSMsgType, web
 from declared_messages import checked
 
+from app.page.inspector_feed import methods
 from app.page.message_parsing import parse
 
 WIDTH, HEIGHT, N_FRAMES = 640, 480, 120
@@ -74,10 +76,7 @@ PLOTS = {
     "torso": [("Angles", "deg", ANGLES[:3]), ("Position", "cm", ("x", "y", "z"))],
     "cost": [("Cost", "px", ("mean", *CAMERA_NAMES))],
 }
-TRACK = {
-    "method": "chamfer", "stride": 1, "cameras": [], "estimate": "refine", "order": 1, "past_poses": 3, "recover": True,
-    "backward_pass": True, "smooth": True,
-}  # fmt: skip
+TRACK = {"method": "chamfer", "stride": 1, "cameras": [], "options": {}}
 SEARCH = {
     "theta_px": None, "outliers": "truncated", "passes": [1.0, 0.5], "patience": 3, "max_expansions": 60,
     "limbs_apart": False, "bound_rad": 0.2618, "bound_m": 0.1, "step_rad": 0.0873, "step_m": 0.05,
@@ -195,7 +194,7 @@ class FakeEndpoint:
             "saved": True, "save_error": None,
         }  # fmt: skip
 
-        self.settings = {"type": "settings"} | {
+        self.settings = {"type": "settings", "methods": msgspec.to_builtins(methods())} | {
             name: dict(values)
             for values, names in ((TRACK, ("track", "track_default")), (SEARCH, ("search", "search_default")))
             for name in names

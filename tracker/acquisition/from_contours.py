@@ -21,6 +21,7 @@ from tracker.acquisition.from_voxels import (
 from tracker.acquisition.size_fit import SightedPerson, SizeFit, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.progress import Report, unreported
 from tracker.contours import occluding_contours
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
@@ -37,8 +38,6 @@ from tracker.tracking.view_regions import read_views, visible_pieces_px
 
 SizeMethod = Literal["contours", "voxels"]
 """Whether the fit to contours starts at the body before, or at a fit to voxels."""
-Report = Callable[[str, float], None]
-"""Is given a stage and the share of all work that is done, 0 to 1. An exception that it raises ends the acquisition."""
 _CHOOSING, _OBSERVING, _VOXELS = 0.1, 0.25, 0.5
 """Shares of the work up to the ends of the stages before the fit."""
 
@@ -89,7 +88,7 @@ def acquire_from_contours(
     person: int,
     placed: Mapping[int, PointTargets],
     settings: AcquisitionSettings,
-    report: Report = lambda stage, share: None,
+    report: Report = unreported,
     seen: Mapping[int, PinBlock] = MappingProxyType({}),
 ) -> Acquisition:
     """Acquire the body of one person.

@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.chamfer_search import ChamferSearchSettings, search_shapes
-from tracker.acquisition.from_contours import Acquisition, Report, cost_px, learn_static_edges, own_views
+from tracker.acquisition.from_contours import Acquisition, cost_px, learn_static_edges, own_views
 from tracker.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.body.model import PosedBody, parts_of
+from tracker.compute.progress import Report, unreported
 from tracker.contours import occluding_contours
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
@@ -63,7 +64,7 @@ def acquire_from_two_views(
     bodies: Mapping[int, tuple[PosedBody, ...]],
     person: int,
     settings: TwoViewSettings,
-    report: Report = lambda stage, share: None,
+    report: Report = unreported,
 ) -> Acquisition:
     """Acquire the shapes of one person's parts. Pose, height and lengths stay.
 

@@ -1,4 +1,6 @@
-"""Numba options, the kernel cache, thread pools and quantiles of small arrays. Imports no other room.
+"""Numba options, the kernel cache, thread pools, quantiles of small arrays, and reports of progress.
 
-Public: `numba_options`, `threads`, `quantiles`, and of `kernel_cache` which kernels are compiled.
+It imports no other room.
+
+Public: `numba_options`, `threads`, `quantiles`, `progress`, and of `kernel_cache` which kernels are compiled.
 """

@@ -1,12 +1,12 @@
 """`gauss_newton.solve` in one compiled call, for contour residuals with priors and penetration terms.
 
 A descent takes a dozen steps of a tenth of a millisecond each. In Python the calls between kernels take as long as the
-kernels, and hold the interpreter's lock. `gauss_newton.solve` is the readable version and the fallback for other blocks
-and for ball joints.
+kernels, and hold the interpreter's lock. `gauss_newton.solve` is the readable version, for any blocks and for ball
+joints; `solver_of` returns the one that a body needs.
 """
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,10 @@ from tracker.fitting.twists import twists_to_dofs
 from tracker.geometry.arrays import Array, IntArray
 
 _KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration)
+
+
+Solver: TypeAlias = Callable[..., Fit]
+"""`gauss_newton.solve`, or `solve_compiled`, which has the same parameters."""
 
 
 class _Blocks(NamedTuple):
@@ -87,26 +91,44 @@ def solve_compiled(
     tolerance: float = 1e-6,
     gain: float = 0.0,
 ) -> Fit:
-    """Minimize the summed cost of all blocks within the joint limits, as `gauss_newton.solve` does, up to rounding."""
+    """Minimize the summed cost of all blocks within the joint limits, as `gauss_newton.solve` does, up to rounding.
+
+    Raises:
+        TypeError: the kernel does not cover the body or the blocks.
+    """
     compiled = _compiled(model, blocks)
-    if compiled is None:
-        return gauss_newton.solve(model, pose, blocks, active_dofs, max_iterations, tolerance, gain)
     is_active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
     found, hessian = np.where(is_active, model.clip(pose), pose), np.empty((model.n_dofs, model.n_dofs))
     cost, iterations = _descend(compiled, found, is_active, max_iterations, tolerance, gain, hessian)
     return Fit(found, cost, iterations, hessian)
 
 
-def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks | None:
-    """Return the blocks as arrays; None if the blocks or the body are not supported."""
-    if any(type(b) not in _KNOWN for b in blocks) or len(model.value_names) != model.n_dofs:
-        return None
+def solver_of(model: BodyModel) -> Solver:
+    """Return `solve_compiled`, or `gauss_newton.solve` for a body with ball joints, which no kernel covers."""
+    return solve_compiled if len(model.value_names) == model.n_dofs else gauss_newton.solve
+
+
+def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks:
+    """Return the blocks as arrays.
+
+    Raises:
+        TypeError: see `solve_compiled`.
+    """
+    if len(model.value_names) != model.n_dofs:
+        ball = next(j.name for j in model.joints if j.kind == "ball")
+        raise TypeError(f"expected joints with axes, found the ball joint '{ball}'; call gauss_newton.solve")
+    unknown = sorted({type(b).__name__ for b in blocks if type(b) not in _KNOWN})
+    if unknown:
+        raise TypeError(f"expected blocks that the kernel covers, found {', '.join(unknown)}; call gauss_newton.solve")
     contours = [b.term(model) for b in blocks if isinstance(b, ContourResiduals)]
     priors = [b for b in blocks if isinstance(b, PosePrior)]
     within = [b.term(model) for b in blocks if isinstance(b, SelfPenetration)]
     between = [b.term(model) for b in blocks if isinstance(b, BodyPenetration)]
     if len(contours) != 1 or len(within) > 1 or len(between) > 1:
-        return None
+        found = f"{len(contours)} ContourResiduals, {len(within)} SelfPenetration and {len(between)} BodyPenetration"
+        raise TypeError(
+            f"expected one ContourResiduals and at most one of the others, found {found}; call gauss_newton.solve"
+        )
     return _Blocks(
         model.tree, model.dof_is_length, model.dof_joint, model.moves, model.limits, contours[0],
         np.array([p.pose for p in priors], np.float64).reshape(-1, model.n_dofs),

@@ -1,16 +1,17 @@
 """Acquire a person's body from the stored poses of a session, and make it the person's present body."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, Report, acquire_from_contours
+from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
 from tracker.acquisition.from_joints import JOINT_M, place_joints
 from tracker.acquisition.two_views import TwoViewSettings, acquire_from_two_views
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.progress import Report, part_of, unreported
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import PointTargets
@@ -62,7 +63,7 @@ def acquire_body(
     person: int,
     frames: Sequence[int],
     settings: AcquisitionSettings | TwoViewSettings,
-    report: Report = lambda stage, share: None,
+    report: Report = unreported,
     known: PosedFrames | None = None,
 ) -> Acquisition:
     """Acquire the body of a person from stored poses; where they are too few, from frames tracked for it.
@@ -87,15 +88,9 @@ def acquire_body(
     rounds = settings.rounds if isinstance(settings, AcquisitionSettings) else 1
     body = session.people[person].model
     for number in range(rounds):
-
-        def report_tracking(share: float, number: int = number) -> None:
-            report("tracking", (number + _TRACKING * share) / rounds)
-
-        def report_rest(stage: str, share: float, number: int = number) -> None:
-            report(stage, (number + _TRACKING + (1 - _TRACKING) * share) / rounds)
-
-        tracked = _tracked_with(body, session, observer, person, frames, known, report_tracking)
-        found = _acquire(observer, tracked, settings, report_rest)
+        begin, between, end = number / rounds, (number + _TRACKING) / rounds, (number + 1) / rounds
+        tracked = _tracked_with(body, session, observer, person, frames, known, part_of(report, begin, between))
+        found = _acquire(observer, tracked, settings, part_of(report, between, end))
         body = found.body
         is_enough = len(tracked.bodies) > _ENOUGH * min(len(frames), _MOST_TRACKED)
         if is_enough or found.cost_after_px >= found.cost_before_px:
@@ -243,7 +238,7 @@ def _placed(stored: StoredPose, observed: Sequence[PointObservation]) -> PointTa
 
 def _tracked_with(
     body: BodyModel, session: Session, observer: Observer, person: int, frames: Sequence[int], known: PosedFrames,
-    report: Callable[[float], None],
+    report: Report,
 ) -> PosedFrames:  # fmt: skip
     """Track the person with a body of other sizes, and return the poses of the present one."""
     present = session.people[person].model
@@ -267,7 +262,7 @@ def _in_body(frames: PosedFrames, body: BodyModel) -> PosedFrames:
 
 def _with_tracked(
     session: Session, observer: Observer, person: int, frames: Sequence[int], known: PosedFrames,
-    report: Callable[[float], None],
+    report: Report,
 ) -> PosedFrames:  # fmt: skip
     """Track the person from the first known frame, in both directions, and add the good frames."""
     first = min(known.bodies)
@@ -281,7 +276,7 @@ def _with_tracked(
         run = TrackingRun(observer, subjects, [b.values for b in own], way)
         for found in ChamferTracker(TrackSettings()).estimates(run):
             done += 1
-            report(done / total)
+            report("tracking", done / total)
             if found.statuses[0] == "good":
                 people = zip(subjects.models, found.poses, strict=True)
                 bodies.setdefault(found.frame, tuple(PosedBody(m, v) for m, v in people))

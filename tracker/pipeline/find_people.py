@@ -1,6 +1,6 @@
 """Find people automatically: first poses, then their sizes. Tracking goes on from there in both directions."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.progress import Report, part_of, unreported
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
@@ -34,10 +35,6 @@ _STARTING = 0.5
 AXES = "silhouette_axes"
 """Setting of the session: the `frame` on which people were found, and the `lines` of the silhouettes' axes by camera.
 For each person these are the successive approximations, as ends x, y in undistorted px (GD96 Fig. 5)."""
-
-Report = Callable[[str, float, str], None]
-"""Is given a stage, the share of all work that is done, 0 to 1, and a sentence, which may be empty. An exception
-that it raises ends the work."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +65,11 @@ class FoundPeople(NamedTuple):
         return self.first.frame
 
 
-def frames_to_try(frames: range, first: int | None) -> list[int]:
-    """Return frames spread over a range, each new one as far as possible from those before.
+def frames_to_try(frames: Sequence[int], first: int | None) -> list[int]:
+    """Return frames spread evenly, each new one as far as possible from those before.
 
     Args:
-        frames: the range.
+        frames: that may be tried, ascending.
         first: frame to try first; None for the middle one.
     """
     begin = frames[len(frames) // 2] if first is None else first
@@ -100,8 +97,8 @@ def expected_steps(n_frames: int, done: int, good: int) -> int:
 
 
 def find_people(
-    session: Session, observer: Observer, people: Sequence[int], frames: range, settings: FindSettings,
-    report: Report = lambda stage, share, text: None, show: Show = lambda frame, found: None,
+    session: Session, observer: Observer, people: Sequence[int], frames: Sequence[int], settings: FindSettings,
+    report: Report = unreported, show: Show = lambda frame, found: None,
 ) -> FoundPeople:  # fmt: skip
     """Find the first poses of people, all on one frame, and their sizes. Nothing is stored; see `store_found`.
 
@@ -141,13 +138,10 @@ def find_people(
     acquired: dict[int, Acquisition] = {}
     whole = range(frames[0], frames[-1] + 1)
     for number, person in enumerate(people if settings.acquire else ()):
-        begin = end + (1 - end) * number / len(people)
-
-        def report_sizes(stage: str, share: float, begin: float = begin) -> None:
-            report("acquiring sizes", begin + (1 - end) * share / len(people), "")
-
+        begin, size = end + (1 - end) * number / len(people), (1 - end) / len(people)
         so_far = FoundPeople(first, bodies, poses, {})
-        found = _acquired(session, observer, person, whole, settings, so_far, report_sizes)
+        of_sizes = part_of(report, begin, begin + size, "acquiring sizes")
+        found = _acquired(session, observer, person, whole, settings, so_far, of_sizes)
         if found.cost_after_px < found.cost_before_px:
             acquired[person] = found
             poses[person] = retarget_pose(poses[person], bodies[person], found.body)
@@ -158,7 +152,7 @@ def find_people(
 
 def _acquired(
     session: Session, observer: Observer, person: int, frames: Sequence[int], settings: FindSettings,
-    found: FoundPeople, report: Callable[[str, float], None],
+    found: FoundPeople, report: Report,
 ) -> Acquisition:  # fmt: skip
     """Acquire the sizes of one person from frames that are tracked from the first poses."""
     others = [i for i in found.bodies if i != person]

@@ -1,31 +1,40 @@
 """The tracking methods by name."""
 
-from collections.abc import Callable, Mapping
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING
 
 from tracker.errors import TrackerError
-from tracker.tracking.chamfer.tracker import ChamferTracker
-from tracker.tracking.contour.tracker import ContourTracker
-from tracker.tracking.tracker import Tracker, TrackerSettings
-from tracker.tracking.voxel.tracker import VoxelTracker
+from tracker.tracking.chamfer.method import CHAMFER
+from tracker.tracking.contour.method import CONTOUR
+from tracker.tracking.method import Method, Option
+from tracker.tracking.voxel.method import VOXEL
 
-MethodName: TypeAlias = Literal["chamfer", "contour", "voxel"]
-METHODS: Mapping[str, Callable[[Any], Tracker]] = {
-    "chamfer": ChamferTracker,
-    "contour": ContourTracker,
-    "voxel": VoxelTracker,
-}
-"""Makes the tracker of each method from its settings."""
+if TYPE_CHECKING:
+    from tracker.tracking.tracker import Tracker, TrackerSettings
+
+METHODS: dict[str, Method] = {method.name: method for method in (CHAMFER, CONTOUR, VOXEL)}
+"""All methods in the order in which they are shown. The first is the default."""
 
 
-def make_tracker(settings: TrackerSettings) -> Tracker:
+def method_named(name: str) -> Method:
+    """Return a method.
+
+    Raises:
+        TrackerError: it is unknown.
+    """
+    if name not in METHODS:
+        raise TrackerError(f"expected a tracking method among {', '.join(METHODS)}, found '{name}'; choose one of them")
+    return METHODS[name]
+
+
+def make_tracker(settings: "TrackerSettings") -> "Tracker":
     """Return the tracker of the method that the settings belong to.
 
     Raises:
         TrackerError: the method is unknown.
     """
-    if settings.method not in METHODS:
-        raise TrackerError(
-            f"expected a tracking method among {', '.join(METHODS)}, found '{settings.method}'; choose one of them"
-        )
-    return METHODS[settings.method](settings)
+    return method_named(settings.method).make_tracker(settings)
+
+
+def all_options() -> dict[str, Option]:
+    """Return the options of all methods by name."""
+    return {option.name: option for method in METHODS.values() for option in method.options}

@@ -3,7 +3,8 @@
 import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any
 
 from tracker.errors import Remedy, SessionError
 from tracker.evidence.observer import Observer
@@ -13,7 +14,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.smoothing import TrackedRows, resumed_rows
-from tracker.pipeline.track_session import StoreSink, TrackSession
+from tracker.pipeline.track_session import Leg, StoreWriter, TrackSession, outward
 from tracker.pipeline.tracked_changes import StoredPerson, keyframes_of, recorded_method, settings_record
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Person, Session
@@ -31,35 +32,45 @@ _MOTION_FRAMES = 8
 _RENAMED = {"second_pass": "backward_pass"}
 """Settings whose names have changed since sessions store them."""
 _UNFINISHED = "unfinished track"
-"""Setting of the store: the task that was interrupted and its next frame."""
+"""Setting of the store: the plan that was interrupted and its next frame."""
 
 
-class TrackTask(NamedTuple):
-    """A tracking task. The same task goes on where it was interrupted."""
+@dataclass(frozen=True)
+class TrackPlan:
+    """What to track. The same plan goes on where it was interrupted."""
 
     frames: Sequence[int]
-    """In the order of tracking."""
+    """In the order of tracking; ascending for a run that goes out from a start."""
     people: tuple[int, ...]
     """Indices of the people to track."""
     settings: TrackerSettings
+    """Of the tracker; they name its method."""
     cameras: tuple[str, ...] = ()
     """Names of the cameras to track with; all if empty."""
+    start: int | None = None
+    """Frame from which the run goes out in both directions; None for a run from the first frame to the last."""
+
+    @property
+    def legs(self) -> list[Sequence[int]]:
+        """Frames of each leg in the order of tracking."""
+        return [self.frames] if self.start is None else outward(self.frames, self.start)
 
     def sources(self, session: Session) -> tuple[CameraSource, ...]:
         """Return the cameras to track with, in the order of the session."""
         return tuple(c for c in session.cameras if not self.cameras or c.camera.name in self.cameras)
 
     def record(self) -> list[Any]:
-        """Return the task as the store keeps it."""
+        """Return the plan as the store keeps it."""
         frames, settings = self.frames, settings_record(self.settings)
         cameras = [sorted(self.cameras)] if self.cameras else []
-        what = [frames[0], frames[-1], len(frames), self.people, *cameras, settings]
+        start = [] if self.start is None else [{"start": self.start}]
+        what = [frames[0], frames[-1], len(frames), self.people, *cameras, *start, settings]
         found: list[Any] = json.loads(json.dumps(what))
         return found
 
 
 @contextmanager
-def stored_run(session: Session, store: AnnotationStore, observer: Observer, task: TrackTask) -> Iterator[TrackSession]:
+def stored_run(session: Session, store: AnnotationStore, observer: Observer, plan: TrackPlan) -> Iterator[TrackSession]:
     """Prepare a run that begins at stored poses. At the end it is saved, and its rest noted if it is not finished.
 
     Keyframes and locked degrees of freedom stay as they are.
@@ -68,29 +79,39 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, tas
         session: whose people are tracked.
         store: annotations of the session.
         observer: of the session.
-        task: what to track.
+        plan: what to track.
 
     Raises:
         SessionError: a person has no pose at or before the first frame.
     """
-    people, frames = session.people, task.frames
-    left = _frames_left(store, task)
-    start = [_start_poses(store, p, left or frames, i in task.people) for i, p in enumerate(people)]
+    people = session.people
     locks = load_locks(people, store.setting)
     active = [active_dofs(p.model, locked) for p, locked in zip(people, locks, strict=True)]
-    subjects = Subjects.of(
-        [p.model for p in people], task.people, active, keyframes_of(store, people, frozenset(frames))
-    )
-    before = frames[: len(frames) - len(left)]
+    keyframes = keyframes_of(store, people, frozenset(plan.frames))
+    subjects = Subjects.of([p.model for p in people], plan.people, active, keyframes)
+    floor, left = floor_plane(session.up, session.floor), _frames_left(store, plan)
+    legs, done = [], list[int]()
+    for whole, rest in zip(plan.legs, left, strict=True):
+        before = whole[: len(whole) - len(rest)]
+        is_begun = len(before) > 0
+        start = _start_poses(session, store, rest if rest else whole, plan, is_begun)
+        known = before if is_begun or plan.start is None else [plan.start]
+        legs.append(
+            Leg(
+                TrackingRun(observer, subjects, start, rest, session.fps, floor),
+                _tracked_before(session, store, known, start, subjects, plan.start),
+                plan.start,
+            )
+        )
+        done += [k for k in before if k != plan.start]
     run = TrackSession(
-        make_tracker(task.settings),
-        TrackingRun(observer, subjects, start, left, session.fps, floor_plane(session.up, session.floor)),
+        make_tracker(plan.settings),
+        legs,
         [StoredPerson(p.name, store.add_model_revision(p.name, format_model(p.model))) for p in people],
-        StoreSink(store, _views(session, task)),
-        f"track frames {min(frames)}:{max(frames) + 1}",
+        StoreWriter(store, _views(session, plan)),
+        f"track frames {min(plan.frames)}:{max(plan.frames) + 1}",
         _SAVE_FRAMES,
-        _tracked_before(session, store, before, start, subjects),
-        _rows_before(session, store, before, subjects),
+        _rows_before(session, store, done, subjects),
     )
     try:
         yield run
@@ -98,24 +119,33 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, tas
         run.save()
         unfinished = None
         if not run.finished:
-            unfinished = {"task": task.record(), "next": run.next_frame, "rows": run.rows_record()}
+            unfinished = {"task": plan.record(), "next": run.next_frame, "rows": run.rows_record()}
         store.set_setting(_UNFINISHED, unfinished)
 
 
-def _views(session: Session, task: TrackTask) -> list[int | None]:
+def _views(session: Session, plan: TrackPlan) -> list[int | None]:
     """Return for each camera of the session its index among those that are tracked with; None for the others."""
-    used = [c.camera.name for c in task.sources(session)]
+    used = [c.camera.name for c in plan.sources(session)]
     return [used.index(c.camera.name) if c.camera.name in used else None for c in session.cameras]
 
 
-def _frames_left(store: AnnotationStore, task: TrackTask) -> Sequence[int]:
-    """Return the frames still to track: all, or the rest of an interrupted run; none in its backward pass."""
-    unfinished, frames = store.setting(_UNFINISHED), task.frames
-    if unfinished is None or not _same_task(unfinished["task"], task.record()):
-        return frames
-    if unfinished["next"] is None:
-        return frames[len(frames) :]
-    return frames[list(frames).index(unfinished["next"]) :] if unfinished["next"] in frames else frames
+def _frames_left(store: AnnotationStore, plan: TrackPlan) -> list[Sequence[int]]:
+    """Return the frames still to track of each leg: all, or the rest of an interrupted run; none in its backward pass.
+
+    A leg that has stored no frame yet begins with the start.
+    """
+    unfinished, legs = store.setting(_UNFINISHED), plan.legs
+    if unfinished is None or not _same_task(unfinished["task"], plan.record()):
+        return legs
+    following = unfinished["next"]
+    if following is None:
+        return [leg[len(leg) :] for leg in legs]
+    for number, leg in enumerate(legs):
+        if following in leg and following != plan.start:
+            at = list(leg).index(following)
+            rest = leg if at == 1 and plan.start is not None else leg[at:]
+            return [*(done[len(done) :] for done in legs[:number]), rest, *legs[number + 1 :]]
+    return legs
 
 
 def _same_task(stored: list[Any], task: list[Any]) -> bool:
@@ -127,9 +157,12 @@ def _same_task(stored: list[Any], task: list[Any]) -> bool:
 
 def _tracked_before(
     session: Session, store: AnnotationStore, frames: Sequence[int], start: Sequence[Sequence[Array]],
-    subjects: Subjects,
+    subjects: Subjects, held: int | None,
 ) -> list[TrackedFrame]:  # fmt: skip
-    """Return the stored frames of an interrupted run, from the one after the last that has been cleared since."""
+    """Return the stored frames of an interrupted run, from the one after the last that has been cleared since.
+
+    The pose of the frame `held`, which the run goes out from, is trusted.
+    """
     out: list[TrackedFrame] = []
     poses = [p[-1] for p in start]
     for frame in frames:
@@ -138,7 +171,8 @@ def _tracked_before(
         for i in range(len(poses)):
             record = records.get(i)
             poses[i] = keyframes[i] if i in keyframes else poses[i] if record is None else record.values
-        statuses = tuple(_status(None if i in keyframes else records.get(i)) for i in range(len(poses)))
+        is_trusted = [i in keyframes or frame == held for i in range(len(poses))]
+        statuses = tuple(_status(None if trusted else records.get(i)) for i, trusted in enumerate(is_trusted))
         if any(r is None and i not in keyframes for i, r in records.items()):
             out.clear()
         else:
@@ -166,7 +200,25 @@ def _status(record: PoseRecord | None) -> Status:
     return "good" if record is None else status_named(record.status)
 
 
-def _start_poses(store: AnnotationStore, person: Person, frames: Sequence[int], needed: bool) -> list[Array]:
+def _start_poses(
+    session: Session, store: AnnotationStore, frames: Sequence[int], plan: TrackPlan, is_begun: bool
+) -> list[list[Array]]:
+    """Return the poses from which each person is tracked: those before the frames, or that of the start alone."""
+    start = None if is_begun else plan.start
+    out = []
+    for i, person in enumerate(session.people):
+        known = None if start is None else _pose_on(store, person, start)
+        out.append(_poses_before(store, person, frames, i in plan.people) if known is None else [known])
+    return out
+
+
+def _pose_on(store: AnnotationStore, person: Person, frame: int) -> Array | None:
+    """Return the stored pose of a frame; None if there is none of the present degrees of freedom."""
+    record = store.pose(person.name, frame)
+    return None if record is None or len(record.values) != len(person.model.value_names) else record.values
+
+
+def _poses_before(store: AnnotationStore, person: Person, frames: Sequence[int], needed: bool) -> list[Array]:
     """Return the poses to begin from, the last one last: those just before the first frame, else the nearest one.
 
     Without any just before, a pose on the first frame itself is nearest. Tracking backward, "before" is after.
@@ -184,8 +236,7 @@ def _start_poses(store: AnnotationStore, person: Person, frames: Sequence[int], 
     rows = {row.frame for row in store.frames(person.name)}
 
     def pose(frame: int) -> Array | None:
-        record = store.pose(person.name, frame) if frame in rows else None
-        return None if record is None or len(record.values) != len(person.model.value_names) else record.values
+        return _pose_on(store, person, frame) if frame in rows else None
 
     past: list[Array] = []
     for frame in range(first - _MOTION_FRAMES * step, first, step):

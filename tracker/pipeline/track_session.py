@@ -5,12 +5,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
+from tracker.evidence.observer import Observer
 from tracker.pipeline.smoothing import TrackedRows
 from tracker.pipeline.tracked_changes import StoredPerson, tracked_changes
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
+from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import Tracker, TrackingRun
 
 
@@ -25,8 +27,8 @@ Step = PoseEstimate | BackwardStep | SmoothedRows
 """A step of a run: a tracked frame of the first pass, a visit to a frame of the second, or all smoothed poses."""
 
 
-class Sink(Protocol):
-    """Receives the poses of a run."""
+class PoseWriter(Protocol):
+    """Stores the poses of a run."""
 
     def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
         """Write poses, but leave keyframes as they are.
@@ -41,7 +43,7 @@ class Sink(Protocol):
         """
 
 
-class StoreSink:
+class StoreWriter:
     """Writes the poses of a run to a store at once."""
 
     def __init__(self, store: AnnotationStore, views: Sequence[int | None] = ()) -> None:
@@ -55,7 +57,7 @@ class StoreSink:
         self._n_used = sum(v is not None for v in views)
 
     def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int:
-        """See `Sink.write`.
+        """See `PoseWriter.write`.
 
         Raises:
             SessionError: the store cannot be written.
@@ -76,42 +78,78 @@ class StoreSink:
         return replace(change, pose=replace(pose, view_costs_px=costs))
 
 
+class Leg(NamedTuple):
+    """One direction of a run."""
+
+    run: TrackingRun
+    """Gives the frames that are left to track, in their order; none where all are tracked."""
+    before: Sequence[TrackedFrame] = ()
+    """Frames of the same leg that are known: those of an interrupted run, or the start. In the order of tracking."""
+    start: int | None = None
+    """Frame whose stored pose the run goes out from. It is tracked to learn from it, and keeps its stored pose."""
+
+    @property
+    def frames(self) -> list[int]:
+        """The frames that this leg stores poses of."""
+        return [k for k in self.run.frames if k != self.start]
+
+
+def outward(frames: Sequence[int], start: int) -> list[Sequence[int]]:
+    """Return the frames of each leg of a run that goes out from a frame: back to the first, then on to the last.
+
+    Args:
+        frames: all frames, ascending.
+        start: one of them. Each leg begins with it.
+    """
+    legs = [k for k in frames if k <= start][::-1], [k for k in frames if k >= start]
+    return [leg for leg in legs if len(leg) > 1] or [[start]]
+
+
+def _with_starts(legs: Sequence[Leg]) -> Subjects:
+    """Return the subjects with the poses that a run goes out from among the keyframes: both are stored already."""
+    subjects = legs[0].run.subjects
+    keyframes = dict(subjects.keyframes)
+    for leg in legs:
+        for frame, poses, *_ in leg.before:
+            if frame == leg.start:
+                keyframes[frame] = {**dict(enumerate(poses)), **keyframes.get(frame, {})}
+    return replace(subjects, keyframes=keyframes)
+
+
 class TrackSession:
-    """One run of a tracker and its results so far.
+    """One run of a tracker and its results so far. It has one leg, or two that go out from a start.
 
     `first_pass`, `backward_pass` and `smoothing` do the work in this order. Another thread than the one that reads
     results may drain them. Each step is handed to `take` before the next one is asked for: its caller holds whatever
-    lock guards the results and the sink. A run stops where its steps are no longer asked for, and goes on where they
+    lock guards the results and the writer. A run stops where its steps are no longer asked for, and goes on where they
     are again.
     """
 
     def __init__(
         self,
         tracker: Tracker,
-        run: TrackingRun,
+        legs: Sequence[Leg],
         stored: Sequence[StoredPerson],
-        sink: Sink,
+        writer: PoseWriter,
         label: str,
         save_frames: int | None = None,
-        tracked_before: Sequence[TrackedFrame] = (),
         rows_before: Mapping[int, TrackedRows] | None = None,
     ) -> None:
         """Prepare a run; no frame is read yet.
 
         Args:
             tracker: the method and its settings.
-            run: what is tracked.
+            legs: what is tracked; at least one. All are of the same people and cameras.
             stored: all people of the session.
-            sink: where poses are saved.
+            writer: where poses are saved.
             label: of the entry of the history.
             save_frames: frames after which `take` saves; None leaves that to calls of `save`.
-            tracked_before: frames of an interrupted run of which this one is the rest, in the order of tracking.
-            rows_before: their rows by person; this run adds its own.
+            rows_before: rows of an interrupted run by person; this run adds its own.
         """
-        self.tracker, self.run, self.label = tracker, run, label
-        self._stored, self._sink, self._save_frames = stored, sink, save_frames
-        self.tracked = {f.frame: f for f in tracked_before}
-        """Frames tracked so far by their number, in the order of tracking."""
+        self.tracker, self.legs, self.label = tracker, legs, label
+        self._stored, self._writer, self._save_frames = stored, writer, save_frames
+        self.tracked = {f.frame: f for leg in legs for f in leg.before}
+        """Frames tracked so far by their number, with those that were known before."""
         self.costs_px: dict[int, float] = {}
         """Cost of each frame that this run has tracked, px."""
         self.normal_matrices: dict[int, tuple[NormalMatrix | None, ...]] = {}
@@ -122,10 +160,31 @@ class TrackSession:
         """The frame that the backward pass visited last; None before it."""
         self.finished = False
         """Whether both passes and smoothing are done."""
-        self._rows = {i: (rows_before or {}).get(i, TrackedRows()) for i in run.subjects.tracked}
+        self._held = _with_starts(legs)
+        self._rows = {i: (rows_before or {}).get(i, TrackedRows()) for i in self.subjects.tracked}
         self._waiting: list[PoseChange] = []
         self._n_waiting = 0
         self._edit: int | None = None
+
+    @property
+    def subjects(self) -> Subjects:
+        """The people, and their keyframes."""
+        return self.legs[0].run.subjects
+
+    @property
+    def observer(self) -> Observer:
+        """Gives the evidence of the cameras that are tracked with."""
+        return self.legs[0].run.observer
+
+    @property
+    def frames(self) -> list[int]:
+        """The frames to track, in their order."""
+        return [k for leg in self.legs for k in leg.frames]
+
+    def ends(self, frame: int) -> tuple[int, int]:
+        """Return the first and the last frame of the leg that tracks a frame."""
+        known = [(leg.run.frames[0], leg.run.frames[-1]) for leg in self.legs if leg.frames]
+        return next((a, b) for a, b in known if min(a, b) <= frame <= max(a, b))
 
     def steps(self) -> Iterator[Step]:
         """Run both passes and smooth the poses."""
@@ -134,19 +193,23 @@ class TrackSession:
         yield from self.smoothing()
 
     def first_pass(self) -> Iterator[PoseEstimate]:
-        """Track the frames."""
-        if self.run.frames:
-            yield from self.tracker.estimates(self.run)
+        """Track the frames of each leg."""
+        for leg in self.legs:
+            if leg.frames:
+                yield from (found for found in self.tracker.estimates(leg.run) if found.frame != leg.start)
 
     def backward_pass(self) -> Iterator[BackwardStep]:
         """Improve frames on which people were lost, in this run or before it was interrupted."""
-        yield from self.tracker.backward_pass(self.run, list(self.tracked.values()))
+        for leg in self.legs:
+            known = [f.frame for f in leg.before]
+            tracked = [self.tracked[k] for k in (*known, *leg.frames)]
+            yield from self.tracker.backward_pass(leg.run, tracked)
 
     def smoothing(self) -> Iterator[SmoothedRows]:
         """Smooth the poses of all people; a single step, so that a run is smoothed as a whole or not at all."""
         if self.tracker.settings.smooth:
-            subjects = self.run.subjects
-            found = (rows.finished(subjects, person, self.run.fps) for person, rows in self._rows.items())
+            held, fps = self._held, self.legs[0].run.fps
+            found = (rows.finished(held, person, fps) for person, rows in self._rows.items())
             yield SmoothedRows(tuple(change for changes in found for change in changes))
         self.finished = True
 
@@ -161,7 +224,7 @@ class TrackSession:
         if isinstance(step, SmoothedRows):
             self._take_finished(step)
             return
-        self._waiting += self._rows_of([step], self.run.subjects.tracked)
+        self._waiting += self._rows_of([step], self.subjects.tracked)
         self._n_waiting += 1
         self.tracked[step.frame] = TrackedFrame.of(step)
         self.costs_px[step.frame] = step.cost_px
@@ -184,8 +247,8 @@ class TrackSession:
     @property
     def next_frame(self) -> int | None:
         """The first frame that is not tracked yet; None where all are."""
-        done = len(self.costs_px)
-        return self.run.frames[done] if done < len(self.run.frames) else None
+        done, frames = len(self.costs_px), self.frames
+        return frames[done] if done < len(frames) else None
 
     def rows_record(self) -> dict[str, Any]:
         """Return the covariances and features with which a resumed run smooths the frames of this one."""
@@ -217,7 +280,7 @@ class TrackSession:
 
     def _rows_of(self, found: Sequence[PoseEstimate], people: Sequence[int]) -> list[PoseChange]:
         """Return the rows of estimates, and keep them for smoothing."""
-        keyframes, settings = self.run.subjects.keyframes, self.tracker.settings
+        keyframes, settings = self._held.keyframes, self.tracker.settings
         changes: list[PoseChange] = []
         for estimate in found:
             for person in people:
@@ -229,4 +292,4 @@ class TrackSession:
 
     def _write(self, changes: Sequence[PoseChange]) -> None:
         if changes:
-            self._edit = self._sink.write(self.label, changes, self._edit)
+            self._edit = self._writer.write(self.label, changes, self._edit)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import ContourResiduals
-from tracker.fitting.gauss_newton import ResidualBlock, value_mask
-from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting.gauss_newton import ResidualBlock, solve, value_mask
+from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.pins import PinBlock, pin_block
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
@@ -132,7 +132,9 @@ def _fit_one(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Fit one person from a pose with a prior; return the pose and which of its values the pins determine."""
     blocks = [*evidence, *prior_blocks(model, pose, sigmas), *([pins] if pins is not None else [])]
-    fit = solve_compiled(model, pose, blocks, active_dofs, _ITERATIONS, _TOLERANCE)
+    # No kernel covers points that are pinned or held.
+    has_points = pins is not None or not all(isinstance(b, ContourResiduals) for b in evidence)
+    fit = (solve if has_points else solver_of(model))(model, pose, blocks, active_dofs, _ITERATIONS, _TOLERANCE)
     if pins is None:
         return fit.pose, np.zeros(len(model.value_names), dtype=bool)
     by_pins = np.diag(pins.linearize(model, fit.pose, model.kinematics(fit.pose)).hessian)

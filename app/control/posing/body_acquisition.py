@@ -87,7 +87,7 @@ class BodyAcquisition:
             text = page_text(error)
             session_state.set(acquisition=AcquisitionState(person=person, message=f"{text[:1].upper()}{text[1:]}."))
 
-    def _report(self, stage: str, share: float) -> None:
+    def _report(self, stage: str, share: float, text: str = "", /) -> None:
         if self._stopping.is_set():
             raise _StoppedError
         session_state, share = self._session_state, round(share * _STEPS) / _STEPS

@@ -9,24 +9,21 @@ from typing import Any
 from app.control.search.search_runs import SearchRuns
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
+from app.control.tracking import track_settings
 from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
 from app.state.progress import FindState, Line
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
+from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.initialization.first_pose import FirstPoses
 from tracker.pipeline.body_acquisition import SIZES_EDITS, with_sizes_changed
-from tracker.pipeline.find_people import (
-    AXES,
-    FindSettings,
-    FoundPeople,
-    axes_record,
-    find_people,
-    first_record,
-    sentences,
-)
-from tracker.session.session import save_model
+from tracker.pipeline.chain import Sink, run_chain
+from tracker.pipeline.find_people import AXES, FindSettings, FoundPeople, axes_record, first_record
+from tracker.pipeline.stored_run import TrackPlan
+from tracker.pipeline.track_session import Step, TrackSession
+from tracker.session.session import Session, save_model
 from tracker.store.records import PoseChange
 
 _LOG = logging.getLogger(__name__)
@@ -57,6 +54,8 @@ class FindingPeople:
         self._session_state, self._activities, self._tracking, self._runs = session_state, activities, tracking, runs
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
+        self._edit: int | None = None
+        """Entry of the history with the people who were found; None before."""
         self._shown: int | None = None
         """Frame at which the user is shown what is tried; another frame is one that the user has gone to."""
         self._first_tried: int | None = None
@@ -89,9 +88,9 @@ class FindingPeople:
                 running=True, stage="starting", sought=frozenset(people), frame=before.frame, axes=before.axes
             )
             session_state.set(finding=finding)
-            self._shown, self._first_tried = session_state.state.frame, None
+            self._shown, self._first_tried, self._edit = session_state.state.frame, None, None
         self._stopping.clear()
-        self._thread = threading.Thread(target=self._work, args=(people, acquire), name="find people", daemon=True)
+        self._thread = threading.Thread(target=self._work, args=(acquire,), name="find people", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -106,26 +105,37 @@ class FindingPeople:
         session_state = self._session_state
         return tuple(i for i in range(len(session_state.present)) if not session_state.saver.index.frames(i))
 
-    def _work(self, people: tuple[int, ...], acquire: bool) -> None:
-        session_state = self._session_state
+    def _work(self, acquire: bool) -> None:
+        session, state = self._session_state.session, self._session_state.state
+        settings = track_settings.of_run(state.settings, state.run_choices)
+        plan = TrackPlan(range(session.n_frames), tuple(range(len(session.people))), settings)
         try:
-            session = session_state.session
-            found = find_people(
-                session, session_state.frames.observer, people, range(session.n_frames), FindSettings(acquire=acquire),
-                self._report, self._show,
-            )  # fmt: skip
-            edit = self._store(found, people)
-            self._set(notes=tuple(sentences(session, found)))
-            is_done = self._track(found, edit)
-            self._set(running=False, message="Done." if is_done else "Stopped; what was tracked stays.")
+            run_chain(plan, FindSettings(acquire=acquire), self, self)
+            self._set(running=False, message="Done.")
         except _StoppedError:
-            self._set(**_ENDED, message="Stopped; nothing was changed.", tried=None)
+            message = "Stopped; nothing was changed." if self._edit is None else "Stopped; what was tracked stays."
+            self._set(**_ENDED, message=message, tried=None)
         except Exception as error:
             if not isinstance(error, TrackerError):
                 _LOG.exception("a search for people failed")
             self._show_failure(error)
 
-    def _report(self, stage: str, share: float, text: str) -> None:
+    @property
+    def session(self) -> Session:
+        """See `OpenSession.session`."""
+        return self._session_state.session
+
+    @property
+    def observer(self) -> Observer:
+        """See `OpenSession.observer`."""
+        return self._session_state.frames.observer
+
+    def sources(self, person: int) -> Mapping[int, str]:
+        """See `OpenSession.sources`."""
+        return {row.frame: row.source for row in self._session_state.saver.rows(person, range(self.session.n_frames))}
+
+    def report(self, stage: str, share: float, text: str = "", /) -> None:
+        """See `Sink.report`."""
         if self._stopping.is_set():
             raise _StoppedError
         before = self._session_state.state.finding
@@ -134,8 +144,8 @@ class FindingPeople:
         if (stage, share, notes) != (before.stage, before.share, before.notes):
             self._set(stage=stage, share=share, notes=notes)
 
-    def _show(self, frame: int, found: FirstPoses | None) -> None:
-        """Draw the first poses of a frame that was tried. Go there unless the user looks or works elsewhere.
+    def show(self, frame: int, found: FirstPoses | None) -> None:
+        """See `Sink.show`: draw the first poses of a frame, and go there unless the user looks or works elsewhere.
 
         Candidates stay in sight while the next frames are tried.
         """
@@ -178,15 +188,15 @@ class FindingPeople:
         with self._session_state.lock:
             self._session_state.set(finding=replace(self._session_state.state.finding, **changes))
 
-    def _store(self, found: FoundPeople, people: tuple[int, ...]) -> int | None:
-        """Store the first poses and bodies as one entry of the history, and show them; return the entry.
+    def store_found(self, found: FoundPeople) -> None:
+        """See `OpenSession.store_found`: store people and bodies as one entry of the history, and show them.
 
         Raises:
             TrackerError: somebody was placed meanwhile, or a body cannot be written.
         """
         with self._activities.editing():
             session_state, saver = self._session_state, self._session_state.saver
-            if self._unplaced() != people:
+            if self._unplaced() != tuple(found.poses):
                 raise TrackerError(
                     "expected nobody to be placed meanwhile, found a new pose; what was found is discarded"
                 )
@@ -211,30 +221,25 @@ class FindingPeople:
             )
             session_state.show_frame(found.frame, finding=finding)
             session_state.refresh_saving()
-            return edit
+            self._edit = edit
 
-    def _track(self, found: FoundPeople, edit: int | None) -> bool:
-        """Track to the first frame, then over the whole recording; return whether both runs did all their work."""
-        last = self._session_state.session.n_frames - 1
-        for backward, begin, end in ((True, found.frame, 0), (False, 0, last)):
-            if begin == end:
-                continue
-            if self._stopping.is_set():
-                return False
-            self._set(stage="tracking back to the first frame" if backward else "tracking", share=1.0)
-            ended, outcome = threading.Event(), list[bool]()
+    def track(self, plan: TrackPlan, sink: Sink) -> TrackPlan:
+        """See `OpenSession.track`. The run can be paused; it is shown like any other, so that the sink gets no step."""
+        assert plan.start is not None
+        ended, outcome = threading.Event(), list[bool]()
 
-            def on_end(is_done: bool, ended: threading.Event = ended, outcome: list[bool] = outcome) -> None:
-                outcome.append(is_done)
-                ended.set()
+        def on_end(is_done: bool) -> None:
+            outcome.append(is_done)
+            ended.set()
 
-            with self._activities.editing():
-                self._session_state.show_frame(begin)
-            self._tracking.start(backward, end, edit, on_end)
-            ended.wait()
-            if not outcome[0]:
-                return False
-        return True
+        self._tracking.start_outward(plan.start, plan.people, self._edit, on_end)
+        ended.wait()
+        if not outcome[0]:
+            raise _StoppedError
+        return plan
+
+    def take(self, run: TrackSession, step: Step) -> None:
+        """See `Sink.take`."""
 
 
 def _axes(record: Mapping[str, Any] | None) -> tuple[int | None, dict[str, tuple[tuple[Line, ...], ...]]]:

@@ -2,10 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import get_args
 
 from app.state.comparison import ComparedPose, Stretch, Verdict
-from tracker.pipeline.methods import MethodName
+from tracker.pipeline.methods import METHODS
 
 _SAME_MM = 10.0
 """Largest distance between the joints of two poses that count as the same, mm: smoothing moves them by as much."""
@@ -14,7 +13,6 @@ _SAME_SHARE = 0.03
 _GAP = 3
 """Largest number of frames between two parts of a stretch in which neither pose is better."""
 _BADNESS = {"good": 0, "doubtful": 1, "lost": 2}
-_TRACKED = get_args(MethodName)
 
 
 def verdict(pose: ComparedPose) -> Verdict:
@@ -27,7 +25,7 @@ def verdict(pose: ComparedPose) -> Verdict:
     now, other = _BADNESS.get(pose.status), _BADNESS.get(pose.other_status)
     if now is not None and other is not None and now != other:
         return "better" if now < other else "worse"
-    is_tracked = pose.method in _TRACKED and pose.other_method in _TRACKED
+    is_tracked = pose.method in METHODS and pose.other_method in METHODS
     if not is_tracked or pose.cost_px is None or pose.other_cost_px is None:
         return "same"
     if abs(pose.cost_px - pose.other_cost_px) <= _SAME_SHARE * max(pose.cost_px, pose.other_cost_px):

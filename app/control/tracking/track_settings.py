@@ -8,59 +8,32 @@ import msgspec
 
 from app.state.run_choices import MAX_STRIDE, RunChoices
 from tracker.errors import TrackerError
-from tracker.pipeline.methods import MethodName
+from tracker.pipeline.methods import METHODS, all_options, method_named
 from tracker.session.matching import check_names
-from tracker.tracking.chamfer.settings import Estimation, TrackSettings
-from tracker.tracking.contour.settings import ContourSettings
-from tracker.tracking.estimation.settings import EstimationSettings, RecoverSettings, at_stride
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.method import Method, OptionValue
 from tracker.tracking.tracker import TrackerSettings
-from tracker.tracking.voxel.settings import VoxelSettings
 
 SETTING = "track_settings"
 """Setting of the session."""
-_SHARED = ("predict", "recover", "theta_px", "outliers", "backward_pass", "smooth")
-"""Settings that a user chooses for every method."""
+_COSTS = ("theta_px", "outliers")
+"""Settings of the search that hold for every method that has them."""
+_RENAMED = {"past_poses": "window"}
+"""Options whose names have changed since sessions store them."""
 
 
-class _Kept(TypedDict, total=False):
-    """The settings that a user chooses."""
+class _Stored(TypedDict, total=False):
+    """The choices that are no options of a method."""
 
-    method: MethodName
+    method: str
     stride: Annotated[int, msgspec.Meta(ge=1, le=MAX_STRIDE)]
     cameras: tuple[str, ...]
-    estimate: Estimation
-    order: int
-    past_poses: int
-    recover: bool
-    backward_pass: bool
-    smooth: bool
 
 
-def changed(before: TrackSettings, changes: Mapping[str, Any]) -> TrackSettings:
-    """Return settings with the changes of a page.
-
-    Args:
-        before: the present settings.
-        changes: any of `estimate`, `order` and `past_poses` (of the motion model), `recover`, `backward_pass`,
-            `smooth`.
-
-    Raises:
-        TrackerError: a value is invalid.
-    """
-    predict = replace(
-        before.predict,
-        order=changes.get("order", before.predict.order),
-        window=changes.get("past_poses", before.predict.window),
-    )
-    recovers = changes.get("recover", before.recover is not None)
-    return replace(
-        before,
-        estimate=changes.get("estimate", before.estimate),
-        predict=predict,
-        recover=(before.recover or RecoverSettings()) if recovers else None,
-        backward_pass=changes.get("backward_pass", before.backward_pass),
-        smooth=changes.get("smooth", before.smooth),
-    )
+def defaults(method: Method) -> dict[str, OptionValue | None]:
+    """Return the default of each option of a method that the page shows."""
+    settings = method.settings()
+    return {option.name: option.read(settings) for option in method.options if option.is_on_page}
 
 
 def with_choices(before: RunChoices, changes: Mapping[str, Any], cameras: Sequence[str]) -> RunChoices:
@@ -68,63 +41,79 @@ def with_choices(before: RunChoices, changes: Mapping[str, Any], cameras: Sequen
 
     Args:
         before: the present choices.
-        changes: any of `method`, `stride` and `cameras`.
+        changes: any of `method`, `stride`, `cameras` and `options`: values by name, None for the default.
         cameras: names of all cameras of the session.
 
     Raises:
-        TrackerError: a camera is unknown.
+        TrackerError: a method, camera or option is unknown, or a value is invalid.
     """
     named = changes.get("cameras", before.cameras)
     check_names(named, cameras, "camera", "the cameras to track with")
     chosen = tuple(name for name in cameras if name in named)
+    known, options = all_options(), dict(before.options)
+    for name, value in changes.get("options", {}).items():
+        if name not in known:
+            raise TrackerError(f"expected an option among {', '.join(known)}, found '{name}'; choose one of them")
+        options.pop(name, None)
+        if value is not None:
+            options[name] = known[name].check(value)
+    usual = {name: value for method in METHODS.values() for name, value in defaults(method).items()}
     return RunChoices(
-        changes.get("method", before.method), changes.get("stride", before.stride),
+        method_named(changes.get("method", before.method)).name,
+        changes.get("stride", before.stride),
         () if len(chosen) == len(cameras) else chosen,
-    )  # fmt: skip
+        {name: value for name, value in options.items() if value != usual[name]},
+    )
+
+
+def changed(before: TrackSettings, choices: RunChoices) -> TrackSettings:
+    """Return the settings of the page's search with the options that a user chose.
+
+    Args:
+        before: the present settings.
+        choices: of the user.
+    """
+    method = METHODS[before.method]
+    values = {**defaults(method), **choices.options}
+    settings = method.with_options(before, {name: value for name, value in values.items() if value is not None})
+    assert isinstance(settings, TrackSettings)
+    return settings
 
 
 def of_run(settings: TrackSettings, choices: RunChoices) -> TrackerSettings:
-    """Return the settings of a run: the chosen ones, as far as its method has them."""
-    if choices.method == "chamfer":
-        return at_stride(settings, choices.stride)
-    if choices.method == "voxel":
-        return VoxelSettings(smooth=settings.smooth)
-    shared = {f.name: getattr(settings, f.name) for f in fields(EstimationSettings) if f.name in _SHARED}
-    return at_stride(ContourSettings(**shared), choices.stride)
+    """Return the settings of a run: the options that a user chose, and what the search has in common with its method.
+
+    Args:
+        settings: of the page's search.
+        choices: of the user.
+    """
+    method = METHODS[choices.method]
+    own: Any = settings if settings.method == method.name else method.settings()
+    shared = {f.name: getattr(settings, f.name) for f in fields(own) if f.name in _COSTS}
+    chosen: TrackerSettings = method.with_options(replace(own, **shared), choices.options)
+    return chosen if choices.stride == 1 else method.at_stride(chosen, choices.stride)
 
 
-def stored(settings: TrackSettings, choices: RunChoices) -> dict[str, Any]:
-    """Return what the session keeps: the changes from the default, see `changed` and `with_choices`."""
-    own, default = dict(_kept(settings, choices)), dict(_kept(TrackSettings(), RunChoices()))
-    return {name: value for name, value in own.items() if value != default[name]}
+def stored(choices: RunChoices) -> dict[str, Any]:
+    """Return what the session keeps: the differences from the default, options among them."""
+    default = RunChoices()
+    own = {"method": choices.method, "stride": choices.stride, "cameras": choices.cameras}
+    return {**{k: v for k, v in own.items() if v != getattr(default, k)}, **choices.options}
 
 
-def restored(data: object, cameras: Sequence[str]) -> tuple[TrackSettings, RunChoices]:
-    """Return settings and choices that a session keeps; the default where it keeps none, or none of this version.
+def restored(data: object, cameras: Sequence[str]) -> RunChoices:
+    """Return choices that a session keeps; the default where it keeps none, or none of this version.
 
     Args:
         data: the result of `stored`, or any other JSON value.
         cameras: names of all cameras of the session.
     """
-    default = TrackSettings(), RunChoices()
-    if not isinstance(data, Mapping) or not data.keys() <= _kept(*default).keys():
-        return default
+    if not isinstance(data, Mapping):
+        return RunChoices()
+    own = {k: v for k, v in data.items() if k in _Stored.__annotations__}
+    options = {_RENAMED.get(k, k): v for k, v in data.items() if k not in own}
+    options = {k: str(v) if k == "order" else v for k, v in options.items()}  # a number in older sessions
     try:
-        kept = msgspec.convert(data, _Kept, strict=True)
-        return changed(default[0], kept), with_choices(default[1], kept, cameras)
+        return with_choices(RunChoices(), {**msgspec.convert(own, _Stored, strict=True), "options": options}, cameras)
     except (TrackerError, msgspec.ValidationError):
-        return default
-
-
-def _kept(settings: TrackSettings, choices: RunChoices) -> "_Kept":
-    return _Kept(
-        method=choices.method,
-        stride=choices.stride,
-        cameras=choices.cameras,
-        estimate=settings.estimate,
-        order=settings.predict.order,
-        past_poses=settings.predict.window,
-        recover=settings.recover is not None,
-        backward_pass=settings.backward_pass,
-        smooth=settings.smooth,
-    )
+        return RunChoices()

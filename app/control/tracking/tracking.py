@@ -17,13 +17,14 @@ from app.state.run_choices import RunChoices
 from app.state.state import StateChanges, finite_or_none
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
-from tracker.geometry.ground_plane import floor_plane
+from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.pipeline.methods import make_tracker
-from tracker.pipeline.track_session import SmoothedRows, Step, TrackSession
+from tracker.pipeline.track_session import Leg, SmoothedRows, Step, TrackSession, outward
 from tracker.pipeline.tracked_changes import StoredPerson
 from tracker.store.records import PoseChange
 from tracker.tracking import confidence
-from tracker.tracking.estimate import BackwardStep, PoseEstimate
+from tracker.tracking.confidence import Status
+from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
@@ -42,10 +43,10 @@ class _Run(NamedTuple):
     @property
     def subjects(self) -> Subjects:
         """The people whom it tracks, and their keyframes."""
-        return self.session.run.subjects
+        return self.session.subjects
 
 
-class _SaverSink:
+class _SaverWriter:
     """Saves the poses of a run through the saver, which retries failed writes."""
 
     def __init__(self, session_state: SessionState, edit: int | None) -> None:
@@ -53,7 +54,7 @@ class _SaverSink:
         self._session_state, self._first_edit = session_state, edit
 
     def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
-        """See `Sink.write`. Poses that cannot be written wait in the saver's queue."""
+        """See `PoseWriter.write`. Poses that cannot be written wait in the saver's queue."""
         self._session_state.last_save = time.monotonic()
         amended = self._first_edit if edit is None else edit
         return self._session_state.saver.write(label, changes, amended, by_program=True)
@@ -72,8 +73,8 @@ class Tracking:
         self._session_state, self._activities = session_state, activities
         activities.add_job(self, on_shown_frame=True)
         kept = session_state.saver.setting(track_settings.SETTING)
-        settings, choices = track_settings.restored(kept, session_state.session.camera_names)
-        session_state.set(settings=settings, run_choices=choices)
+        choices = track_settings.restored(kept, session_state.session.camera_names)
+        session_state.set(settings=track_settings.changed(session_state.state.settings, choices), run_choices=choices)
         self._run: _Run | None = None
         self.after_run: Callable[[range], None] = lambda frames: None
         """Called with the frames of each run that ended; must return quickly."""
@@ -90,64 +91,108 @@ class Tracking:
         Raises:
             TrackerError: the session's settings cannot be written.
         """
-        state = self._session_state.state
-        settings = track_settings.stored(state.settings, state.run_choices)
+        settings = track_settings.stored(self._session_state.state.run_choices)
         self._session_state.saver.store_setting(track_settings.SETTING, settings)
 
     def choose(self, choices: RunChoices) -> None:
         """Choose method, frames and cameras of the next run."""
         self._session_state.set(run_choices=choices)
 
-    def start(
-        self, backward: bool, until: int | None, edit: int | None = None,
-        on_end: Callable[[bool], None] = lambda is_done: None,
-    ) -> None:  # fmt: skip
+    def start(self, backward: bool, until: int | None) -> None:
         """Begin a run from the shown poses; a former run must have been ended.
 
         Args:
             backward: towards the first frame.
             until: last frame to track; None for the end of the recording.
-            edit: entry of the history that the run belongs to; None for one of its own.
-            on_end: called at the end with whether the run did all its work; must return quickly.
 
         Raises:
             TrackerError: no person has been placed, or there is no frame to track.
         """
+        with self._activities.editing():
+            people = self._placed()
+            frames = self._frames(backward, until, people)
+            run = TrackingRun(
+                self._observer(),
+                self._subjects(people, frames),
+                self._session_state.present_poses(),
+                frames,
+                *self._clock_and_floor(),
+            )
+            way = "backward" if backward else "forward"
+            self._begin([Leg(run)], f"track {way} from frame {frames[0]}", None, lambda is_done: None)
+
+    def start_outward(
+        self, start: int, people: tuple[int, ...], edit: int | None, on_end: Callable[[bool], None]
+    ) -> None:
+        """Begin a run over all frames that goes out from the poses of one frame in both directions.
+
+        Args:
+            start: the frame.
+            people: indices of those to track; they have a pose there.
+            edit: entry of the history that the run belongs to; None for one of its own.
+            on_end: called at the end with whether the run did all its work; must return quickly.
+        """
         session_state = self._session_state
         with self._activities.editing():
-            state, saver = session_state.state, session_state.saver
-            models = session_state.present
-            people = tuple(i for i in range(len(models)) if saver.index.frames(i))
-            if not people:
-                raise TrackerError("expected a person who has been placed, found none; pose the body here first")
-            frames = self._frames(backward, until, people)
-            way = "backward" if backward else "forward"
-            free = [session_state.active_dofs(person) for person in range(len(models))]
-            session = TrackSession(
-                make_tracker(track_settings.of_run(state.settings, state.run_choices)),
-                TrackingRun(
-                    self._observer(state.run_choices),
-                    Subjects.of(models, people, free, saver.keyframes(frames)),
-                    session_state.present_poses(),
-                    frames,
-                    session_state.session.fps,
-                    floor_plane(session_state.session.up, session_state.session.floor),
-                ),
-                [StoredPerson(p.name, saver.revisions.current(i)) for i, p in enumerate(session_state.session.people)],
-                _SaverSink(session_state, edit),
-                f"track {way} from frame {frames[0]}",
-            )
-            job = Job(
-                session.steps,
-                lambda step, seconds: self._stepped(run, step, seconds),
-                lambda error: self._ended(run, error),
-                lambda: self._paused(run),
-            )
-            run = _Run(session, job, on_end)
-            self._run, session_state.open_edit_owner = run, None
-            track = TrackState(running=True, first=frames[0], last=frames[-1], total=len(frames))
-            session_state.set(track=track, follow=True)
-            run.job.run()
+            session_state.show_frame(start)
+            stride = session_state.state.run_choices.stride
+            frames = range(start % stride, session_state.session.n_frames, stride)
+            observer, subjects, poses = self._observer(), self._subjects(people, frames), session_state.present_poses()
+            trusted: Status = "good"
+            known = TrackedFrame(start, tuple(poses), (trusted,) * len(poses))
+            legs = [
+                Leg(TrackingRun(observer, subjects, poses, leg, *self._clock_and_floor()), [known], start)
+                for leg in outward(frames, start)
+            ]
+            if len(frames) < 2:
+                on_end(True)
+                return
+            self._begin(legs, f"track out from frame {start}", edit, on_end)
+
+    def _placed(self) -> tuple[int, ...]:
+        """Return the people who have a pose.
+
+        Raises:
+            TrackerError: nobody has.
+        """
+        session_state = self._session_state
+        people = tuple(i for i in range(len(session_state.present)) if session_state.saver.index.frames(i))
+        if not people:
+            raise TrackerError("expected a person who has been placed, found none; pose the body here first")
+        return people
+
+    def _subjects(self, people: tuple[int, ...], frames: Sequence[int]) -> Subjects:
+        session_state, models = self._session_state, self._session_state.present
+        active = [session_state.active_dofs(person) for person in range(len(models))]
+        return Subjects.of(models, people, active, session_state.saver.keyframes(frames))
+
+    def _clock_and_floor(self) -> tuple[float, GroundPlane | None]:
+        session = self._session_state.session
+        return session.fps, floor_plane(session.up, session.floor)
+
+    def _begin(self, legs: Sequence[Leg], label: str, edit: int | None, on_end: Callable[[bool], None]) -> None:
+        """Begin a run in a worker thread; the caller is editing."""
+        session_state = self._session_state
+        state, saver = session_state.state, session_state.saver
+        session = TrackSession(
+            make_tracker(track_settings.of_run(state.settings, state.run_choices)),
+            legs,
+            [StoredPerson(p.name, saver.revisions.current(i)) for i, p in enumerate(session_state.session.people)],
+            _SaverWriter(session_state, edit),
+            label,
+        )
+        job = Job(
+            session.steps,
+            lambda step, seconds: self._stepped(run, step, seconds),
+            lambda error: self._ended(run, error),
+            lambda: self._paused(run),
+        )
+        run = _Run(session, job, on_end)
+        self._run, session_state.open_edit_owner = run, None
+        frames = session.frames
+        track = TrackState(running=True, first=frames[0], last=session.ends(frames[0])[1], total=len(frames))
+        session_state.set(track=track, follow=True)
+        run.job.run()
 
     def resume(self) -> None:
         """Continue a paused run, if there is one."""
@@ -196,9 +241,9 @@ class Tracking:
                 self.flush()
                 self._session_state.show_frame(at)
 
-    def _observer(self, choices: RunChoices) -> Observer:
+    def _observer(self) -> Observer:
         """Return the observer of the chosen cameras."""
-        observer, cameras = self._session_state.frames.observer, choices.cameras
+        observer, cameras = self._session_state.frames.observer, self._session_state.state.run_choices.cameras
         chosen = [i for i, c in enumerate(observer.cameras) if c.camera.name in cameras]
         return observer.with_cameras(chosen) if chosen else observer
 
@@ -259,9 +304,10 @@ class Tracking:
         session_state = self._session_state
         worst = confidence.worst([found.statuses[i] for i in run.subjects.tracked])
         track = session_state.state.track
-        done = track.done + 1
+        done, (first, last) = track.done + 1, run.session.ends(found.frame)
         track = replace(
             track, running=run.job.running, at=found.frame, done=done, per_second=done / max(1e-6, seconds),
+            first=first, last=last,
             doubtful=track.doubtful + (worst == "doubtful"), lost=track.lost + (worst == "lost"),
         )  # fmt: skip
         if session_state.state.follow or session_state.state.frame == found.frame:
@@ -276,7 +322,7 @@ class Tracking:
     def _found(self, run: _Run, found: PoseEstimate) -> StateChanges:
         """Return the fields of the state that show a tracked frame."""
         keyframes, tracked = run.subjects.keyframes_at(found.frame), run.subjects.tracked
-        names = [c.camera.name for c in run.session.run.observer.cameras]
+        names = [c.camera.name for c in run.session.observer.cameras]
         view_costs_px = dict(zip(names, map(finite_or_none, found.view_costs_px), strict=True))
         people = []
         for i, shown in enumerate(self._session_state.state.people):

@@ -3,6 +3,7 @@
 import json
 import shutil
 from contextlib import closing
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from typing import get_args, get_type_hints
@@ -12,7 +13,7 @@ import pytest
 from command_line import SAMPLE, assert_refused, stored
 from gestures import wait_for
 
-from app.cli.track import _SETTINGS, TrackArguments
+from app.cli.track import TrackArguments, settings_of
 from app.server import address
 from tracker.compute.kernel_cache import compiled_mark
 from tracker.evaluation.metrics import axes_matrix
@@ -160,10 +161,11 @@ def test_the_contour_method_reports_its_normal_matrices(run, session):
 
 def test_every_tracking_method_can_be_named():
     choices = get_args(get_type_hints(TrackArguments)["method"])
-    assert set(choices) == METHODS.keys() == _SETTINGS.keys()
+    assert set(choices) == METHODS.keys()
     for method in choices:
         arguments = TrackArguments(SAMPLE, method=method)
-        assert _SETTINGS[method](arguments).method == method
+        assert settings_of(arguments) == METHODS[method].settings()
+        assert settings_of(replace(arguments, paper=True)) == METHODS[method].paper.settings()
 
 
 @pytest.mark.parametrize("compiled", [False, True])

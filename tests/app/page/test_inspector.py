@@ -5,6 +5,7 @@ import json
 import msgspec
 import pytest
 
+from app.control.tracking import track_settings
 from app.page.commands import dispatch
 from app.page.inspector_feed import InspectorFeed
 from app.page.message_parsing import MessageError, parse
@@ -35,24 +36,36 @@ class Page:
 def test_settings_are_shown_changed_one_by_one_and_their_defaults_known(page):
     first = page.updates()["settings"]
     assert (first.track, first.search) == (first.track_default, first.search_default)
-    page.send("track_settings", changes={"estimate": "search", "order": 2, "past_poses": 5, "recover": False})
+    page.send("track_settings", changes={"options": {"estimate": "search", "order": "2", "recover": False}})
+    page.send("track_settings", changes={"options": {"window": 5}})
     page.send("search_settings", changes={"bound_rad": 0.5, "theta_px": 25, "passes": [1, 0.5]})
     shown = page.updates()["settings"]
     settings = page.controller.state.settings
     assert (settings.estimate, settings.recover, settings.backward_pass) == ("search", None, True)
     assert (settings.predict.order, settings.predict.window) == (2, 5)
-    assert (shown.track.order, shown.track.past_poses, shown.track.recover) == (2, 5, False)
+    assert shown.track.options == {"estimate": "search", "order": "2", "window": 5, "recover": False}
     assert (shown.search.bound_rad, shown.search.theta_px, shown.search.passes) == (0.5, 25, (1, 0.5))
     assert shown.search.step_rad == first.search.step_rad
-    page.send("track_settings", changes={"recover": True})
+    page.send("track_settings", changes={"options": {"recover": True, "order": None}})
     assert page.controller.state.settings.recover is not None
-    with pytest.raises(MessageError, match=r"a whole number <= 8 as 'changes.past_poses'"):
-        page.send("track_settings", changes={"past_poses": 9})
+    assert page.updates()["settings"].track.options == {"estimate": "search", "window": 5}
+    for options, expected in (
+        ({"window": 9}, "a whole number from 1 to 8 as 'window', found 9"),
+        ({"window": 2.5}, "a whole number from 1 to 8"),
+        ({"order": "7"}, "one of 0, 1, 2 as 'order', found '7'"),
+        ({"recover": 1}, "true or false as 'recover'"),
+        ({"voxel_size": True}, "a number from 10 to 100"),
+        ({"speed": 1}, "an option among estimate, order"),
+    ):
+        with pytest.raises(TrackerError, match=expected):
+            page.send("track_settings", changes={"options": options})
+    with pytest.raises(TrackerError, match="a tracking method among chamfer, contour, voxel, found 'sonar'"):
+        page.send("track_settings", changes={"method": "sonar"})
 
 
 def test_track_settings_are_kept_with_the_session(page, opened):
-    page.send("track_settings", changes={"estimate": "search", "order": 2, "recover": False, "backward_pass": False})
-    page.send("track_settings", changes={"smooth": False})
+    page.send("track_settings", changes={"options": {"estimate": "search", "order": "2", "recover": False}})
+    page.send("track_settings", changes={"method": "voxel", "options": {"smooth": False, "voxel_size": 25}})
     page.send("search_settings", changes={"bound_rad": 0.5})
     chosen = page.updates()["settings"]
     page.controller = opened()
@@ -60,7 +73,9 @@ def test_track_settings_are_kept_with_the_session(page, opened):
     shown = again.updates()["settings"]
     assert shown.track == chosen.track != chosen.track_default
     assert shown.search == chosen.search_default  # those of a search are for trials
-    again.send("track_settings", changes=msgspec.to_builtins(chosen.track_default))
+    assert track_settings.of_run(again.controller.state.settings, again.controller.state.run_choices).voxel_m == 0.025
+    none = dict.fromkeys(shown.track.options)
+    again.send("track_settings", changes=msgspec.to_builtins(chosen.track_default) | {"options": none})
     assert Page(opened()).updates()["settings"].track == chosen.track_default
 
 
@@ -82,7 +97,7 @@ def test_stride_and_cameras_are_kept_and_only_known_cameras_taken(page, opened):
 @pytest.mark.parametrize(
     "kept",
     [
-        3, {"order": 7}, {"order": "2"}, {"estimate": "guess"}, {"later": True}, ["order"], {"stride": 0},
+        3, {"order": 7}, {"window": "2"}, {"estimate": "guess"}, {"later": True}, ["order"], {"stride": 0},
         {"cameras": ["roof"]},
     ],
 )  # fmt: skip
@@ -90,6 +105,15 @@ def test_kept_settings_that_cannot_be_used_are_passed_over(opened, kept):
     opened()._session_state.saver.store_setting("track_settings", kept)
     settings = Page(opened()).updates()["settings"]
     assert settings.track == settings.track_default
+
+
+def test_settings_of_former_versions_are_read(opened):
+    kept = {"method": "contour", "order": 2, "past_poses": 5, "estimate": "search", "backward_pass": False}
+    opened()._session_state.saver.store_setting("track_settings", kept)
+    state = opened().state
+    assert (state.settings.estimate, state.settings.predict.order, state.settings.predict.window) == ("search", 2, 5)
+    run = track_settings.of_run(state.settings, state.run_choices)
+    assert (run.method, run.predict.order, run.predict.window, run.backward_pass) == ("contour", 2, 5, False)
 
 
 def test_the_3d_view_is_chosen_and_kept_with_the_session(page, opened):

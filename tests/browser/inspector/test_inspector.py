@@ -31,8 +31,8 @@ async def test_settings_are_changed_marked_and_reset(page, endpoint):
     await page.keyboard.press("Enter")
     await until(lambda: len(endpoint.received) == 4)
     order, recover, bound, passes = endpoint.received
-    assert order == {"type": "track_settings", "changes": {"order": 2}}
-    assert recover == {"type": "track_settings", "changes": {"recover": False}}
+    assert order == {"type": "track_settings", "changes": {"options": {"order": "2"}}}
+    assert recover == {"type": "track_settings", "changes": {"options": {"recover": False}}}
     assert bound["changes"]["bound_rad"] == pytest.approx(0.349066)
     assert passes == {"type": "search_settings", "changes": {"passes": [1, 0.5]}}
     endpoint.settings["search"]["bound_rad"] = 0.349066

@@ -9,7 +9,7 @@ from tracker.body.model import PosedBody
 from tracker.fitting import gauss_newton, gauss_newton_compiled
 from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import PointTargets, PosePrior
-from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting.gauss_newton_compiled import solve_compiled, solver_of
 from tracker.fitting.interpenetration import BodyPenetration, SelfPenetration
 from tracker.formats.model_toml import load_model
 
@@ -173,9 +173,16 @@ def test_steps_are_those_of_the_readable_version(n):
         assert promised == pytest.approx(-(g[:n] + 0.5 * own @ expected) @ expected)
 
 
-@pytest.mark.parametrize("strange", ["two matches", "no match", "another block", "a ball joint"])
-def test_what_it_does_not_know_is_left_to_the_readable_version(staged, monkeypatch, strange):
-    model, blocks, asked = staged.model, staged.blocks(), []
+@pytest.mark.parametrize(
+    ("strange", "named"),
+    [
+        ("two matches", "found 2 ContourResiduals"), ("no match", "found 0 ContourResiduals"),
+        ("another block", "found PointTargets"), ("a ball joint", "found the ball joint 'left_shoulder'"),
+    ],
+)  # fmt: skip
+def test_what_it_does_not_cover_is_refused_by_name(staged, strange, named):
+    model, blocks = staged.model, staged.blocks()
+    assert solver_of(model) is solve_compiled
     if strange == "two matches":
         blocks.append(blocks[0])
     elif strange == "no match":
@@ -187,6 +194,6 @@ def test_what_it_does_not_know_is_left_to_the_readable_version(staged, monkeypat
         joints = list(model.joints)
         joints[shoulder] = replace(joints[shoulder], kind="ball", axes=())
         model = replace(model, joints=tuple(joints))
-    monkeypatch.setattr(gauss_newton, "solve", lambda *args: asked.append(args))
-    solve_compiled(model, model.neutral(), blocks)
-    assert len(asked) == 1
+        assert solver_of(model) is gauss_newton.solve
+    with pytest.raises(TypeError, match=named):
+        solve_compiled(model, model.neutral(), blocks)

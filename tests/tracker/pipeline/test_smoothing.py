@@ -12,11 +12,12 @@ from tracker.formats.model_toml import format_model, load_model
 from tracker.motion import smoothing
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.smoothing import TrackedRows, resumed_rows
-from tracker.pipeline.stored_run import TrackTask, stored_run
+from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.pipeline.track_session import SmoothedRows
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
+from tracker.tracking.chamfer.method import CHAMFER
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.confidence import LimbFeatures, PoseQuality
 from tracker.tracking.estimate import AlternativePose, PoseEstimate
@@ -56,7 +57,7 @@ class Jittery:
 
 @pytest.fixture
 def session(tmp_path, sample_folder, monkeypatch):
-    monkeypatch.setitem(METHODS, "chamfer", Jittery)
+    monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=Jittery))
     monkeypatch.setattr(smoothing, "_ITERATIONS", 3)
     return load_session(shutil.copytree(sample_folder, tmp_path / "session"))
 
@@ -78,7 +79,7 @@ def store(session):
 
 def track(session, store, settings=SETTINGS, n=None):
     """Take so many steps, or all."""
-    with stored_run(session, store, None, TrackTask(range(N), (0,), settings)) as run:
+    with stored_run(session, store, None, TrackPlan(range(N), (0,), settings)) as run:
         for k, step in enumerate(run.steps(), start=1):
             run.take(step)
             if k == n:
@@ -153,7 +154,7 @@ def test_a_resumed_run_ends_like_one_without_a_break(session, store, n):
     assert not run.finished
     assert x_of_tracked(store, n) == pytest.approx([tracked_x(k) for k in range(n) if k not in (0, 6)])
     run = track(session, store)
-    assert len(run.run.frames) == N - n
+    assert len(run.frames) == N - n
     np.testing.assert_array_equal([r.values for r in records(store)], whole)
 
 
@@ -166,7 +167,7 @@ def x_of_tracked(store, n):
 
 
 def test_a_run_interrupted_before_its_smoothed_poses_are_written_is_not_smoothed_in_part(session, store):
-    with stored_run(session, store, None, TrackTask(range(N), (0,), SETTINGS)) as run:
+    with stored_run(session, store, None, TrackPlan(range(N), (0,), SETTINGS)) as run:
         for step in run.steps():
             if isinstance(step, SmoothedRows):
                 break
@@ -180,7 +181,11 @@ def test_a_run_interrupted_before_its_smoothed_poses_are_written_is_not_smoothed
 @pytest.fixture
 def with_a_leap(monkeypatch):
     """The person is 40 cm ahead on frame 9, where the frame does not contradict that."""
-    monkeypatch.setitem(METHODS, "chamfer", lambda settings: Jittery(settings, CLEAR._replace(limbs=CLEAR.limbs[:4])))
+
+    def fewer_limbs(settings):
+        return Jittery(settings, CLEAR._replace(limbs=CLEAR.limbs[:4]))
+
+    monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=fewer_limbs))
     monkeypatch.setitem(globals(), "tracked_x", lambda frame: 0.05 * frame)
 
 

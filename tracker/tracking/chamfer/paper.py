@@ -15,10 +15,9 @@ from tracker.formats.model_toml import load_model
 from tracker.geometry.shapes import TaperedSuperquadric
 from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings
+from tracker.tracking.chamfer.constants import PAPER_BODY
 from tracker.tracking.chamfer.settings import TrackSettings
 
-PAPER_BODY = "gavrila22"
-"""Body of 22 degrees of freedom with tapered superquadrics (GD96 Sect. 3)."""
 _POSES = 8
 """T of GD96 Sect. 4.2, which it does not state. A parabola through fewer poses amplifies the noise of a lattice of 5
 degrees: the variance of the prediction is 2 times that of a pose with 8 poses, and 19 times with 3."""

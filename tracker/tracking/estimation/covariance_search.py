@@ -14,7 +14,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
-from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN, PoseScorer, ScoredFit
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE
@@ -49,7 +49,7 @@ def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigm
 
     def refined(scorer: PoseScorer, pose: Array) -> ScoredFit:
         held = PosePrior(pose, 1 / own)
-        found = solve_compiled(
+        found = solver_of(model)(
             model, pose, _blocks(scorer, held), scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
         )
         return ScoredFit(found, scorer.cost(found) - held.cost(model, found.pose))
@@ -57,7 +57,7 @@ def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigm
     here, *others = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, own, draw)])
     cheapest = min(others, key=lambda x: x.cost)
     best = cheapest if cheapest.cost < here.cost - MIN_COST_GAIN else here
-    return solve_compiled(model, best.fit.pose, scorer.blocks, scorer.active_dofs, 0)
+    return solver_of(model)(model, best.fit.pose, scorer.blocks, scorer.active_dofs, 0)
 
 
 def _blocks(scorer: PoseScorer, held: PosePrior) -> list[ResidualBlock]:
@@ -69,7 +69,7 @@ def _samples(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array, draw:
     """Return poses drawn around a fit, (n_values,) each."""
     free = np.flatnonzero(np.ones(model.n_dofs, dtype=bool) if scorer.active_dofs is None else scorer.active_dofs)
     blocks = _blocks(scorer, PosePrior(fit.pose, 1 / (_FREE * sigma)))
-    around = solve_compiled(model, fit.pose, blocks, scorer.active_dofs, 0)
+    around = solver_of(model)(model, fit.pose, blocks, scorer.active_dofs, 0)
     # Steps with the inverse Hessian as covariance. Its eigenvalues would take a hundred times as long.
     factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])
     steps = np.zeros((_N_SAMPLES, model.n_dofs))

@@ -16,7 +16,7 @@ from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals, PartCosts
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
-from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import PoseQuality
@@ -162,7 +162,7 @@ class FrameProblem:
     ) -> Fit:
         """Minimize the cost of some blocks from a pose, (n_values,)."""
         model, _, active, _ = self.people[person]
-        return solve_compiled(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
+        return solver_of(model)(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
 
     def sigma(self, person: int) -> Array:
         """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""

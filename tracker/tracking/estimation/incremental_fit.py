@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import Fit, ResidualBlock
-from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE
 
@@ -41,7 +41,7 @@ def fit_by_chains(
     for name, dofs in fit_chains(model):
         if not (dofs & is_active).any():
             continue
-        fit = solve_compiled(model, pose, blocks, dofs & is_active, MAX_ITERATIONS, TOLERANCE)
+        fit = solver_of(model)(model, pose, blocks, dofs & is_active, MAX_ITERATIONS, TOLERANCE)
         pose = fit.pose
         yield FitStep(name, fit)
 

@@ -22,7 +22,7 @@ from tracker.compute.jit import njit
 from tracker.compute.threads import N_HELPERS, kernel_pool, map_chunked
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
 from tracker.fitting.gauss_newton import Fit, ResidualBlock
-from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, RecoverSettings
 
@@ -178,12 +178,12 @@ def _search_limb(
     """
 
     def limb_only(scorer: PoseScorer, pose: Array) -> ScoredFit:
-        fit = solve_compiled(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE)
+        fit = solver_of(model)(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE)
         return ScoredFit(fit, scorer.cost(fit))
 
     def whole_body(scorer: PoseScorer, pose: Array) -> ScoredFit:
         min_decrease = scorer.settings.min_decrease
-        fit = solve_compiled(model, pose, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, min_decrease)
+        fit = solver_of(model)(model, pose, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, min_decrease)
         return ScoredFit(fit, scorer.cost(fit))
 
     of_limb = scorer.restricted_to(limb)

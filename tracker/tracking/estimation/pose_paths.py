@@ -17,7 +17,7 @@ from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, map_chunked
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
 from tracker.fitting.gauss_newton import ResidualBlock
-from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.limb_recovery import DISTINCT_POSE_M, MIN_COST_GAIN
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings, prior_blocks
@@ -73,7 +73,7 @@ class FrameCost:
 
         def refine(residuals: ContourResiduals, pose: Array) -> Array:
             blocks = [residuals, *prior_blocks(model, pose, sigma), *self._penetration]
-            fit = solve_compiled(model, pose, blocks, self._active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+            fit = solver_of(model)(model, pose, blocks, self._active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
             return fit.pose
 
         return np.array(map_chunked(refine, self._clones, poses))

@@ -18,7 +18,8 @@ _AXIS = np.linspace(-0.75, 0.75, 10)
 _LOST_SHARE, _DOUBTFUL_SHARE = 0.5, 0.85
 """A limb of whose axis less lies in voxels is lost, or doubtful."""
 _LOST_VOLUME, _DOUBTFUL_VOLUME = 0.75, 0.4
-"""Volume that no part explains, in volumes of a forearm, above which a limb is lost, or doubtful: it is elsewhere."""
+"""Volume that no part explains, in volumes of a forearm, above which a limb partly outside of the voxels is lost, and
+above which a pose is doubtful."""
 _BESIDE_M, _FOOT_M = 0.07, 0.30
 """Distance from the surface of a part beyond which voxels are not its skin, and from a calf's end within which they are
 a foot, metres."""
@@ -73,7 +74,8 @@ def assess(
         return FigureAssessment("lost", f"{display} outside of the voxels", lost)
     if inside[:2].min() < _LOST_SHARE:
         return FigureAssessment("lost", "trunk or head outside of the voxels")
-    if volume > _LOST_VOLUME:
+    # A limb that is elsewhere has left its place. Where all limbs lie in voxels, the hull may hold a phantom.
+    if volume > _LOST_VOLUME and shares[worst] < _DOUBTFUL_SHARE:
         return FigureAssessment("lost", "voxels that no part explains: a limb is elsewhere")
     if coarse:
         return FigureAssessment("doubtful", "; ".join(coarse))

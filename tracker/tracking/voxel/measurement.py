@@ -120,7 +120,7 @@ def linearize(
     if with_sizes:
         residual[:, 6:] = found.sizes[parts] - sizes
         H[one, 6 + xyz, state.layout.sizes_at.start + columns] = 1.0
-        R[:, 6 + xyz, 6 + xyz] = noise.size_m**2
+        R[:, 6 + xyz, 6 + xyz] = noise.size_m**2 * doubt[:, None]
     if noise.independent_m3 is not None:
         R[:, :6, :6] *= _influence_limits(state, residual[:, :6], H[:, :6], R[:, :6, :6])[:, None, None]
     noises = np.zeros((n, n_rows, n, n_rows))

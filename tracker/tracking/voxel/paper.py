@@ -9,12 +9,11 @@ from functools import cache
 from tracker.body.model import BodyModel
 from tracker.errors import Remedy, TrackerError
 from tracker.formats.model_toml import load_model
+from tracker.tracking.voxel.constants import PAPER_BODY
 from tracker.tracking.voxel.measurement import MeasurementNoise
 from tracker.tracking.voxel.motion_model import ProcessNoise
 from tracker.tracking.voxel.settings import VoxelSettings
 
-PAPER_BODY = "mikic10"
-"""Body of ten parts on ball joints (MTHC01 Fig. 5)."""
 PAPER_VOXEL_M = 0.05
 """Edge of the paper's voxels, metres (MTHC01 Sect. 1)."""
 

@@ -6,15 +6,13 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from tracker.errors import TrackerError
+from tracker.tracking.voxel.constants import MAX_VOXEL_M, MIN_VOXEL_M
 from tracker.tracking.voxel.labels import LabelRule
 from tracker.tracking.voxel.measurement import MeasurementNoise
 from tracker.tracking.voxel.motion_model import ProcessNoise
 
 SizeEstimation = Literal["frozen", "first", "always"]
 """When part sizes are estimated: never, on the first frame of a run, or on all frames."""
-
-MIN_VOXEL_M, MAX_VOXEL_M = 0.01, 0.10
-"""Smallest and largest edge of a voxel, metres: a forearm is no wider than the largest."""
 
 
 def check_voxel_size(voxel_m: float) -> None:

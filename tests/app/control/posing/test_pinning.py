@@ -5,7 +5,7 @@ import pytest
 from gestures import FRONT, PAGE, drag, pixel_of, wait_for
 
 from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton_compiled import solve_compiled
+from tracker.fitting import gauss_newton
 from tracker.posing import pinned_fit
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
@@ -254,11 +254,11 @@ def test_a_live_pin_costs_a_few_steps_of_the_solver_a_move(opened, monkeypatch):
     drag(controller, "torso", (4.0, 0.0))
 
     def counted(*arguments):
-        fit = solve_compiled(*arguments)
+        fit = gauss_newton.solve(*arguments)
         iterations[-1].append(fit.iterations)
         return fit
 
-    monkeypatch.setattr(pinned_fit, "solve_compiled", counted)
+    monkeypatch.setattr(pinned_fit, "solve", counted)
     start = pixel_of(controller, "left_wrist")
     controller.pinning.begin(PAGE, 0, FRONT, 0, "left_wrist", tuple(start), True)
     for i in range(12):

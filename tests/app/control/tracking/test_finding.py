@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from gestures import drag, wait_for
 
-from app.control.tracking import finding
 from app.drawing import overlays
 from app.page import inspector_feed
 from app.state.page_view import View
@@ -14,6 +13,7 @@ from tracker.errors import TrackerError
 from tracker.initialization.first_pose import FirstPose, FirstPoses
 from tracker.initialization.generators.start_generators import StartCandidate
 from tracker.initialization.start_fit import FittedStart
+from tracker.pipeline import chain
 from tracker.pipeline.find_people import FoundPeople
 
 FRAME = 1
@@ -37,7 +37,7 @@ def found(monkeypatch):
         first = FirstPose(FRAME, candidate, FittedStart(pose, "good", 1.0), True, (), lines)
         return FoundPeople(FirstPoses(FRAME, dict.fromkeys(people, first)), {0: body}, {0: pose}, {})
 
-    monkeypatch.setattr(finding, "find_people", find)
+    monkeypatch.setattr(chain, "find_people", find)
     return go
 
 
@@ -46,11 +46,11 @@ def tracked(monkeypatch):
     """The runs of the tracker that were asked for; each does nothing and ends well."""
     runs = []
 
-    def start(self, backward, until, edit, on_end):
-        runs.append((self._session_state.state.frame, backward, until, edit))
+    def start(self, frame, people, edit, on_end):
+        runs.append((frame, people, edit))
         on_end(True)
 
-    monkeypatch.setattr("app.control.tracking.tracking.Tracking.start", start)
+    monkeypatch.setattr("app.control.tracking.tracking.Tracking.start_outward", start)
     return runs
 
 
@@ -68,10 +68,9 @@ def test_one_entry_holds_poses_sizes_and_tracks(opened, found, tracked):
     found.set()
     wait_for(lambda: not controller.state.finding.running)
     assert controller.state.finding.message == "Done."
-    last = controller.session.n_frames - 1
-    (edit,) = {run[3] for run in tracked}
+    ((frame, people, edit),) = tracked
+    assert (frame, people) == (FRAME, (0,))
     assert edit is not None
-    assert [run[:3] for run in tracked] == [(FRAME, True, 0), (0, False, last)]
     assert controller.session.people[0].model.height_m == pytest.approx(1.05 * before)
     controller.history.undo()
     assert controller.session.people[0].model.height_m == pytest.approx(before)
@@ -144,7 +143,7 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
             assert event.wait(10)
         raise TrackerError("expected a body that fills the silhouettes, found none")
 
-    monkeypatch.setattr(finding, "find_people", find)
+    monkeypatch.setattr(chain, "find_people", find)
     controller = opened()
     controller.finding.start()
     wait_for(lambda: controller.state.finding.candidates)
@@ -180,7 +179,7 @@ def test_an_error_is_one_sentence(opened, monkeypatch):
             wait_for(lambda: controller.state.frame == frame)  # noqa: B023
         raise TrackerError("expected somebody in the silhouettes, found none", camera=camera)
 
-    monkeypatch.setattr(finding, "find_people", fail)
+    monkeypatch.setattr(chain, "find_people", fail)
     controller = opened()
     camera = controller.session.cameras[1].camera.name
     controller.finding.start()

@@ -30,6 +30,31 @@ def x_of(controller):
     return controller.state.poses[0][0]
 
 
+def test_a_run_goes_out_from_a_frame_in_both_directions_and_keeps_its_pose(placed, tracker, session):
+    start, last, ended = x_of(placed), placed.session.n_frames - 1, []
+    placed.tracking.start_outward(2, (0,), None, ended.append)
+    assert placed.state.track.total == last
+    tracker.let_go(2)  # the start and the frame before it
+    wait_for(at(placed, 1))
+    assert (placed.state.track.first, placed.state.track.last) == (2, 0)
+    assert placed.state.poses[0][0] == pytest.approx(start + STEP_M)
+    end_the_step_soon(tracker)
+    placed.tracking.pause()
+    placed.tracking.resume()
+    tracker.let_go(last + 2)
+    wait_for(lambda: ended)
+    assert ended == [True]
+    assert tracker.seen == [2, 1, 0, *range(2, last + 1)]
+    store = AnnotationStore(session / "annotations.sqlite", read_only=True)
+    assert tracker.last[3].poses[0][0] == pytest.approx(start + STEP_M)  # the second leg begins at the start, too
+    assert store.pose("person", 2).values[0] == start
+    assert len(store.frames("person")) == last + 1
+    assert {row.frame for row in store.frames("person") if row.source == "manual"} == {2}
+    placed.history.undo()
+    assert [row.frame for row in store.frames("person")] == [2]
+    store.close()
+
+
 def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, session):
     start = x_of(placed)
     placed.tracking.start(backward=False, until=9)

@@ -1,5 +1,7 @@
 """The extended Kalman filter: derivatives, covariances over thousands of steps, normalized innovations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from filter_states import some_state
@@ -82,6 +84,21 @@ def test_derivative_of_the_measurement():
     found = linearize(state, measure_parts(state, clouds_of(state, other), 0.01, by_size=False), NOISE, ALL, True)
     expected = -differences(state, residual).reshape(9 * N_PARTS, -1)
     np.testing.assert_allclose(found.jacobian, expected, atol=1e-6)
+
+
+def test_sizes_of_a_part_that_is_merged_with_another_count_less():
+    """The trunk is as deep as it is wide where arms lie on it."""
+    state, noise = some_state(3), NOISE._replace(independent_m3=0.0003)
+
+    def size_variances(other):
+        found = linearize(state, measure_parts(state, clouds_of(state, other), 0.01, by_size=False), noise, ALL, True)
+        return np.diag(found.noise).reshape(N_PARTS, 9)[:, 6:]
+
+    sizes = state.sizes.copy()
+    sizes[0, :2] *= 2.0
+    alone, merged = size_variances(state), size_variances(replace(state, sizes=sizes))
+    assert np.all(merged[0] > 2 * alone[0])
+    np.testing.assert_allclose(merged[1:], alone[1:])
 
 
 def test_derivative_of_measured_rotations():

@@ -1,0 +1,36 @@
+"""How long work reports its progress."""
+
+from typing import Protocol
+
+
+class Report(Protocol):
+    """Receives the progress of long work. Raise to end the work."""
+
+    def __call__(self, stage: str, share: float, text: str = "", /) -> None:
+        """Receive one step.
+
+        Args:
+            stage: the kind of work, as text for the user.
+            share: of the work that is done, 0 to 1.
+            text: a sentence on a result; empty without one.
+        """
+
+
+def part_of(report: Report, begin: float, end: float, stage: str = "") -> Report:
+    """Return what a part of the work reports to.
+
+    Args:
+        report: receives the progress of the whole.
+        begin: share of the whole that is done before the part, 0 to 1.
+        end: the same after it.
+        stage: kind of work of the whole part; that of each step if empty.
+    """
+
+    def reported(own: str, share: float, text: str = "", /) -> None:
+        report(stage or own, begin + (end - begin) * share, text)
+
+    return reported
+
+
+def unreported(stage: str, share: float, text: str = "", /) -> None:
+    """Show no progress."""

@@ -1,0 +1,58 @@
+"""The descriptor of the contour tracker."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from tracker.tracking.estimation.options import BACKWARD_PASS, ORDER, RECOVER, SMOOTH, THETA, WINDOW
+from tracker.tracking.method import Method, Option, PaperMode
+
+if TYPE_CHECKING:
+    from tracker.tracking.contour.settings import ContourSettings
+    from tracker.tracking.contour.tracker import ContourTracker
+
+
+def _settings() -> "ContourSettings":
+    from tracker.tracking.contour.settings import ContourSettings
+
+    return ContourSettings()
+
+
+def _paper_settings() -> "ContourSettings":
+    from tracker.tracking.contour.paper import paper_settings
+
+    return paper_settings()
+
+
+def _tracker(settings: "ContourSettings") -> "ContourTracker":
+    from tracker.tracking.contour.tracker import ContourTracker
+
+    return ContourTracker(settings)
+
+
+def _with_sliding(settings: "ContourSettings", on: bool) -> "ContourSettings":
+    from tracker.tracking.contour.settings import with_sliding
+
+    return with_sliding(settings, on)
+
+
+def _at_stride(settings: Any, stride: int) -> Any:
+    from tracker.tracking.estimation.settings import at_stride
+
+    return at_stride(settings, stride)
+
+
+IMAGE_CONTOURS = Option(
+    "image_contours", "Image contours", "the contours in the image that the model's are compared with",
+    "edges by default, silhouettes with --paper", "choice", lambda s: s.image_contours,
+    lambda s, value: replace(s, image_contours=value), {"edges": "Edges", "silhouettes": "Silhouettes"},
+)  # fmt: skip
+SLIDING = Option(
+    "sliding", "Sliding term", "whether the Jacobian has the term of contours that slide on the surface", "", "switch",
+    lambda s: s.sliding, _with_sliding,
+)  # fmt: skip
+CONTOUR = Method(
+    "contour", "Extremal contours",
+    "extremal contours, refined by Gauss-Newton until it converges, without a search of whole bodies",
+    _settings, _tracker, (IMAGE_CONTOURS, SLIDING, ORDER, WINDOW, RECOVER, BACKWARD_PASS, SMOOTH, THETA),
+    PaperMode("Knossow, Ronfard and Horaud 2008", _paper_settings), _at_stride,
+)  # fmt: skip
