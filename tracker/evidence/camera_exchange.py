@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording, read_background, read_mask
-from tracker.geometry.arrays import Array, Image
+from tracker.geometry.arrays import Array, Image, Mask
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
-from tracker.images.background_subtraction import Mask
 
 _SIDE_PX = 128
 """Longer side of the pictures."""

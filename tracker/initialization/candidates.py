@@ -8,10 +8,9 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import GroundPlane
-from tracker.images.background_subtraction import Mask
 from tracker.initialization.axis_start import AxisStart, search_on_axes
 from tracker.initialization.body_axis import BodyAxis, find_body_axes
 from tracker.initialization.head_template import Head
