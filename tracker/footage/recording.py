@@ -118,6 +118,18 @@ class Recording:
         self._check(k)
         return self._read_one(camera, k)
 
+    def quick_frames(self, n: int) -> list[int]:
+        """Return at most n frames spread over the recording, ascending, that are soon read.
+
+        They are the last key frames of the first camera before evenly spread frames, or these where key frames are few:
+        a key frame is decoded alone, another one with all between.
+        """
+        source, footage = self._cameras[0], self._footage[0]
+        evenly = np.unique(np.linspace(0, self.n_frames - 1, n).astype(int))
+        keys = np.append(0, footage.key_frames - source.offset)
+        nearest = np.unique(np.maximum(keys[np.searchsorted(keys[1:], evenly, side="right")], 0))
+        return (nearest if len(nearest) == len(evenly) else evenly).tolist()
+
     def cached(self, k: int) -> bool:
         """Return whether frame k of every camera is in the cache."""
         with self._cache_lock:

@@ -24,7 +24,7 @@ from tracker.footage.image_folder import ImageFolder
 from tracker.footage.packet_scan import PacketScan, TimeStamps
 from tracker.footage.passed_frames import MAX_BYTES
 from tracker.footage.video_decoder import VideoDecoder
-from tracker.geometry.arrays import Image
+from tracker.geometry.arrays import Image, IntArray
 
 _ATTEMPTS = 2  # a frame is read again if the file was replaced meanwhile
 
@@ -107,6 +107,12 @@ class VideoFile:
     def n_frames(self) -> int:
         """Number of frames; while frames are being listed, the number listed so far."""
         return len(self._listed.frames.pts)
+
+    @property
+    def key_frames(self) -> IntArray:
+        """Frames listed so far that are decoded alone, ascending, (n,)."""
+        listed = self._listed.frames
+        return np.searchsorted(listed.pts, listed.key_pts)
 
     @property
     def listed_share(self) -> float | None:

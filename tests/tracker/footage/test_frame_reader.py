@@ -1,10 +1,11 @@
 """Random access by `VideoFile`: how many frames it decodes, how much it keeps, and that the order never matters."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from clips import SIZE, N, encode
+from clips import SIZE, N, encode, write_images
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,6 +19,7 @@ from tracker.geometry.cameras import Camera
 
 YUV_BYTES = (128 + 64) * SIZE[1]
 """Size of a frame as decoded: FFmpeg pads rows of 64 and 32 pixels to 128 and 64 bytes."""
+CAMERA = Camera("cam", SIZE, np.array([[50.0, 0, 32], [0, 50, 24], [0, 0, 1]]), np.zeros(0), np.eye(4))
 OPEN_GROUPS = {"x264-params": "open-gop=1:keyint=15:min-keyint=15:bframes=3:b-adapt=0:scenecut=0"}
 
 
@@ -58,14 +60,30 @@ def test_a_group_that_does_not_fit_is_decoded_in_parts(tmp_path, decoded):
 
 def test_what_is_kept_is_bounded_for_all_cameras_together(tmp_path, decoded, monkeypatch):
     monkeypatch.setattr(passed_frames, "MAX_BYTES", 20 * YUV_BYTES)
-    camera = Camera("cam", SIZE, np.array([[50.0, 0, 32], [0, 50, 24], [0, 0, 1]]), np.zeros(0), np.eye(4))
     path = encode(tmp_path / "a.mp4", gop=N)
-    with Recording([CameraSource(camera, path)] * 2, cache_bytes=0) as recording:
+    with Recording([CameraSource(CAMERA, path)] * 2, cache_bytes=0) as recording:
         for k in range(N - 1, -1, -1):
             recording.read(k)
             kept = [footage._reader._passed for footage in recording._footage]
             assert all(len(p._frames) * YUV_BYTES == p.n_bytes <= 10 * YUV_BYTES for p in kept)
         assert decoded[0] < 2 * N * N / 2 / 5
+
+
+@pytest.mark.parametrize(("gop", "chosen"), [(12, [0, 12, 36, 48]), (N, [0, 19, 39, N - 1])])
+def test_quick_frames_are_key_frames_where_there_are_enough(tmp_path, decoded, gop, chosen):
+    source = CameraSource(CAMERA, encode(tmp_path / "a.mp4", gop=gop, options={"x264-params": "scenecut=0"}))
+    with Recording([source]) as recording:
+        assert recording.quick_frames(4) == chosen
+        decoded[0] = 0
+        for k in recording.quick_frames(4):
+            recording.read(k)
+        assert decoded[0] == (4 if gop == 12 else N)
+    with Recording([replace(source, offset=5)]) as recording:
+        assert recording.quick_frames(3) == ([0, 19, 43] if gop == 12 else [0, 27, 54])
+    images = CameraSource(CAMERA, write_images(tmp_path / "b", [f"{i}.png" for i in range(9)]))
+    with Recording([images]) as recording:
+        assert recording.quick_frames(3) == [0, 4, 8]
+        assert recording.quick_frames(50) == list(range(9))
 
 
 def test_frames_larger_than_the_bound_are_decoded_again(tmp_path):
