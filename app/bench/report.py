@@ -60,7 +60,7 @@ def measure() -> Iterator[Row]:
         yield contour_rows.iteration(six_of_54, yardstick)
         yield from contour_rows.solves(six_of_54, yardstick)
         yield from bench_rows.evolution(cones, yardstick)
-        simulate(Path(folder) / "crowd", Simulation("crowd_of_three", n_frames=1))
+        simulate(Path(folder) / "crowd", Simulation("crowd_of_three", n_frames=2))
         yield from bench_rows.crowds(read_crowd(Path(folder) / "crowd", 0), yardstick)
     yield voxel_rows.voxel_frame(frame, yardstick)
     yield bench_rows.pipeline(frame, yardstick)

@@ -172,25 +172,14 @@ def searches(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> Iter
         fit = _refined(of, steps[-1].best[0], start)
         timed = yardstick.beside(partial(_searched_and_refined, of, start), 9)
         note = f"{steps[-1].evaluations} poses scored; {_apart(of, start, fit)}"
-        yield Row(
-            f"search_hard_{name}",
-            f"hard frame: search and refinement, {name}",
-            *timed,
-            *(in_yardsticks(ms, CORES) for ms in (25, 12)),
-            note,
-        )
+        must, aim = in_yardsticks(25, CORES), in_yardsticks(12, CORES)
+        yield Row(f"search_hard_{name}", f"hard frame: search and refinement, {name}", *timed, must, aim, note)
         start = of.near_prediction()
         fit = _refined(of, start, start)
         timed = yardstick.beside(partial(_refined, of, start, start), 15)
         note = f"{fit.iterations} iterations; {_apart(of, start, fit)}"
-        yield Row(
-            f"refine_tracked_{name}",
-            f"tracked frame: refinement, {name}",
-            *timed,
-            in_yardsticks(8),
-            in_yardsticks(4),
-            note,
-        )
+        must, aim = in_yardsticks(8), in_yardsticks(4)
+        yield Row(f"refine_tracked_{name}", f"tracked frame: refinement, {name}", *timed, must, aim, note)
 
 
 def _searched(frame: BenchFrame, start: Array, settings: SearchSettings = _SEARCH) -> Array:
