@@ -37,7 +37,7 @@ def iteration(six: BenchFrame, yardstick: Yardstick) -> Row:
     poses = [model.retract(start, step) for step in steps]
     few, many = (partial(descended, model, match, poses, n) for n in (2, 6))
     n, timed = many() - few(), yardstick.beside_difference(many, few, 30)
-    timed = timed._replace(work_us=timed.work_us / n)
+    timed = timed.scaled(1 / n)
     what = f"contour iteration, {model.n_dofs} DOF, {len(model.parts)} parts, {len(six.views)} views"
     return Row("contour_iteration", what, *timed, 1 / _MUST, 1 / _AIM)
 

@@ -1,10 +1,12 @@
 """The report of `quadrille bench`: the tracker's speed beside its requirements, and whether it has become slower.
 
 Times depend on the machine. Requirements therefore bound their ratio to a yardstick that is timed in the same run. The
-ratios are compared with those of a baseline that is part of the program.
+ratios are compared with those of a baseline that is part of the program. Both are in processor time, which other
+programs hardly change; time by the clock and the load of the machine stand beside it.
 """
 
 import json
+import os
 import platform
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -58,7 +60,7 @@ def measure() -> Iterator[Row]:
         yield contour_rows.iteration(six_of_54, yardstick)
         yield from contour_rows.solves(six_of_54, yardstick)
         yield from bench_rows.evolution(cones, yardstick)
-        simulate(Path(folder) / "crowd", Simulation("crowd_of_three", n_frames=1))
+        simulate(Path(folder) / "crowd", Simulation("crowd_of_three", n_frames=2))
         yield from bench_rows.crowds(read_crowd(Path(folder) / "crowd", 0), yardstick)
     yield voxel_rows.voxel_frame(frame, yardstick)
     yield bench_rows.pipeline(frame, yardstick)
@@ -97,7 +99,9 @@ def report(rows: list[Row], baseline: Mapping[str, Any]) -> dict[str, Any]:
     """Compare rows with their requirements and the baseline.
 
     Returns:
-        `versions`, `tolerance`, `rows` and the names of those that became `slower` than the tolerance allows.
+        `versions`, `load` (mean number of running programs of the last 1, 5 and 15 minutes; None where the system does
+        not say) and `cores` of the machine, `tolerance`, `rows` and the names of those that became `slower` than the
+        tolerance allows.
     """
     ratios, tolerance = baseline["ratios"], baseline["tolerance"]
     compared = []
@@ -107,7 +111,9 @@ def report(rows: list[Row], baseline: Mapping[str, Any]) -> dict[str, Any]:
             {
                 "name": r.name,
                 "what": r.what,
-                "median_us": r.time_us,
+                "processor_us": r.time_us,
+                "clock_us": r.clock_us,
+                "busy_cores": r.busy_cores,
                 "yardstick_us": r.yardstick_us,
                 "ratio": r.ratio,
                 "must": r.must,
@@ -120,6 +126,8 @@ def report(rows: list[Row], baseline: Mapping[str, Any]) -> dict[str, Any]:
         )
     return {
         "versions": versions(),
+        "load": os.getloadavg() if hasattr(os, "getloadavg") else None,
+        "cores": os.cpu_count(),
         "tolerance": tolerance,
         "rows": compared,
         "slower": [t["name"] for t in compared if t["slower"]],
@@ -139,12 +147,16 @@ def versions() -> dict[str, str]:
 
 def show(found: Mapping[str, Any], console: Console) -> None:
     """Print a report as a table. Ratios are given as at least 1: the time in yardsticks, or the reverse."""
-    table = Table("work", "median", "yardstick", "must", "aim", "baseline", "")
+    table = Table("work", "processor", "clock", "cores", "yardsticks", "must", "aim", "baseline", "")
     for r in found["rows"]:
         verdict = "slower" if r["slower"] else "" if r["holds"] is None else "holds" if r["holds"] else "fails"
         ratios = [_ratio(r[k]) for k in ("ratio", "must", "aim", "baseline")]
-        table.add_row(r["what"], _time(r["median_us"]), *ratios, f"{verdict} {r['note']}".strip())
+        times = _time(r["processor_us"]), _time(r["clock_us"]), f"{r['busy_cores']:.1f}"
+        table.add_row(r["what"], *times, *ratios, f"{verdict} {r['note']}".strip())
     console.print(table)
+    if found["load"] is not None:
+        loads = ", ".join(f"{load:.1f}" for load in found["load"])
+        console.print(f"load of the {found['cores']} cores in the last 1, 5 and 15 minutes: {loads}", highlight=False)
     console.print(", ".join(f"{k} {v}" for k, v in found["versions"].items()), highlight=False)
     if found["slower"]:
         by = f"{100 * found['tolerance']:.0f}%"

@@ -33,6 +33,10 @@ _CANDIDATES = 100
 _PIPELINE_FRAMES = range(5, 45)
 _SETTINGS = TrackSettings()
 _SEARCH = _SETTINGS.search
+CORES = 2
+"""Number of cores on which requirements are stated by the clock, for work that uses several."""
+_QUIET_YARDSTICK_MS = 1.5
+"""Time of the yardstick on the quiet machine on which requirements are stated, ms."""
 
 
 class Row(NamedTuple):
@@ -41,30 +45,49 @@ class Row(NamedTuple):
     name: str
     what: str
     time_us: float
-    """Median, microseconds."""
+    """Median processor time of all threads, microseconds."""
+    clock_us: float
+    """Median time by the clock, microseconds."""
     yardstick_us: float
-    """Median of the yardstick between the runs, microseconds."""
+    """Median processor time of the yardstick between the runs, microseconds."""
     must: float | None = None
-    """Largest allowed time, in yardsticks; None for rows that are only for comparison."""
+    """Largest allowed processor time, in yardsticks; None for rows that are only for comparison."""
     aim: float | None = None
-    """Desired time, in yardsticks."""
+    """Desired processor time, in yardsticks."""
     note: str = ""
 
     @property
     def ratio(self) -> float:
-        """Time in yardsticks."""
+        """Processor time in yardsticks."""
         return self.time_us / self.yardstick_us
+
+    @property
+    def busy_cores(self) -> float:
+        """Mean number of cores that the work kept busy; less than one where other programs interrupted it."""
+        return self.time_us / self.clock_us
 
 
 class Timed(NamedTuple):
     """Median times of some work and of the yardstick, microseconds."""
 
     work_us: float
+    """Processor time of the work, all threads."""
+    clock_us: float
+    """Time of the work by the clock."""
     yardstick_us: float
+    """Processor time of the yardstick."""
+
+    def scaled(self, share: float) -> "Timed":
+        """Return the times of a share of the work."""
+        return self._replace(work_us=share * self.work_us, clock_us=share * self.clock_us)
 
 
 class Yardstick:
-    """The unit of all times: a distance transform (L2, 5x5) of a 640x480 image on one thread."""
+    """The unit of all times: a distance transform (L2, 5x5) of a 640x480 image on one thread.
+
+    Processor times are compared: other programs interrupt a long work more often than the yardstick, so that by the
+    clock the ratio grows with their load.
+    """
 
     def __init__(self) -> None:
         """Scatter edges over the image."""
@@ -75,36 +98,41 @@ class Yardstick:
         """Do the work once."""
         cv2.distanceTransform(self._image, cv2.DIST_L2, cv2.DIST_MASK_5)
 
-    def beside(
-        self, work: Callable[[], object], runs: int, times: int = 1, clock: Callable[[], float] = time.perf_counter
-    ) -> Timed:
+    def beside(self, work: Callable[[], object], runs: int, times: int = 1) -> Timed:
         """Time some work and the yardstick alternately, so that both meet the same load, after one untimed run.
 
         Args:
             work: the work to time.
             runs: number of runs.
             times: number of pieces of work in one run.
-            clock: returns a time, s.
         """
-        spent = np.array([(_seconds(work, clock), _seconds(self, clock)) for _ in range(runs + 1)][1:])
-        work_s, yardstick_s = np.median(spent, axis=0)
-        return Timed(1e6 * work_s / times, 1e6 * yardstick_s)
+        spent = np.array([[*spent_s(work), *spent_s(self)] for _ in range(runs + 1)][1:])
+        work_s, clock_s, yardstick_s, _ = np.median(spent, axis=0)
+        return Timed(1e6 * work_s, 1e6 * clock_s, 1e6 * yardstick_s).scaled(1 / times)
 
     def beside_difference(self, long: Callable[[], object], short: Callable[[], object], runs: int) -> Timed:
-        """Time the difference between two works, alternately with the yardstick; otherwise as `beside`.
-
-        Works of one thread are timed by the processor time of that thread. Other programs interrupt a long work more
-        often than the yardstick, so that by the clock the ratio grows with their load.
-        """
-        more_s, clock = list[float](), time.thread_time
-        timed = self.beside(lambda: more_s.append(_seconds(long, clock) - _seconds(short, clock)), runs, clock=clock)
-        return timed._replace(work_us=1e6 * float(np.median(more_s[1:])))
+        """Time the difference between two works, alternately with the yardstick; otherwise as `beside`."""
+        more_s = list[Array]()
+        timed = self.beside(lambda: more_s.append(spent_s(long) - spent_s(short)), runs)
+        work_s, clock_s = np.median(more_s[1:], axis=0)
+        return timed._replace(work_us=1e6 * work_s, clock_us=1e6 * clock_s)
 
 
-def _seconds(work: Callable[[], object], clock: Callable[[], float]) -> float:
-    start = clock()
+def spent_s(work: Callable[[], object]) -> Array:
+    """Do some work; return its processor time, of all threads, and its time by the clock, (2,), s."""
+    before = np.array([time.process_time(), time.perf_counter()])
     work()
-    return clock() - start
+    return np.array([time.process_time(), time.perf_counter()]) - before
+
+
+def in_yardsticks(clock_ms: float, cores: int = 1) -> float:
+    """Return the processor time, in yardsticks, of a requirement by the clock of the quiet machine.
+
+    Args:
+        clock_ms: the required time, ms.
+        cores: number of cores that the work can keep busy.
+    """
+    return cores * clock_ms / _QUIET_YARDSTICK_MS
 
 
 def candidates(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> Iterator[Row]:
@@ -112,8 +140,7 @@ def candidates(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> It
     bodies = (("superquadrics", frame, 15, 25), ("cones", cones, 28, 50))
     for name, of, must, aim in bodies:
         cost, poses = of.cost(threads=1), of.candidates(_CANDIDATES)
-        # By processor time, see `Yardstick.beside_difference`.
-        timed = yardstick.beside(partial(cost.of_person, 0, poses, [of.values]), 60, _CANDIDATES, time.thread_time)
+        timed = yardstick.beside(partial(cost.of_person, 0, poses, [of.values]), 60, _CANDIDATES)
         yield Row(f"candidate_{name}", f"one candidate pose, {name}, 4 views", *timed, 1 / must, 1 / aim)
     painted = PaintedCost(frame.views, frame.model, frame.cost().edge_points_px)
     poses, cost = frame.candidates(20), frame.cost()
@@ -145,12 +172,14 @@ def searches(frame: BenchFrame, cones: BenchFrame, yardstick: Yardstick) -> Iter
         fit = _refined(of, steps[-1].best[0], start)
         timed = yardstick.beside(partial(_searched_and_refined, of, start), 9)
         note = f"{steps[-1].evaluations} poses scored; {_apart(of, start, fit)}"
-        yield Row(f"search_hard_{name}", f"hard frame: search and refinement, {name}", *timed, 25 / 1.5, 12 / 1.5, note)
+        must, aim = in_yardsticks(25, CORES), in_yardsticks(12, CORES)
+        yield Row(f"search_hard_{name}", f"hard frame: search and refinement, {name}", *timed, must, aim, note)
         start = of.near_prediction()
         fit = _refined(of, start, start)
         timed = yardstick.beside(partial(_refined, of, start, start), 15)
         note = f"{fit.iterations} iterations; {_apart(of, start, fit)}"
-        yield Row(f"refine_tracked_{name}", f"tracked frame: refinement, {name}", *timed, 8 / 1.5, 4 / 1.5, note)
+        must, aim = in_yardsticks(8), in_yardsticks(4)
+        yield Row(f"refine_tracked_{name}", f"tracked frame: refinement, {name}", *timed, must, aim, note)
 
 
 def _searched(frame: BenchFrame, start: Array, settings: SearchSettings = _SEARCH) -> Array:
@@ -188,7 +217,7 @@ def iterations(cones: BenchFrame, six: BenchFrame, yardstick: Yardstick) -> Iter
         # The difference between long and short descents leaves out what a descent costs besides its iterations.
         few, many = (partial(descended, of.model, match, poses, n) for n in (2, 6))
         n, timed = many() - few(), yardstick.beside_difference(many, few, 30)
-        timed = timed._replace(work_us=timed.work_us / n)
+        timed = timed.scaled(1 / n)
         yield Row(f"iteration_{name}_views", f"Gauss-Newton iteration, cones, {name} views", *timed, 1 / must, 1 / aim)
         timed = yardstick.beside(partial(_stepped, of.model, match, poses), 30, len(poses))
         yield Row(f"iteration_{name}_views_readable", "the same as `gauss_newton.solve` takes it", *timed)
@@ -275,7 +304,7 @@ def _pipeline(
 ) -> Row:
     """Track a session from the fitted poses; `per_second` are the required and the desired frames per second."""
     timed, note = tracked_pipeline(_SETTINGS, session, models, joints, yardstick)
-    must, aim = (1e3 / fps / 1.5 for fps in per_second)
+    must, aim = (in_yardsticks(1e3 / fps, CORES) for fps in per_second)
     return Row(name, what, *timed, must, aim, note)
 
 
@@ -286,23 +315,26 @@ def tracked_pipeline(
     joints: Sequence[MarkerTable],
     yardstick: Yardstick,
 ) -> tuple[Timed, str]:
-    """Track a session from the fitted poses, and return the time of a frame and the frames per second in words."""
+    """Track a session from the fitted poses, and return the times of a frame and the frames per second in words."""
     wanted = [k for k in _PIPELINE_FRAMES if k < session.n_frames]
     first = [pose_at(j, m, wanted[0]) for j, m in zip(joints, models, strict=True)]
-    n, spent = len(wanted), list[float]()
+    n, spent = len(wanted), list[Array]()
 
     def run() -> None:
         with Recording(session.cameras) as recording:
             observer = Observer(session.cameras, recording)
             tracked = make_tracker(settings).estimates(TrackingRun(observer, Subjects.of(models), first, wanted))
             next(tracked)  # opening the videos does not count
-            start = time.perf_counter()
-            for found in islice(tracked, n - 1):
-                bodies = [PosedBody(m, p) for m, p in zip(models, found.poses, strict=True)]
-                for camera in observer.working_cameras:
-                    occluding_contours.trace(bodies, camera)
-            spent.append(time.perf_counter() - start)
+
+            def rest() -> None:
+                for found in islice(tracked, n - 1):
+                    bodies = [PosedBody(m, p) for m, p in zip(models, found.poses, strict=True)]
+                    for camera in observer.working_cameras:
+                        occluding_contours.trace(bodies, camera)
+
+            spent.append(spent_s(rest))
 
     timed = yardstick.beside(run, 3)
-    frame_us = 1e6 * float(np.median(spent[1:])) / (n - 1)
-    return timed._replace(work_us=frame_us), f"{1e6 / frame_us:.1f} frames per second"
+    work_us, clock_us = 1e6 * np.median(spent[1:], axis=0) / (n - 1)
+    note = f"{1e6 / clock_us:.1f} frames per second, {CORES * 1e6 / work_us:.1f} with {CORES} cores kept busy"
+    return timed._replace(work_us=work_us, clock_us=clock_us), note

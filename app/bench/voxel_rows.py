@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from app.bench.rows import Row, Yardstick
+from app.bench.rows import Row, Yardstick, in_yardsticks
 from app.bench.sample_frames import FRAME, BenchFrame, pose_at
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder
@@ -16,8 +16,8 @@ from tracker.tracking.voxel.settings import VoxelSettings
 
 _VOXEL_M = 0.05
 _FRAMES = range(FRAME, FRAME + 8)
-_MUST, _AIM = 10 / 1.5, 5 / 1.5
-"""10 and 5 ms in yardsticks of the quiet machine that bounds are stated for."""
+_MUST, _AIM = in_yardsticks(10), in_yardsticks(5)
+"""Largest allowed and desired processor time, in yardsticks."""
 
 
 def voxel_frame(frame: BenchFrame, yardstick: Yardstick) -> Row:

@@ -12,6 +12,8 @@ def command(
 ) -> None:
     """Measure the tracker's speed on this machine and compare it with a baseline; status 1 if it became slower.
 
+    Verdicts go by processor time, in units of a yardstick that is timed in turns. The clock shows what the load adds.
+
     Args:
         json: print one JSON object.
         baseline: file to compare with; the program's own by default.

@@ -31,7 +31,7 @@ def command(session: SessionArg, /, check: bool = True, json: bool = False) -> N
 
 def summarize(session: "Session") -> dict[str, Any]:
     """Summarize the cameras, people and poses of a session."""
-    from tracker.session.relink import missing_files
+    from tracker.session.missing_files import missing_files
     from tracker.store.annotation_store import AnnotationStore
 
     missing = missing_files(session)

@@ -58,10 +58,11 @@ def relink(folder: Path, places: "Places") -> dict[str, Any]:
     from tracker.footage.proxy import FOLDER, Proxy
     from tracker.session import relink as relinking
     from tracker.session.lock import SessionLock
+    from tracker.session.missing_files import missing_files
     from tracker.session.session import load_session
 
     session = load_session(folder)
-    missing = relinking.missing_files(session)
+    missing = missing_files(session)
     if missing and places == relinking.Places():
         raise SessionError(
             f"camera '{missing[0].camera}': {missing[0].kind} {missing[0].path} is missing; say where to look with "
@@ -75,7 +76,7 @@ def relink(folder: Path, places: "Places") -> dict[str, Any]:
     return {
         "folder": str(session.folder),
         "relinked": [_row(f.camera, f.kind) | {"old": str(f.old), "new": str(f.new)} for f in found],
-        "missing": [_row(m.camera, m.kind) | {"path": str(m.path)} for m in relinking.missing_files(session)],
+        "missing": [_row(m.camera, m.kind) | {"path": str(m.path)} for m in missing_files(session)],
     }
 
 

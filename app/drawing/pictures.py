@@ -12,9 +12,8 @@ from app.drawing import overlay_colors
 from tracker.body.model import PosedBody
 from tracker.contours.label_image import part_labels
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.arrays import Image
+from tracker.geometry.arrays import Image, Mask
 from tracker.geometry.cameras import Camera
-from tracker.images.background_subtraction import Mask
 
 _JPEG_QUALITY = 85
 _FAST = 1

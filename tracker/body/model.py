@@ -8,16 +8,18 @@ vector in the frame of its child part. Without ball joints, values and dofs coin
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.kinematics import BALL, REVOLVE, TRANSLATE, Kinematics, Tree, forward_kinematics, point_jacobian
 from tracker.body.parts import Joint, Landmark, Part, SearchGroup
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.shapes import Shape
+
+if TYPE_CHECKING:  # imported lazily elsewhere: compiled kernels take 0.2 s to load
+    from tracker.body.kinematics import Kinematics, Tree
 
 
 class _Ball(NamedTuple):
@@ -192,8 +194,10 @@ class BodyModel:
         return tuple(pairs)
 
     @cached_property
-    def tree(self) -> Tree:
+    def tree(self) -> "Tree":
         """The joint tree as arrays, for `forward_kinematics`."""
+        from tracker.body.kinematics import BALL, REVOLVE, TRANSLATE, Tree
+
         ops, axes = [], []
         for i, j in enumerate(self.joints):
             if j.free:
@@ -220,11 +224,13 @@ class BodyModel:
                 values[i] = 1.0
         return self.clip(values)
 
-    def kinematics(self, values: Array) -> Kinematics:
+    def kinematics(self, values: Array) -> "Kinematics":
         """Compute the kinematics of a pose, (n_values,)."""
-        n_parts, n_dofs = len(self.parts), self.n_dofs
-        out = Kinematics(np.empty((n_parts, 4, 4)), np.empty((n_dofs, 3)), np.empty((n_dofs, 3)))
-        forward_kinematics(np.asarray(values, dtype=np.float64), self.tree, *out)
+        import tracker.body.kinematics  # this form costs a tenth of the call; `from` costs a third
+
+        n_parts, n_dofs, kernels = len(self.parts), self.n_dofs, tracker.body.kinematics
+        out = kernels.Kinematics(np.empty((n_parts, 4, 4)), np.empty((n_dofs, 3)), np.empty((n_dofs, 3)))
+        kernels.forward_kinematics(np.asarray(values, dtype=np.float64), self.tree, *out)
         return out
 
     def points_world(self, values: Array) -> Array:
@@ -235,12 +241,12 @@ class BodyModel:
         """Return the positions of the body's points by name, (3,) each, metres."""
         return PosedBody(self, values).named_points_world
 
-    def points_at(self, kinematics: Kinematics, points: IntArray) -> Array:
+    def points_at(self, kinematics: "Kinematics", points: IntArray) -> Array:
         """Return the positions of some points, given by index (N,), from known kinematics, (N, 3), metres."""
         T = kinematics.Ts_world_part[self.point_parts[points]]
         return np.einsum("nij,nj->ni", T[:, :3, :3], self.points_part[points]) + T[:, :3, 3]
 
-    def joint_centers_at(self, kinematics: Kinematics, points: IntArray) -> Array:
+    def joint_centers_at(self, kinematics: "Kinematics", points: IntArray) -> Array:
         """Return the anatomical joint centres of some points, given by index (N,), (N, 3), metres."""
         offsets, R = self.center_offsets[points], kinematics.Ts_world_part[self.proximal_parts[points], :3, :3]
         return self.points_at(kinematics, points) + np.einsum("nij,nj->ni", R, offsets)
@@ -252,7 +258,7 @@ class BodyModel:
         """
         return PosedBody(self, values).joint_centers_world
 
-    def point_jacobian(self, kinematics: Kinematics, parts: IntArray, points_world: Array) -> Array:
+    def point_jacobian(self, kinematics: "Kinematics", parts: IntArray, points_world: Array) -> Array:
         """Differentiate points fixed to parts by the degrees of freedom.
 
         A rotation about axis a through o moves x at `a x (x - o)`, a translation at `a` (the columns of the
@@ -266,6 +272,8 @@ class BodyModel:
         Returns:
             (N, 3, n_dofs), metres per radian or per metre.
         """
+        from tracker.body.kinematics import point_jacobian
+
         J = np.empty((len(parts), 3, self.n_dofs))
         point_jacobian(kinematics, self.dof_is_length, self.moves, parts, points_world, J)
         return J
@@ -343,7 +351,7 @@ class PosedBody:
     """Pose, (n_values,)."""
 
     @cached_property
-    def kinematics(self) -> Kinematics:
+    def kinematics(self) -> "Kinematics":
         """The poses of its parts."""
         return self.model.kinematics(self.values)
 

@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording, read_background, read_mask
-from tracker.geometry.arrays import Array, Image
+from tracker.geometry.arrays import Array, Image, Mask
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
-from tracker.images.background_subtraction import Mask
 
 _SIDE_PX = 128
 """Longer side of the pictures."""
@@ -75,8 +74,7 @@ def find_exchange(cameras: Sequence[CameraSource], recording: Recording) -> Came
         return None
     views = [_SmallView(c.camera) for c in cameras]
     n = _FRAMES if all(c.background or c.masks for c in cameras) else _FRAMES_WITHOUT_BACKGROUND
-    frames = sorted(set(np.linspace(0, recording.n_frames - 1, n).astype(int).tolist()))
-    footage = _read(cameras, views, recording, frames)
+    footage = _read(cameras, views, recording, recording.quick_frames(n))
     order = list(range(len(cameras)))
     room, foregrounds = _Room(views), [f.foregrounds for f in footage]
     coverage = _coverage(room, foregrounds)
@@ -255,7 +253,8 @@ def _through(view: _SmallView, filmed: _SmallView, footage: _Footage) -> _Footag
 def _changed(image: NDArray[np.float32], empty: NDArray[np.float32]) -> Mask:
     """Return where a picture differs from the empty scene, after its exposure is matched."""
     gain = np.median(image[::2, ::2] / (empty[::2, ::2] + 1), axis=(0, 1))
-    difference = np.abs(image - gain * empty).max(axis=-1)
+    red, green, blue = np.moveaxis(np.abs(image - gain * empty), -1, 0)
+    difference = np.maximum(np.maximum(red, green), blue)  # ten times as fast as along the last axis
     changed = (difference > max(_MIN_DIFFERENCE, 6 * float(np.median(difference[::2, ::2])))).astype(np.uint8)
     changed = np.asarray(cv2.morphologyEx(changed, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8)), np.uint8)
     return np.asarray(cv2.morphologyEx(changed, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))) > 0

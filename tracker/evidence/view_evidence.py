@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
-from tracker.geometry.arrays import FloatArray, Image
+from tracker.geometry.arrays import FloatArray, Image, Mask
 from tracker.geometry.cameras import Camera, Region
-from tracker.images.background_subtraction import Mask
 from tracker.images.color_histogram import BINS, count_colors
 from tracker.images.distance_transform import distance_image
 from tracker.images.edge_segments import (

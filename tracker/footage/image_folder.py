@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from itertools import islice, pairwise
 from pathlib import Path
 
+import numpy as np
+
 from tracker.errors import RecordingError
 from tracker.footage.image_file import IMAGE_SUFFIXES, read_image, read_image_or_none
-from tracker.geometry.arrays import Image
+from tracker.geometry.arrays import Image, IntArray
 
 _REGULAR_SHARE = 0.5
 """Share of equal steps between the numbers of images; the names are times if fewer are equal."""
@@ -59,6 +61,11 @@ class ImageFolder:
         self.numbers = image_numbers([f.stem for f in self.files])
         height, width = read_image(self.files[0], self._where).shape[:2]
         self.size = (width, height)
+
+    @property
+    def key_frames(self) -> IntArray:
+        """Frames that are decoded alone, ascending, (n,): all."""
+        return np.arange(self.n_frames)
 
     def read(self, k: int) -> Image | None:
         """Decode frame k, (H, W, 3) RGB; None if the image is damaged.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.errors import RecordingError
+from tracker.footage import passed_frames
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_file import IMAGE_SUFFIXES, read_image, read_unchanged
 from tracker.footage.video import open_footage
@@ -39,7 +40,8 @@ class Recording:
 
         Args:
             cameras: footage and offset of each camera.
-            cache_bytes: size of the cache of decoded frames, bytes; the frames in use come on top.
+            cache_bytes: size of the cache of decoded frames, bytes; the frames in use come on top, and those kept for
+                steps backward (`passed_frames.MAX_BYTES`).
             indices: folder in which the lists of frames are cached; None for no cache.
             in_background: do not wait for lists that are not cached; see `listed_share`.
 
@@ -48,10 +50,10 @@ class Recording:
                 before its offset.
         """
         self._cameras = tuple(cameras)
-        self._pool = ThreadPoolExecutor(max(1, len(self._cameras)), thread_name_prefix="decode")
-        self._footage = list(
-            self._pool.map(lambda c: open_footage(c.footage, c.camera.name, indices, in_background), self._cameras)
-        )
+        n_cameras = max(1, len(self._cameras))
+        self._pool = ThreadPoolExecutor(n_cameras, thread_name_prefix="decode")
+        more = indices, in_background, passed_frames.MAX_BYTES // n_cameras
+        self._footage = list(self._pool.map(lambda c: open_footage(c.footage, c.camera.name, *more), self._cameras))
         for source, footage in zip(self._cameras, self._footage, strict=True):
             check_size(source.camera.name, footage.path, footage.size, source.camera.size)
         if not in_background:
@@ -115,6 +117,18 @@ class Recording:
         """Read frame k of one camera, by its index; otherwise as `read`."""
         self._check(k)
         return self._read_one(camera, k)
+
+    def quick_frames(self, n: int) -> list[int]:
+        """Return at most n frames spread over the recording, ascending, that are soon read.
+
+        They are the last key frames of the first camera before evenly spread frames, or these where key frames are few:
+        a key frame is decoded alone, another one with all between.
+        """
+        source, footage = self._cameras[0], self._footage[0]
+        evenly = np.unique(np.linspace(0, self.n_frames - 1, n).astype(int))
+        keys = np.append(0, footage.key_frames - source.offset)
+        nearest = np.unique(np.maximum(keys[np.searchsorted(keys[1:], evenly, side="right")], 0))
+        return (nearest if len(nearest) == len(evenly) else evenly).tolist()
 
     def cached(self, k: int) -> bool:
         """Return whether frame k of every camera is in the cache."""

@@ -19,12 +19,13 @@ from tracker.errors import RecordingError
 from tracker.footage import frame_index, packet_scan
 from tracker.footage.display import display_turn, displayed_size
 from tracker.footage.frame_index import FileVersion, Index
+from tracker.footage.frame_reader import FrameReader
 from tracker.footage.image_folder import ImageFolder
 from tracker.footage.packet_scan import PacketScan, TimeStamps
+from tracker.footage.passed_frames import MAX_BYTES
 from tracker.footage.video_decoder import VideoDecoder, open_container
-from tracker.geometry.arrays import Image
+from tracker.geometry.arrays import Image, IntArray
 
-_NOWHERE = 2**62  # as the number of the next frame that the decoder gives: unknown, so that the next read seeks
 _ATTEMPTS = 2  # a frame is read again if the file was replaced meanwhile
 
 
@@ -48,7 +49,14 @@ class VideoFile:
     version: int
     """Number of times that the file was opened again because it had changed."""
 
-    def __init__(self, path: Path, camera: str, indices: Path | None = None, in_background: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        camera: str,
+        indices: Path | None = None,
+        in_background: bool = False,
+        passed_bytes: int = MAX_BYTES,
+    ) -> None:
         """Open a video and list its frames.
 
         Args:
@@ -56,6 +64,7 @@ class VideoFile:
             camera: name of its camera, for messages.
             indices: folder in which indices of videos are cached; None for no cache.
             in_background: do not wait for a list that is not cached: `read` waits until the frame is in it.
+            passed_bytes: bound on the frames kept for steps backward, bytes.
 
         Raises:
             RecordingError: the file is missing, unreadable, truncated, too large, or has no usable time stamps.
@@ -68,9 +77,8 @@ class VideoFile:
         self._listed = PacketScan(Index(np.empty(0, np.int64), {}, np.empty(0, np.int64)), 0.0)
         self._is_listed, self._closed = False, False
         self._failure: RecordingError | None = None
-        self._index = self._listed.frames
-        self._decoder: VideoDecoder | None = None
-        self._next = 0
+        self._reader: FrameReader | None = None
+        self._passed_bytes = passed_bytes
         self._refused: tuple[FileVersion, str] | None = None  # the last version that could not be opened, and why
         if not path.is_file():
             raise RecordingError(f"{self._where} not found; check the path")
@@ -83,7 +91,6 @@ class VideoFile:
                     index = self._list()
                 if index is not None:
                     self._finish(index, declared_rate, decoder.tick_s)
-                self._index = self._listed.frames
                 first = next(decoder.frames, None) if index is None else self._first_frame(index, decoder)
             self._open()
         except av.FFmpegError as error:
@@ -100,6 +107,12 @@ class VideoFile:
     def n_frames(self) -> int:
         """Number of frames; while frames are being listed, the number listed so far."""
         return len(self._listed.frames.pts)
+
+    @property
+    def key_frames(self) -> IntArray:
+        """Frames listed so far that are decoded alone, ascending, (n,)."""
+        listed = self._listed.frames
+        return np.searchsorted(listed.pts, listed.key_pts)
 
     @property
     def listed_share(self) -> float | None:
@@ -151,16 +164,15 @@ class VideoFile:
     # --- the file and its versions ------------------------------------------------------------------------------
 
     def _open(self) -> None:
-        """Move the decoder before the first frame."""
+        """Open a reader of the present version."""
         self._release()
-        self._decoder = VideoDecoder(self.path, self._where)
-        self._next = 0
+        self._reader = FrameReader(self.path, self._where, self._listed.frames, self._passed_bytes)
 
     def _release(self) -> None:
-        """Close the decoder; nothing can reach it afterwards."""
-        decoder, self._decoder = self._decoder, None
-        if decoder is not None:
-            decoder.close()
+        """Close the reader; nothing can reach it afterwards."""
+        reader, self._reader = self._reader, None
+        if reader is not None:
+            reader.close()
 
     def _present_version(self) -> FileVersion:
         """Return the present version of the file.
@@ -189,7 +201,7 @@ class VideoFile:
             self._release()
             raise
         if found == self._opened_version:
-            if self._decoder is None:
+            if self._reader is None:
                 try:
                     self._open()
                 except av.FFmpegError as error:
@@ -230,7 +242,7 @@ class VideoFile:
             declared_rate = float(decoder.stream.average_rate or 0)
         self._finish(index, declared_rate, decoder.tick_s)
         self._open()
-        self._opened_version, self._refused, self._index = found, None, index
+        self._opened_version, self._refused = found, None
         self.version += 1
 
     def _unreadable(self, error: av.FFmpegError) -> RecordingError:
@@ -246,11 +258,9 @@ class VideoFile:
 
     def _read_once(self, k: int) -> Image | None:
         """Decode frame k of the version that is open; None if it is damaged."""
-        if self._index is not self._listed.frames:
-            # The decoder's position refers to the shorter list.
-            self._index, self._next = self._listed.frames, _NOWHERE
+        assert self._reader is not None
         try:
-            frame = self._decode_frame(k)
+            frame = self._reader.read(self._listed.frames, k)
             image = None if frame is None else self._to_rgb(frame)
         except av.FFmpegError as error:
             self._release()  # its position is unknown
@@ -268,57 +278,6 @@ class VideoFile:
         # One converter for all frames: preparing one takes longer than a conversion.
         image: Image = np.asarray(self._converter.reformat(frame, format="rgb24").to_ndarray(), np.uint8)
         return display_turn(frame).apply(image)
-
-    def _decode_frame(self, k: int) -> VideoFrame | None:
-        """Decode frame k; None if it is damaged."""
-        if not self._reaches_soon(k):
-            self._seek(self._best_key(k))
-            frame = self._decode_until(k)
-            if frame is not None:
-                return frame
-            # Some containers (MPEG program streams) lose the first time stamps after a seek: start earlier.
-            self._seek(max(0, self._best_key(k) - 2))
-        return self._decode_until(k)
-
-    def _decode_until(self, k: int) -> VideoFrame | None:
-        target = int(self._index.pts[k])
-        assert self._decoder is not None
-        for frame in self._decoder.frames:
-            if frame.pts is None:  # the index has no such frame: the file is changing
-                return None
-            self._next = int(np.searchsorted(self._index.pts, frame.pts, side="right"))
-            if frame.pts >= target:
-                return frame if frame.pts == target and not frame.is_corrupt else None
-        return None
-
-    def _best_key(self, k: int) -> int:
-        """Return the index of the last key frame from which frame k decodes completely.
-
-        That is the last one shown no later. A frame stored after a key frame but shown before it may depend on frames
-        stored before the key frame.
-        """
-        return int(np.searchsorted(self._index.key_pts, self._index.pts[k], side="right")) - 1
-
-    def _reaches_soon(self, k: int) -> bool:
-        """Return whether decoding on from the current position is the shortest way to frame k."""
-        if k < self._next:
-            return False
-        return self._next == k or self._index.key_pts[self._best_key(k)] <= self._index.pts[self._next]
-
-    def _seek(self, best: int) -> None:
-        """Move the decoder to a key frame, given by its index, or before it."""
-        assert self._decoder is not None
-        # Some containers land after the requested time; then request an earlier key frame.
-        latest = self._index.position[int(self._index.key_pts[best])]
-        for pts in self._index.key_pts[max(0, best - 2) : best + 1][::-1].tolist():
-            first = self._decoder.seek(pts)
-            if (
-                first is not None
-                and first.pts is not None
-                and self._index.position.get(first.pts, latest + 1) <= latest
-            ):
-                return
-        self._open()
 
     # --- the list of frames -------------------------------------------------------------------------------------
 
@@ -387,10 +346,18 @@ class VideoFile:
 Footage = VideoFile | ImageFolder
 
 
-def open_footage(path: Path, camera: str, indices: Path | None = None, in_background: bool = False) -> Footage:
-    """Open a video file or a folder of images; `indices` and `in_background` as for `VideoFile`.
+def open_footage(
+    path: Path,
+    camera: str,
+    indices: Path | None = None,
+    in_background: bool = False,
+    passed_bytes: int = MAX_BYTES,
+) -> Footage:
+    """Open a video file or a folder of images; `indices` and the following as for `VideoFile`.
 
     Raises:
         RecordingError: it is missing, unreadable, truncated or empty.
     """
-    return ImageFolder(path, camera) if path.is_dir() else VideoFile(path, camera, indices, in_background)
+    if path.is_dir():
+        return ImageFolder(path, camera)
+    return VideoFile(path, camera, indices, in_background, passed_bytes)

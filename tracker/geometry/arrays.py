@@ -11,8 +11,10 @@ IntArray = NDArray[np.int64]
 """Indices and counts."""
 Image = NDArray[np.uint8]
 """Pixels, (H, W) or (H, W, 3) in BGR, as each function states."""
+Mask = NDArray[np.bool_]
+"""Whether each pixel belongs to something, (H, W)."""
 
 
-def intersection_over_union(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
+def intersection_over_union(one: Mask, other: Mask) -> float:
     """Return the share of two masks of one shape that both cover, of all that either covers; 0 for empty masks."""
     return int(np.count_nonzero(one & other)) / max(1, int(np.count_nonzero(one | other)))

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
 from tracker.compute.quantiles import median
-from tracker.geometry.arrays import FloatArray, Image
-
-Mask = NDArray[np.bool_]
+from tracker.geometry.arrays import FloatArray, Image, Mask
 
 SMOOTHING_PX = 1.0
 """Standard deviation of the Gaussian that smooths images before they are compared or differentiated, px."""

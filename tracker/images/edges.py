@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
 from tracker.compute.quantiles import quantiles
-from tracker.geometry.arrays import FloatArray, Image
-from tracker.images.background_subtraction import Mask
+from tracker.geometry.arrays import FloatArray, Image, Mask
 
 STRONG_FRACTION, WEAK_FRACTION = 0.92, 0.80
 """Canny's thresholds without a foreground, as the fractions of pixels with a weaker gradient."""

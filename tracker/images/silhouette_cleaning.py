@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.images.background_subtraction import Mask
+from tracker.geometry.arrays import Mask
 
 _CLOSING = 0.004
 """Radius of the morphological closing, as a fraction of the longer side of the image: 3 px of 640."""

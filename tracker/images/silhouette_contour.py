@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
-from tracker.geometry.arrays import FloatArray
-from tracker.images.background_subtraction import Mask
+from tracker.geometry.arrays import FloatArray, Mask
 from tracker.images.edges import Edges
 
 MIN_LENGTH_PX = 24

@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.geometry.arrays import Array, Image
+from tracker.geometry.arrays import Array, Image, Mask
 from tracker.geometry.cameras import Camera, Region
-from tracker.images.background_subtraction import Mask
 
 WORKING_AREA_PX = 640 * 480
 """Largest number of pixels of a frame as filmed at working scale. Smaller frames are not enlarged."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from tracker.errors import RecordingError, Remedy, SessionError, TrackerError
 from tracker.footage.camera_source import CameraSource
@@ -17,19 +17,9 @@ from tracker.footage.recording import check_size, read_background
 from tracker.footage.video import open_footage
 from tracker.session.assemble import check_side_files, find_background, find_masks
 from tracker.session.matching import check_names
+from tracker.session.missing_files import Kind, MissingFile, missing_files
 from tracker.session.session import Session, save_cameras
 from tracker.validation import same_form
-
-Kind = Literal["footage", "background", "masks"]
-KINDS: tuple[Kind, ...] = ("footage", "background", "masks")
-
-
-class MissingFile(NamedTuple):
-    """A file or folder that session.toml names and that is not there."""
-
-    camera: str
-    kind: Kind
-    path: Path
 
 
 class Relinked(NamedTuple):
@@ -53,17 +43,6 @@ class Places:
     """Folder of CAM.png or CAM.mp4 of the empty scene."""
     masks: Path | None = None
     """Folder of CAM/%06d.png."""
-
-
-def missing_files(session: Session) -> tuple[MissingFile, ...]:
-    """Return what session.toml names and is not there, by camera."""
-    found = []
-    for source in session.cameras:
-        for kind in KINDS:
-            path: Path | None = getattr(source, kind)
-            if path is not None and not path.exists():
-                found.append(MissingFile(source.camera.name, kind, path))
-    return tuple(found)
 
 
 def require_files(session: Session) -> None:

@@ -24,7 +24,6 @@ from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.files import check_regular, refuse_links, write_text_atomic
 from tracker.footage.camera_source import CameraSource
-from tracker.footage.video import open_footage
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
@@ -114,6 +113,8 @@ def create_session(
         raise SessionError(f"{folder} exists already and is not an empty folder; choose another name or remove it")
     sources = tuple(_absolute(c) for c in cameras)
     if n_frames is None:
+        from tracker.footage.video import open_footage  # imported lazily: PyAV takes 0.1 s to load
+
         n_frames = min((open_footage(c.footage, c.camera.name).n_frames - c.offset for c in sources), default=0)
     session = Session(folder, name or folder.name, float(fps), n_frames, sources, tuple(people), up)
     _checked_content(session)

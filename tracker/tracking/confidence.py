@@ -13,6 +13,7 @@ from functools import lru_cache
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import ColorScore, PartColors
 from tracker.body.limbs import Limb, limb_display_name, limbs
@@ -240,7 +241,7 @@ def quality(
         predicted: the predicted pose, (n_values,).
         colors: scores of the colours, and the colours that were learnt; None before the first frame.
     """
-    model, chains = body.model, limbs(body.model)
+    model, chains, layout = body.model, limbs(body.model), _layout(body.model)
     far = np.nan_to_num(costs.forward_px) / thetas_px[:, None] * costs.length_px
     n_views = int(np.count_nonzero(costs.length_px.sum(axis=1) > 0))
     scale = px_per_m([v.camera for v in views], body)
@@ -250,17 +251,16 @@ def quality(
         score, known = colors
         color = np.where(score.samples >= _MIN_SAMPLES, score.parts, np.inf)
         worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
-    spreads, free_spreads = scale * _end_spreads(body, fits)
+    spreads, free_spreads = scale * _end_spreads(body, fits, layout.ends)
     innovations = np.linalg.norm(model.points_world(predicted) - body.points_world, axis=1) / model.height_m
     trusted = np.array([v.silhouette is not None and v.silhouette.trust > _MIN_TRUST for v in views], dtype=bool)
-    trunk = np.flatnonzero(~np.isin(np.arange(len(model.parts)), [p for c in chains for p in c.parts]))
     contours = _Contours(costs, far, beside_px, n_views)
     forward, explained = contours.forward(slice(None)), contours.explained(slice(None))
     return PoseQuality(
         forward,
         n_views,
         _second_largest(1.0 - costs.silhouette[trusted]),
-        contours.forward(trunk),
+        contours.forward(layout.trunk),
         tuple(
             LimbFeatures(
                 c.name, float(color[c.parts].min()), float(worst_drop[c.parts].max()), float(spread),
@@ -268,11 +268,30 @@ def quality(
                 _share_at_limits(model, body.values, c), float(free_spread), contours.second_forward(c.parts, forward),
                 np.inf if c.name == _HEAD else float(color[c.parts[-1]]),
                 contours.explained(c.parts[-1:]) / max(_MIN_EXPLAINED, explained),
-                float(innovations[np.isin(model.point_parts, c.parts)].max()),
+                float(innovations[points].max()),
             )
-            for c, spread, free_spread in zip(chains, spreads, free_spreads, strict=True)
+            for c, points, spread, free_spread in zip(chains, layout.points, spreads, free_spreads, strict=True)
         ),
     )  # fmt: skip
+
+
+class _Layout(NamedTuple):
+    """Indices of the parts and points of a body, by limb."""
+
+    trunk: IntArray
+    """Parts of no limb, (n,)."""
+    points: tuple[NDArray[np.bool_], ...]
+    """Whether each of the body's points lies on a limb, (n_points,), by limb."""
+    ends: IntArray
+    """Last point of each limb, (n_limbs,)."""
+
+
+@lru_cache(maxsize=32)  # as `limbs`: this takes longer than the features of a pose
+def _layout(model: BodyModel) -> _Layout:
+    chains = limbs(model)
+    trunk = np.flatnonzero(~np.isin(np.arange(len(model.parts)), [p for c in chains for p in c.parts]))
+    ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in chains], dtype=np.int64)
+    return _Layout(trunk, tuple(np.isin(model.point_parts, c.parts) for c in chains), ends)
 
 
 def _share_at_limits(model: BodyModel, pose: Array, limb: Limb) -> float:
@@ -362,10 +381,9 @@ def worst(statuses: Sequence[Status]) -> Status:
     return max(statuses, key=("good", "doubtful", "lost").index, default="good")
 
 
-def _end_spreads(body: PosedBody, fits: Sequence[Fit]) -> Array:
-    """Return the standard deviation of the end of each limb by each fit, (n_fits, n_limbs), metres."""
+def _end_spreads(body: PosedBody, fits: Sequence[Fit], ends: IntArray) -> Array:
+    """Return the standard deviation of some points by each fit, (n_fits, n_points), metres."""
     model = body.model
-    ends = np.array([np.flatnonzero(model.point_parts == c.parts[-1])[-1] for c in limbs(model)], dtype=np.int64)
     J = model.point_jacobian(body.kinematics, model.point_parts[ends], body.points_world[ends])
     variances = [np.trace(J @ covariance(model, fit) @ np.swapaxes(J, 1, 2), axis1=1, axis2=2) for fit in fits]
     return np.sqrt(np.array(variances))

@@ -7,9 +7,8 @@ import cv2
 import numpy as np
 
 from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
-from tracker.images.background_subtraction import Mask
 from tracker.voxels.voxel_grid import Voxels
 
 _OVERLAP = 0.02

@@ -1,6 +1,7 @@
 import json
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor, wait
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ def frame():
 
 
 def row(name, time_us, must=None):
-    return Row(name, f"what {name} is", time_us, 1000.0, must)
+    return Row(name, f"what {name} is", time_us, 2 * time_us, 1000.0, must)
 
 
 def test_the_painted_cost_is_honest(frame):
@@ -52,27 +53,41 @@ def test_work_and_yardstick_are_timed_in_turns():
 def test_differences_are_taken_in_turns(monkeypatch):
     """A machine that becomes slower from run to run adds as much to both, and the first run is for nothing."""
     took_s = {"long": iter((9.0, 3.0, 4.0, 5.0)), "short": iter((1.0, 1.0, 2.0, 3.0))}
-    monkeypatch.setattr(bench_rows, "_seconds", lambda work, _: work() or 0.0)
+    monkeypatch.setattr(bench_rows, "spent_s", lambda work: (work() or 0.0) * np.array([1.0, 2.0]))
     timed = Yardstick().beside_difference(lambda: next(took_s["long"]), lambda: next(took_s["short"]), 3)
-    assert timed.work_us == 2e6
+    assert (timed.work_us, timed.clock_us) == (2e6, 4e6)
 
 
-def test_differences_do_not_grow_with_what_other_programs_do():
-    timed = Yardstick().beside_difference(lambda: time.sleep(0.02), lambda: None, 3)
-    assert abs(timed.work_us) < 5_000
-    assert timed.yardstick_us > 0
+def test_times_do_not_grow_with_what_other_programs_do():
+    for timed in (
+        Yardstick().beside_difference(lambda: time.sleep(0.02), lambda: None, 3),
+        Yardstick().beside(lambda: time.sleep(0.02), 3),
+    ):
+        assert abs(timed.work_us) < 5_000 < 15_000 < timed.clock_us
+        assert timed.yardstick_us > 0
+
+
+def test_the_processor_time_is_that_of_all_threads():
+    """Two yardsticks on two threads take the time of two, whatever the clock says."""
+    yardstick, pool = Yardstick(), ThreadPoolExecutor(2)
+
+    def twice():
+        wait([pool.submit(lambda: [yardstick() for _ in range(5)]) for _ in range(2)])
+
+    timed = yardstick.beside(twice, 5)
+    assert 7 < timed.work_us / timed.yardstick_us < 14
 
 
 @pytest.mark.slow
 def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
     """Not how fast, only that they run and tell what they should."""
 
-    def beside(self, work, runs, times=1, clock=None):
+    def beside(self, work, runs, times=1):
         done = work()
-        return bench_rows.Timed(2.0 * (done if isinstance(done, int) else 1), 1.0)
+        return bench_rows.Timed(2.0 * (done if isinstance(done, int) else 1), 1.0, 1.0)
 
     def beside_difference(self, long, short, runs):
-        return bench_rows.Timed(2.0 * (long() - short()), 1.0)
+        return bench_rows.Timed(2.0 * (long() - short()), 1.0, 1.0)
 
     monkeypatch.setattr(Yardstick, "beside", beside)
     monkeypatch.setattr(Yardstick, "beside_difference", beside_difference)
@@ -103,6 +118,10 @@ def test_a_ratio_beyond_the_tolerance_is_slower(tmp_path):
     )
     assert found["slower"] == ["b"]
     assert [r["holds"] for r in found["rows"]] == [False, True, None]
+    first = found["rows"][0]
+    assert (first["processor_us"], first["clock_us"], first["busy_cores"]) == (125, 250, 0.5)
+    assert found["cores"] >= 1
+    assert len(found["load"]) == 3
     assert [r["baseline"] for r in found["rows"]] == [0.1, 0.1, None]  # what is new is compared with nothing
     assert found["tolerance"] == 0.3
     assert {"python", "numpy", "numba", "opencv-python-headless"} <= found["versions"].keys()
@@ -147,4 +166,4 @@ def test_the_command_says_by_its_status_what_became_slower(tmp_path, monkeypatch
                 main()
         told = json.loads(capsys.readouterr().out)
         assert told["slower"] == (["a"] if status else [])
-        assert told["rows"][0]["median_us"] == time_us
+        assert told["rows"][0]["processor_us"] == time_us

@@ -18,7 +18,8 @@ from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.session.assemble import NewSession, assemble
 from tracker.session.matching import check_names
-from tracker.session.relink import Places, _files_named, missing_files, relink, require_files
+from tracker.session.missing_files import missing_files
+from tracker.session.relink import Places, _files_named, relink, require_files
 from tracker.session.session import load_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])

@@ -5,10 +5,9 @@ from typing import NamedTuple
 
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import GroundPlane
-from tracker.images.background_subtraction import Mask
 from tracker.initialization.generators.silhouette_axis import MajorAxis, major_axis
 from tracker.voxels.figure_masks import FigureMask
 from tracker.voxels.voxel_grid import Voxels

@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
-from tracker.images.background_subtraction import Mask
 
 _LATERAL = 2.0
 """Points farther aside of the axis are removed, in standard deviations of the points that are kept. A strip of even

@@ -17,9 +17,8 @@ from tracker.body.model import BodyModel
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.compute.threads import N_HELPERS, kernel_pool
-from tracker.geometry.arrays import Array, FloatArray, IntArray
+from tracker.geometry.arrays import Array, FloatArray, IntArray, Mask
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
-from tracker.images.background_subtraction import Mask
 
 _CELL_M = 0.018
 """Size of a cell at the person, metres."""

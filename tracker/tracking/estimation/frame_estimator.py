@@ -120,9 +120,9 @@ class FrameEstimator:
                 break
 
     def _converge(self, fits: dict[int, PersonFit], people: Sequence[int]) -> None:
-        """Refine some people again, free of their prediction."""
-        for person in people:
-            fits[person] = self.move(person, self.problem.converge(person, fits[person]))
+        """Refine some people again in parallel, free of their prediction, each with the others as in their fit."""
+        converged = map_parallel(lambda p: self.problem.converge(p, fits[p]), people)
+        fits.update({p: self.move(p, fit) for p, fit in zip(people, converged, strict=True)})
 
     def _recover(self, fits: dict[int, PersonFit]) -> None:
         """Search for lost limbs and bodies, and move people to what was found.
