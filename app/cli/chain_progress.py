@@ -6,6 +6,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 from app.runtime.progress import Reporter
+from tracker.compute.kernel_cache import compiled_mark
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 if TYPE_CHECKING:
@@ -36,8 +37,11 @@ class ChainProgress:
 
     def report(self, stage: str, share: float, text: str = "", /) -> None:
         """See `Sink.report`."""
-        if not self._stage and share < 1:
-            self._advance = self._bar.enter_context(self._progress.share("finding people"))
+        if not self._stage:
+            if not compiled_mark().exists():
+                self._progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
+            if share < 1:
+                self._advance = self._bar.enter_context(self._progress.share("finding people"))
         if stage != self._stage and share < 1:
             self._progress.say(stage)
         self._stage = stage

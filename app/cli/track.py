@@ -172,15 +172,12 @@ def track(
         SessionError: a person has no pose at or before the first frame.
     """
     from app.cli.chain_progress import ChainProgress
-    from tracker.compute.kernel_cache import compiled_mark
     from tracker.pipeline.chain import open_stored_session, run_chain
 
     is_stopped = False
     with open_stored_session(session) as opened, ChainProgress(progress) as sink:
         if opened.backup_error is not None:
             progress.say(opened.backup_error)
-        if not compiled_mark().exists():
-            progress.say("kernels that are not compiled yet are compiled first, once: it may take a minute or two")
         try:
             plan = opened.track(plan, sink) if find is None else run_chain(plan, find, opened, sink)
         except KeyboardInterrupt:

@@ -140,6 +140,7 @@ class StoredSession:
         cameras = [i for i, c in enumerate(self.observer.cameras) if c.camera.name in used]
         with stored_run(self.session, self._store, self.observer.with_cameras(cameras), plan) as self.run:
             self.plan = plan
+            sink.report("tracking", 1.0)
             for step in self.run.steps():
                 self.run.take(step)
                 sink.take(self.run, step)

@@ -147,7 +147,7 @@ def test_too_few_poses_are_completed_by_tracking(session, store):
     with Recording(session.cameras) as recording:
         observer = Observer(session.cameras, recording)
 
-        def report(stage, share):
+        def report(stage, share, text=""):
             shares.append(share)
             if stage != "tracking":
                 raise KeyboardInterrupt

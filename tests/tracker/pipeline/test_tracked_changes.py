@@ -43,7 +43,7 @@ def test_keyframes_and_people_who_are_not_tracked_are_not_written():
 
 def test_stored_settings_name_their_method():
     for method in METHODS:
-        assert make_tracker(METHODS[method]().settings).settings.method == method
+        assert make_tracker(METHODS[method].settings()).settings.method == method
     record = json.loads(json.dumps(settings_record(TrackSettings())))
     assert recorded_method(record) == record.pop("method") == "chamfer"
     assert recorded_method(record) == "chamfer"  # as former versions stored them

@@ -48,7 +48,7 @@ ESTIMATE = Option(
     "estimate", "Estimation",
     "how the pose of a frame is found from its prediction: refine fits contours to edges and searches only what it "
     "cannot fit",
-    "refine by default, search with --paper", "choice", lambda s: s.estimate,
+    "refine by default, search in the paper's mode", "choice", lambda s: s.estimate,
     lambda s, value: replace(s, estimate=value), {"refine": "Refine, then search", "search": "Search only (GD96)"},
 )  # fmt: skip
 CHAMFER = Method(

@@ -43,7 +43,7 @@ def _at_stride(settings: Any, stride: int) -> Any:
 
 IMAGE_CONTOURS = Option(
     "image_contours", "Image contours", "the contours in the image that the model's are compared with",
-    "edges by default, silhouettes with --paper", "choice", lambda s: s.image_contours,
+    "edges by default, silhouettes in the paper's mode", "choice", lambda s: s.image_contours,
     lambda s, value: replace(s, image_contours=value), {"edges": "Edges", "silhouettes": "Silhouettes"},
 )  # fmt: skip
 SLIDING = Option(

@@ -26,7 +26,7 @@ ORDER = Option(
     {"0": "Stays in place", "1": "Constant velocity", "2": "Constant acceleration"},
 )  # fmt: skip
 WINDOW = Option(
-    "window", "Past poses", "number of poses from which the motion is predicted", "3 by default, 8 with --paper",
+    "window", "Past poses", "number of poses from which the motion is predicted", "3 by default, 8 in the paper's mode",
     "whole", lambda s: s.predict.window,
     lambda s, value: replace(s, predict=replace(s.predict, window=int(value))), limits=(1, 8),
 )  # fmt: skip

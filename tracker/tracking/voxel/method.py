@@ -39,13 +39,14 @@ def _tracker(settings: "VoxelSettings") -> "VoxelTracker":
 
 
 VOXEL_SIZE = Option(
-    "voxel_size", "Voxels, mm", "edge of a voxel, mm", "30 by default, 50 with --paper", "number",
+    "voxel_size", "Voxels, mm", "edge of a voxel, mm", "30 by default, 50 in the paper's mode", "number",
     lambda s: round(1000 * s.voxel_m, 6), lambda s, mm: replace(s, voxel_m=mm / 1000),
     limits=(1000 * MIN_VOXEL_M, 1000 * MAX_VOXEL_M), step=5,
 )  # fmt: skip
 SIZES = Option(
     "sizes", "Part sizes", "when part sizes are estimated: never, on the first frame, or on all frames",
-    "first by default, always with --paper", "choice", lambda s: s.sizes, lambda s, value: replace(s, sizes=value),
+    "first by default, always in the paper's mode", "choice", lambda s: s.sizes,
+    lambda s, value: replace(s, sizes=value),
     {"frozen": "Those of the body", "first": "On the first frame", "always": "On all frames"},
 )  # fmt: skip
 VOXEL = Method(
