@@ -166,7 +166,9 @@ def test_an_acquisition_names_its_frame_and_views():
     pose, stages = in_posture(model), []
     settings = TwoViewSettings(search=ChamferSearchSettings(levels=1, passes=1))
     bodies = {3: (PosedBody(model, pose),)}
-    found = acquire_from_two_views(_Staged(model, pose), bodies, 0, settings, lambda stage, share, *_: stages.append(share))
+    found = acquire_from_two_views(
+        _Staged(model, pose), bodies, 0, settings, lambda stage, share, *_: stages.append(share)
+    )
     assert (found.frames, found.views) == ((3,), ("front", "side"))
     assert stages == sorted(stages)
     assert found.cost_after_px == pytest.approx(found.cost_before_px, abs=0.3)

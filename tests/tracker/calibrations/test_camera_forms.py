@@ -38,6 +38,11 @@ def assert_places(path, places=PLACES, **options):
     return found
 
 
+def in_full(value):
+    """A parameter of the long tests alone."""
+    return pytest.param(value, marks=pytest.mark.slow)
+
+
 @pytest.mark.parametrize("form", FORMS)
 def test_quaternions_of_either_order(tmp_path, form):
     assert assert_places(written(tmp_path, lambda R, t: FORMS[form](R) | {"t": t})).notes == ()
@@ -66,7 +71,7 @@ def test_quaternions_of_other_conventions(tmp_path, form, convention):
     assert_places(path, poses=convention)
 
 
-@pytest.mark.parametrize("kind", ["ring", "arc", "corners", "row", "pair"])
+@pytest.mark.parametrize("kind", ["ring", *map(in_full, ["arc", "corners", "row", "pair"])])
 def test_quaternions_of_random_rigs_are_read_right_or_asked_about(tmp_path, kind):
     rng, asked = np.random.default_rng(3), {None: 0, "world-to-camera": 0}
     for i in range(20):
@@ -117,7 +122,7 @@ def test_angles_in_place_of_rotation_vectors_are_refused(tmp_path, order, conven
         read_cameras(written(tmp_path, lay))
 
 
-@pytest.mark.parametrize("kind", ["ring", "arc", "corners", "row", "pair", "turned by 90 degrees"])
+@pytest.mark.parametrize("kind", ["arc", *map(in_full, ["ring", "corners", "row", "pair", "turned by 90 degrees"])])
 def test_rotation_vectors_are_not_taken_for_angles(tmp_path, kind):
     rng = np.random.default_rng(4)
     for _ in range(20):
@@ -228,7 +233,7 @@ def turned_away(T):
 
 
 @pytest.mark.parametrize("change", [rigid.inverse, turned_away, lambda T: np.eye(4)])
-@pytest.mark.parametrize("kind", ["ring", "arc", "corners"])
+@pytest.mark.parametrize("kind", ["ring", *map(in_full, ["arc", "corners"])])
 def test_one_camera_whose_pose_is_wrong_is_named(tmp_path, kind, change):
     rng, named, unjust, n = np.random.default_rng(6), 0, 0, 0
     for _ in range(25):

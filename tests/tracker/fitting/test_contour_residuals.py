@@ -46,7 +46,7 @@ def scales(found):
 
 @each_model
 @each_direction
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
 def test_against_rows_built_one_by_one(model, match, seed):
     """Cost, gradient and Hessian are those of a least-squares problem whose every row is differentiated numerically.
 
@@ -149,7 +149,13 @@ AMBIGUOUS = {("mikic10", 0)}
 
 
 @pytest.mark.parametrize(
-    ("name", "seed"), [(n, seed) for n in PRESETS for seed in range(4) if (n, seed) not in AMBIGUOUS]
+    ("name", "seed"),
+    [
+        pytest.param(n, seed, marks=[pytest.mark.slow] if seed > 1 else [])
+        for n in PRESETS
+        for seed in range(4)
+        if (n, seed) not in AMBIGUOUS
+    ],
 )
 def test_shaken_poses_come_back(name, seed):
     """From 4 degrees and 2 cm beside, drawn in every degree of freedom at once, to the pose that drew the edges.
