@@ -2,6 +2,7 @@
 
 import json
 import random
+import re
 import socket
 import time
 import tomllib
@@ -54,7 +55,8 @@ def written(write):
         files = sorted(path.iterdir()) if path.is_dir() else [path]
         data = files[0].read_bytes()
         if write is easymocap:
-            data = (path.parent / "intri.yml").read_bytes() + data.partition(b"---")[2]
+            own = re.sub(rb"names:\n( +-.*\n)+", b"", data.partition(b"---")[2])  # the other file has them
+            data = (path.parent / "intri.yml").read_bytes() + own
         return f"cameras{files[0].suffix}", [data]
 
 
