@@ -41,14 +41,26 @@ def test_named_pipes_do_not_hang_a_command_that_reads(run, placed, name, expecte
     assert_refused(run("info", placed, "--no-check"), [expected])
 
 
-@pytest.mark.parametrize("name", ["lock.json", "annotations.sqlite-journal", "backups/annotations-20260101T0Z.sqlite"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "lock.json",
+        *(
+            pytest.param(n, marks=pytest.mark.slow)
+            for n in ("annotations.sqlite-journal", "backups/annotations-20260101T0Z.sqlite")
+        ),
+    ],
+)
 def test_named_pipes_do_not_hang_a_command_that_writes(run, placed, name):
     replaced_by_a_pipe(placed / name)
     status, _, err = run("init", placed, "--joints", SAMPLE / "truth.trc", "--frame", "5")
     assert (status, "Traceback" in err) == (int("backups" not in name), False)
 
 
-@pytest.mark.parametrize("kind", ["footage", "background", "masks"])
+@pytest.mark.parametrize(
+    "kind",
+    ["footage", pytest.param("background", marks=pytest.mark.slow), pytest.param("masks", marks=pytest.mark.slow)],
+)
 def test_named_pipes_in_place_of_footage(run, session, kind):
     os.mkfifo(session / "pipe")
     text = (session / "session.toml").read_text("utf-8")

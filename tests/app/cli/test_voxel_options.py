@@ -13,6 +13,7 @@ def placed(run, session):
     return session
 
 
+@pytest.mark.slow
 def test_track_by_voxels(run, placed):
     words = ("track", placed, "--frames", "20:23", "--method", "voxel", "--voxel-size", "50", "--sizes", "frozen")
     status, out, _ = run(*words, "--json")

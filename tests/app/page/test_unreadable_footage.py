@@ -46,7 +46,10 @@ def notices(page):
     return [m["text"] for m in page.told if m["type"] == "notice"]
 
 
-@pytest.mark.parametrize("damage", ["truncated", "removed", "emptied"])
+@pytest.mark.parametrize(
+    "damage",
+    ["truncated", pytest.param("removed", marks=pytest.mark.slow), pytest.param("emptied", marks=pytest.mark.slow)],
+)
 async def test_a_video_that_cannot_be_read_is_one_notice_until_it_is_back(controller, session, damage):
     video = session / FRONT
     async with visiting(controller) as page:

@@ -115,6 +115,7 @@ async def test_frames_that_only_some_cameras_have_are_left_out_by_choice(folders
     assert load_session(form["folder"]).n_frames == n_frames - 2
 
 
+@pytest.mark.slow
 async def test_nothing_is_made_while_two_cameras_seem_exchanged(serve, form, tmp_path, data_folder):
     walk = data_folder("walk")
     mixed = tmp_path / "mixed"

@@ -34,7 +34,10 @@ def test_on_a_system_that_is_read_only(run, session, monkeypatch):
     assert_refused(run("index", session), ["cannot write the proxies into", "Read-only file system; make the session"])
 
 
-@pytest.mark.parametrize("name", ["lock.json", "FRONT.json", "FRONT.index", "FRONT.mjpeg"])
+@pytest.mark.parametrize(
+    "name",
+    ["lock.json", *(pytest.param(n, marks=pytest.mark.slow) for n in ("FRONT.json", "FRONT.index", "FRONT.mjpeg"))],
+)
 def test_a_named_pipe_in_place_of_a_proxy_does_not_hang_the_program(run, session, name):
     (session / "proxies").mkdir()
     os.mkfifo(session / "proxies" / name)

@@ -152,6 +152,7 @@ def test_dannce_corrected_by_half_is_refused(tmp_path):
         read_cameras(path)
 
 
+@pytest.mark.slow
 def test_five_hundred_cameras(tmp_path):
     rig = cameras(ring(525), LENS)
     for name in ("CMU Panoptic", "anipose, Pose2Sim (`Calib.toml`)"):
