@@ -1,4 +1,4 @@
-"""What a seek costs with many people and cameras: `python tests/benchmarks/many_people.py`.
+"""Measure a seek with many people and cameras: `python tests/benchmarks/many_people.py`.
 
 Prints the processor time of drawing the vectors over all views, and over one view, for one person and for eight in four
 and in sixteen views. No footage is read. Then the processor time of opening the annotations of a recording, and of

@@ -108,7 +108,7 @@ def trees():
 
 @cache
 def imports():
-    """What each module imports."""
+    """Dotted names that each module imports."""
     return {name: imported(tree, FILES) for name, tree in trees().items()}
 
 

@@ -37,7 +37,7 @@ _UNFINISHED = "unfinished track"
 
 @dataclass(frozen=True)
 class TrackPlan:
-    """What to track. The same plan goes on where it was interrupted."""
+    """A run to track: frames, people, settings and cameras. The same plan goes on where it was interrupted."""
 
     frames: Sequence[int]
     """In the order of tracking; ascending for a run that goes out from a start."""

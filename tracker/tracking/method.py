@@ -28,7 +28,7 @@ class Option:
     label: str
     """Name on the page."""
     help: str
-    """What it sets, for both programs; begins lower-case."""
+    """Description for both programs; begins lower-case."""
     defaults: str
     """Its value where nobody chooses one, for the help; empty for a switch, which is on."""
     kind: OptionKind

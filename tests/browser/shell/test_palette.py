@@ -99,7 +99,7 @@ async def test_what_suits_the_state_comes_next(page, endpoint):
     await endpoint.broadcast(endpoint.state | {"track": track})
     await shows(page, "quadrille.state.state.track.running")
     assert (await suiting())[:2] == ["Pause or continue tracking", "Follow the tracker (toggle)"]
-    # What cannot be done now is not suggested, and what was used last comes before.
+    # Commands that cannot be done now are not suggested; the one used last comes first.
     await page.keyboard.press("Control+k")
     await page.keyboard.type("messages")
     await page.keyboard.press("Enter")

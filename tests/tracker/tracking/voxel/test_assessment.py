@@ -1,4 +1,4 @@
-"""What statuses follow from the voxels near a figure."""
+"""Statuses that follow from the voxels near a figure."""
 
 from types import SimpleNamespace
 
