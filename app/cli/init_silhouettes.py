@@ -1,7 +1,5 @@
 """`quadrille init --method voxels`, `axis` and `auto`: automatic first poses."""
 
-from collections.abc import Sequence
-from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 from app.cli.target import Target
@@ -11,7 +9,6 @@ from tracker.errors import TrackerError
 if TYPE_CHECKING:
     from tracker.initialization.first_pose import FirstPoses
     from tracker.session.session import Session
-    from tracker.store.annotation_store import AnnotationStore
 
 
 def init_from_silhouettes(
@@ -34,27 +31,18 @@ def init_from_silhouettes(
     Raises:
         TrackerError: everybody has a pose, or no frame shows the people well enough; nothing is stored then.
     """
-    from tracker.evidence.observer import Observer
-    from tracker.footage.recording import Recording
     from tracker.initialization.first_pose import find_first_poses, find_first_poses_anywhere
-    from tracker.pipeline.find_people import FoundPeople, frames_to_try, store_found
-    from tracker.session.lock import SessionLock
-    from tracker.session.relink import require_files
-    from tracker.store.annotation_store import AnnotationStore
+    from tracker.pipeline.chain import open_stored_session, unplaced
+    from tracker.pipeline.find_people import FoundPeople, frames_to_try
 
     session = at.session
-    require_files(session)
-    with (
-        SessionLock(session.folder),
-        closing(AnnotationStore(session.annotations_path)) as store,
-        Recording(session.cameras) as recording,
-    ):
-        people = unplaced(session, store, at.people) if only_unplaced else at.people
+    with open_stored_session(session) as opened:
+        people = unplaced(opened, at.people) if only_unplaced else at.people
         if not people:
             raise TrackerError(
                 "expected a person without a pose, found none; name one with --person to find the person again"
             )
-        observer = Observer(session.cameras, recording)
+        observer = opened.observer
         if method == "auto":
             tried = frames_to_try(range(session.n_frames), frame)
             first = find_first_poses_anywhere(session, observer, people, tried, voxel_m, progress.say)
@@ -62,13 +50,8 @@ def init_from_silhouettes(
             first = find_first_poses(session, observer, people, [frame], (method,), voxel_m)
         bodies = {i: p.model for i, p in first.poses.items()}
         poses = {i: p.fitted.pose for i, p in first.poses.items()}
-        store_found(session, store, FoundPeople(first, bodies, poses, {}), f"init from {method}")
+        opened.store_found(FoundPeople(first, bodies, poses, {}), f"init from {method}")
     return first_poses_record(session, first)
-
-
-def unplaced(session: "Session", store: "AnnotationStore", people: Sequence[int]) -> tuple[int, ...]:
-    """Return the people who have no pose on any frame."""
-    return tuple(i for i in people if not store.frames(session.people[i].name))
 
 
 def first_poses_record(session: "Session", first: "FirstPoses") -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Shapes of the matrices of a camera: lens, pose, and the projection that holds both."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ _MAX_ASPECT = 2.0
 """Largest ratio of the focal lengths: anamorphic footage has up to 2."""
 _UNIT = 1e-3
 """Error of the length of a quaternion that is printed with four digits."""
-_ROUNDING = 1e-6
+ROUNDING = 1e-6
 """Relative size below which a number of a matrix is rounding."""
 
 
@@ -72,8 +72,7 @@ def lens_matrix(known: Mapping[str, Any]) -> Any:
         return _of_numbers(known)
     array = plain_array(matrix)
     if array.shape == (4,):  # as Kalibr writes it
-        fx, fy, cx, cy = array.tolist()
-        return [[fx, known.get("skew", 0.0), cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
+        return _pinhole_matrix(array.tolist(), known)
     padded, whole = plain_array(reshaped(matrix, {12: (3, 4), 16: (4, 4)})), np.eye(4)
     if padded.shape in ((3, 4), (4, 4)):
         whole[:3, :3] = padded[:3, :3]
@@ -90,8 +89,13 @@ def _of_numbers(known: Mapping[str, Any]) -> Any:
         numbers |= {"cx": float(principal[0]), "cy": float(principal[1])}
     if not {"fx", "fy", "cx", "cy"} <= numbers.keys():
         return None
-    fx, fy, cx, cy = (numbers[key] for key in ("fx", "fy", "cx", "cy"))
-    return [[fx, numbers.get("skew", 0.0), cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
+    return _pinhole_matrix([numbers[key] for key in ("fx", "fy", "cx", "cy")], known)
+
+
+def _pinhole_matrix(numbers: Sequence[Any], known: Mapping[str, Any]) -> list[list[Any]]:
+    """Return the matrix of fx, fy, cx and cy, with the skew of the words, if they have one."""
+    fx, fy, cx, cy = numbers
+    return [[fx, known.get("skew", 0.0), cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]
 
 
 def is_projection(value: Any) -> bool:
@@ -118,7 +122,7 @@ def split_projection(value: Any) -> tuple[Array, Array]:
         raise ProjectionError("expected the projection of a camera as 3x4 matrix, found one without a centre")
     if np.linalg.det(M) < 0:
         # A factor of -1 changes nothing, and fits leave it open; a matrix of K, R and t has none.
-        if abs(depth - 1) < _ROUNDING:
+        if abs(depth - 1) < ROUNDING:
             raise ProjectionError("expected the projection of a camera as 3x4 matrix, found one that mirrors pictures")
         P, M = -P, -M
     K, R = _rq(M / depth)
@@ -129,7 +133,7 @@ def split_projection(value: Any) -> tuple[Array, Array]:
             f"{skew:.4g} and principal point {K[0, 2]:.4g}, {K[1, 2]:.4g}"
         )
     t = np.asarray(np.linalg.solve(K, P[:, 3] / depth), dtype=np.float64)
-    K[0, 1] = 0.0 if abs(skew) < _ROUNDING * fx else skew
+    K[0, 1] = 0.0 if abs(skew) < ROUNDING * fx else skew
     return K, rigid.transform(R, t)
 
 

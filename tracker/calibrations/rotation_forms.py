@@ -1,4 +1,4 @@
-"""Rotations whose numbers can be read in several ways, told by where the cameras would look and stand.
+"""Resolve ambiguous rotations by the optical axes and centres of the cameras that each reading gives.
 
 Four numbers are a quaternion with its real part first or last. Three numbers are a rotation vector or angles about the
 axes. Rotations that are all equal are parallel cameras or were never filled in.
@@ -9,7 +9,7 @@ from itertools import permutations
 
 import numpy as np
 
-from tracker.calibrations.camera_matrices import plain_array, rotation_of_quaternion
+from tracker.calibrations.camera_matrices import ROUNDING, plain_array, rotation_of_quaternion
 from tracker.calibrations.camera_words import Section
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.pose_conventions import best_cost, in_words, is_clearly_worse
@@ -21,8 +21,6 @@ from tracker.validation import quoted
 
 _ORDERS = {"w, x, y, z": (0, 1, 2, 3), "x, y, z, w": (3, 0, 1, 2)}
 """Places of w, x, y and z among the four numbers."""
-_EQUAL = 1e-6
-"""Largest relative difference of numbers that are equal: calibrated cameras never agree to their last digits."""
 _ALONG = 0.02
 """Share of the length of a row by which rectified cameras stand beside it: their rows are exact but for rounding."""
 
@@ -123,14 +121,15 @@ def check_turned(Ts_world_camera: Sequence[Array], where: str) -> str | None:
         CalibrationError: they stand otherwise.
     """
     Ts = np.asarray(Ts_world_camera)
-    if len(Ts) < 2 or np.abs(Ts[:, :3, :3] - Ts[0, :3, :3]).max() > _EQUAL:
+    # Calibrated cameras never agree to their last digits.
+    if len(Ts) < 2 or np.abs(Ts[:, :3, :3] - Ts[0, :3, :3]).max() > ROUNDING:
         return None
     moves = (Ts[:, :3, 3] - Ts[0, :3, 3]) @ Ts[0, :3, :3]
     reach = np.abs(moves).max(axis=0)
-    is_zero = np.abs(Ts[0, :3, :3] - np.eye(3)).max() <= _EQUAL
+    is_zero = np.abs(Ts[0, :3, :3] - np.eye(3)).max() <= ROUNDING
     found = "all rotations are 0" if is_zero else "all rotations are equal"
     along = max(reach[0], reach[1])
-    if along > _EQUAL * np.abs(Ts[:, :3, 3]).max() and min(reach[0], reach[1]) + reach[2] <= _ALONG * along:
+    if along > ROUNDING * np.abs(Ts[:, :3, 3]).max() and min(reach[0], reach[1]) + reach[2] <= _ALONG * along:
         return f"{found.capitalize()}: check that the cameras are parallel, as rectified ones are."
     raise CalibrationError(
         f"{where}: expected the rotation of each camera, found that {found}, while the cameras do not stand in a row "

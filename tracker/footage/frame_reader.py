@@ -9,11 +9,6 @@ from tracker.footage.frame_index import Index
 from tracker.footage.passed_frames import PassedFrames
 from tracker.footage.video_decoder import VideoDecoder
 
-_NOWHERE = 2**62
-"""Number of the next frame that the decoder gives where it is unknown, so that the next read seeks."""
-_ALL = -(2**62)
-"""Time stamp from which frames are complete where decoding began at the first frame."""
-
 
 class FrameReader:
     """A decoder with its position and the frames that it passed. Not safe to use from several threads."""
@@ -34,6 +29,10 @@ class FrameReader:
         self._path, self._where, self._index = path, where, index
         self._passed = PassedFrames(passed_bytes)
         self._decoder: VideoDecoder
+        self._next: int | None
+        """Number of the next frame that the decoder gives; None where it is unknown, so that the next read seeks."""
+        self._complete_pts: int | None
+        """Time stamp from which frames are complete; None where decoding began at the first frame."""
         self._open()
 
     def read(self, index: Index, k: int) -> VideoFrame | None:
@@ -47,7 +46,7 @@ class FrameReader:
             av.FFmpegError: the file cannot be read; the position is unknown then, so close the reader.
         """
         if self._index is not index:  # the position refers to the shorter list
-            self._index, self._next = index, _NOWHERE
+            self._index, self._next = index, None
         passed = self._passed.get(int(index.pts[k]))
         if passed is not None:
             return passed
@@ -67,7 +66,7 @@ class FrameReader:
     def _open(self) -> None:
         """Move the decoder before the first frame."""
         self._decoder = VideoDecoder(self._path, self._where)
-        self._next, self._complete_pts = 0, _ALL
+        self._next, self._complete_pts = 0, None
 
     def _decode_until(self, k: int) -> VideoFrame | None:
         """Decode on to frame k, and keep the frames before it; None if it is damaged."""
@@ -78,7 +77,8 @@ class FrameReader:
             self._next = int(np.searchsorted(self._index.pts, frame.pts, side="right"))
             if frame.pts >= target:
                 return frame if frame.pts == target and not frame.is_corrupt else None
-            if frame.pts >= self._complete_pts and not frame.is_corrupt:
+            is_complete = self._complete_pts is None or frame.pts >= self._complete_pts
+            if is_complete and not frame.is_corrupt:
                 self._passed.keep(frame.pts, frame)
         return None
 
@@ -92,15 +92,15 @@ class FrameReader:
 
     def _reaches_soon(self, k: int) -> bool:
         """Return whether decoding on from the current position is the shortest way to frame k."""
-        if k < self._next:
+        if self._next is None or k < self._next:
             return False
         return self._next == k or self._index.key_pts[self._best_key(k)] <= self._index.pts[self._next]
 
     def _seek(self, best: int) -> None:
         """Move the decoder to a key frame, given by its index, or before it."""
-        self._complete_pts = int(self._index.key_pts[best])  # frames shown before it may lack their references
+        self._complete_pts = key = int(self._index.key_pts[best])  # frames shown before it may lack their references
         # Some containers land after the requested time; then request an earlier key frame.
-        latest = self._index.position[self._complete_pts]
+        latest = self._index.position[key]
         for pts in self._index.key_pts[max(0, best - 2) : best + 1][::-1].tolist():
             first = self._decoder.seek(pts)
             if (

@@ -43,9 +43,10 @@ ENOUGH_FRAMES = 2
 """Number of frames with good starts whose heights agree that end the trial of `auto`."""
 _OTHER_FRAMES = 5
 """Frames on which `auto` tries another generator where the first gave no good start."""
-_HEIGHTS_AGREE = 0.06
-"""Share by which the heights of a person on two such frames differ at most: two standard deviations of their difference
-(`find_people.MEASURED`)."""
+HEIGHT_SIGMA = 0.02
+"""Standard deviation of the logarithm of a height that was measured: shoes, hair and a voxel at both ends."""
+_HEIGHTS_AGREE = 3 * HEIGHT_SIGMA
+"""Largest difference of the logarithms of two heights that agree: 97% of pairs of one person do."""
 _SURE_RATIO = 1.05
 """Ratio of the cost of the cheapest track that faces the other way above which left and right are known."""
 _LARGER = 0.02

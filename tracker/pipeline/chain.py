@@ -117,7 +117,7 @@ class StoredSession:
         """Use a locked session and its open store; see `open_stored_session`."""
         self.session, self.observer, self._store = session, observer, store
         self.plan: TrackPlan | None = None
-        """What was tracked last."""
+        """The last plan that was tracked."""
         self.run: TrackSession | None = None
         """The results of that."""
 
@@ -130,9 +130,9 @@ class StoredSession:
         """See `OpenSession.sources`."""
         return {row.frame: row.source for row in self._store.frames(self.session.people[person].name)}
 
-    def store_found(self, found: FoundPeople) -> None:
-        """See `OpenSession.store_found`."""
-        self.session = store_found(self.session, self._store, found)
+    def store_found(self, found: FoundPeople, label: str = "find people") -> None:
+        """See `OpenSession.store_found`; the label is that of the entry of the history."""
+        self.session = store_found(self.session, self._store, found, label)
 
     def track(self, plan: TrackPlan, sink: Sink) -> TrackPlan:
         """See `OpenSession.track`."""

@@ -14,6 +14,7 @@ from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.initialization.first_pose import (
     ENOUGH_FRAMES,
+    HEIGHT_SIGMA,
     FirstPose,
     FirstPoses,
     Show,
@@ -27,8 +28,6 @@ from tracker.store.records import PoseChange, PoseRecord
 
 _FRAMES = 12
 """Largest number of frames on which first poses are looked for."""
-_MEASURED = 0.02
-"""Standard deviation of the logarithm of a height that was measured: shoes, hair and a voxel at both ends."""
 _STARTING = 0.5
 """Share of the work up to the end of the first poses, where sizes are acquired too."""
 
@@ -162,7 +161,7 @@ def _acquired(
     known = PosedFrames({found.frame: on_frame}, {}, {})
     how = settings.acquisition
     if person in found.first.poses and found.first.poses[person].candidate.is_measured:
-        how = replace(how, priors=replace(how.priors, height=min(_MEASURED, how.priors.height)))
+        how = replace(how, priors=replace(how.priors, height=min(HEIGHT_SIGMA, how.priors.height)))
     return acquire_body(sized, observer, person, frames, how, report, known)
 
 

@@ -20,6 +20,7 @@ _IdText: TypeAlias = Annotated[str, Meta(pattern=r"^[0-9]{1,19}\Z", description=
 _Names: TypeAlias = Annotated[list[Name], Meta(max_length=1000)]
 _Base64: TypeAlias = Annotated[str, Meta(pattern=r"^([A-Za-z0-9+/]{4})*([A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?\Z")]
 _ROUNDING = 1e-6
+"""Error of the length of a unit vector that was stored as text."""
 _Point: TypeAlias = tuple[Number, Number]
 
 
