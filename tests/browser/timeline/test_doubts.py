@@ -86,6 +86,7 @@ async def test_ten_entries_are_listed_before_more(page, endpoint):
     await page.get_by_role("button", name="7 more").click()
     await shows(page, f"{ROWS}.length === 17 && document.activeElement === {ROWS}[10].querySelector('button')")
     await page.keyboard.press("Shift+L")
+    await shows(page, "document.querySelector('#doubts').hidden")
     await page.keyboard.press("Shift+L")
     await shows(page, f"{ROWS}.length === 11")
 
