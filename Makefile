@@ -25,7 +25,7 @@ run: install
 test: $(VENV)/.tested $(VENV)/.typescript
 	$(PARALLEL) --keep-going kernels test-page test-library check
 
-# And what is long and rarely broken.
+# And what is long, or costs much for what it alone reaches.
 test-all: test
 	$(MAKE) test-slow
 

@@ -52,6 +52,7 @@ def test_its_paths_are_relative_and_stay_within(session):
             assert (session.folder / path).is_file()
 
 
+@pytest.mark.slow
 def test_its_footage_and_truth_are_of_all_frames(session):
     assert [c.camera.name for c in session.cameras] == ["FRONT", "RIGHT", "BACK", "LEFT"]
     assert session.n_frames == FRAMES[session.name]

@@ -72,6 +72,7 @@ def test_people_are_refined_again_only_where_others_moved(monkeypatch, off_m, so
     assert len(done) == solves
 
 
+@pytest.mark.slow
 def test_nothing_depends_on_who_is_done_first(gavrila, monkeypatch):
     """Two people, each with an arm that is predicted elsewhere and is searched: in threads, and one by one from the
     last to the first."""

@@ -22,6 +22,7 @@ def all_lines(path, kind):
     return list(read_lines(path, kind))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("read", [read_text, read_toml, read_json, all_lines])
 def test_a_file_of_many_megabytes_is_refused_unread(tmp_path, read):
     """Parsed, this one took a minute and a half."""

@@ -131,6 +131,7 @@ def test_voxels_before_the_contours(run, placed, quick):
     assert "evaluations" in out
 
 
+@pytest.mark.slow
 def test_wrong_input(run, placed):
     before = files_of(placed)
     for words, expected in (

@@ -86,6 +86,7 @@ def test_version(run):
     assert run("--version") == (0, f"quadrille {metadata.version('quadrille')}\n", "")
 
 
+@pytest.mark.slow
 def test_init_says_where_the_body_is_and_refuses_what_is_nowhere(run, session, tmp_path):
     status, out, _ = run("init", session, "--joints", SAMPLE / "truth.trc", "--json")
     views = json.loads(out)["views"]
@@ -124,6 +125,7 @@ def test_evaluate_notes_a_reference_that_is_of_something_else(run, session, tmp_
     assert "--axes" not in run("evaluate", session, "--reference", tmp_path / "y_up.trc", "--axes", "x,-z,y")[1]
 
 
+@pytest.mark.slow
 def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "2")
@@ -168,6 +170,7 @@ def test_every_tracking_method_can_be_named():
         assert settings_of(replace(arguments, paper=True)) == METHODS[method].paper.settings()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", [False, True])
 def test_tracking_says_that_kernels_may_have_to_be_compiled(run, session, tmp_path, monkeypatch, compiled):
     monkeypatch.setattr("tracker.compute.kernel_cache._folder", lambda: tmp_path)
@@ -189,6 +192,7 @@ def test_tracking_leaves_what_is_locked(run, session):
     assert len(np.unique(knee)) == 4
 
 
+@pytest.mark.slow
 def test_interrupted_tracking_keeps_what_is_done(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     original = ChamferTracker.estimates
@@ -280,6 +284,7 @@ def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(r
     assert offered == []
 
 
+@pytest.mark.slow
 def test_going_on_is_as_if_never_stopped(run, session, monkeypatch):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     run("track", session, "--no-smooth", "--frames", "0:4")
@@ -289,6 +294,7 @@ def test_going_on_is_as_if_never_stopped(run, session, monkeypatch):
     np.testing.assert_allclose(stored(session)[4].values, stepwise, atol=2e-3)
 
 
+@pytest.mark.slow
 def test_backward_and_paper(run, session):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "5")
     status, out, _ = run("track", session, "--frames", "3:6", "--backward", "--paper", "--theta", "12", "--json")
@@ -338,6 +344,7 @@ def test_simulate(run, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["sim"]
 
 
+@pytest.mark.slow
 def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
     asked, samples, browsed = [], [], []
     monkeypatch.setattr(
@@ -393,6 +400,7 @@ def test_samples_are_opened_as_working_copies_by_name(run, monkeypatch, tmp_path
     assert_refused(run("some/session", "--start-again"), ["some/session and --start-again"])
 
 
+@pytest.mark.slow
 def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):
     other = Path(shutil.copytree(SAMPLE, tmp_path / "other"))
     for folder in (session, other):
@@ -407,6 +415,7 @@ def test_poses_of_a_reference_that_is_a_session(run, session, tmp_path):
     assert summary["axis_error_deg"] == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_every_second_frame_with_some_cameras(run, session):
     """Frames between get no pose; costs stand at the places of the session's cameras."""
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
@@ -430,6 +439,7 @@ def test_every_second_frame_with_some_cameras(run, session):
     assert "without offset" in text
 
 
+@pytest.mark.slow
 def test_strides_and_cameras_that_are_none(run, session):
     run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
     assert_refused(run("track", session, "--stride", "0"), ["--stride as a whole number from 1, found 0"])

@@ -39,6 +39,7 @@ def true_wrist(frame):
     return truth.points[frame, truth.names.index("left_wrist")].tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "stamp", "frames"),
     [
@@ -56,6 +57,7 @@ def test_init_takes_the_row_of_its_frame(run, session, tmp_path, number, stamp, 
         assert joints_of_frame(session, frame) == pytest.approx(true_wrist(frame), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_init_says_where_the_file_begins(run, session, tmp_path):
     path = written(tmp_path / "a.trc", list(range(20, 40)))
     _, out, _ = run("init", session, "--joints", path, "--frame", "25")
@@ -72,6 +74,7 @@ def test_a_frame_in_a_gap(run, session, tmp_path):
     assert_refused(run("init", session, "--joints", path, "--frame", "15"), expected)
 
 
+@pytest.mark.slow
 def test_a_contradiction_is_asked_about_and_decided(run, session, tmp_path):
     path = written(tmp_path / "a.trc", list(range(20, 40)), stamp=-20)  # Frame# 20 at 0 s
     expected = ["a.trc", "Frame# 20", "Time 0 s", "--first-frame 20 or 0"]
@@ -86,6 +89,7 @@ def test_a_contradiction_is_asked_about_and_decided(run, session, tmp_path):
     assert shifted["mpjpe_mm"] > found["mpjpe_mm"]
 
 
+@pytest.mark.slow
 def test_a_rate_that_contradicts_the_stamps(run, session, tmp_path):
     path = written(tmp_path / "a.trc", list(range(50)), number=1, rate=50.0)
     assert_refused(run("init", session, "--joints", path, "--frame", 30), ["DataRate 50", "Time", "--clock frames"])
@@ -95,6 +99,7 @@ def test_a_rate_that_contradicts_the_stamps(run, session, tmp_path):
     assert_refused(run("evaluate", session, "--reference", SAMPLE / "truth.csv", "--clock", "time"), expected)
 
 
+@pytest.mark.slow
 def test_both_say_that_a_file_was_resampled(run, session, tmp_path):
     truth = read_trc(TRUTH)
     twice = np.repeat(truth.points, 2, axis=0)[:-1]
@@ -106,6 +111,7 @@ def test_both_say_that_a_file_was_resampled(run, session, tmp_path):
     assert note in run("evaluate", session, "--reference", tmp_path / "a.trc")[1]
 
 
+@pytest.mark.slow
 def test_an_exported_range_comes_back_to_its_frames(run, session, tmp_path):
     for frame in range(20, 23):
         assert run("init", session, "--joints", TRUTH, "--frame", frame)[0] == 0
@@ -118,6 +124,7 @@ def test_an_exported_range_comes_back_to_its_frames(run, session, tmp_path):
     assert found["notes"] == ["the first row of the file, Frame# 21 at 0.800 s, is frame 20"]
 
 
+@pytest.mark.slow
 def test_evaluate_lists_lost_frames(run, session, tmp_path):
     truth = read_trc(TRUTH)
     points = truth.points.copy()
@@ -134,6 +141,7 @@ def test_evaluate_lists_lost_frames(run, session, tmp_path):
     assert "lost: frames" not in run("evaluate", session, "--reference", TRUTH, "--frames", "2:6")[1]
 
 
+@pytest.mark.slow
 def test_lost_frames_without_any_pose(run, session):
     run("init", session, "--joints", TRUTH, "--frame", 8)
     at = load_target(session, None, several=False)

@@ -13,6 +13,7 @@ def placed(run, session):
     return session
 
 
+@pytest.mark.slow
 def test_one_frame_and_another_camera(run, placed):
     status, out, err = run("observability", placed, "--frame", "20", "--another-camera", "--json")
     found = json.loads(out)
@@ -38,6 +39,7 @@ def test_what_a_person_reads(run, placed):
     assert "medians over 1 frames" in out or "frame 20" in out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

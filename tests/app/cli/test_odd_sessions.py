@@ -20,6 +20,7 @@ def placed(run, session):
     return session
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
@@ -41,6 +42,7 @@ def test_named_pipes_do_not_hang_a_command_that_reads(run, placed, name, expecte
     assert_refused(run("info", placed, "--no-check"), [expected])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [

@@ -40,6 +40,7 @@ def test_a_damaged_store_goes_back_to_its_backup(run, edited):
         assert db.execute("SELECT frame FROM pose_changes ORDER BY frame").fetchall() == [(4,), (6,)]
 
 
+@pytest.mark.slow
 def test_a_sound_store_stays_as_it_is_unless_a_backup_is_named(run, edited):
     before = (edited / "annotations.sqlite").read_bytes()
     status, out, _ = run("restore", edited)
@@ -51,6 +52,7 @@ def test_a_sound_store_stays_as_it_is_unless_a_backup_is_named(run, edited):
     assert "the file that it replaces is kept as" in out
 
 
+@pytest.mark.slow
 def test_what_cannot_be_restored_is_refused(run, edited, tmp_path):
     assert_refused(run("restore", tmp_path), ["is not a session"])
     assert_refused(run("restore", edited, "--backup", "other.sqlite"), ["expected a backup", "other.sqlite", "no such"])
@@ -61,6 +63,7 @@ def test_what_cannot_be_restored_is_refused(run, edited, tmp_path):
     assert_refused(run("restore", edited), ["found none; put a copy of the file in its place"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

@@ -85,6 +85,7 @@ def calibrated(**changes):
 SKEWED = [[1.0, 0.0, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "expected"),
     [
@@ -116,6 +117,7 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "expected"),
     [
@@ -219,6 +221,7 @@ def test_a_session_whose_video_is_gone(run, session):
     assert stored(session)[0].values.tolist() == before[0].values.tolist()
 
 
+@pytest.mark.slow
 def test_a_session_open_already(run, session):
     with SessionLock(session):
         for words in (
@@ -262,6 +265,7 @@ def test_a_busy_port(session):
     assert not (session / "lock.json").exists()
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_read_enough():
     """As `quadrille info S | head -1` where head is gone before the program writes."""
     words = [sys.executable, "-m", "app", "info", str(SAMPLE)]

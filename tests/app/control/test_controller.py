@@ -197,6 +197,7 @@ def test_a_stopped_search_keeps_the_best_so_far_on_disk(opened, session):
     wait_for(lambda: controller.state.search.evaluations > evaluations)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interruption", ["seek", "drag", "undo", "set"])
 def test_whatever_a_hand_does_stops_a_running_search(opened, interruption):
     controller = opened()

@@ -28,6 +28,7 @@ def middle_of(image):
     return np.array([(x * weights).sum(), (y * weights).sum()]) / weights.sum()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(480, 560), (900, 300), (640, 480), (1600, 1200), (160, 120)])
 @pytest.mark.parametrize("point", [(0.0, 0.0, 2.0), (0.4, 0.2, 2.0), (-0.6, -0.7, 2.5)])
 def test_points_lie_where_a_viewer_without_a_principal_point_draws_them(camera, size, point):

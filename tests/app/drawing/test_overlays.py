@@ -36,6 +36,7 @@ def drawn(controller, state, views=None, view=SEGMENTS):
     return overlays.paths(controller.session, state, view, views)
 
 
+@pytest.mark.slow
 def test_segments_are_drawn_only_with_their_layer_and_their_evidence(controller):
     state = controller.state
     assert kinds_of(drawn(controller, state), "rejected")

@@ -34,6 +34,7 @@ def painted(image):
     return np.abs(image - (0x53, 0xA5, 0x04)).max(axis=-1) < 60
 
 
+@pytest.mark.slow
 def test_one_view_has_the_footage_with_the_body_over_it(session, tmp_path):
     loaded = load_session(session)
     motion = posed_motion(loaded, range(2, 5), gaps=(3,))
@@ -52,6 +53,7 @@ def test_one_view_has_the_footage_with_the_body_over_it(session, tmp_path):
     assert abs(np.median(rows) - np.median(points_px[:, 1])) < 60
 
 
+@pytest.mark.slow
 def test_a_grid_shows_all_views(session, tmp_path):
     motion = posed_motion(load_session(session), range(2, 3))
     overlay_video.write_overlay_video(motion, ExportOptions(), tmp_path / "a.mp4")

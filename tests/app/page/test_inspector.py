@@ -63,6 +63,7 @@ def test_settings_are_shown_changed_one_by_one_and_their_defaults_known(page):
         page.send("track_settings", changes={"method": "sonar"})
 
 
+@pytest.mark.slow
 def test_track_settings_are_kept_with_the_session(page, opened):
     page.send("track_settings", changes={"options": {"estimate": "search", "order": "2", "recover": False}})
     page.send("track_settings", changes={"method": "voxel", "options": {"smooth": False, "voxel_size": 25}})
@@ -79,6 +80,7 @@ def test_track_settings_are_kept_with_the_session(page, opened):
     assert Page(opened()).updates()["settings"].track == chosen.track_default
 
 
+@pytest.mark.slow
 def test_stride_and_cameras_are_kept_and_only_known_cameras_taken(page, opened):
     names = page.controller.session.camera_names
     page.send("track_settings", changes={"stride": 4, "cameras": [names[2], names[0]]})
@@ -94,6 +96,7 @@ def test_stride_and_cameras_are_kept_and_only_known_cameras_taken(page, opened):
     assert again.updates()["settings"].track.cameras == ()  # all of them
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kept",
     [

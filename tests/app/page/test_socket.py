@@ -26,6 +26,7 @@ def curves_of(message):
     return frames.tolist(), dict(zip(names, values, strict=True))
 
 
+@pytest.mark.slow
 async def test_a_page_is_told_all_when_it_connects(controller):
     async with visiting(controller) as page:
         session = await page.hear("session")
@@ -40,6 +41,7 @@ async def test_a_page_is_told_all_when_it_connects(controller):
         assert not [m for m in page.told if m["type"] == "curves"]  # only for those who ask
 
 
+@pytest.mark.slow
 async def test_a_run_is_watched_frame_by_frame(controller, tracker):
     async with visiting(controller) as page:
         await page.hear("timeline")
@@ -62,6 +64,7 @@ async def test_a_run_is_watched_frame_by_frame(controller, tracker):
         assert cells["4"]["remark"] == "left arm relocated"
 
 
+@pytest.mark.slow
 async def test_images_come_though_the_tracker_is_ahead_by_then(controller, tracker):
     """A tracker that is faster than the pictures must not leave the panes without any."""
     async with visiting(controller) as page:
@@ -107,6 +110,7 @@ async def go_on_slowly(tracker):
         tracker.let_go(1)
 
 
+@pytest.mark.slow
 async def test_what_cannot_be_tracked_is_a_notice(controller, caplog):
     async with visiting(controller) as page:
         await page.send("track", action="backward", until=40)
@@ -118,6 +122,7 @@ async def test_what_cannot_be_tracked_is_a_notice(controller, caplog):
     assert "as 'group', found 'ears'" in caplog.text
 
 
+@pytest.mark.slow
 async def test_a_tracker_that_fails_is_a_notice_once(controller, tracker):
     tracker.fails_at = 4
     async with visiting(controller) as page:
@@ -130,6 +135,7 @@ async def test_a_tracker_that_fails_is_a_notice_once(controller, tracker):
         assert len([m for m in page.told if m["type"] == "notice"]) == 1
 
 
+@pytest.mark.slow
 async def test_curves_come_whole_and_then_as_they_change(controller, tracker):
     async with visiting(controller) as page:
         await page.hear("timeline")
@@ -187,6 +193,7 @@ async def test_a_drag_means_the_frame_that_the_hand_saw(controller):
         await page.hear("state", lambda m: m["undo"] == "drag torso, frame 2")
 
 
+@pytest.mark.slow
 async def test_segments_are_sent_when_the_evidence_has_come(controller):
     async with visiting(controller) as page:
         await page.hear("timeline")
@@ -223,6 +230,7 @@ async def test_a_range_is_worked_on_and_told(controller):
         assert "poses at both ends" in (await page.hear("notice"))["text"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "fields"),
     [
@@ -253,6 +261,7 @@ async def test_what_is_not_understood_is_refused_and_nothing_has_happened(contro
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("data", "binary"),
     [
@@ -330,6 +339,7 @@ async def test_pictures_of_a_frame_come_as_sets_of_the_size_asked_for(controller
         assert limits == {"image": None, "silhouette": None, "parts": None, "distance": pytest.approx(2 * 0.03 * 640)}
 
 
+@pytest.mark.slow
 async def test_evidence_waits_for_the_pictures(controller):
     """Both need the processor: what the eye waits for goes first."""
     frames, made = controller.frames, []
@@ -349,6 +359,7 @@ async def test_evidence_waits_for_the_pictures(controller):
     assert made == ["image"] * 4 + ["evidence"]
 
 
+@pytest.mark.slow
 async def test_a_pose_changes_the_part_masks_alone(controller):
     async with visiting(controller) as page:
         await page.shows("image", "parts")
@@ -359,6 +370,7 @@ async def test_a_pose_changes_the_part_masks_alone(controller):
         assert {m["layer"] for m in page.told[count:] if m["type"] == "image"} == {"parts"}
 
 
+@pytest.mark.slow
 async def test_what_a_page_sees_anew_is_sent_and_nothing_else(controller):
     async with visiting(controller) as page:
         await page.hear("image", lambda m: m["of"] == 4)

@@ -30,6 +30,7 @@ def made(opened, monkeypatch):
     found.close()
 
 
+@pytest.mark.slow
 def test_a_thumbnail_is_made_once_for_each_pose_and_limb(made):
     controller, found, drawn = made
     first = found.jpeg(0, 0, 1)

@@ -46,6 +46,7 @@ def notices(page):
     return [m["text"] for m in page.told if m["type"] == "notice"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",
     ["truncated", pytest.param("removed", marks=pytest.mark.slow), pytest.param("emptied", marks=pytest.mark.slow)],
@@ -80,6 +81,7 @@ async def test_a_video_that_cannot_be_read_is_one_notice_until_it_is_back(contro
         assert len(notices(page)) == 1
 
 
+@pytest.mark.slow
 async def test_a_drive_that_is_gone_is_one_notice_for_all_cameras(controller, session):
     async with visiting(controller) as page:
         await pictures(page, 2)

@@ -134,6 +134,7 @@ def no_collector():
         gc.enable()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends_by", ["discarding a paused job", "discarding a running job", "the last step"])
 def test_a_job_that_is_over_frees_what_its_steps_held(ends_by):
     images, go = [], threading.Semaphore(0)

@@ -76,6 +76,7 @@ def output(program, how):
     return run.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["given back", "kept"])
 def test_images_that_are_freed_are_given_back(how):
     kept, now = map(int, output(FREED, how).split())
@@ -83,6 +84,7 @@ def test_images_that_are_freed_are_given_back(how):
     assert (now < 0.2 * kept) == (how == "given back")
 
 
+@pytest.mark.slow
 def test_no_huge_page_fills_again_what_was_trimmed():
     if output(HUGE_PAGES, "kept").split() in ([], ["0"]):
         pytest.skip("this system gives numpy no huge pages")

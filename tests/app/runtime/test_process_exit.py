@@ -36,6 +36,7 @@ def ended(ends, run="process_exit.run(main)"):
     return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ends", "status"), [("pass", 0), ("sys.exit(1)", 1), ("sys.exit(130)", 130), ("sys.exit()", 0), ("1 / 0", 1)]
 )
@@ -62,6 +63,7 @@ program.program()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 def test_termination_cleans_up_as_an_interrupt_does(tmp_path, number, status):
     with subprocess.Popen([sys.executable, "-c", EXPORTING, str(tmp_path)], stdout=subprocess.PIPE) as process:

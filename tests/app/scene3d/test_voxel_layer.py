@@ -81,6 +81,7 @@ def views(monkeypatch):
     monkeypatch.setattr(voxel_layer, "_REST_S", 0.0)
 
 
+@pytest.mark.slow
 def test_voxels_are_drawn_while_they_are_switched_on(views):
     scene, controller = Scene(), Controller()
     VoxelLayer(scene, controller)

@@ -69,6 +69,7 @@ async def test_headers_that_drip_end():
         writer.close()
 
 
+@pytest.mark.slow
 async def test_a_reader_that_stands_still_ends(monkeypatch):
     """Idle connections are kept here: only the limit of an answer can end this one."""
     monkeypatch.setattr(connections, "ANSWER_S", 0.3)

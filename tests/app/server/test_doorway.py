@@ -47,6 +47,7 @@ def test_the_page_says_what_the_program_is_doing(doorway):
         wait_for(lambda told=told: json.loads(get(doorway, "/starting.json")[2]) == told)
 
 
+@pytest.mark.slow
 def test_the_files_of_the_page_are_kept(doorway):
     page = get(doorway, "/")[2]
     addresses = re.findall(r'"(static/[^"]+)"', page)
@@ -88,6 +89,7 @@ def test_threads_answer_where_a_process_cannot(monkeypatch, tmp_path):
         assert json.loads(get(doorway, "/starting.json")[2])["at"] == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path", ["/static/main.js", "/static/../app/__main__.py", "/static/%2e%2e/pyproject.toml", "/ws"]
 )
@@ -95,6 +97,7 @@ def test_nothing_else_is_read(doorway, path):
     assert get(doorway, path)[0] == 503
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("headers", [{"Host": "evil.example"}, {"Origin": "http://evil.example"}])
 def test_other_names_and_pages_are_refused(doorway, headers):
     status, _, text = get(doorway, "/", **headers)

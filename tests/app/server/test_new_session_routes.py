@@ -99,6 +99,7 @@ async def test_footage_is_given_to_cameras_by_hand(folders, serve, form):
     assert "one body model for all" in line["failed"]
 
 
+@pytest.mark.slow
 async def test_frames_that_only_some_cameras_have_are_left_out_by_choice(folders, serve, form):
     client, walk = await serve(), folders[0]
     n_frames, images = load_session(walk).n_frames, cv2.VideoCapture(str(walk / "LEFT.mp4"))
@@ -138,6 +139,7 @@ async def test_nothing_is_made_while_two_cameras_seem_exchanged(serve, form, tmp
     assert [next(iter(line)) for line in lines[-2:]] == ["warning", "made"]
 
 
+@pytest.mark.slow
 async def test_a_calibration_of_a_file_for_each_camera_is_given_by_these_files(folders, serve, form):
     client, walk = await serve(), folders[0]
     (walk / "LEFT.mp4").unlink()
@@ -166,6 +168,7 @@ async def test_a_calibration_of_a_file_for_each_camera_is_given_by_these_files(f
         assert why in line["failed"]
 
 
+@pytest.mark.slow
 async def test_poses_of_another_convention_are_named_as_a_choice_of_the_form(folders, serve, form):
     """A file that does not state the size of its pictures is surveyed too."""
     client, entries = await serve(), {}

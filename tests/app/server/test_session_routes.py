@@ -118,6 +118,7 @@ def test_a_restart_keeps_the_way_in_which_the_program_was_started(monkeypatch, o
     assert called == [(executable, [executable, *program, "open", "/data/dance"])]
 
 
+@pytest.mark.slow
 async def test_a_session_is_made_with_its_checks_told_one_by_one(folders, serve, tmp_path):
     walk = folders[0]
     client = await serve()

@@ -122,6 +122,7 @@ def test_a_program_that_could_not_save_ends_with_status_1(run, session, monkeypa
     assert (status, out, "kept in /x/rescue.json" in err) == (1, "", True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n_full", [1, 2])
 def test_the_next_folder_is_taken_where_there_is_no_room(open_with, places, n_full):
     for folder in places[:n_full]:
@@ -132,6 +133,7 @@ def test_the_next_folder_is_taken_where_there_is_no_room(open_with, places, n_fu
     assert len(open_with(lambda controller: None)) == 1
 
 
+@pytest.mark.slow
 def test_edits_of_a_folder_that_is_away_at_the_end_are_kept(open_with, session, run, tmp_path):
     def edit(controller):
         drag(controller, "torso", (10.0, 0.0))
@@ -162,6 +164,7 @@ def test_a_damaged_rescue_file_is_refused_and_changes_nothing(open_with, session
     np.testing.assert_array_equal(stored(session)[0].values, before)
 
 
+@pytest.mark.slow
 def test_rescued_edits_are_of_one_session(open_with, session, tmp_path):
     with pytest.raises(TrackerError):
         open_with(edit_on_a_full_disk)
@@ -193,6 +196,7 @@ def test_edits_of_another_folder_are_offered_and_written_on_request_alone(open_w
     assert path.exists()
 
 
+@pytest.mark.slow
 def test_a_rescue_file_of_another_session_is_refused(open_with, session, run, tmp_path, places):
     with pytest.raises(TrackerError):
         open_with(edit_on_a_full_disk)
@@ -211,6 +215,7 @@ def store_id(session):
         return store.id
 
 
+@pytest.mark.slow
 def test_the_end_of_the_terminal_ends_the_program_as_control_c_does(open_with, session):
     def hang_up(_):
         signal.raise_signal(signal.SIGHUP)

@@ -43,12 +43,14 @@ def observer(made):
         yield Observer(loaded.cameras, recording)
 
 
+@pytest.mark.slow
 def test_the_session_keeps_its_lens(session):
     cameras = [c.camera for c in load_session(session).cameras]
     assert [c.fisheye for c in cameras] == [True, False, False, False]
     assert cameras[0].pinhole.width > cameras[0].width == 640
 
 
+@pytest.mark.slow
 def test_the_page_gets_the_undistorted_picture_and_its_size(opened):
     controller = opened()
     camera = controller.session.cameras[FRONT].camera
@@ -100,6 +102,7 @@ def test_a_dragged_joint_goes_where_the_pointer_is(opened):
     np.testing.assert_allclose(pixel_of(controller, "left_wrist"), np.add(start, (12.0, -9.0)), atol=2.0)
 
 
+@pytest.mark.slow
 def test_exported_video_is_drawn_on_the_footage_as_filmed(session, tmp_path):
     loaded = load_session(session)
     (person,) = loaded.people
@@ -122,6 +125,7 @@ def test_exported_video_is_drawn_on_the_footage_as_filmed(session, tmp_path):
         assert np.ptp(rows) == pytest.approx(np.ptp(filmed[:, 1]), rel=0.35)
 
 
+@pytest.mark.slow
 def test_exchanged_footage_of_a_fisheye_is_named(session):
     loaded = load_session(session)
     with Recording(loaded.cameras) as recording:
@@ -146,6 +150,7 @@ def test_exchanged_footage_of_a_fisheye_is_named(session):
     assert set(found.cameras) == {"FRONT", "LEFT"}
 
 
+@pytest.mark.slow
 def test_it_is_tracked_as_well_as_with_a_common_lens(session, run, tmp_path):
     twin, errors = shutil.copytree(SAMPLE, tmp_path / "twin"), []
     for folder in (twin, session):

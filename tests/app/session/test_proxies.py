@@ -15,6 +15,7 @@ from tracker.footage.recording import Recording
 from tracker.session.session import load_session
 
 
+@pytest.mark.slow
 def test_index_makes_a_proxy_of_every_camera(run, session):
     status, out, _ = run("index", session)
     assert status == 0
@@ -68,6 +69,7 @@ def test_stopped_it_goes_on(run, session, monkeypatch):
     assert [p.n_frames for p in proxies.proxies(loaded)] == [loaded.n_frames] * len(loaded.cameras)
 
 
+@pytest.mark.slow
 def test_the_page_looks_at_the_proxy_and_matches_the_footage(run, session, monkeypatch):
     assert run("index", session)[0] == 0
     loaded = load_session(session)
@@ -123,6 +125,7 @@ def test_a_proxy_that_vanishes_is_replaced_by_the_footage(indexed, session):
     assert frames.problem() is None
 
 
+@pytest.mark.slow
 def test_a_proxy_is_not_looked_at_once_its_footage_is_replaced(indexed, session):
     loaded, frames = indexed
     front = next(i for i, c in enumerate(loaded.cameras) if c.camera.name == "FRONT")

@@ -91,6 +91,7 @@ def with_camera(name):
     return change
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
@@ -132,6 +133,7 @@ def test_a_named_pipe_in_place_of_a_rescue_file(tmp_path):
         read_rescue(tmp_path / "rescue.json")
 
 
+@pytest.mark.slow
 def test_mutated_files_are_written_or_refused(tmp_path, store):
     """Every file has a valid checksum; a traceback would fail the test."""
     rng = random.Random("rescue")

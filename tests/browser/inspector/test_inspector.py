@@ -19,6 +19,7 @@ def row(page, label):
     return page.locator(".row", has=page.get_by_text(label, exact=True))
 
 
+@pytest.mark.slow
 async def test_settings_are_changed_marked_and_reset(page, endpoint):
     await opened(page, "track", "search")
     await row(page, "Prediction").locator("select").select_option("2")
@@ -149,6 +150,7 @@ async def test_angles_of_the_joint_have_whole_names_and_sliders(page, endpoint):
     }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_people=2)
 async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
     await page.set_viewport_size({"width": 1280, "height": 720})
@@ -184,6 +186,7 @@ FOUND = {
 }
 
 
+@pytest.mark.slow
 async def test_the_palette_leads_to_sections_and_rows(page, endpoint):
     for query, (label, focused) in FOUND.items():
         await page.keyboard.press("Control+k")
@@ -215,6 +218,7 @@ async def test_words_of_a_beginner_find_something(page):
 GROUND = "getComputedStyle(document.querySelector('#scene')).backgroundColor"
 
 
+@pytest.mark.slow
 async def test_a_theme_is_chosen_kept_and_recolours_the_3d_view_as_it_stands(page, endpoint):
     frame = page.frame_locator("#scene").locator("body")
     await frame.evaluate("() => (window.isLoadedOnce = true)")
@@ -237,6 +241,7 @@ async def test_a_theme_is_chosen_kept_and_recolours_the_3d_view_as_it_stands(pag
     assert endpoint.received == []
 
 
+@pytest.mark.slow
 async def test_people_are_found_with_progress_and_a_stop(page, endpoint):
     await opened(page, "find")
     section = page.locator("[data-section=find]")

@@ -14,6 +14,7 @@ from app.server.server import create_app
 from app.server.static_files import static_folder
 
 
+@pytest.mark.slow
 async def test_after_another_start_the_page_goes_back_to_its_frame_and_person(browser, blank_viser):
     first = FakeEndpoint(n_people=2)
     first.state |= {"frame": 31, "person": 1}
@@ -71,6 +72,7 @@ async def test_a_foreign_page_cannot_open_the_socket(browser, endpoint, address)
     await page.context.close()
 
 
+@pytest.mark.slow
 async def test_viser_runs_in_its_frame_behind_the_proxy(browser, endpoint):
     scene = PrivateViser()
     connected = asyncio.Event()

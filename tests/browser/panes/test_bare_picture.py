@@ -17,6 +17,7 @@ LINES = """(() => {
 """JavaScript: how many pixels of the first pane have about a colour."""
 
 
+@pytest.mark.slow
 async def test_one_held_key_hides_all_drawing(page, endpoint):
     endpoint.state["unseen_depth"] = {"person": 0, "points": ["l_wrist"], "camera": 1}
     await endpoint.broadcast(endpoint.state)
@@ -47,6 +48,7 @@ async def test_one_held_key_hides_all_drawing(page, endpoint):
     await shows(page, f"({DRAWN}) > 200")
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_people=2)
 async def test_without_contours_no_dashed_ones_are_left(page, endpoint):
     contours = page.locator("#quick-layers").get_by_text("Contours")
@@ -66,6 +68,7 @@ async def test_without_contours_no_dashed_ones_are_left(page, endpoint):
     assert not await page.evaluate("quadrille.state.layers.shown.hidden")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["alternative", "compared", "preview", "result", "new_sizes"])
 async def test_contours_of_other_poses_are_contours_too(page, endpoint, kind):
     endpoint.other_kind = kind

@@ -33,6 +33,7 @@ async def set_slider(page, selector, value):
     await page.locator(selector).fill(str(value))
 
 
+@pytest.mark.slow
 async def test_a_picture_shows_vanishes_and_is_as_strong_as_its_slider_says(page):
     plain = await color_at(page)
     await page.keyboard.press("a")
@@ -49,6 +50,7 @@ async def test_a_picture_shows_vanishes_and_is_as_strong_as_its_slider_says(page
         assert await color_at(page) == plain
 
 
+@pytest.mark.slow
 async def test_the_image_fades_into_black_in_either_theme(page):
     plain = await color_at(page)
     await page.emulate_media(color_scheme="light")
@@ -61,6 +63,7 @@ async def test_the_image_fades_into_black_in_either_theme(page):
     assert await color_at(page) == [0, 0, 0]
 
 
+@pytest.mark.slow
 async def test_without_any_pictures_frames_are_shown_all_the_same(page):
     await page.keyboard.press("Shift+Digit1")
     await shows(page, "!quadrille.state.layers.shown.image")
@@ -95,6 +98,7 @@ async def test_lines_fade_with_their_layer(page, endpoint):
     assert faint[0] < full[0] - 30
 
 
+@pytest.mark.slow
 async def test_layers_are_remembered_and_reset(page, endpoint):
     await page.keyboard.press("a")
     await page.locator("[data-layer=silhouette]").check()
@@ -178,6 +182,7 @@ class TestGrid:
     def endpoint(self, n_cameras):
         return FakeEndpoint(n_cameras=n_cameras, sizes=((640, 480), (640, 480), (480, 640), (960, 540)))
 
+    @pytest.mark.slow
     async def test_all_cameras_fit_and_each_fills_the_grid(self, page, endpoint, n_cameras):
         await self.fit(page, endpoint, n_cameras)
         await self.fill(page, endpoint, n_cameras)
@@ -224,6 +229,7 @@ class TestGrid:
 
 @pytest.mark.endpoint(n_cameras=16)
 class TestZoom:
+    @pytest.mark.slow
     async def test_zooming_in_asks_for_finer_pictures_of_that_camera(self, page, endpoint):
         before = endpoint.views[-1]["reductions"]
         assert min(before) > 1
@@ -233,6 +239,7 @@ class TestZoom:
         await until(lambda: endpoint.views[-1]["reductions"][5] == 1)
         assert endpoint.views[-1]["reductions"][:5] == before[:5]
 
+    @pytest.mark.slow
     async def test_the_next_frame_comes_as_coarse_as_a_pane_that_is_zoomed_out_again_can_use(self, page, endpoint):
         before = endpoint.views[-1]["reductions"]
         box = await page.locator(".pane").nth(5).bounding_box()

@@ -41,6 +41,7 @@ async def slow(page, endpoint, frame):
     endpoint.held = None
 
 
+@pytest.mark.slow
 async def test_the_nearest_frame_stands_in_marked_and_is_replaced_by_the_true_one(page, endpoint):
     await visit(page, 40, 90)
     async with slow(page, endpoint, 45):
@@ -50,6 +51,7 @@ async def test_the_nearest_frame_stands_in_marked_and_is_replaced_by_the_true_on
     assert await page.locator(".pane-placeholder:visible").count() == 0
 
 
+@pytest.mark.slow
 async def test_no_hand_takes_anything_of_a_frame_that_stands_in(page, endpoint):
     await visit(page, 40, 90)
     u, v = await handle_of(page, 0, "l_wrist")
@@ -74,6 +76,7 @@ async def test_where_the_frame_on_the_screen_is_the_nearest_it_stays_and_is_mark
         assert await page.locator(".pane-placeholder").first.inner_text() == "frame 40, while 44 loads"
 
 
+@pytest.mark.slow
 async def test_a_hand_that_scrubs_on_is_followed(page, endpoint):
     await visit(page, 20, 60, 100)
     async with slow(page, endpoint, 59):

@@ -1,5 +1,6 @@
 """The layer of observability: rings around joints, lines before angles, sentences in tooltips and labels."""
 
+import pytest
 from fake_endpoint import DOFS
 from page_driver import handle_of, shows, state_of, to_client, until
 
@@ -50,6 +51,7 @@ async def test_rings_lines_and_sentences(page, endpoint):
     assert SENTENCES["known"] not in await row.get_attribute("title")
 
 
+@pytest.mark.slow
 async def test_figures_of_another_frame_are_not_shown(page, endpoint):
     await page.keyboard.press("a")
     await page.locator("[data-layer=observability]").check()

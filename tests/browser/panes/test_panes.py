@@ -151,6 +151,7 @@ async def test_a_pane_fills_the_grid_by_key_and_double_click(page):
     assert await page.locator(".pane:visible").count() == 4
 
 
+@pytest.mark.slow
 async def test_zoom_stays_at_the_pointer_and_zero_resets_it(page):
     # The wheel reports whole pixels: what must stay is what lies under one.
     x, y = map(round, await to_client(page, 1, 100, 100))
@@ -170,6 +171,7 @@ async def test_zoom_stays_at_the_pointer_and_zero_resets_it(page):
     assert (await state_of(page))["views"][1]["zoom"] == 1
 
 
+@pytest.mark.slow
 async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
     (first,) = endpoint.views
     assert first["layers"] == ["image", "contours", "joints", "epipolar", "axes"]
@@ -231,6 +233,7 @@ async def test_a_minor_joint_in_the_hand_stays_there_as_it_meets_another(page, e
     await until(lambda: endpoint.heard("drag")[-1]["phase"] == "end")
 
 
+@pytest.mark.slow
 async def test_the_splitter_moves_by_drag_and_key_within_bounds(page):
     panes = page.locator("#panes")
     before = (await panes.bounding_box())["width"]
@@ -257,6 +260,7 @@ class TestPeople:
         assert endpoint.heard("select") == [{"type": "select", "person": 1, "point": None}]
 
 
+@pytest.mark.slow
 async def test_all_views_are_framed_on_the_people_by_a_key(page):
     await page.keyboard.press("Shift+0")
     await shows(page, "quadrille.state.views.every((view) => view.zoom > 1.05)")
@@ -302,6 +306,7 @@ async def test_linked_views_show_the_same_joint_at_the_same_size(page):
     assert [view["zoom"] for view in (await state_of(page))["views"]][1:] == others
 
 
+@pytest.mark.slow
 async def test_zoom_is_kept_over_a_reload(page):
     x, y = await to_client(page, 0, 200.0, 150.0)
     await page.mouse.move(x, y)
@@ -316,6 +321,7 @@ async def test_zoom_is_kept_over_a_reload(page):
     await shows(page, "!localStorage.getItem('quadrille.views.elbow_rotation').includes('zoom')")
 
 
+@pytest.mark.slow
 async def test_a_session_is_framed_on_its_people_when_it_first_opens_and_not_again(page, endpoint):
     await page.evaluate("localStorage.removeItem('quadrille.views.elbow_rotation')")
     await page.reload()
@@ -345,6 +351,7 @@ async def test_a_session_is_framed_on_its_people_when_it_first_opens_and_not_aga
     assert all(view["zoom"] == 1 for view in (await state_of(page))["views"])
 
 
+@pytest.mark.slow
 async def test_a_view_moved_before_the_first_overlay_stays_where_it_is(page, endpoint):
     endpoint.held = asyncio.Event()
     await page.evaluate("localStorage.removeItem('quadrille.views.elbow_rotation')")
@@ -361,6 +368,7 @@ async def test_a_view_moved_before_the_first_overlay_stays_where_it_is(page, end
     assert [view["zoom"] for view in (await state_of(page))["views"]] == [view["zoom"] for view in moved]
 
 
+@pytest.mark.slow
 async def test_the_pane_that_fills_the_grid_is_kept_over_a_reload(page):
     await page.keyboard.press("3")
     await shows(page, "quadrille.state.filled === 2")

@@ -26,6 +26,7 @@ async def step(page, frame):
     await shows(page, STEPPED.format(frame))
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(walk_m=0.1)
 async def test_a_zoomed_view_follows_the_person_from_frame_to_frame(page, endpoint):
     x, y = await to_client(page, 0, *await handle_of(page, 0, "head"))
@@ -94,6 +95,7 @@ async def test_a_hidden_tab_asks_for_no_view(page, endpoint):
     await until(lambda: endpoint.views[-1] == before)
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(walk_m=0.1)
 async def test_framed_people_stay_framed_and_an_edit_moves_no_view(page, endpoint):
     await page.keyboard.press("Shift+0")
@@ -111,6 +113,7 @@ async def test_framed_people_stay_framed_and_an_edit_moves_no_view(page, endpoin
     assert (await state_of(page))["views"][0]["zoom"] == before["zoom"]
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(walk_m=0.1)
 async def test_a_session_opens_framed_on_the_people_where_they_are_now(page, endpoint):
     await page.keyboard.press("Shift+0")
@@ -151,6 +154,7 @@ async def test_people_who_are_found_are_framed(page, endpoint):
 FOOTAGE = {"portrait": {"sizes": PORTRAIT}, "4:3": {}, "8 cameras": {"n_cameras": 8}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("endpoint", FOOTAGE.values(), indirect=True, ids=FOOTAGE)
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])
 async def test_a_drawer_keeps_the_arrangement_of_the_panes(page, endpoint, size):
@@ -167,6 +171,7 @@ async def test_a_drawer_keeps_the_arrangement_of_the_panes(page, endpoint, size)
     assert await tracks_of(page) == before
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(sizes=PORTRAIT)
 @pytest.mark.parametrize("size", [(1280, 720), (1920, 1080)])
 async def test_portrait_footage_uses_the_window(page, endpoint, size):

@@ -1,8 +1,10 @@
 """The bar of the selected joint, against `fake_endpoint`."""
 
+import pytest
 from page_driver import shows
 
 
+@pytest.mark.slow
 async def test_angles_have_whole_names_where_there_is_room_and_are_explained(page):
     names = page.locator("#joint-dofs .dof-name")
     for width, shown in ((1920, "abduction"), (1280, "abd."), (1100, "abd.")):

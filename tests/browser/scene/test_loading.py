@@ -1,11 +1,13 @@
 """When the 3-D view is loaded."""
 
+import pytest
 from page_driver import OPENED, shows
 
 NOTE = "!document.querySelector('#scene-note').hidden"
 ADDRESS = "document.querySelector('#scene').getAttribute('src')"
 
 
+@pytest.mark.slow
 async def test_it_follows_the_first_cost_where_no_graphics_card_draws(page, endpoint):
     """Its start stops such a page for seconds, in which nobody could drag."""
     assert not await page.evaluate(NOTE)
@@ -19,6 +21,7 @@ async def test_it_follows_the_first_cost_where_no_graphics_card_draws(page, endp
     await shows(page, f"{ADDRESS}?.startsWith('viser/') && !({NOTE})")
 
 
+@pytest.mark.slow
 async def test_it_waits_no_longer_than_for_the_kernels_of_a_cost(page, endpoint):
     """A frame that cannot be read has no cost."""
     endpoint.state |= {"compiling": "tracking", "cost_px": None}

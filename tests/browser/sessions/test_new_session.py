@@ -99,6 +99,7 @@ async def assigned(page):
     return await page.locator("#new-cameras select").evaluate_all("all => all.map((one) => one.value.split('/').pop())")
 
 
+@pytest.mark.slow
 async def test_files_are_chosen_in_a_dialog(form):
     page, program = form
     await page.click("[data-browse=footage]")
@@ -158,6 +159,7 @@ async def test_several_files_of_one_calibration_are_marked(form):
     assert await choose.inner_text() == "Choose this folder"
 
 
+@pytest.mark.slow
 async def test_each_camera_shows_its_footage_and_the_rig_is_drawn(form):
     page, program = form
     await choose_files(page)
@@ -233,6 +235,7 @@ async def test_footage_is_given_to_cameras_by_menu_drag_and_hand(form):
     }.items()  # fmt: skip
 
 
+@pytest.mark.slow
 async def test_exchanged_cameras_are_exchanged_by_a_button_before_anything_is_made(form):
     page, program = form
     await choose_files(page)
@@ -250,6 +253,7 @@ async def test_exchanged_cameras_are_exchanged_by_a_button_before_anything_is_ma
     assert program.posted[2] == {"folder": "/data/new"}
 
 
+@pytest.mark.slow
 async def test_exchanged_cameras_may_stay(form):
     page, program = form
     await choose_files(page)
@@ -259,6 +263,7 @@ async def test_exchanged_cameras_may_stay(form):
     assert [sent["keep_assignment"] for sent in program.posted] == [False, True]
 
 
+@pytest.mark.slow
 async def test_what_cannot_be_read_is_said_before_anything_is_made(form):
     page, program = form
     program.survey = SURVEY | {"cameras": [], "rig": None, "assigned": {}, "problems": ["no calibration of ours"]}
@@ -273,6 +278,7 @@ async def test_what_cannot_be_read_is_said_before_anything_is_made(form):
     assert program.posted[0]["cameras"] == []
 
 
+@pytest.mark.slow
 async def test_other_files_are_looked_at_before_the_session_is_made(form):
     """However quickly Create follows, it takes the cameras of the files that the form has."""
     page, program = form

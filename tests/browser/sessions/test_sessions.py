@@ -3,6 +3,7 @@
 import json
 import re
 
+import pytest
 from page_driver import shows
 
 RECENT = {"refusal": None, "folder": "/data/here", "recent": [
@@ -12,6 +13,7 @@ STARTED = {"steps": [], "at": 0, "folder": "/data/here"}
 WHY = "expected a page that only its user can open, found one without a token"
 
 
+@pytest.mark.slow
 async def test_a_session_is_opened_by_its_folder_or_from_the_list(fresh_page, endpoint):
     page, listed, posted = fresh_page, dict(RECENT), []
     starting = [STARTED, *({"steps": ["Loading the program"], "at": 0} for _ in range(4)), STARTED | {"folder": "/b"}]
@@ -67,6 +69,7 @@ async def test_where_no_session_was_opened_before_a_new_one_is_offered(fresh_pag
     assert not await page.locator("#sessions-panel").is_visible()
 
 
+@pytest.mark.slow
 async def test_where_no_session_can_be_made_the_page_says_why(fresh_page):
     page = fresh_page
     await page.route(

@@ -1,5 +1,6 @@
 """Accessibility: names, focus, reduced motion, and a page that does not jump."""
 
+import pytest
 from page_driver import dragging, shows, state_of, until
 
 
@@ -30,6 +31,7 @@ async def test_every_control_has_a_name_and_a_title_in_every_panel(page):
         await page.keyboard.press("Escape")
 
 
+@pytest.mark.slow
 async def test_all_is_reached_by_tab_and_the_focus_is_seen(page):
     await page.set_viewport_size({"width": 1280, "height": 720})
     reached, unseen = set(), []
@@ -84,6 +86,7 @@ async def test_the_live_region_says_what_changed(page, endpoint):
     await shows(page, "document.querySelector('#announcer').textContent === 'drag r_knee, frame 13.'")
 
 
+@pytest.mark.slow
 async def test_nothing_jumps_while_work_is_under_way(page, endpoint):
     await page.set_viewport_size({"width": 1280, "height": 720})
     await shows(page, "quadrille.state.views[0].scale > 0.5")

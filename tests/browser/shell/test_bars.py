@@ -7,6 +7,7 @@ from page_driver import handle_of, shows, state_of, to_client, until
 from playwright.async_api import expect
 
 
+@pytest.mark.slow
 async def test_frame_keys(page, endpoint):
     frames = {"Period": 13, "Comma": 12, "Shift+Period": 22, "Shift+Comma": 12, "Home": 0, "End": 119}
     for key, frame in frames.items():
@@ -24,6 +25,7 @@ async def test_frames_end_at_the_ends(page, endpoint):
     assert {m["frame"] for m in endpoint.heard("seek")} == {0}
 
 
+@pytest.mark.slow
 async def test_a_frame_asked_for_after_an_undo_is_shown_although_it_was_on_the_screen(page, endpoint):
     undone, answer = asyncio.Event(), endpoint.answer
 
@@ -150,6 +152,7 @@ async def test_the_list_of_keys_opens_and_closes(page, endpoint):
     assert not endpoint.received
 
 
+@pytest.mark.slow
 async def test_scrubbing_asks_for_one_frame_at_a_time_and_ends_at_the_last(page, endpoint):
     endpoint.image_delay_s = 0.05  # 200 ms a frame
     box = await page.locator("#timeline").bounding_box()
@@ -166,6 +169,7 @@ async def test_scrubbing_asks_for_one_frame_at_a_time_and_ends_at_the_last(page,
     assert endpoint.heard("seek")[-1]["frame"] == wanted
 
 
+@pytest.mark.slow
 async def test_playback_keeps_no_backlog_and_stops_at_the_end(page, endpoint):
     endpoint.image_delay_s = 0.03  # 120 ms a frame, far slower than 30 fps
     await page.keyboard.press("Shift+Period")
@@ -180,6 +184,7 @@ async def test_playback_keeps_no_backlog_and_stops_at_the_end(page, endpoint):
     assert len(frames) < 20
 
 
+@pytest.mark.slow
 async def test_nothing_is_cut_off_in_small_windows(page):
     for width, height in ((1280, 720), (1100, 680)):
         await page.set_viewport_size({"width": width, "height": height})
@@ -252,6 +257,7 @@ async def test_the_backward_pass_is_told_from_the_first(page, endpoint):
 USUAL = "document.querySelector('#usual-cost').textContent"
 
 
+@pytest.mark.slow
 async def test_the_cost_has_a_scale_from_the_good_frames(page, endpoint):
     good = sorted(endpoint.cell(k)["cost_px"] for k in range(100) if endpoint.cell(k)["status"] == "good")
     low, high = (f"{good[i]:.1f}" for i in (len(good) // 10, len(good) - 1 - len(good) // 10))

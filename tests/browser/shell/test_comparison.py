@@ -16,6 +16,7 @@ TEXT_BOXES = """['#show-comparison', '#cost'].map((one) => {
 TEXT = "document.querySelector('#show-comparison').textContent"
 
 
+@pytest.mark.slow
 async def test_costs_before_and_after_are_shown_and_one_key_shows_the_pose_before(page, endpoint):
     assert not await page.locator("#show-comparison").is_visible()
     endpoint.state |= {"compared": COMPARED, "cost_px": 5.44}
@@ -83,6 +84,7 @@ async def test_a_result_that_disagrees_with_the_placement_says_so_until_the_next
     assert await page.locator("#notices .notice", has_text="left wrist").count() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1280, 1510, 1600, 1640])
 async def test_both_costs_have_room_in_the_top_bar(page, endpoint, width):
     await page.set_viewport_size({"width": width, "height": 900})

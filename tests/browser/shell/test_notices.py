@@ -31,6 +31,7 @@ async def test_escape_closes_the_last_notice_and_no_more_than_three_stand(page, 
     assert shown == ["notice 2", "notice 3"]
 
 
+@pytest.mark.slow
 async def test_notices_leave_panes_and_bars_free(page, endpoint):
     await page.set_viewport_size({"width": 1280, "height": 720})
     await shows(page, "innerWidth === 1280")
@@ -47,6 +48,7 @@ async def test_notices_leave_panes_and_bars_free(page, endpoint):
         assert apart, (part, box, other)
 
 
+@pytest.mark.slow
 async def test_what_is_not_saved_says_why_is_tried_again_and_holds_the_page(fresh_page, endpoint):
     page = fresh_page
     assert not await page.locator("#unsaved").is_visible()
@@ -97,6 +99,7 @@ BY_HAND = {"sources": ("manual",)}
 """A session that was never tracked."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "endpoint", [{"n_people": 1, **BY_HAND}, {"n_people": 2, **BY_HAND}], indirect=True, ids=("one", "two")
 )
@@ -119,6 +122,7 @@ async def test_the_first_steps_cover_nothing(browser, address, endpoint):
     await context.close()
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(**BY_HAND)
 async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(browser, address, endpoint):
     context = await browser.new_context(viewport={"width": 1280, "height": 720}, newcomer=True)
@@ -162,6 +166,7 @@ async def test_the_first_steps_tell_the_shortest_way_and_are_closed_for_good(bro
     await context.close()
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(**BY_HAND)
 async def test_the_first_steps_belong_to_a_session(browser, address, endpoint):
     """Closed in one, they show in the next one, but not where a run has tracked."""

@@ -14,6 +14,7 @@ async def found(page):
     return await page.locator("#palette-list li > span:first-child").all_inner_texts()
 
 
+@pytest.mark.slow
 async def test_a_few_letters_and_enter_do_it(page, endpoint):
     for query, message in {
         "57": {"type": "seek", "frame": 57},
@@ -30,6 +31,7 @@ async def test_a_few_letters_and_enter_do_it(page, endpoint):
         await page.locator("#palette").wait_for(state="hidden")
 
 
+@pytest.mark.slow
 async def test_layers_and_cameras_are_found_by_name(page, endpoint):
     await open_palette(page, "hidden cont")
     await page.keyboard.press("Enter")
@@ -39,6 +41,7 @@ async def test_layers_and_cameras_are_found_by_name(page, endpoint):
     await shows(page, "quadrille.state.filled === 2")
 
 
+@pytest.mark.slow
 async def test_it_says_why_not(page, endpoint):
     await open_palette(page, "redo")
     assert "Nothing to redo" in await page.locator("#palette-why").inner_text()
@@ -58,6 +61,7 @@ async def test_it_says_why_not(page, endpoint):
     assert not endpoint.received
 
 
+@pytest.mark.slow
 async def test_what_was_used_lately_comes_first_and_enter_alone_does_nothing(page, endpoint):
     await open_palette(page)
     first = await found(page)
@@ -80,6 +84,7 @@ async def test_what_was_used_lately_comes_first_and_enter_alone_does_nothing(pag
 SUITING = "[...document.querySelectorAll('#palette-list li')].filter((li) => li.innerText.includes('suits now'))"
 
 
+@pytest.mark.slow
 async def test_what_suits_the_state_comes_next(page, endpoint):
     async def suiting():
         await open_palette(page)
@@ -128,6 +133,7 @@ async def test_every_suggestion_is_a_command(page):
     assert [label for label, is_there in known if not is_there] == []
 
 
+@pytest.mark.slow
 async def test_every_key_and_button_is_in_it(page):
     await open_palette(page)
     await page.evaluate("document.querySelector('#palette').close()")
@@ -153,6 +159,7 @@ async def test_every_key_and_button_is_in_it(page):
     ]
 
 
+@pytest.mark.slow
 async def test_the_list_of_keys_is_searched_and_fits(page):
     await page.set_viewport_size({"width": 1280, "height": 720})
     await page.keyboard.press("?")
@@ -225,6 +232,7 @@ async def test_a_key_that_does_nothing_says_why(page, endpoint):
     assert not endpoint.received
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_people=2)
 async def test_people_are_changed_by_key_by_name_and_by_a_click(page, endpoint):
     await page.set_viewport_size({"width": 1280, "height": 720})
@@ -246,6 +254,7 @@ async def test_people_are_changed_by_key_by_name_and_by_a_click(page, endpoint):
     await shows(page, "quadrille.state.state.person === 0 && quadrille.state.state.point === 'r_wrist'")
 
 
+@pytest.mark.slow
 async def test_one_frame_without_a_pose_is_a_page_too(browser, endpoint, address):
     endpoint.n_frames = 1
     endpoint.state |= {

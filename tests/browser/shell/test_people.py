@@ -38,6 +38,7 @@ async def test_solo_keeps_the_others_out_of_reach(couple, endpoint):
     await shows(couple, "!quadrille.state.state.solo")
 
 
+@pytest.mark.slow
 async def test_searches_and_fits_are_of_everybody_or_of_one(couple, endpoint):
     for key in ("s", "g", "Shift+E", "s", "g"):
         await couple.keyboard.press(key)
@@ -101,6 +102,7 @@ async def test_a_lane_has_the_colour_of_its_person_and_the_pattern_of_the_status
     assert [line.split(":")[0] for line in lines] == ["Frame 50", "person 1", "left arm"]
 
 
+@pytest.mark.slow
 async def test_each_has_a_lane_and_two_poses_as_good_are_gone_to(couple, endpoint):
     assert (await state_of(couple))["timeline"]["71"]["ambiguous"]
     height = (await couple.locator("#timeline").bounding_box())["height"]
@@ -115,6 +117,7 @@ async def test_each_has_a_lane_and_two_poses_as_good_are_gone_to(couple, endpoin
     await until(lambda: [m["action"] for m in endpoint.heard("pose")] == ["alternative", "alternative"])
 
 
+@pytest.mark.slow
 async def test_bars_and_legend_tell_what_is_visible_of_the_person_worked_on(couple, endpoint):
     cell = {
         "source": "manual", "cost_px": 1.0, "keyframe": True, "status": "", "remark": "", "reviewed": False,
@@ -150,6 +153,7 @@ async def test_bars_and_legend_tell_what_is_visible_of_the_person_worked_on(coup
     assert "contours are hidden" in await legend.inner_text()
 
 
+@pytest.mark.slow
 async def test_a_joint_tells_by_whom_it_is_hidden_and_solo_shows_it(couple, endpoint):
     endpoint.hider = 1
     await endpoint.send_overlay()

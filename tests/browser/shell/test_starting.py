@@ -49,6 +49,7 @@ async def program(doorway, blank_viser):
     await asyncio.gather(serving, return_exceptions=True)
 
 
+@pytest.mark.slow
 async def test_the_page_waits_for_the_program_and_connects_without_being_loaded_again(browser, doorway, blank_viser):
     async with opened(browser, doorway.address) as page:
         doorway.show(STEPS[1])
@@ -69,6 +70,7 @@ async def test_a_page_without_its_token_is_refused_once_the_program_has_started(
         assert "expected the token of this start" in await page.inner_text("body")
 
 
+@pytest.mark.slow
 async def test_a_page_whose_program_has_ended_says_so(browser, doorway):
     async with opened(browser, doorway.address) as page:
         await shows(page, "document.querySelector('#steps li')")
@@ -91,6 +93,7 @@ async def another_port():
         yield port, heard
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
 async def test_other_ports_of_this_machine_get_no_cookie(browser, doorway, blank_viser, name):
     address = doorway.address.replace("127.0.0.1", name)
@@ -106,6 +109,7 @@ async def test_other_ports_of_this_machine_get_no_cookie(browser, doorway, blank
         assert set(heard) == {None}
 
 
+@pytest.mark.slow
 async def test_an_open_page_comes_back_after_a_restart(browser, doorway, blank_viser):
     async with opened(browser, doorway.address) as page:
         await shows(page, "document.querySelector('#steps li')")

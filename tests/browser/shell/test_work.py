@@ -20,6 +20,7 @@ def work(page, name):
     return page.locator(f"#work-{name}")
 
 
+@pytest.mark.slow
 async def test_all_long_work_is_listed_in_one_place_and_can_be_stopped(page, endpoint):
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 15, "done": 4, "total": 18}
     ranges = {"running": True, "what": "interpolating", "done": 500, "total": 12000, "message": ""}
@@ -84,6 +85,7 @@ async def test_the_time_left_is_that_of_the_work(page):
     ]
 
 
+@pytest.mark.slow
 async def test_people_are_searched_while_one_looks_around(page, endpoint):
     endpoint.state["people"][0]["source"] = None
     await endpoint.broadcast(endpoint.state)
@@ -149,6 +151,7 @@ async def test_a_failure_of_no_single_view_has_no_picture(page, endpoint):
             assert endpoint.thumbnails == []
 
 
+@pytest.mark.slow
 async def test_a_failure_takes_nobody_away_from_another_frame(page, endpoint):
     await endpoint.broadcast(FINDING | {"tried": 60})
     await shows(page, "quadrille.state.finding?.running")

@@ -1,5 +1,6 @@
 """Widths of the panes and the 3-D view, and how the 3-D view folds away."""
 
+import pytest
 from page_driver import OPENED, shows, until
 
 SMALL = {"width": 1280, "height": 720}
@@ -12,6 +13,7 @@ async def widths(page):
     return pane["width"], (await scene.bounding_box())["width"] if await scene.is_visible() else 0
 
 
+@pytest.mark.slow
 async def test_the_3d_view_leaves_its_room_where_inspector_and_search_leave_none(page):
     await page.set_viewport_size(SMALL)
     await page.keyboard.press("b")

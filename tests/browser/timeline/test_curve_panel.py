@@ -39,6 +39,7 @@ async def place_of(page, frame, height=0.5):
     return x, box["y"] + height * box["height"]
 
 
+@pytest.mark.slow
 async def test_curves_are_sent_only_while_they_are_open(page, endpoint):
     assert await page.locator("#curves").is_hidden()
     assert not endpoint.heard("curves")
@@ -52,6 +53,7 @@ async def test_curves_are_sent_only_while_they_are_open(page, endpoint):
     assert [m["group"] for m in endpoint.heard("curves")] == ["arms", "legs", None]
 
 
+@pytest.mark.slow
 async def test_what_is_open_is_remembered(curves, endpoint):
     await curves.locator("#drawer-tabs").get_by_text("Torso", exact=True).click()
     await shows(curves, "quadrille.state.curves.group === 'torso'")
@@ -60,6 +62,7 @@ async def test_what_is_open_is_remembered(curves, endpoint):
     assert await curves.locator("#curves").is_visible()
 
 
+@pytest.mark.slow
 async def test_a_click_goes_to_the_frame_whichever_curve_is_there(curves, endpoint):
     for frame, height in ((77, 0.2), (55, 0.7)):
         endpoint.received.clear()
@@ -68,6 +71,7 @@ async def test_a_click_goes_to_the_frame_whichever_curve_is_there(curves, endpoi
         assert endpoint.heard("seek") == [{"type": "seek", "frame": frame}]
 
 
+@pytest.mark.slow
 async def test_curves_and_timeline_share_their_axis(curves, endpoint):
     x, _ = await place_of(curves, 93)
     box = await curves.locator("#timeline").bounding_box()
@@ -82,6 +86,7 @@ async def test_gaps_stay_open(curves):
         assert await curves.evaluate(DRAWN, [102, 118, index]) == 0
 
 
+@pytest.mark.slow
 async def test_the_legend_reads_values_and_switches_curves(curves, endpoint):
     switches = curves.locator(".legend-switch")
     assert [t.split("\n")[0] for t in await switches.all_inner_texts()] == [
@@ -103,6 +108,7 @@ async def test_the_legend_reads_values_and_switches_curves(curves, endpoint):
     assert await curves.evaluate(DRAWN, [0, 100, 1]) > 0
 
 
+@pytest.mark.slow
 async def test_angles_are_drawn_without_jumps_of_a_turn(curves):
     values = await curves.evaluate("[...quadrille.state.curves.series[2].values]")
     known = np.array([v for v in values if v is not None and np.isfinite(v)])
@@ -120,6 +126,7 @@ async def test_changes_are_taken_over_frame_by_frame(curves, endpoint):
     assert after[3] == pytest.approx(before[3] + 100.0, abs=1e-3)
 
 
+@pytest.mark.slow
 async def test_costs_have_a_curve_for_each_view(curves):
     await curves.locator("#drawer").get_by_text("Cost", exact=True).click()
     await shows(curves, "quadrille.state.curves.group === 'cost'")
@@ -128,6 +135,7 @@ async def test_costs_have_a_curve_for_each_view(curves):
     assert " px" in names[0]
 
 
+@pytest.mark.slow
 async def test_they_fit_a_small_screen(curves):
     await curves.set_viewport_size({"width": 1280, "height": 720})
     timeline = await curves.locator("#timeline").bounding_box()
@@ -159,6 +167,7 @@ class TestLong:
         assert 1_000 < points < 50_000
 
 
+@pytest.mark.slow
 async def test_the_landscape_says_why_it_is_empty(page, endpoint):
     await page.keyboard.press("v")
     waiting = page.locator("#landscape p")

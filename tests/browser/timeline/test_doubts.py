@@ -11,6 +11,7 @@ async def rows_of(page):
     return [row.split("\n") for row in await page.locator("#doubt-list .doubt").all_inner_texts()]
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_people=2)
 async def test_doubts_are_listed_by_severity_and_vanish_when_they_are_resolved(page, endpoint):
     await page.keyboard.press("Shift+L")
@@ -77,6 +78,7 @@ async def test_doubts_of_one_cause_are_one_entry(page, endpoint):
     await shows(page, f"{ROWS}.length === 2")
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_frames=1200)
 async def test_ten_entries_are_listed_before_more(page, endpoint):
     await replace_doubts(page, endpoint, {k: [0.05 + k / 3000, 0.0, 0.0, 0.0, 0.0] for k in range(100, 1100, 60)})
@@ -91,6 +93,7 @@ async def test_ten_entries_are_listed_before_more(page, endpoint):
     await shows(page, f"{ROWS}.length === 11")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["entry", "key"])
 async def test_going_to_a_doubt_selects_the_limb_and_zooms_the_views_that_show_it(page, endpoint, way):
     assert await page.evaluate("quadrille.state.views.every(({ zoom }) => zoom === 1)")

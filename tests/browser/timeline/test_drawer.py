@@ -6,6 +6,7 @@ from page_driver import OPENED, shows
 EMPTY = {"type": "timeline", "person": None, "cells": {}, "replace": True}
 
 
+@pytest.mark.slow
 async def test_a_drawer_opens_again_in_its_session_only_and_only_with_content(page, endpoint):
     await page.keyboard.press("c")
     await shows(page, "quadrille.state.drawer === 'arms'")
@@ -25,6 +26,7 @@ async def test_a_drawer_opens_again_in_its_session_only_and_only_with_content(pa
     assert await page.locator("#drawer").is_hidden()
 
 
+@pytest.mark.slow
 async def test_a_drawer_whose_content_is_gone_closes(page, endpoint):
     await page.keyboard.press("c")
     await shows(page, "quadrille.state.drawer === 'arms'")
@@ -58,6 +60,7 @@ async def test_a_search_drawer_without_searches_stays_as_opened(page, endpoint):
     assert await page.locator("#drawer").is_visible()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("endpoint", [{"n_people": 2}, {"n_people": 8}], indirect=True, ids=["2", "8"])
 @pytest.mark.parametrize("height", [720, 1080])
 async def test_no_lane_of_the_timeline_is_cut_off(page, endpoint, height):

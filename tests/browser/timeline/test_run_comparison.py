@@ -1,5 +1,6 @@
 """The drawer's comparison of the poses of a range with those that they replaced."""
 
+import pytest
 from page_driver import shows, until
 
 ROWS = "[...document.querySelectorAll('#run-comparison-rows tr')]"
@@ -48,6 +49,7 @@ async def test_a_range_is_compared_frame_by_frame(page, endpoint):
     await shows(page, f"{ROWS}[1].classList.contains('is-current') && !{ROWS}[0].classList.contains('is-current')")
 
 
+@pytest.mark.slow
 async def test_the_replaced_poses_are_taken_and_the_comparison_ends(page, endpoint):
     await open_comparison(page, endpoint)
     await page.locator("#run-comparison-take").click()

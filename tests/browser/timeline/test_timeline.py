@@ -85,6 +85,7 @@ async def test_keys_change_the_rate(page):
         await shows(page, f"quadrille.state.rate === {rate} && document.querySelector('#rate').value === '{rate}'")
 
 
+@pytest.mark.slow
 async def test_frames_that_would_come_late_are_skipped_or_waited_for(page, endpoint):
     endpoint.image_delay_s = 0.03  # 8 frames a second of 4 cameras
     _, skipping = await played(page, endpoint, lambda f: len(f) > 4)
@@ -95,6 +96,7 @@ async def test_frames_that_would_come_late_are_skipped_or_waited_for(page, endpo
     assert every == list(range(every[0], every[0] + len(every)))
 
 
+@pytest.mark.slow
 async def test_playing_ends_at_the_last_frame_and_begins_anew(page, endpoint):
     await go_to(page, 115)
     await page.keyboard.press("Space")
@@ -104,6 +106,7 @@ async def test_playing_ends_at_the_last_frame_and_begins_anew(page, endpoint):
     await page.keyboard.press("Space")
 
 
+@pytest.mark.slow
 async def test_a_loop_goes_round_the_marked_range(page, endpoint):
     await mark(page, 40, 46)
     await page.keyboard.press("Shift+Space")
@@ -115,6 +118,7 @@ async def test_a_loop_goes_round_the_marked_range(page, endpoint):
     await shows(page, "!quadrille.state.loops")
 
 
+@pytest.mark.slow
 async def test_a_hand_that_goes_elsewhere_while_it_plays_is_followed(page, endpoint):
     await page.keyboard.press("Space")
     await shows(page, "quadrille.state.shown.frame > 20")
@@ -127,6 +131,7 @@ async def test_a_hand_that_goes_elsewhere_while_it_plays_is_followed(page, endpo
         assert at < home_at or frame <= 30 * (at - home_at) + 1
 
 
+@pytest.mark.slow
 async def test_the_wheel_zooms_where_the_pointer_is(page):
     x, y = await place_of(page, 70)
     await page.mouse.move(x, y)
@@ -185,6 +190,7 @@ async def test_timeline_and_curves_share_the_zoom(page):
     await page.keyboard.press("c")
 
 
+@pytest.mark.slow
 async def test_the_menu_counts_what_there_is_to_go_to(page):
     await page.locator("#show-jumps").click()
     await page.keyboard.press("Escape")
@@ -204,6 +210,7 @@ async def test_the_menu_counts_what_there_is_to_go_to(page):
     assert await page.locator("#jump-menu").is_hidden()
 
 
+@pytest.mark.slow
 async def test_jumps_by_keys(page):
     for key, frame in (
         ("d", 44), ("d", 45), ("d", 45), ("Shift+D", 44), ("w", 60), ("w", 80), ("Shift+W", 60), ("Alt+n", 61),
@@ -220,6 +227,7 @@ async def test_a_double_click_marks_the_stretch_between_keyframes(page):
     await shows(page, "quadrille.state.range?.first === 80 && quadrille.state.range.last === 119")
 
 
+@pytest.mark.slow
 async def test_a_range_is_worked_on_from_its_bar(page, endpoint):
     assert await page.locator("#range-bar").is_hidden()
     await mark(page, 24, 36)
@@ -278,6 +286,7 @@ async def test_marks_of_the_shown_frame(page, endpoint):
     assert await page.locator("#toggle-reviewed").is_disabled()  # a keyframe is reviewed
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_people=2)
 async def test_the_legend_leaves_out_what_does_not_fit(page, endpoint):
     await page.set_viewport_size({"width": 1280, "height": 720})

@@ -33,6 +33,7 @@ async def place_of(page, frame):
     return box["x"] + 52 + (frame + 0.5) * (box["width"] - 60) / n_frames, box["y"] + box["height"] - 14
 
 
+@pytest.mark.slow
 async def test_a_run_is_watched_paused_and_stopped(page, endpoint):
     assert await page.locator("#track-pause").is_disabled()
     await page.locator("#track-forward").click()
@@ -126,6 +127,7 @@ async def test_statuses_differ_by_colour_and_by_height(page, scheme):
     assert found[15][1] + 2 < found[31][1] < found[50][1] - 2
 
 
+@pytest.mark.slow
 async def test_a_tooltip_says_what_the_tracker_thinks_of_each_limb(page):
     tip = page.locator("#cell-tip")
     await page.mouse.move(*await place_of(page, 31))
@@ -145,6 +147,7 @@ async def test_a_tooltip_says_what_the_tracker_thinks_of_each_limb(page):
     await tip.wait_for(state="hidden")
 
 
+@pytest.mark.slow
 async def test_doubtful_and_lost_frames_are_visited_one_after_the_other(page, endpoint):
     for frame in (31, 32, 50, 50):
         await page.keyboard.press("n")

@@ -76,6 +76,7 @@ def girths(body):
     return np.array([np.mean(parts[p].girths_m) for p in ("left_upper_arm", "left_forearm", "left_thigh", "left_calf")])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stoutness", [1.2, pytest.param(0.85, marks=pytest.mark.slow)])
 def test_height_and_girths_of_a_person_are_found(stoutness):
     person, model = person_of(stoutness), load_model("gavrila22", 1.78)
@@ -86,6 +87,7 @@ def test_height_and_girths_of_a_person_are_found(stoutness):
     assert found.overlap_after > found.overlap_before + 0.05
 
 
+@pytest.mark.slow
 def test_derivatives_agree_with_differences():
     model = load_model("gavrila34", 1.7)
     parameters = SizeParameters(model)

@@ -36,6 +36,7 @@ def on_surface(body, part):
     return unit[smooth], normals[smooth]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gavrila22_cones", pytest.param("gavrila34", marks=pytest.mark.slow)])
 def test_surface_points_move_as_their_derivatives_say(name):
     """Across the surface: along it a point with the same unit coordinates may slide."""
@@ -69,6 +70,7 @@ def _moved(body, pose, part, unit, parameter):
     return surface(body, pose, part, unit * low[:, None])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PRESETS)
 def test_points_move_as_their_derivatives_say(name):
     parameters, sizes, pose = staged(name)

@@ -85,6 +85,7 @@ def test_what_is_not_seen_stays_as_uncertain_as_before():
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), parameters.sigmas, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_only_the_kinds_of_a_round_change():
     person, model = other_body(), load_model("gavrila22", 1.7)
     parameters = SizeParameters(model)
@@ -106,6 +107,7 @@ def test_the_fit_can_be_stopped():
         )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_frames_that_differ_are_chosen():
     """Of nine frames alike and three unlike them, the three and one of the others."""
     model = load_model("gavrila34", 1.7)
@@ -167,6 +169,7 @@ def test_a_body_where_nobody_is_gets_no_sizes():
         acquire_from_contours(staged, {}, 0, {}, AcquisitionSettings())
 
 
+@pytest.mark.slow
 def test_the_height_of_a_child_is_the_stature():
     """Head and legs have other shares of the stature: the unit of the fractions is not how tall the child is."""
     model = load_model("gavrila22", 1.1)

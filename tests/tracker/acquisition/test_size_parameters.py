@@ -39,6 +39,7 @@ def test_zero_is_the_body_itself(name):
     assert same.height_m == pytest.approx(model.height_m)
 
 
+@pytest.mark.slow
 @each_model
 @pytest.mark.parametrize("coupled", [True, False])
 def test_derivatives_are_those_of_differences(name, coupled):

@@ -84,6 +84,7 @@ def moved(model, values, limb, n, seed=0):
     return model.clip(model.retract(values, steps))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["left_forearm", "right_calf"])
 def test_a_look_is_what_its_definition_says(gavrila, couple, name):
     """All but a few samples at the border of an occluder, where the cells of the image are coarser."""

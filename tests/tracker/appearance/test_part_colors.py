@@ -166,6 +166,7 @@ def darker(views, share=0.6):
     return [replace(v, colors=(v.colors * share).astype(np.uint8)) for v in views]
 
 
+@pytest.mark.slow
 def test_colours_follow_the_light(gavrila, stand, seen):
     """The light fades step by step: colours learnt along the way still match, colours learnt once do not."""
     colors, first = seen

@@ -44,6 +44,7 @@ def test_kinematics_against_the_definition(model):
         np.testing.assert_allclose(model.kinematics(values).Ts_world_part, slow_kinematics(model, values), atol=1e-12)
 
 
+@pytest.mark.slow
 @each_model
 @pytest.mark.parametrize("seed", range(5))
 def test_point_jacobian_against_finite_differences(model, seed):
@@ -64,6 +65,7 @@ def test_point_jacobian_against_finite_differences(model, seed):
         np.testing.assert_allclose(J[:, :, i], numeric, atol=1e-8, err_msg=model.dof_names[i])
 
 
+@pytest.mark.slow
 @each_model
 @given(seed=seeds)
 def test_difference_undoes_retract(model, seed):
@@ -75,6 +77,7 @@ def test_difference_undoes_retract(model, seed):
     np.testing.assert_allclose(model.difference(values, values), 0, atol=1e-12)
 
 
+@pytest.mark.slow
 @each_model
 @given(seed=seeds)
 def test_clip_puts_within_limits_once_and_for_all(model, seed):
@@ -89,6 +92,7 @@ def test_clip_puts_within_limits_once_and_for_all(model, seed):
     np.testing.assert_allclose(calm, model.neutral(), atol=1e-12)
 
 
+@pytest.mark.slow
 @given(seed=seeds)
 def test_clipped_ball_is_within_cone_and_twist(seed):
     model = MODELS["balls"]

@@ -23,6 +23,7 @@ def placed(model, values):
     return shapes, model.named_points_world(values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "part"), CASES)
 def test_any_part_may_be_the_root(name, part):
     model = MODELS[name]

@@ -56,6 +56,7 @@ def test_numbers_with_names_of_their_own(tmp_path):
         read_cameras(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("form", ["wxyz", "xyzw"])
 def test_quaternions_of_other_conventions(tmp_path, form, convention):
@@ -71,6 +72,7 @@ def test_quaternions_of_other_conventions(tmp_path, form, convention):
     assert_places(path, poses=convention)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ring", *map(in_full, ["arc", "corners", "row", "pair"])])
 def test_quaternions_of_random_rigs_are_read_right_or_asked_about(tmp_path, kind):
     rng, asked = np.random.default_rng(3), {None: 0, "world-to-camera": 0}
@@ -122,6 +124,7 @@ def test_angles_in_place_of_rotation_vectors_are_refused(tmp_path, order, conven
         read_cameras(written(tmp_path, lay))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["arc", *map(in_full, ["ring", "corners", "row", "pair", "turned by 90 degrees"])])
 def test_rotation_vectors_are_not_taken_for_angles(tmp_path, kind):
     rng = np.random.default_rng(4)
@@ -232,6 +235,7 @@ def turned_away(T):
     return T @ rigid.transform(rigid.so3_exp(np.array([0.0, np.pi / 3, 0.0])))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [rigid.inverse, turned_away, lambda T: np.eye(4)])
 @pytest.mark.parametrize("kind", ["ring", *map(in_full, ["arc", "corners"])])
 def test_one_camera_whose_pose_is_wrong_is_named(tmp_path, kind, change):

@@ -66,6 +66,7 @@ def test_the_name_of_the_file_does_not_matter(tmp_path, name):
     assert layout.name == name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("convention", CONVENTIONS)
 @pytest.mark.parametrize("name", [n for n in WRITERS if not n.startswith("Kalibr")])
 def test_a_wrong_convention_is_named_in_each_layout(tmp_path, name, convention):

@@ -28,6 +28,7 @@ YES = [True, 1, 1.0, "1", "true", "True", "yes", "YES"]
 NO = [False, 0, 0.0, "0", "false", "no", None, "null"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

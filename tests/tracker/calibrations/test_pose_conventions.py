@@ -15,6 +15,7 @@ EXPECTED = "poses that map world to camera"
 KINDS = ("ring", "arc", "corners", "row", "pair", "turned by 90 degrees")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_random_rigs(kind):
     rng, counts = np.random.default_rng(5), Counter()
@@ -100,6 +101,7 @@ UNUSUAL = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", UNUSUAL)
 def test_right_poses_of_unusual_rigs_are_read(name):
     rng, refused = np.random.default_rng(9), 0

@@ -63,6 +63,7 @@ def kernel():
     return double_twice
 
 
+@pytest.mark.slow
 def test_an_interpreted_kernel_compiles_nothing(kernel):
     with interpreted():
         assert kernel(np.ones(3)) == 12
@@ -88,6 +89,7 @@ def test_a_context_in_another_ends_alone():
     assert not is_interpreted("any")
 
 
+@pytest.mark.slow
 def test_chosen_modules_are_interpreted_in_all_threads(kernel):
     interpret_modules(__name__)
     try:

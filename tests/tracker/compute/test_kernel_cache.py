@@ -144,6 +144,7 @@ def test_the_key_changes_with_what_a_kernel_reaches(clone, name, old, new, chang
     assert {k for k in before if before[k] != after[k]} == changed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new"),
     [
@@ -157,6 +158,7 @@ def test_what_cannot_be_followed_has_no_key(clone, old, new):
         clone.keys()
 
 
+@pytest.mark.slow
 def test_a_kernel_depends_on_the_kernels_of_other_files(tmp_path):
     """Kernels of part_edges.py compile one of visibility.py into themselves; kernels of images need none of it."""
     copy = Path(shutil.copytree(SOURCE, tmp_path / "tracker", ignore=shutil.ignore_patterns("__pycache__")))

@@ -59,6 +59,7 @@ def dense(pieces_px):
     return (pieces_px[:, :2] + t * (pieces_px[:, 2:] - pieces_px[:, :2])).reshape(-1, 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLIDS)
 def test_outline_is_that_of_a_dense_mesh(name):
     rng = np.random.default_rng(4)

@@ -96,6 +96,7 @@ def afresh(staged, bodies, person=0):
     return ContourResiduals(views, bodies, person, settings, THETA, everywhere=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("person", range(N_PEOPLE))
 def test_pose_after_pose_costs_what_each_costs_by_itself(gavrila, staged, person):
     views, start, settings = staged

@@ -57,6 +57,7 @@ def depths_along(shape, points, eye, s):
     return shape.inside_outside(points + s[..., None] * (eye - points)) ** (1 / shape.degree)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PARTS)
 @pytest.mark.parametrize("eye", [(3.0, 0.5, 0.8), (0.3, 0.2, 2.5), (0.0, 0.0, 3.0), (2.0, 0.0, 0.0)])
 def test_lines_of_sight_are_blocked_where_they_meet_the_solid(name, eye):

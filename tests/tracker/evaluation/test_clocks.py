@@ -63,6 +63,7 @@ def files(draw):
     return file, fps, n_frames, truth
 
 
+@pytest.mark.slow
 @given(files())
 def test_a_row_lies_at_its_frame_or_the_file_is_asked_about(case):
     file, fps, n_frames, truth = case

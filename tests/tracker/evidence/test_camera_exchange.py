@@ -46,6 +46,7 @@ def exchanged(i, j, sources=None, side=True):
     return order, sources
 
 
+@pytest.mark.slow
 def test_the_right_assignment_passes(frames):
     sources = load_session(SAMPLE).cameras
     damaged = {k: [None, *views[1:]] if k == 16 else views for k, views in frames.items()}
@@ -53,6 +54,7 @@ def test_the_right_assignment_passes(frames):
     assert find_exchange(sources[:1], Frames(frames)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pair", "side"), [((0, 3), True), ((1, 2), False)])
 def test_exchanged_footage_is_named(frames, pair, side):
     order, sources = exchanged(*pair, side=side)
@@ -63,6 +65,7 @@ def test_exchanged_footage_is_named(frames, pair, side):
     assert "seems to be exchanged" in found.text
 
 
+@pytest.mark.slow
 def test_a_body_that_is_seen_only_with_two_exchanged(frames):
     points_world = read_trc(SAMPLE / "truth.trc").points[0]
     sources = load_session(SAMPLE).cameras

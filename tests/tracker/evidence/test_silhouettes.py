@@ -113,6 +113,7 @@ def test_a_damaged_frame_shows_nobody(camera):
     assert silhouette.source == "none"
 
 
+@pytest.mark.slow
 def test_large_footage_is_reduced(tmp_path):
     footage = tmp_path / "cam"
     footage.mkdir()

@@ -83,6 +83,7 @@ def off_square(view, outline_world):
 LENS = np.array([-0.1, 0.02, 0.001, -0.001])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "size", [(640, 480), (1023, 771), *(pytest.param(s, marks=pytest.mark.slow) for s in ((1920, 1080), (1080, 1920)))]
 )
@@ -173,6 +174,7 @@ def person_boxes(real_frame, cameras, margin_px=60):
     return boxes
 
 
+@pytest.mark.slow
 def test_the_background_keeps_edges_to_the_person(sample, real_frame):
     session, recording = sample
     boxes = person_boxes(real_frame, [c.camera for c in session.cameras])
@@ -184,6 +186,7 @@ def test_the_background_keeps_edges_to_the_person(sample, real_frame):
         assert 200 < len(view.points_px) < 2000
 
 
+@pytest.mark.slow
 def test_masks_go_before_the_background(sample, tmp_path, real_frame):
     session, recording = sample
     cameras = [c.camera for c in session.cameras]
@@ -226,6 +229,7 @@ def test_a_background_of_another_size(sample, tmp_path):
         Observer(cameras, recording)
 
 
+@pytest.mark.slow
 def test_same_frame_twice_is_the_same(sample):
     session, recording = sample
     observer = Observer(session.cameras, recording)
@@ -268,6 +272,7 @@ def test_views_can_be_looked_at_in_part_or_whole(sample):
     assert [v.corner_px for v in views] == [(100, 50), (0, 0), (0, 0), (600, 440)]
 
 
+@pytest.mark.slow
 def test_settings_say_which_edges_are_found(sample):
     session, recording = sample
     observer = Observer(session.cameras, recording)
@@ -413,6 +418,7 @@ def test_the_silhouette_and_its_contour_are_evidence(sample, real_frame):
     assert all(view.silhouette is None for view in bare)
 
 
+@pytest.mark.slow
 def test_a_broken_background_is_not_trusted(sample, tmp_path):
     session, recording = sample
     first = session.cameras[0]
@@ -426,6 +432,7 @@ def test_a_broken_background_is_not_trusted(sample, tmp_path):
     assert broken.trust < good.trust - 0.3
 
 
+@pytest.mark.slow
 def test_exposure_that_changed_is_made_up_for(sample, tmp_path):
     session, recording = sample
     first = session.cameras[0]

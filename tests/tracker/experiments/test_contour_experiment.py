@@ -79,6 +79,7 @@ def test_a_tracker_follows_the_own_shape():
     assert found.before_px[1:].mean() > 2 * found.after_px.mean()
 
 
+@pytest.mark.slow
 def test_priors_pull_less_where_the_body_fits_well():
     """The own shape fits to a fraction of a pixel; a person of another shape does not, and is tracked as before."""
     on, off = (ContourSettings(recover=None, measure_noise=m) for m in (True, False))

@@ -69,6 +69,7 @@ def test_against_rows_built_one_by_one(model, match, seed):
     np.testing.assert_allclose(found.gradient / scales(found), numeric / scales(found), atol=1e-3)
 
 
+@pytest.mark.slow
 @each_model
 @each_direction
 def test_hessian_is_positive_semidefinite(model, match):
@@ -79,6 +80,7 @@ def test_hessian_is_positive_semidefinite(model, match):
         assert np.linalg.eigvalsh(found.hessian).min() > -1e-9 * found.hessian.max()
 
 
+@pytest.mark.slow
 @each_model
 @each_direction
 def test_gradient_is_the_slope_of_the_cost(model, match):
@@ -102,6 +104,7 @@ def test_gradient_is_the_slope_of_the_cost(model, match):
     assert numeric @ gradient / (gradient @ gradient) == pytest.approx(1, abs=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("person", [0, 1])
 @each_direction
 def test_the_others_hide_and_draw_edges(gavrila, person, match):
@@ -148,6 +151,7 @@ AMBIGUOUS = {("mikic10", 0)}
 """Elbows that are balls without limits: another pose of the arms draws the same outline, to 2% of the cost at first."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "seed"),
     [

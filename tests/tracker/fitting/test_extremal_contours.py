@@ -36,6 +36,7 @@ def test_zero_reference_kinematics_place_the_parts_alike(name):
         np.testing.assert_allclose(model.kinematics(values).Ts_world_part, expected, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", REVOLUTE)
 def test_the_jacobian_of_a_chain(name):
     """J_H of Eq. 43-54 equals central differences of the part's motion, and the Jacobian of points that runs."""
@@ -117,6 +118,7 @@ def test_extremal_contours_move_as_their_jacobian_says(block):
     assert done >= 250
 
 
+@pytest.mark.slow
 def test_sliding_does_not_move_a_contour_across_itself():
     """The tangent plane holds the line of sight: along the contour's normal the sliding motion is zero to 1e-9."""
     flagged = 0
@@ -182,6 +184,7 @@ def row_of_kernels(part, values, camera, point_world, normal_px, x, slope=None):
     return gradient, hessian
 
 
+@pytest.mark.slow
 def test_kernels_agree_with_the_reference():
     """The rows that the kernels sum are normal . J_I (A + B) J_H of Eq. 55, to 1e-3."""
     reference = ZeroReference(BODY, np.zeros(6))
@@ -193,6 +196,7 @@ def test_kernels_agree_with_the_reference():
         np.testing.assert_allclose(hessian, np.outer(row, row), atol=1e-3 * np.abs(row).max() ** 2)
 
 
+@pytest.mark.slow
 def test_the_kernel_of_the_sliding_term_agrees_with_the_reference():
     """The rows that the kernel sums are dD/dx . J_I (A + B) J_H of Eq. 55 for any slope of the distance, to 1e-3."""
     reference, rng, slides = ZeroReference(BODY, np.zeros(6)), np.random.default_rng(5), 0

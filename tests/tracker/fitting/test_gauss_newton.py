@@ -256,6 +256,7 @@ def test_fit_to_points_recovers_poses_from_their_own_joints(seed):
     assert np.degrees(np.arccos(np.clip(np.sum(axes[0] * axes[1], axis=1), -1, 1))).max() < 1
 
 
+@pytest.mark.slow
 def test_other_sizes_are_fitted_as_well_as_they_can():
     values = GAVRILA.neutral()
     targets = points_of(GAVRILA, values)
@@ -265,6 +266,7 @@ def test_other_sizes_are_fitted_as_well_as_they_can():
     assert 0.01 < off(shorter, found.pose, targets).mean() < 0.05
 
 
+@pytest.mark.slow
 def test_a_longer_trunk_is_not_bent_to_be_shorter():
     """Shoulders 4 cm below those of this body: buckling the trunk would bring it nearer, but is unnatural."""
     model = load_model("gavrila34")

@@ -79,6 +79,7 @@ def test_every_kind_of_block_counts(staged, n_blocks):
     assert last.cost > 0.1 or np.isinf(staged.model.spreads).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [{}, {"tolerance": 0.02}, {"gain": 5.0}])
 def test_every_step_is_that_of_the_readable_version(staged, how):
     """Step by step: costs of images are rough, so after a dozen steps rounding may lead elsewhere."""
@@ -109,6 +110,7 @@ class Asked:
         return gauss_newton.NormalEquations(0.0, np.zeros(model.n_dofs), np.zeros((model.n_dofs, model.n_dofs)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("how", [{}, {"tolerance": 1e-3}, {"gain": 1.0}, {"gain": 10.0}])
 def test_whole_descents_without_images_are_the_same(staged, seed, how):

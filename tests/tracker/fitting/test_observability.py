@@ -133,6 +133,7 @@ def test_a_second_camera_helps_most_from_the_side():
     np.testing.assert_allclose(np.linalg.norm(best.camera.center_world - body.points_world.mean(axis=0)), 4.0, rtol=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gavrila22", "knossow54"])
 def test_every_degree_of_freedom_has_a_sentence(name):
     model = load_model(name, 1.7)

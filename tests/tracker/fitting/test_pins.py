@@ -96,6 +96,7 @@ def test_exact_views_meet_in_the_point():
     assert found.why == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 3, 4])
 def test_noisy_views_scatter_as_their_geometry_says(n):
     """The mean squared error of 400 triangulations against the covariance of the linearized problem, to 15%."""

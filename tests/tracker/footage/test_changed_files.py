@@ -35,6 +35,7 @@ def cut(path, share):
         file.truncate(int(path.stat().st_size * share))
 
 
+@pytest.mark.slow
 def test_nothing_is_read_from_a_closed_container(clip):
     """In a process of its own: libav would read a null pointer."""
     words = "import sys; from pathlib import Path; from tracker.footage.video_decoder import VideoDecoder;"
@@ -43,6 +44,7 @@ def test_nothing_is_read_from_a_closed_container(clip):
     assert (done.returncode, done.stdout.strip()) == (0, "end"), done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
 def test_a_truncated_video_is_an_error_until_it_is_back(clip, video, share):
     whole = clip.read_bytes()
@@ -67,6 +69,7 @@ def test_a_removed_video_is_an_error_until_it_is_back(clip, video, tmp_path):
     assert video.version == 0  # the same file
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("in_place", [False, True])
 def test_a_video_replaced_by_one_of_the_same_frames_is_read_anew(clip, video, tmp_path, in_place):
     video.read(30)

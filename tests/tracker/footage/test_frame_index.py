@@ -57,6 +57,7 @@ def test_a_video_that_was_changed_is_listed_again(clip, tmp_path, listed):
     assert len(listed) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 half a file", b"nothing of the kind"])
 def test_a_damaged_list_is_made_again(clip, tmp_path, listed, damage):
     frames(clip, tmp_path / "kept")

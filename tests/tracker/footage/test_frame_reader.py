@@ -44,6 +44,7 @@ def decoded_backward(video, decoded, step=1):
     return decoded[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [1, 2])
 @pytest.mark.parametrize("gop", [12, 60])
 def test_a_group_is_decoded_once_on_the_way_back(tmp_path, decoded, gop, step):
@@ -110,6 +111,7 @@ def videos(folder):
     return path, [video.read(k) for k in range(N)]
 
 
+@pytest.mark.slow
 @given(order=st.lists(st.integers(0, N - 1), max_size=30), room=st.integers(0, 25))
 @settings(max_examples=30)
 def test_frames_do_not_depend_on_the_order(tmp_path_factory, order, room):

@@ -85,6 +85,7 @@ def test_it_cannot_be_written(proxy, clip, tmp_path):
         make(proxy, clip)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "damage", [b"[" * 100_000, b"{", b"[1]", b'{"version": "1"}', b"\xff"], ids=lambda d: str(d[:6])
 )

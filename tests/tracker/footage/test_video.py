@@ -69,6 +69,7 @@ def test_random_access_does_not_start_from_the_beginning(tmp_path, name, monkeyp
         assert abs(number(video.read(k)) - k) <= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["mp4", "mkv"])
 def test_video_cut_at_an_open_group(tmp_path, suffix):
     """Leading frames that need what has been cut away cannot be shown, and so are not counted."""
@@ -96,6 +97,7 @@ def with_edit(path, skip, ticks_per_frame=512, duration_ms=None):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("skip", [1, 7, 12, 17])
 def test_edit_lists(tmp_path, skip):
     path = with_edit(encode(tmp_path / "a.mp4"), skip)
@@ -118,6 +120,7 @@ def test_video_that_starts_before_zero(tmp_path):
     assert_same_in_any_order(path, frames)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rotation", [0, 90, 180, -90])
 def test_display_rotation_turns_as_opencv_does(tmp_path, rotation):
     path = encode(tmp_path / "a.mp4", rotation=rotation)
@@ -176,6 +179,7 @@ def test_variable_rate_is_noticed(tmp_path):
     assert not VideoFile(encode(tmp_path / "a.mp4", times=times), "cam").has_constant_rate
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("late", "jitter", "gaps"), [(0, 0.0, 0), (90, 0.0, 0), (0, 0.15, 0), (0, 0.0, 2)])
 def test_start_jitter_and_gaps_of_time_stamps(tmp_path, late, jitter, gaps):
     times = 3000 * np.arange(N) + np.round(3000 * jitter * np.array([(-1) ** k for k in range(N)])).astype(int)
@@ -211,6 +215,7 @@ def test_out_of_range_names_the_range(tmp_path, k):
         VideoFile(encode(tmp_path / "a.mp4"), "cam").read(k)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "settings"),
     [
@@ -281,6 +286,7 @@ def test_time_stamps_out_of_order(tmp_path):
         VideoFile(path, "cam")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cam01", *(pytest.param(f"cam0{i}", marks=pytest.mark.slow) for i in (2, 3, 4))])
 def test_real_footage(data_folder, name):
     video = VideoFile(data_folder("balance_real") / f"{name}.mp4", name)

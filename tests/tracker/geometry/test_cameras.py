@@ -138,6 +138,7 @@ PAIRS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pair", PAIRS)
 def test_epipolar_segment_is_where_the_ray_is_seen(pair):
     source, target = PAIRS[pair]

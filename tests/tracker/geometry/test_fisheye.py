@@ -74,6 +74,7 @@ def test_rays_are_those_of_opencv(lens):
     np.testing.assert_allclose(rays[ahead, :2] / rays[ahead, 2:], expected, rtol=1e-6, atol=1e-8)
 
 
+@pytest.mark.slow
 @given(
     st.floats(150, 2000),
     st.floats(-0.05, 0.1),
@@ -139,6 +140,7 @@ def test_the_undistorted_picture_holds_the_footage_up_to_its_angle(lens):
     assert kept > 0.6
 
 
+@pytest.mark.slow
 @lenses
 def test_undistorted_image_shows_each_point_where_the_pinhole_sees_it(lens):
     c = fisheye(lens, skew=4.0)

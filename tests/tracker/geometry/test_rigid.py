@@ -53,6 +53,7 @@ def test_turns_about_one_axis_add(axis, a, b):
     close(rigid.so3_exp(axis * a) @ rigid.so3_exp(axis * b), rigid.so3_exp(axis * (a + b)))
 
 
+@pytest.mark.slow
 @given(rotvecs)
 def test_quaternions_and_matrices_agree(rotvec):
     q, R = rigid.quaternion_exp(rotvec), rigid.so3_exp(rotvec)
@@ -64,6 +65,7 @@ def test_quaternions_and_matrices_agree(rotvec):
     close(rigid.matrix_from_quaternion(back), R)
 
 
+@pytest.mark.slow
 @given(rotvecs, rotvecs, rotvecs)
 def test_quaternion_product(a, b, c):
     qa, qb, qc = (rigid.quaternion_exp(v) for v in (a, b, c))
@@ -74,6 +76,7 @@ def test_quaternion_product(a, b, c):
     )
 
 
+@pytest.mark.slow
 @given(transforms, transforms, transforms)
 def test_group_laws(a, b, c):
     close((a @ b) @ c, a @ (b @ c), atol=1e-10)
@@ -82,6 +85,7 @@ def test_group_laws(a, b, c):
     close(rigid.inverse(a @ b), rigid.inverse(b) @ rigid.inverse(a), atol=1e-10)
 
 
+@pytest.mark.slow
 @given(transforms, transforms, vectors)
 def test_apply_composes(T_a_b, T_b_c, point_c):
     close(rigid.apply(T_a_b @ T_b_c, point_c), rigid.apply(T_a_b, rigid.apply(T_b_c, point_c)), atol=1e-10)

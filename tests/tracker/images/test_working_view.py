@@ -24,6 +24,7 @@ def smooth_picture(size, seed=0):
     return cv2.resize(coarse, size, interpolation=cv2.INTER_CUBIC)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(640, 480), (1088, 1920), (1280, 960), (700, 500)])
 @lenses
 def test_regions_are_parts_of_the_whole(size, lens):
@@ -36,6 +37,7 @@ def test_regions_are_parts_of_the_whole(size, lens):
         np.testing.assert_array_equal(view.image(frame, region), whole[v0:v1, u0:u1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(640, 480), (1088, 1920)])
 @lenses
 def test_matched_pixels_show_what_the_matched_camera_sees(size, lens):
@@ -52,6 +54,7 @@ def test_matched_pixels_show_what_the_matched_camera_sees(size, lens):
         np.testing.assert_allclose(seen[mv, mu, :2], expected, atol=2)
 
 
+@pytest.mark.slow
 @lenses
 def test_a_mask_keeps_its_place(lens):
     source = with_lens(camera_at("c", (4, 0, 0), size=(1280, 960)), lens)
@@ -72,6 +75,7 @@ def test_no_black_frame_where_the_lens_leaves_the_picture():
     assert (seen == 200).all()
 
 
+@pytest.mark.slow
 @lenses
 @pytest.mark.parametrize("scale", [1.0, 0.61, 0.5, 0.23])
 def test_another_scale_shows_the_undistorted_image_reduced(lens, scale):

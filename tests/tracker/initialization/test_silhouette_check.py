@@ -27,6 +27,7 @@ def changed(body, **dofs):
     return PosedBody(body.model, values)
 
 
+@pytest.mark.slow
 def test_a_right_start_passes(scene):
     check = check_against_silhouettes(*scene)
     assert check.cameras == ("c0", "c1", "c2", "c3")

@@ -20,6 +20,7 @@ def off_m(body, truth):
     return float(np.linalg.norm(body.points_world - truth.points_world, axis=1).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 3, 6])
 def test_a_trunk_that_turned_the_wrong_way_is_found_again(monkeypatch, seed):
     truth = PosedBody(MODEL, posed(MODEL, seed))

@@ -30,6 +30,7 @@ def motion(order, n, seed):
     return middle + np.vander(times, order + 1) @ rates
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [0, 1, 2])
 @pytest.mark.parametrize("window", [3, 4, 7])
 @given(seed=st.integers(0, 10_000))

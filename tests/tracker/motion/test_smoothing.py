@@ -54,6 +54,7 @@ def errors(model, poses, truth):
     return np.linalg.norm(error, axis=-1).mean(), np.linalg.norm(acceleration, axis=-1).mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gavrila34", "gavrila22", "balls"])
 def test_noise_falls_and_its_acceleration_more(name):
     model = MODELS[name]
@@ -75,6 +76,7 @@ def test_keyframes_are_bit_identical_and_their_neighbours_follow_them():
     assert of_frames[[16, 18]].mean() < of_frames[20:36].mean()
 
 
+@pytest.mark.slow
 def test_a_turn_goes_on_through_half_a_turn():
     """Angles that jump by a whole turn are the same rotation."""
     twist = MODEL.dof_names.index("torso.twist")
@@ -99,6 +101,7 @@ def test_limits_are_kept():
     assert (found <= high).all()
 
 
+@pytest.mark.slow
 def test_a_lost_limb_follows_its_motion_before_and_after():
     truth = motion(MODEL, 40)
     track = noisy(MODEL, truth)
@@ -129,6 +132,7 @@ def test_lost_frames_are_interpolated_but_not_extrapolated():
     assert np.abs(found[12:14, :3] - truth[12:14, :3]).max() < 0.05
 
 
+@pytest.mark.slow
 def test_a_gap_in_time_counts():
     """Frames two steps apart move twice as far: smoothed at the times they have, they do not lag."""
     truth = motion(MODEL, 50)
@@ -141,6 +145,7 @@ def test_a_gap_in_time_counts():
     assert after_m < 0.75 * before_m
 
 
+@pytest.mark.slow
 def test_blocks_give_what_one_piece_gives(monkeypatch):
     truth = motion(MODEL, 70)
     track = noisy(MODEL, truth)

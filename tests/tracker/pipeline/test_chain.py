@@ -124,6 +124,7 @@ def test_smoothing_joins_both_directions_and_keeps_the_start(opened, found, walk
     assert all(poses[k].settings["smooth"] for k in (0, 1, 2, 4, 5))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 3, 4])
 def test_a_stopped_chain_goes_on_where_it_was(opened, found, walkers, n):
     """In the first leg, between the legs, and in the second."""

@@ -94,6 +94,7 @@ def test_the_share_that_is_done_counts_the_frames_that_will_be_tried():
     assert expected_steps(2, 2, 1) == 2
 
 
+@pytest.mark.slow
 def test_a_stop_is_heard_between_two_fits_of_a_frame(session, silhouettes, monkeypatch):
     silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
     is_stopping = False
@@ -119,6 +120,7 @@ def test_a_stop_is_heard_between_two_fits_of_a_frame(session, silhouettes, monke
     assert len(fitted) == 1
 
 
+@pytest.mark.slow
 def test_a_generator_is_added_by_an_entry_and_tried_where_the_others_propose_nothing(
     session, silhouettes, fits, monkeypatch
 ):
@@ -139,6 +141,7 @@ def test_a_generator_is_added_by_an_entry_and_tried_where_the_others_propose_not
     assert [text.split(":")[0] for text in said] == [f"frame 3, {name}" for name in GENERATORS]
 
 
+@pytest.mark.slow
 def test_two_frames_that_agree_end_the_trial(session, silhouettes, fits, monkeypatch):
     silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
     tried = list[int]()
@@ -155,6 +158,7 @@ def test_two_frames_that_agree_end_the_trial(session, silhouettes, fits, monkeyp
     assert tried == frames
 
 
+@pytest.mark.slow
 def test_nobody_in_the_silhouettes(session, silhouettes):
     silhouettes += [s._replace(mask=np.zeros_like(s.mask)) for s in silhouettes_of_figure(figure()[0], CAMERAS)]
     with pytest.raises(TrackerError, match="expected somebody in the silhouettes of at least 2 views, found none"):
@@ -169,6 +173,7 @@ def test_two_people_where_one_was_announced(session, silhouettes):
         find(session)
 
 
+@pytest.mark.slow
 def test_a_camera_that_moved_is_named(session, silhouettes, fits, monkeypatch):
     monkeypatch.setattr(own_figure, "_MAX_HULL_M3", 0.5)  # three views leave a wide hull
     views = silhouettes_of_figure(figure()[0], CAMERAS)
@@ -207,6 +212,7 @@ def off_by(places, monkeypatch):
     monkeypatch.setattr(first_pose, "StartFitter", fitter(track))
 
 
+@pytest.mark.slow
 def test_a_body_in_empty_space_is_refused(session, silhouettes, monkeypatch):
     silhouettes += silhouettes_of_figure(figure(noise=0.1)[0], CAMERAS)
     off_by([0.6] * 10, monkeypatch)
@@ -214,6 +220,7 @@ def test_a_body_in_empty_space_is_refused(session, silhouettes, monkeypatch):
         find(session)
 
 
+@pytest.mark.slow
 def test_another_start_takes_its_place(session, silhouettes, monkeypatch):
     silhouettes += silhouettes_of_figure(figure(noise=0.1)[0], CAMERAS)
     off_by([0.6] + [0.0] * 9, monkeypatch)
@@ -252,6 +259,7 @@ def test_legs_that_look_like_shadows_are_found(session, silhouettes, monkeypatch
     assert find(session).is_good
 
 
+@pytest.mark.slow
 def test_a_start_that_one_view_contradicts_is_doubtful(session, silhouettes, fits, monkeypatch):
     silhouettes += silhouettes_of_figure(figure(noise=0.1)[0], CAMERAS)
     painted = first_pose.figure_masks

@@ -145,6 +145,7 @@ def test_locked_degrees_of_freedom_keep_their_values(session, store):
     np.testing.assert_array_equal(x_of(store), before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [3, 9, N])
 def test_a_resumed_run_ends_like_one_without_a_break(session, store, n):
     track(session, store)

@@ -13,6 +13,7 @@ def place(model, values, point):
     return model.points_world(values)[model.point_names.index(point)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("up", list(UP_ROTATIONS))
 def test_standing_pose(gavrila, up):
     """The default pose is upright along the up axis, where the cameras look, for any axes of the world."""

@@ -33,6 +33,7 @@ def pose(gavrila):
     return values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("point", ["left_wrist", "right_wrist", "left_elbow", "left_ankle", "right_ankle", "left_knee"])
 @pytest.mark.parametrize("seed", range(4))
 def test_a_dragged_joint_stays_under_the_pointer(gavrila, pose, point, seed):
@@ -211,6 +212,7 @@ LIMBS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gavrila22", "gavrila22_cones", "gavrila34", "knossow54"])
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])
 def test_no_drag_of_a_limb_moves_another(name, seed):

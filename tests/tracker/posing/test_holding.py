@@ -70,6 +70,7 @@ def test_a_placed_end_stays_while_the_middle_turns_about_it_and_the_other_way_ro
     assert away(model, dragged(model, values, FRONT, end, by_px, {middle: BOTH}), values, middle)[0] < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gavrila22", "gavrila34"])
 @pytest.mark.parametrize("seed", range(3))
 def test_no_drag_of_a_limb_moves_another_whatever_is_held(name, seed):
@@ -113,6 +114,7 @@ def test_a_second_view_keeps_where_the_first_one_placed_a_point(model, point):
         assert second_px(first, {point: [first]}) < 0.5 * second_px(first, {})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_an_ankle_drag_bends_the_knee_forwards(model, seed):
     rng = np.random.default_rng(seed)
@@ -170,6 +172,7 @@ def test_an_elbow_that_is_raised_from_a_hanging_arm_arrives(model):
     assert np.linalg.norm(place(model, moved, "left_elbow") - goal) < 0.06
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("point", ["left_shoulder", "right_shoulder", "left_hip"])
 @pytest.mark.parametrize("way", [(40, -30), (-60, 80), (5, 200)])
 def test_a_shoulder_or_hip_turns_the_body_about_the_vertical_and_never_tilts_it(model, point, way):

@@ -280,6 +280,7 @@ def test_limbs_apart(gavrila):
     assert [s.group for s in stages([ball], COARSE_SEARCH)] == list(ball.search_groups)
 
 
+@pytest.mark.slow
 def test_a_refinement_makes_up_for_a_short_search(gavrila, views, truth):
     """From 8 degrees and 5 cm off in every degree of freedom, where a refinement alone fails."""
 

@@ -201,6 +201,7 @@ def test_different_lengths(room):
     assert_refused(room, RecordingError, "'front' 9, 'left' 12", offsets={"left": 1})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("longer", "offsets", "n"), [("left", {}, 9), ("front", {}, 9), ("left", {"front": 2}, 7)])
 def test_frames_that_all_cameras_have(room, longer, offsets, n):
     encode(room / f"{longer}.mp4", n=12)
@@ -417,6 +418,7 @@ def test_a_camera_without_a_pose_is_left_out_unless_it_is_asked_for(room):
         assert_refused(room, SessionError, "camera 'third' is asked for, but the calibration has no pose", **asked)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "kind", "expected"),
     [
@@ -438,6 +440,7 @@ def test_wrong_options(room, changes, kind, expected):
     assert_refused(room, kind, expected, **changes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["balance_real", "walk", "two_people", "fast_arms"])
 def test_footage_at_hand(data_folder, tmp_path, name):
     folder = data_folder(name)

@@ -22,6 +22,7 @@ def folder(tmp_path_factory):
     return out
 
 
+@pytest.mark.slow
 def test_the_session_loads_with_all_its_footage(folder):
     session = load_session(folder)
     assert (session.n_frames, session.fps, session.up) == (12, 25.0, "z")
@@ -88,6 +89,7 @@ def test_the_same_arguments_give_the_same_bytes_and_another_seed_others(folder, 
     assert not np.array_equal(first, second)
 
 
+@pytest.mark.slow
 def test_the_fitted_body_can_be_filmed_itself(tmp_path):
     simulate(tmp_path / "s", Simulation(**(ARGUMENTS | {"n_frames": 2}), body="model"))
     true, preset = load_model(tmp_path / "s" / "truth_model.toml"), load_model("gavrila22", 1.78)

@@ -296,6 +296,7 @@ def test_history_is_limited(store):
     assert [(h.label, h.undone) for h in store.history(2)] == [("4", True), ("3", True), ("2", False), ("1", False)]
 
 
+@pytest.mark.slow
 def test_random_edits_match_a_list_of_states(store):
     """The store against the obvious: a list of snapshots and a cursor."""
     rng = np.random.default_rng(4)

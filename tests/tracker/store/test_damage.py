@@ -37,6 +37,7 @@ def altered(path, statement, *parameters):
         db.commit()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("statement", "parameters"),
     [
@@ -154,6 +155,7 @@ def renamed_as_of_the_future(path, with_counter):
         backup.rename(backup.with_name(f"annotations-{counter + '-' if with_counter else ''}{stamp}.sqlite"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("with_counter", [True, False])
 def test_backups_of_a_clock_that_was_ahead_do_not_disable_newer_ones(path, with_counter):
     for frame in (10, 11, 12):

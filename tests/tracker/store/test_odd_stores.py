@@ -59,6 +59,7 @@ FOREIGN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("foreign", FOREIGN)
 @pytest.mark.parametrize("read_only", [True, False])
 def test_foreign_definitions_are_refused(path, foreign, read_only):
@@ -168,6 +169,7 @@ GOOD_SETTINGS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in SETTINGS.items() for value in values])
 def test_odd_settings_are_named(path, name, value):
     with closing(AnnotationStore(path)) as store:
@@ -187,6 +189,7 @@ def test_settings_of_other_names_are_any_json(path):
         assert store.setting("unknown") == {"any": [1]}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("statement", ODD)
 def test_odd_rows_are_named(path, statement):
     read_all(path)
@@ -200,6 +203,7 @@ def test_odd_rows_are_named(path, statement):
     assert len(text) < 500
 
 
+@pytest.mark.slow
 def test_a_query_without_end_is_stopped(path, monkeypatch):
     monkeypatch.setattr(query_limit, "_FREE_STEPS", 1_000_000)
     with closing(Connection(path, read_only=True)) as connection:

@@ -60,6 +60,7 @@ def test_it_is_rolled_back_under_the_lock_that_the_program_holds(path):
         assert (path.parent / LOCK_FILE).exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("why", ["read only", "held"])
 def test_a_copy_is_rolled_back_where_the_folder_may_not_be_written(path, why, monkeypatch, tmp_path):
     temporary = tmp_path / "temporary"
@@ -110,6 +111,7 @@ def test_a_journal_that_leads_to_another_file_is_refused(path, read_only, tmp_pa
     assert (tmp_path / "mine.txt").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["", "-journal", "-wal"])
 @pytest.mark.parametrize("read_only", [True, False])
 def test_a_named_pipe_beside_the_store_does_not_hang_the_program(tmp_path, ending, read_only):

@@ -100,6 +100,7 @@ ASTRAY = (0.3, 0.2, 0.1, 0.25, 6.0, 0.4, -1.0, 0.1, 0.2)
 """Contours far from edges, hardly seen, that explain little, with the wrong colour, far from the prediction."""
 
 
+@pytest.mark.slow
 @given(before=figures, worse=st.tuples(*[st.floats(0, 3)] * 12), body=st.tuples(*[st.floats(0, 0.1)] * 2))
 def test_worse_figures_never_clear_a_limb(before, worse, body):
     signs = (-1, 1, 1, 1, -1, -1, 1, 1, 1, -1, -1, 1)

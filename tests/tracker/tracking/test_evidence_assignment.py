@@ -58,6 +58,7 @@ def own_segments(view, bodies, person):
     return ~((others <= 0.5 * theta) & (others < 0.5 * own)), clear
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("person", [0, 1, 2])
 def test_the_shares_of_three_are_those_of_the_simple_version(person):
     """Segments of several pixels at random around three who hide each other, and points of a silhouette."""

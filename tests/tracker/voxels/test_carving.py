@@ -20,6 +20,7 @@ def carved(silhouettes, size_m, **settings):
     return Carver(silhouettes).carve(grid, CarveSettings(**settings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("size_m", "lens"),
     [(0.02, ()), *(pytest.param(*p, marks=pytest.mark.slow) for p in ((0.02, LENS), (0.01, ()), (0.01, LENS)))],
@@ -45,6 +46,7 @@ def test_axes_point_along_the_solid():
     np.testing.assert_allclose(found.center, 0, atol=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lens", "settings"), [((), {}), (LENS, {}), (LENS, {"missing": 1}), ((), {"min_views": 4})])
 def test_blocks_and_single_voxels_agree(lens, settings):
     # Some solids are cut off by images.
@@ -60,6 +62,7 @@ def test_blocks_and_single_voxels_agree(lens, settings):
     assert carver.count_tests(grid, rule) < found.size / 4
 
 
+@pytest.mark.slow
 def test_voxels_are_where_the_silhouettes_are():
     """The oracle against plain projection."""
     views = silhouettes_of([ellipsoid((0.05, 0, 0), AXES, TURNED)], cameras_around(4, LENS))
@@ -77,6 +80,7 @@ def test_voxels_are_where_the_silhouettes_are():
     assert margin.mean() < 0.2
 
 
+@pytest.mark.slow
 def test_a_broken_view_is_outvoted():
     cameras = cameras_around(12)
     views = silhouettes_of([ellipsoid((0, 0, 0), AXES)], cameras)
@@ -87,6 +91,7 @@ def test_a_broken_view_is_outvoted():
     assert whole.occupied.sum() <= found.occupied.sum() < 1.3 * whole.occupied.sum()
 
 
+@pytest.mark.slow
 def test_surface_voxels():
     voxels = carved(silhouettes_of([ellipsoid((0, 0, 0), np.full(3, 0.15))], cameras_around(20)), 0.02)
     radii = np.linalg.norm(voxels.points_world, axis=1)
@@ -123,6 +128,7 @@ def test_a_person_cut_off_by_an_image_is_not_cut_off_in_space():
     assert found >= carved(silhouettes_of([ellipsoid((0, 0, 0), AXES)], cameras_around(10)), 0.02).occupied.sum()
 
 
+@pytest.mark.slow
 def test_nobody_and_nothing_in_common():
     views = silhouettes_of([ellipsoid((0, 0, 0), AXES)], cameras_around(4))
     empty = [v._replace(mask=np.zeros_like(v.mask)) for v in views]

@@ -1,6 +1,7 @@
 """The silhouette of one of several figures, and figures where nobody is."""
 
 import numpy as np
+import pytest
 from solids import ellipsoid, silhouettes_of
 from staging import camera_at
 
@@ -25,6 +26,7 @@ def test_lines_of_sight_that_meet_are_nobody():
     np.testing.assert_allclose(middles, [-0.5, 0.5], atol=0.1)
 
 
+@pytest.mark.slow
 def test_a_figure_has_its_own_silhouette():
     people = [ellipsoid((0.0, -0.5, 0.0), HALF), ellipsoid((0.0, 0.5, 0.0), HALF)]
     views = silhouettes_of(people, cameras(4, step=0.7))
@@ -38,6 +40,7 @@ def test_a_figure_has_its_own_silhouette():
     assert found[0].is_apart
 
 
+@pytest.mark.slow
 def test_a_view_in_which_another_person_covers_the_figure_is_marked():
     people = [ellipsoid((0.0, 0.0, 0.0), HALF), ellipsoid((1.0, 0.0, 0.0), HALF)]
     views = silhouettes_of(people, cameras(4))

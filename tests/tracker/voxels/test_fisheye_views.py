@@ -43,11 +43,13 @@ def off_axis_deg(camera):
     return np.degrees(np.arccos(camera.depths(np.zeros(3)) / np.linalg.norm(camera.center_world)))
 
 
+@pytest.mark.slow
 def test_the_solid_is_far_from_the_axes():
     assert [30 < off_axis_deg(c) < 65 for c in cameras()] == [True] * 4
     assert all(v.mask.any() for v in views())
 
 
+@pytest.mark.slow
 def test_voxels_are_where_the_silhouettes_are():
     grid, seen = VoxelGrid.over(-BOX, BOX, SIZE_M), views()
     carver = Carver(seen)
@@ -72,6 +74,7 @@ def test_the_bounding_volume_holds_the_solid_closely():
     assert box.center_miss_m < 0.05
 
 
+@pytest.mark.slow
 def test_a_view_that_sees_somebody_beside_itself_bounds_nobody():
     """Beyond 90 degrees slopes have no meaning; the others bound the person."""
     beside = with_fisheye(camera_at("beside", (0.5, 2.0, 0.0), (8.0, 2.5, 0.0), size=(450, 450)), 220.0)

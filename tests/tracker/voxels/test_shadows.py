@@ -23,6 +23,7 @@ def on_floor(silhouette, x_m, y_m):
     return paint(points, SIZE_M, silhouette) & ~silhouette.mask
 
 
+@pytest.mark.slow
 def test_legs_before_a_floor_that_others_see_unchanged_come_back(whole):
     seen = hide_legs(whole, {0, 1}, [np.zeros_like(s.mask) for s in whole])
     for own, true in zip(recover_standing(seen, FLOOR), whole, strict=True):

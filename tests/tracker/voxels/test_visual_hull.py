@@ -14,6 +14,7 @@ CAMERAS = cameras_around(6, focal=250.0)
 SIZE_M = 0.03
 
 
+@pytest.mark.slow
 def test_two_people_who_stand_apart_are_two_figures():
     hull = carve_people(silhouettes_of([WOMAN, MAN], CAMERAS), SIZE_M)
     assert [np.sign(f.points_world[:, 0].mean()) for f in hull.figures] == [-1, 1]
@@ -21,6 +22,7 @@ def test_two_people_who_stand_apart_are_two_figures():
     assert not hull.broken
 
 
+@pytest.mark.slow
 def test_a_broken_view_is_left_out():
     views = silhouettes_of([MAN], CAMERAS)
     holed = views[2].mask.copy()
@@ -33,6 +35,7 @@ def test_a_broken_view_is_left_out():
     assert 0.9 < hull.figures[0].volume_m3 / whole.figures[0].volume_m3 < 1.3
 
 
+@pytest.mark.slow
 def test_a_silhouette_that_shows_more_than_people_is_explained_least():
     views = silhouettes_of([MAN], CAMERAS)
     for i, extra in ((1, 1), (4, 2)):
@@ -49,6 +52,7 @@ def turned(view, radians):
     return view._replace(camera=replace(view.camera, T_world_camera=T))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radians", [0.05, 0.15])
 def test_a_camera_that_moved_is_left_out(radians):
     """Turned a little, its silhouette meets the others in part; turned farther, not at all."""
@@ -58,6 +62,7 @@ def test_a_camera_that_moved_is_left_out(radians):
     assert hull.coverages[[0, 2, 3, 4, 5]].min() > 0.95
 
 
+@pytest.mark.slow
 def test_several_cameras_that_moved_are_an_error():
     views = silhouettes_of([MAN], CAMERAS)
     with pytest.raises(TrackerError, match="no camera has moved"):
@@ -71,6 +76,7 @@ def test_no_view_is_left_out_where_several_could_be():
         carve_people([views[0], turned(views[1], 0.15), views[2]], SIZE_M)
 
 
+@pytest.mark.slow
 def test_the_silhouette_that_is_explained_least_is_named():
     views = silhouettes_of([MAN], CAMERAS)
     for i, margin in ((1, 20), (4, 10)):
@@ -87,6 +93,7 @@ def test_nothing_of_the_size_of_a_person():
         carve_people(silhouettes_of([ellipsoid((0, 0, 0), np.full(3, 0.1))], CAMERAS), SIZE_M)
 
 
+@pytest.mark.slow
 def test_a_refusal_does_not_contradict_itself():
     """Three pieces of 4 litres each are no figure; "at least 8 litres, found 12" would be."""
     pieces = [ellipsoid((0.7 * i, 0, 0), np.full(3, 0.1)) for i in (-1, 0, 1)]
@@ -96,6 +103,7 @@ def test_a_refusal_does_not_contradict_itself():
     assert 3 < found < 8
 
 
+@pytest.mark.slow
 def test_a_small_child_is_a_figure():
     child = ellipsoid((0, 0, 0), np.array([0.09, 0.11, 0.33]))
     assert carve_people(silhouettes_of([child], CAMERAS), SIZE_M).figures[0].volume_m3 < 0.02

@@ -54,6 +54,7 @@ def test_frames_with_another_pose_are_marked_and_show_it(tracked):
     assert drawn(controller) == set()
 
 
+@pytest.mark.slow
 def test_the_other_pose_is_taken_vouched_for_and_left_again(tracked):
     controller, _, bob, lifted = tracked
     controller.navigation.seek(1)
@@ -82,6 +83,7 @@ def test_people_who_may_be_each_other_are_exchanged_together(tracked):
     np.testing.assert_array_equal(controller.state.poses[BOB], lifted)
 
 
+@pytest.mark.slow
 def test_who_vouches_for_a_pose_has_chosen(tracked):
     controller, *_ = tracked
     controller.navigation.seek(1)

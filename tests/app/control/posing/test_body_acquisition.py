@@ -73,6 +73,7 @@ def test_the_result_is_a_draft_that_is_applied_and_undone(posed, acquiring):
     assert posed.models[0].height_m == before.height_m
 
 
+@pytest.mark.slow
 def test_voxels_are_fitted_first_where_they_are_chosen(posed, acquiring):
     begun(posed, "voxels")
     assert posed.state.acquisition.stage == "fitting sizes to voxels"
@@ -92,6 +93,7 @@ def test_a_stopped_acquisition_changes_nothing(posed, acquiring):
     assert posed.state.draft is None
 
 
+@pytest.mark.slow
 def test_one_at_a_time_and_not_without_a_pose(opened, posed, acquiring):
     begun(posed)
     with pytest.raises(TrackerError, match="no other acquisition"):
@@ -117,6 +119,7 @@ def test_an_error_is_shown(posed, monkeypatch):
     assert posed.state.acquisition.message == "Expected contours, found none."
 
 
+@pytest.mark.slow
 def test_sizes_changed_meanwhile_win(posed, acquiring):
     begun(posed)
     posed.body_sizes.set_height(0, 1.6)

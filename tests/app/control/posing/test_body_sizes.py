@@ -40,6 +40,7 @@ def posed(opened):
     return controller
 
 
+@pytest.mark.slow
 def test_a_draft_is_drawn_and_changes_nothing(posed, session):
     before = posed.models[0]
     lengthen(posed)
@@ -56,6 +57,7 @@ def test_a_draft_is_drawn_and_changes_nothing(posed, session):
     assert length(load_session(session).people[0].model) == length(before)
 
 
+@pytest.mark.slow
 def test_each_side_by_itself(posed):
     before = posed.models[0]
     posed.body_sizes.couple(False)
@@ -72,6 +74,7 @@ def test_poses_that_keep_the_earlier_sizes_are_told(posed):
     assert posed.state.sizes_message.endswith("average. 1 other pose keeps the earlier sizes until tracked again.")
 
 
+@pytest.mark.slow
 def test_keyframes_are_refitted_to_their_joints_as_one_edit(posed, session):
     was = {frame: joints(posed, frame) for frame in FRAMES}
     lengthen(posed)
@@ -88,6 +91,7 @@ def test_keyframes_are_refitted_to_their_joints_as_one_edit(posed, session):
     assert posed.state.undo == "sizes of person, 2 keyframes refitted"
 
 
+@pytest.mark.slow
 def test_poses_that_are_kept_are_shown_with_their_own_body_and_marked(posed):
     old, was = posed.models[0], {frame: joints(posed, frame) for frame in FRAMES}
     lengthen(posed)
@@ -112,6 +116,7 @@ def test_poses_that_are_kept_are_shown_with_their_own_body_and_marked(posed):
     assert posed.state.revisions == posed.state.present
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("refit", [True, False])
 def test_undo_brings_the_old_body_back_also_after_a_restart(posed, opened, session, refit):
     was = {frame: joints(posed, frame) for frame in FRAMES}
@@ -131,6 +136,7 @@ def test_undo_brings_the_old_body_back_also_after_a_restart(posed, opened, sessi
     assert opened().state.undo.startswith("sizes of person")
 
 
+@pytest.mark.slow
 def test_previous_sizes_are_one_click_away(posed):
     before = length(posed.models[0])
     with pytest.raises(TrackerError, match="sizes that person had before, found none"):
@@ -172,6 +178,7 @@ def test_tracking_goes_on_in_the_new_body(placed, tracker):
     assert placed.stored_poses.in_present_body(0, range(2, 4)).keys() == {2, 3}
 
 
+@pytest.mark.slow
 def test_a_drag_in_the_new_body_is_stored_with_it(posed):
     lengthen(posed)
     posed.body_sizes.apply(0, refit=True)

@@ -27,6 +27,7 @@ def test_opposite_views_alone_miss_the_depth_until_a_view_across_is_used(opened)
     assert unseen(controller) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["undo", "seek", "fit", "edit"])
 def test_the_note_ends_with_its_pose(opened, change):
     controller = opened()

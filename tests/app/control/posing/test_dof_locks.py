@@ -72,6 +72,7 @@ def test_a_search_leaves_locked_degrees_of_freedom_alone(opened):
     assert not np.array_equal(after, before)
 
 
+@pytest.mark.slow
 def test_a_tracking_run_is_told_what_is_locked(placed, tracker):
     locked = dofs_of(placed, "left_shoulder")
     placed.dof_locks.set(0, locked, True)
@@ -90,6 +91,7 @@ def test_with_all_locked_a_search_says_so(opened):
     assert controller.state.search.kind is None
 
 
+@pytest.mark.slow
 def test_locks_survive_a_restart_and_are_no_entry_of_the_history(opened):
     controller = opened()
     locked = frozenset(dofs_of(controller, "right_knee", "torso"))

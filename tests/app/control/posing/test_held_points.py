@@ -15,6 +15,7 @@ def world_of(controller, point):
     return controller.models[0].points_world(controller.state.poses[0])[controller.models[0].point_names.index(point)]
 
 
+@pytest.mark.slow
 def test_a_drag_holds_the_point_it_placed_on_its_frame_until_it_is_released(opened):
     controller = opened()
     drag(controller, "left_wrist", (25.0, -25.0))

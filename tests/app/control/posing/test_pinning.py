@@ -64,6 +64,7 @@ def test_pins_are_stored_in_pixels_of_the_footage(opened, session):
     assert stored_pins(session)[0].position_px == place
 
 
+@pytest.mark.slow
 def test_pins_and_their_history_outlast_a_restart(opened):
     controller = opened()
     pin(controller, "left_wrist", (200.0, 150.0))
@@ -107,6 +108,7 @@ def test_pins_are_removed_one_by_one_by_joint_or_all(opened, session):
     assert controller.state.undo == "remove pin left wrist in RIGHT, frame 0"
 
 
+@pytest.mark.slow
 def test_the_body_follows_a_live_pin_in_one_entry(opened, session):
     controller = opened()
     drag(controller, "torso", (4.0, 0.0))
@@ -124,6 +126,7 @@ def test_the_body_follows_a_live_pin_in_one_entry(opened, session):
     assert len(stored_pins(session)) == 1
 
 
+@pytest.mark.slow
 def test_where_a_live_pin_ends_decides_not_its_way(opened):
     controller = opened()
     drag(controller, "torso", (4.0, 0.0))
@@ -163,6 +166,7 @@ def test_another_page_cannot_move_what_this_one_holds(opened):
     assert pins_of(controller) == {("head", FRONT): (100.0, 100.0)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interruption", ["seek", "drag", "undo", "fit"])
 def test_whatever_comes_in_between_ends_and_saves_the_gesture(opened, session, interruption):
     controller = opened()
@@ -248,6 +252,7 @@ def test_fit_leaves_locked_degrees_of_freedom_alone(opened):
     assert not set(moved) & set(locked)
 
 
+@pytest.mark.slow
 def test_a_live_pin_costs_a_few_steps_of_the_solver_a_move(opened, monkeypatch):
     """Some 40 ms on a quiet machine of two cores."""
     controller, iterations = opened(), []
@@ -269,6 +274,7 @@ def test_a_live_pin_costs_a_few_steps_of_the_solver_a_move(opened, monkeypatch):
     assert np.median([sum(each) for each in iterations]) < 60
 
 
+@pytest.mark.slow
 def test_pins_belong_to_the_frame_that_a_tracker_shows(placed, tracker):
     controller = placed
     pin(controller, "head", (100.0, 100.0))

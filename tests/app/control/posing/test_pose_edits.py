@@ -14,6 +14,7 @@ def world_of(controller, point):
     return model.points_world(controller.state.poses[0])[model.point_names.index(point)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("right_m", "up_m"), [(0.02, 0.0), (0.0, 0.01), (-0.01, -0.02)])
 def test_a_nudge_moves_a_joint_parallel_to_the_image(opened, right_m, up_m):
     controller = opened()

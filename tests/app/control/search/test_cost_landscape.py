@@ -9,6 +9,7 @@ from tracker.errors import TrackerError
 from tracker.tracking.chamfer.settings import pose_cost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["left_shoulder.abduction", "torso.x", "torso.twist"])
 def test_it_is_what_the_cost_says_one_by_one(opened, name):
     controller = opened()

@@ -75,6 +75,7 @@ def test_a_replay_shows_every_step_and_changes_nothing(opened):
     assert (controller.state.undo, controller.state.timeline_version) == (undo, version)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["drag", "seek", "step", "undo"])
 def test_whatever_happens_to_the_frame_ends_the_replay(opened, what):
     controller = opened()
@@ -167,6 +168,7 @@ def test_stop_ends_a_paused_search(opened):
     wait_for(lambda: len(controller.replay.runs()) == 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["discarded", "moved", "sizes"])
 def test_a_comparison_ends_with_its_run(opened, what):
     controller = opened()
@@ -206,6 +208,7 @@ def source_of(controller):
     return shown
 
 
+@pytest.mark.slow
 def test_the_shown_source_is_the_stored_one(opened):
     controller = opened()
     drag(controller, "torso", (4.0, 0.0))
@@ -263,6 +266,7 @@ def test_contours_are_fitted_iteration_by_iteration(opened):
     assert controller.state.search_view.replay.fitted_from is None
 
 
+@pytest.mark.slow
 def test_a_search_that_is_forgotten_leaves_nothing_to_the_collector_of_cycles(opened):
     controller = opened()
     controller.search.set_settings(QUICK)

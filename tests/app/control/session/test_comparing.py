@@ -61,6 +61,7 @@ def test_the_views_show_the_pose_before_and_nothing_is_undone(fitted):
     assert controller.state.drawn is controller.state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", ["undo", "drag", "seek", "size"])
 def test_a_comparison_ends_with_the_result(fitted, change):
     controller, _ = fitted

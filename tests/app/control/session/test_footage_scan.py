@@ -47,6 +47,7 @@ def fresh(session, gate):
         store.close()
 
 
+@pytest.mark.slow
 def test_what_is_listed_is_shown_and_the_rest_follows(fresh, gate):
     wait_for(lambda: fresh.state.cost_px is not None)
     assert 0 < fresh.state.footage.listed < 1

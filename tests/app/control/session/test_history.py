@@ -51,6 +51,7 @@ def test_the_history_can_be_gone_along_to_any_entry(edited):
         edited.history.go_to(987)
 
 
+@pytest.mark.slow
 def test_the_history_lives_on_after_a_restart(edited, opened):
     edited.history.go_to(edited.history.entries(100)[2].edit)
     controller = opened()
@@ -60,6 +61,7 @@ def test_the_history_lives_on_after_a_restart(edited, opened):
     assert set(controller.stored_poses.timeline()) == {0, 1, 2, 3, 4}
 
 
+@pytest.mark.slow
 def test_what_a_full_disk_refuses_is_shown_waits_and_is_saved_by_hand(edited, opened):
     with full_disk():
         edited.navigation.seek(6)
@@ -88,6 +90,7 @@ def test_what_a_full_disk_refuses_is_shown_waits_and_is_saved_by_hand(edited, op
     assert len(controller.state.pins[0]) == 1
 
 
+@pytest.mark.slow
 def test_a_gesture_that_goes_on_after_the_disk_has_room_is_one_entry(edited):
     pixel = (200.0, 200.0)
     for frame in (8, 7):  # the first has the kernels compiled, whose cache wants a disk too

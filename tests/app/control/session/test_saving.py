@@ -136,6 +136,7 @@ EDITS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", EDITS)
 def test_saved_is_said_when_it_is_on_the_disk(placed, edit, monkeypatch):
     held = []

@@ -79,6 +79,7 @@ def test_one_entry_holds_poses_sizes_and_tracks(opened, found, tracked):
     assert controller.session.people[0].model.height_m == pytest.approx(1.05 * before)
 
 
+@pytest.mark.slow
 def test_the_axes_of_the_silhouettes_are_shown_and_kept(opened, found, tracked):
     controller = opened()
     begun(controller)

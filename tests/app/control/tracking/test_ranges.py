@@ -35,6 +35,7 @@ def stored(session, frame):
         store.close()
 
 
+@pytest.mark.slow
 def test_interpolating_fills_between_the_ends_as_one_entry(two_keys, session):
     model, ends = two_keys.models[0], (stored(session, 2), stored(session, 12))
     two_keys.ranges.interpolate(2, 12)
@@ -52,6 +53,7 @@ def test_interpolating_fills_between_the_ends_as_one_entry(two_keys, session):
     assert len(cells(two_keys)) == 11
 
 
+@pytest.mark.slow
 def test_keyframes_within_are_passed_through_and_stay(two_keys, session):
     two_keys.navigation.seek(6)
     drag(two_keys, "right_wrist", (-30.0, -30.0))
@@ -89,6 +91,7 @@ def test_clearing_leaves_keyframes(two_keys):
     assert len(cells(two_keys)) == 11
 
 
+@pytest.mark.slow
 def test_marks_of_a_range(two_keys, session):
     two_keys.ranges.interpolate(2, 12)
     before = stored(session, 4)
@@ -171,6 +174,7 @@ def test_long_work_is_watched_and_stopped_as_one_entry(two_keys, monkeypatch):
     assert not two_keys.state.ranges.running
 
 
+@pytest.mark.slow
 def test_a_frame_that_jumps_is_named_and_no_longer_once_it_is_mended(two_keys):
     two_keys.ranges.interpolate(2, 12)
     assert two_keys.state.inconsistent_frames == ()

@@ -55,6 +55,7 @@ def test_a_run_goes_out_from_a_frame_in_both_directions_and_keeps_its_pose(place
     store.close()
 
 
+@pytest.mark.slow
 def test_a_run_shows_and_stores_what_it_finds_as_one_entry(placed, tracker, session):
     start = x_of(placed)
     placed.tracking.start(backward=False, until=9)
@@ -121,6 +122,7 @@ def test_a_draft_is_tracked_itself(placed, tracker):
     assert tracker.seen == [5, 6]
 
 
+@pytest.mark.slow
 def test_keyframes_are_taken_as_they_are(placed, tracker):
     placed.navigation.seek(4)
     drag(placed, "torso", (0.0, 9.0))
@@ -144,6 +146,7 @@ def tracker_fixed(controller, tracker):
     return tracker.run.subjects.keyframes
 
 
+@pytest.mark.slow
 def test_a_run_takes_the_chosen_stride_and_cameras(placed, tracker):
     names = placed.session.camera_names
     alone = placed.state.settings
@@ -174,6 +177,7 @@ def test_a_run_over_keyframes_alone_is_no_entry(placed, tracker):
     assert placed.state.undo == "drag torso, frame 3"
 
 
+@pytest.mark.slow
 def test_pause_and_go_on_are_one_entry(placed, tracker, session):
     placed.tracking.start(backward=False, until=8)
     tracker.let_go(2)
@@ -195,6 +199,7 @@ def test_pause_and_go_on_are_one_entry(placed, tracker, session):
     assert set(placed.stored_poses.timeline()) == {2}
 
 
+@pytest.mark.slow
 def test_stop_ends_a_run_and_keeps_what_it_found(placed, tracker):
     placed.tracking.start(backward=False, until=None)
     tracker.let_go(3)
@@ -236,6 +241,7 @@ def test_seeking_while_nothing_runs_leaves_following_as_it_is(placed):
     assert placed.state.follow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("edit", ["drag", "set", "search", "undo"])
 def test_edits_stop_a_run(placed, tracker, edit):
     placed.tracking.start(backward=False, until=None)
@@ -260,6 +266,7 @@ def test_edits_stop_a_run(placed, tracker, edit):
     assert tracker.seen == seen
 
 
+@pytest.mark.slow
 def test_undo_goes_to_the_nearest_frame_of_the_run(placed, tracker):
     placed.tracking.start(backward=False, until=6)
     tracker.let_go(4)
@@ -271,6 +278,7 @@ def test_undo_goes_to_the_nearest_frame_of_the_run(placed, tracker):
         placed.history.redo()
 
 
+@pytest.mark.slow
 def test_a_hand_takes_hold_of_the_frame_that_it_saw(placed, tracker):
     placed.tracking.start(backward=False, until=None)
     tracker.let_go(4)
@@ -284,6 +292,7 @@ def test_a_hand_takes_hold_of_the_frame_that_it_saw(placed, tracker):
     assert placed.state.undo == "drag torso, frame 4"
 
 
+@pytest.mark.slow
 def test_a_run_writes_no_more_often_than_it_should(placed, tracker, monkeypatch):
     written = []
     for name in ("commit", "amend"):
@@ -316,6 +325,7 @@ def test_a_tracker_that_fails_says_so_and_loses_nothing(placed, tracker):
     assert set(placed.stored_poses.timeline()) == {2, 3, 4, 5}
 
 
+@pytest.mark.slow
 def test_what_a_full_disk_refused_is_written_later(placed, tracker, monkeypatch):
     real = AnnotationStore.commit
 
@@ -335,6 +345,7 @@ def test_what_a_full_disk_refused_is_written_later(placed, tracker, monkeypatch)
     assert set(placed.stored_poses.timeline()) == {2, 3, 4, 5, 6}
 
 
+@pytest.mark.slow
 def test_a_run_survives_a_restart(placed, tracker, opened):
     placed.tracking.start(backward=False, until=6)
     tracker.let_go(4)
@@ -366,6 +377,7 @@ def improved_backward(tracker, steps):
     return offered
 
 
+@pytest.mark.slow
 def test_the_backward_pass_takes_the_place_of_what_was_lost(placed, tracker):
     offered = improved_backward(tracker, 3)
     placed.search.set_settings(replace(placed.state.settings, smooth=False))
@@ -400,6 +412,7 @@ def test_a_frame_that_is_looked_at_shows_what_the_backward_pass_found(placed, tr
     assert {(t.done, t.total) for t in seen if t.back} == {(1, 2), (2, 2)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smooth", [True, False])
 def test_the_poses_are_smoothed_at_the_end_of_a_run(placed, tracker, smooth):
     """The frame that is looked at shows its smoothed pose, and one undo takes back all of the run."""
@@ -416,6 +429,7 @@ def test_the_poses_are_smoothed_at_the_end_of_a_run(placed, tracker, smooth):
     assert set(placed.stored_poses.timeline()) == {2}
 
 
+@pytest.mark.slow
 def test_the_backward_pass_can_be_switched_off(placed, tracker):
     offered = improved_backward(tracker, 1)
     placed.search.set_settings(replace(placed.state.settings, backward_pass=False))
@@ -426,6 +440,7 @@ def test_the_backward_pass_can_be_switched_off(placed, tracker):
     assert placed.state.track.message == "done: 7 frames, 1 doubtful, 1 lost"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_stopped", [True, False])
 def test_a_run_that_is_over_leaves_nothing_to_the_collector_of_cycles(placed, tracker, is_stopped):
     """Runs that were broken off each kept ten megabytes for minutes."""

@@ -52,6 +52,7 @@ def test_three_points_in_two_views_give_the_plane(opened):
     assert controller.state.floor.plane is None, "nothing has been applied yet"
 
 
+@pytest.mark.slow
 def test_clicks_two_pixels_off_tilt_it_little_and_more_views_make_it_surer(opened):
     controller, errors = opened(), {}
     for cameras in ((0, 1), (0, 1, 2, 3)):

@@ -76,6 +76,7 @@ def test_solo_lasts_until_it_is_taken_back(couple):
     assert not couple.state.visibility.solo
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("person", [ANN, BOB])
 def test_one_is_searched_and_the_other_stays_a_draft(couple, person):
     before = couple.state.people
@@ -98,6 +99,7 @@ def test_a_search_of_others_takes_the_place_of_the_one_that_stands(couple):
     assert (second.over, len(second.steps), {s.person for s in second.stages}) == (False, 2, {ANN})
 
 
+@pytest.mark.slow
 def test_a_fit_is_of_those_who_have_been_placed_or_of_one(couple):
     couple.pinning.fit(0)
     assert [p.source for p in couple.state.people] == ["fitted", None]

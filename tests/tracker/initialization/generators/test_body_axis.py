@@ -19,6 +19,7 @@ def axes_of(voxels, cameras=CAMERAS):
     return [major_axis(s.mask, s.camera) for s in silhouettes_of_figure(voxels, cameras)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arms_deg", [5, 35, 70])
 def test_the_axis_is_upright_and_ends_at_the_head(arms_deg):
     found = find_body_axes(axes_of(figure(arms_deg=arms_deg, turn_deg=20)[0]), UP, 1.75)
@@ -43,6 +44,7 @@ def moved(voxels, cameras):
     return [s._replace(camera=c) for s, c in pairs]
 
 
+@pytest.mark.slow
 def test_a_view_that_contradicts_the_others_is_left_out():
     voxels = figure()[0]
     turned = CAMERAS[1].T_world_camera @ rigid.transform(rigid.so3_exp(np.array([0.0, 0.0, 0.7])))
@@ -60,6 +62,7 @@ def test_views_from_one_side_are_refused():
         find_body_axes([one], UP, 1.75)
 
 
+@pytest.mark.slow
 def test_no_head_is_invented():
     """A pillar is as wide at its end as everywhere."""
     voxels = figure()[0]

@@ -51,6 +51,7 @@ def test_the_axis_gives_starts():
     assert max(errors) < 120
 
 
+@pytest.mark.slow
 def test_voxels_give_both_ways_of_facing():
     voxels, joints = figure(**POSES[1])
     ahead, back = from_voxels(scene(voxels), MODEL, False)
@@ -61,6 +62,7 @@ def test_voxels_give_both_ways_of_facing():
     assert ahead.model.height_m == pytest.approx(1.74, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_known_height_stays():
     assert from_voxels(scene(figure()[0]), MODEL, True)[0].model is MODEL
 
@@ -72,6 +74,7 @@ def test_a_search_needs_no_head_that_stands_out():
     assert min(error_mm(c, joints) for c in found) < 150
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arms_deg", [20, 90, 175])
 def test_raised_arms_do_not_make_a_person_taller(arms_deg):
     voxels, joints = figure(arms_deg=arms_deg)
@@ -81,6 +84,7 @@ def test_raised_arms_do_not_make_a_person_taller(arms_deg):
     assert found == pytest.approx(top[2] - soles_m, abs=0.03)
 
 
+@pytest.mark.slow
 def test_shoes_that_a_shadow_hides_do_not_make_a_person_smaller():
     voxels, joints = figure()
     floor_m = joints["left_ankle"][2] - 0.07
@@ -119,6 +123,7 @@ def test_a_person_who_lies_or_crouches_has_no_standing_height():
     assert standing_height(scene(voxels), UP, top, head._replace(neck=head.neck - (0.0, 0.0, 0.10))) is None
 
 
+@pytest.mark.slow
 def test_views_in_which_others_stand_before_the_person_are_left_out():
     own = scene(figure()[0])
     masks = [m._replace(is_apart=i > 0) for i, m in enumerate(own.masks)]

@@ -25,6 +25,7 @@ def errors_mm(model: BodyModel, pose, joints):
     return {n: 1000 * float(np.linalg.norm(own[n] - joints[n])) for n in LIMB_JOINTS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", [*POSES[:2], *(pytest.param(pose, marks=pytest.mark.slow) for pose in POSES[2:])])
 def test_all_parts_are_found_left_and_right(pose):
     voxels, joints = figure(**pose)
@@ -46,6 +47,7 @@ def test_any_body_takes_the_start(name):
     assert np.mean(list(errors_mm(model, start_pose(model, parts_of(voxels)), joints).values())) < 80
 
 
+@pytest.mark.slow
 def test_the_head_and_the_neck():
     voxels, joints = figure()
     head = find_head(voxels, neighbor_graph(voxels))
@@ -55,6 +57,7 @@ def test_the_head_and_the_neck():
     assert joints["neck"][2] < head.neck[2] < joints["head"][2]
 
 
+@pytest.mark.slow
 def test_arms_on_the_body_and_closed_legs_are_not_guessed():
     parts = parts_of(figure(arms_deg=2, legs_deg=-6)[0])
     assert {"left_leg", "right_leg"} <= set(parts.unresolved)
@@ -74,6 +77,7 @@ def test_a_child_is_found():
         assert np.linalg.norm(limb.distal - joints[f"{side}_{'wrist' if kind == 'arm' else 'ankle'}"]) < 0.10
 
 
+@pytest.mark.slow
 def test_coarse_voxels_of_a_small_child_give_a_start():
     """Enlarged to an adult, a voxel is wider than the slices in which limbs are measured."""
     parts = parts_of(child(share=0.4, size_m=0.03, arms_deg=25, legs_deg=4)[0])
@@ -86,10 +90,12 @@ def test_a_figure_without_a_trunk():
         parts_of(child(share=0.4, arms_deg=10)[0])
 
 
+@pytest.mark.slow
 def test_straight_limbs_are_named():
     assert {"left_leg", "right_leg"} <= set(parts_of(figure()[0]).straight)
 
 
+@pytest.mark.slow
 def test_motion_tells_the_direction():
     voxels, _ = figure(turn_deg=90)
     ahead, back = (parts_of(voxels, sign * np.array([0.0, 1.0, 0.0])) for sign in (1, -1))
@@ -97,6 +103,7 @@ def test_motion_tells_the_direction():
     assert ahead.facing > back.facing
 
 
+@pytest.mark.slow
 def test_turning_round_exchanges_left_and_right():
     parts = parts_of(figure()[0])
     other = turned_round(parts)
@@ -105,6 +112,7 @@ def test_turning_round_exchanges_left_and_right():
     assert turned_round(other).limbs == parts.limbs
 
 
+@pytest.mark.slow
 def test_a_figure_without_a_head():
     voxels, _ = figure()
     occupied = voxels.occupied.copy()

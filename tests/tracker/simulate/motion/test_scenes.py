@@ -175,6 +175,7 @@ def test_any_seed_can_be_performed_for_long(scene, true_model):
         assert len(poses) == 250
 
 
+@pytest.mark.slow
 def test_elbow_rotation_raises_the_arms_then_turns_the_elbows_forward(true_model):
     poses = solve_posture(cast_of("elbow_rotation")[0], true_model, 50, FPS)
     points = points_of(true_model, poses)
@@ -196,6 +197,7 @@ def test_elbow_rotation_raises_the_arms_then_turns_the_elbows_forward(true_model
     assert lean[-1] < lean[22] - 0.01
 
 
+@pytest.mark.slow
 def test_standing_feet_stay_where_they_are(true_model):
     points = points_of(true_model, solve_posture(cast_of("elbow_rotation")[0], true_model, 50, FPS))
     for ankle in ("left_ankle", "right_ankle"):

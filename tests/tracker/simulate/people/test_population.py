@@ -8,6 +8,7 @@ from tracker.simulate.people.skeleton import altered_model
 from tracker.simulate.people.skin import make_skin
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["child_3", "heavy_man", *(pytest.param(n, marks=pytest.mark.slow) for n in POPULATION)]
 )

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 import trimesh
 
 from tracker.geometry import rigid
@@ -17,6 +18,7 @@ def winding_number(mesh, point):
     return np.sum(2 * np.arctan2(volume, la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb)) / (4 * np.pi)
 
 
+@pytest.mark.slow
 def test_the_skin_is_one_closed_surface_of_a_persons_size(skin):
     mesh = trimesh.Trimesh(skin.vertices_rest, skin.faces, process=False)
     assert mesh.is_watertight
@@ -44,6 +46,7 @@ def test_weights_sum_to_one_and_do_not_leak_from_limb_to_limb(skin):
     assert skin.weights[on_forearm][:, strangers].max() < 1e-6
 
 
+@pytest.mark.slow
 def test_joints_stay_within_the_skin_and_its_volume_within_a_tenth(skin):
     rest = trimesh.Trimesh(skin.vertices_rest, skin.faces, process=False).volume
     poses = solve_posture(cast_of("elbow_rotation")[0], skin.model, 50, 25.0)

@@ -42,6 +42,7 @@ def test_the_person_stands_out_and_the_room_stays(backdrops, skin):
         assert change[: np.nonzero(mask)[0].min() - 2].max() == 0.0
 
 
+@pytest.mark.slow
 def test_the_floor_darkens_beside_the_feet(backdrops, skin):
     image, mask = film(backdrops[0], freeze([skin], [standing(skin.model)]))
     ratio = image.mean(axis=-1) / backdrops[0].image.mean(axis=-1)

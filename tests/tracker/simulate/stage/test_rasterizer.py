@@ -16,6 +16,7 @@ def coverage(camera, vertices, faces):
     return pixel_means((cast(camera.scaled(SAMPLES), vertices, faces).faces >= 0).astype(np.float32))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("center", [(0.0, 0.0, 1.0), (0.6, -0.4, 0.3), (-0.5, 0.7, 1.6)])
 def test_a_ball_appears_where_it_projects(center):
     radius, center = 0.3, np.array(center)
@@ -40,6 +41,7 @@ def test_a_ball_appears_where_it_projects(center):
         assert np.allclose(found, (moments["m10"] / moments["m00"], moments["m01"] / moments["m00"]), atol=0.03)
 
 
+@pytest.mark.slow
 def test_the_skins_edges_lie_where_its_vertices_project(skin):
     values = solve_posture(cast_of("elbow_rotation")[0], skin.model, 30, 25.0)[-1]
     vertices = skin.posed(values)

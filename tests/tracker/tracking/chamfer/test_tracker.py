@@ -134,6 +134,7 @@ def off_m(model, values, truth):
     return np.linalg.norm(model.points_world(values) - model.points_world(truth), axis=1)
 
 
+@pytest.mark.slow
 def test_refinement_follows_by_itself(gavrila):
     """Nobody is lost, so nothing is searched; the estimates say all there is to know."""
     truth = dancing(gavrila, 5)
@@ -153,6 +154,7 @@ def test_refinement_follows_by_itself(gavrila):
         assert np.median(sigma[~gavrila.dof_is_length]) < np.radians(3)
 
 
+@pytest.mark.slow
 def test_an_arm_that_jumps_is_searched_and_the_frame_says_so(gavrila):
     truth = dancing(gavrila, 5, jump_at=3)
     views = [dressed([PosedBody(gavrila, v)], cameras_around(4), SUIT) for v in truth]
@@ -234,6 +236,7 @@ def test_a_keyframe_moves_what_is_locked_from_there_on(balls):
     assert [f.poses[0][2] for f in found] == [0, 0, 0.2, 0.2, 0.2]
 
 
+@pytest.mark.slow
 def test_what_the_prediction_refused_is_looked_at_again(gavrila):
     """The prediction accepts no edge of an arm that jumps: it is found among all edges."""
     truth = dancing(gavrila, 5, jump_at=3)
@@ -373,6 +376,7 @@ def test_an_arm_that_passes_a_picture_on_the_wall_does_not_stay_there(data_folde
     assert (errors.missing_frames, errors.lost_frames) == (0, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("segments", [True, False])
 def test_contours_are_traced_once_per_pose(gavrila, monkeypatch, segments):
     """Those of the prediction and those of the result, in each view; the cost of the result traces nothing."""

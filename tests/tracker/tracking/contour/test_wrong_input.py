@@ -61,6 +61,7 @@ def test_fewer_residuals_than_degrees_of_freedom(body, settings):
         assert "fewer than the 22 degrees of freedom" in estimate.notes[0]
 
 
+@pytest.mark.slow
 @mode
 def test_a_camera_that_sees_nothing_takes_no_part(body, settings):
     good = own_evidence([body], cameras_around(3))
@@ -85,6 +86,7 @@ def test_empty_silhouettes_lose_the_person(body, settings):
         assert estimate.statuses == ("lost",)
 
 
+@pytest.mark.slow
 @mode
 def test_parts_behind_a_camera_take_no_part(body, settings):
     """A camera between the person's arms: some parts are before it, some behind, and some around it."""

@@ -39,6 +39,7 @@ def off_m(model, values, truth):
     return np.linalg.norm(model.points_world(values) - model.points_world(truth), axis=1).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backward", [False, True])
 def test_a_lost_arm_is_improved_backward_from_where_it_is_trusted_again(scene, backward):
     model, truth, views, first = scene
@@ -90,6 +91,7 @@ def test_what_was_right_on_one_frame_is_carried_to_those_that_both_passes_lost(s
         assert estimate.qualities[0] is not None
 
 
+@pytest.mark.slow
 def test_keyframes_and_locked_degrees_of_freedom_stay(scene):
     model, _, views, first = scene
     keyframes = {3: {0: first[3]}}
@@ -106,6 +108,7 @@ def test_keyframes_and_locked_degrees_of_freedom_stay(scene):
         np.testing.assert_array_equal(estimate.poses[0][~free], first[2, ~free])
 
 
+@pytest.mark.slow
 def test_the_others_stay_as_they_were_found(scene):
     model, truth, _, first = scene
     other = truth.copy()

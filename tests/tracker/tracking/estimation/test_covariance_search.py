@@ -55,6 +55,7 @@ class Staged:
         return np.linalg.norm(found - true, axis=1).max()
 
 
+@pytest.mark.slow
 def test_trunks_that_turned_the_wrong_way_are_found_again(model):
     """Refinement does not lead out of these poses, and no single limb of them is lost."""
     n_nearer = 0

@@ -99,6 +99,7 @@ def test_a_lost_leg_is_found(gavrila):
     assert staged.off_m(staged.search(leg), leg.parts) < 0.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [RecoverSettings(), for_several(RecoverSettings())])
 def test_limbs_that_are_lost_together(gavrila, settings):
     """An arm on a leg that went elsewhere: neither finds its place while the other is in the way."""
@@ -131,6 +132,7 @@ def test_for_several_places_are_looked_for_once(gavrila, monkeypatch):
     assert n_looked[0] > n_looked[1] == 2
 
 
+@pytest.mark.slow
 def test_the_whole_body_is_refined_only_with_what_comes_near_the_best(gavrila, monkeypatch):
     truth, n_refined = posed(gavrila, 1), []
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
@@ -185,6 +187,7 @@ def test_best_places_apart(gavrila):
     assert len(limb_recovery._best_apart(gavrila, arm, legs, np.zeros(2), 5, 0.05)) == 1
 
 
+@pytest.mark.slow
 def test_where_nothing_is_better_the_pose_is_kept(gavrila):
     truth = posed(gavrila, 1)
     staged = Staged(gavrila, truth, truth)
@@ -239,6 +242,7 @@ def test_the_same_every_time(gavrila):
     assert twice[0].cost == twice[1].cost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [2, 5, 60])
 def test_the_same_however_many_threads_look(gavrila, monkeypatch, threads):
     """Also where there are more threads than poses."""

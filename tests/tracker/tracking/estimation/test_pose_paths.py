@@ -29,6 +29,7 @@ def cost_of(points, costs, before, after, way):
     return total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("known", [(2, 2), (1, 0), (0, 2)])
 def test_the_cheapest_way_is_that_of_all_ways_tried(seed, known):

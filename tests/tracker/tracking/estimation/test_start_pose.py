@@ -65,6 +65,7 @@ def test_a_start_that_fits_stays(gavrila, truth, views):
     assert settle(gavrila, near, views) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_start_beside_the_person_is_searched(gavrila, truth, views, seed):
     start = beside(gavrila, truth, seed)
@@ -87,6 +88,7 @@ def test_limbs_are_exchanged_in_space(gavrila):
     np.testing.assert_allclose(after[others], before[others], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_who_was_tracked_before_or_may_not_be_searched_stays(gavrila, truth, views):
     start = beside(gavrila, truth, 0)
     assert settle(gavrila, start, views) is not None
@@ -115,6 +117,7 @@ def test_whose_start_is_searched(gavrila, truth, views, monkeypatch, n_people, q
     assert asked == ([*range(n_people)] if searched else [])
 
 
+@pytest.mark.slow
 def test_locked_degrees_of_freedom_keep_their_values(gavrila, truth, views):
     start = beside(gavrila, truth, 0)
     active = np.array([not n.startswith("right_elbow") for n in gavrila.dof_names])
@@ -123,6 +126,7 @@ def test_locked_degrees_of_freedom_keep_their_values(gavrila, truth, views):
     np.testing.assert_allclose(gavrila.difference(found, start)[~active], 0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_keyframe_beside_the_person_stays_and_the_next_frames_are_good(gavrila, truth, views):
     """The colours are those under the settled pose: under the keyframe they would refute every right pose."""
     start = beside(gavrila, truth, 0)

@@ -39,6 +39,7 @@ def test_retract_and_difference_are_inverse():
     np.testing.assert_allclose(state.retract(step).difference(state), step, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_derivatives_of_centers_and_joints():
     state = some_state()
     np.testing.assert_allclose(state.center_jacobian, differences(state, lambda s: s.centers), atol=1e-6)
@@ -108,6 +109,7 @@ def test_derivative_of_measured_rotations():
     np.testing.assert_allclose(found.jacobian, expected, atol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("paper", "n_steps"),
     [(False, 60), (True, 60), pytest.param(False, 3000, marks=pytest.mark.slow),

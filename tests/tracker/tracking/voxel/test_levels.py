@@ -27,18 +27,21 @@ def levels_of(before=None, patience=1, **pose):
     return find_levels(before or DetailLevels.finest(), state, voxels, labels.labels, 0, patience), state, labels.clouds
 
 
+@pytest.mark.slow
 def test_limbs_apart_are_resolved():
     levels, _, _ = levels_of(arms_deg=35, legs_deg=12)
     assert levels.is_resolved.all()
     assert levels.notes == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_arms_on_the_body_are_part_of_it(side):
     levels, _, _ = levels_of(arms_deg=-4, legs_deg=12)
     assert f"{side} arm on the body: not resolved" in levels.notes
 
 
+@pytest.mark.slow
 def test_closed_legs_are_measured_as_one_and_parted_again():
     levels, state, clouds = levels_of(arms_deg=35, legs_deg=-4.5)
     assert levels.notes == ("legs closed: measured as one",)
@@ -49,6 +52,7 @@ def test_closed_legs_are_measured_as_one_and_parted_again():
     assert again.is_resolved.all()
 
 
+@pytest.mark.slow
 def test_an_unresolved_arm_turns_with_the_trunk():
     levels, before, _ = levels_of(arms_deg=-4, legs_deg=12)
     step = np.zeros(before.layout.n)
@@ -59,6 +63,7 @@ def test_an_unresolved_arm_turns_with_the_trunk():
     np.testing.assert_allclose(R[0].T @ R[part], before.rotations[0].T @ before.rotations[part], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_legs_that_touch_for_a_moment_stay_apart():
     once, _, _ = levels_of(patience=2, arms_deg=35, legs_deg=-4.5)
     assert once.is_resolved.all()

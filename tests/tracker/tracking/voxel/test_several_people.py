@@ -55,12 +55,14 @@ def tracked(gap_m, n, seen=lambda k, offsets: offsets):
     return found, errors
 
 
+@pytest.mark.slow
 def test_people_who_stand_apart_are_followed():
     found, errors = tracked(1.4, 4)
     assert max(errors) < 0.06
     assert "lost" not in found[-1].statuses
 
 
+@pytest.mark.slow
 def test_a_person_who_has_gone_is_lost_and_the_other_one_not_good():
     found, errors = tracked(1.4, 4, lambda k, offsets: offsets[:1] if k > 1 else offsets)
     assert found[-1].statuses == ("doubtful", "lost")
@@ -98,6 +100,7 @@ def test_voxels_count_for_the_person_whom_they_are_connected_with(states):
     assert not second.touches
 
 
+@pytest.mark.slow
 def test_people_who_touch_are_told(states):
     low, high = states[0].centers[0] - 0.03, states[1].centers[0] + 0.03
     assert all(f.touches for f in unexplained_voxels(occupied(states, (low, high)), states))

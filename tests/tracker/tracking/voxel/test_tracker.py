@@ -88,6 +88,7 @@ def test_the_papers_version_runs():
     assert estimates[0].method == "voxel"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stride", [1, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_limb_of_a_child_that_is_off_is_called_lost(stride):
     """A large head and short limbs, tracked with the proportions of an adult of the same height."""
@@ -100,6 +101,7 @@ def without_person(k, views):
     return [v._replace(mask=np.zeros_like(v.mask)) for v in views] if k > 3 else views
 
 
+@pytest.mark.slow
 def test_empty_silhouettes_are_reported_and_the_body_stays():
     estimates, errors = tracked(n=8, change=without_person)
     assert [e.statuses[0] for e in estimates[4:]] == ["lost"] * 4
@@ -108,6 +110,7 @@ def test_empty_silhouettes_are_reported_and_the_body_stays():
     assert errors[-1].max() < 0.6  # it does not run away
 
 
+@pytest.mark.slow
 def test_a_person_who_has_gone_is_lost():
     """Silhouettes of somebody elsewhere, out of reach."""
     far = [v._replace(mask=np.roll(v.mask, 70, axis=1)) for v in views_at(0.0)]
@@ -136,6 +139,7 @@ def test_a_person_who_is_cut_off_is_named():
     assert estimates[-1].notes[0]
 
 
+@pytest.mark.slow
 def test_keyframes_stay():
     body = load_model("gavrila34", 1.72)
     key = fit_to_points(body, joints_at(2 / FPS)).pose
