@@ -42,7 +42,7 @@ export function layout(people) {
   const { bottom } = lanes[lanes.length - 1];
   const overview = { top: bottom + 8, bottom: bottom + 14 };
   const cells = { top: CELLS_TOP, bottom };
-  return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, overview, height: overview.bottom + 6 };
+  return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, overview, height: overview.bottom + 2 };
 }
 
 /**
