@@ -4,7 +4,8 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# Without compiling to bytecode: the first import of a module does that, and most modules are never imported.
+PIP_INSTALL := $(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile --constraint constraints.txt --editable
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := app tracker tests
 PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
@@ -20,9 +21,9 @@ run: install
 	$(BIN)/quadrille
 
 # What must hold on every change: at most five minutes on two cores. The steps run beside one another. The kernels, for
-# which others wait, have the highest priority. Tests of the page wait a lot: those of the library take what they leave.
-# All steps run to their end: one run shows all that fails.
-test: $(VENV)/.tested $(VENV)/.typescript
+# which others wait, have the highest priority; they are compiled from when the program is installed. Tests of the page
+# wait a lot: those of the library take what they leave. All steps run to their end: one run shows all that fails.
+test: $(VENV)/.installed
 	$(PARALLEL) --keep-going kernels test-page test-library check
 
 # And what is long, or costs much for what it alone reaches.
@@ -78,18 +79,18 @@ $(BIN)/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
-	$(PIP) install --constraint constraints.txt --editable .
+	$(PIP_INSTALL) .
 	touch $@
 
 # .tested: the tools of development, and a browser for the tests.
 $(VENV)/.tested: $(VENV)/.installed tests/support/chromium.py
-	$(PIP) install --constraint constraints.txt --editable '.[dev]'
+	$(PIP_INSTALL) '.[dev]'
 	$(BIN)/python tests/support/chromium.py
 	touch $@
 
 # .slow: the programs that exported files are read by; OpenSim is big.
 $(VENV)/.slow: $(VENV)/.tested
-	$(PIP) install --constraint constraints.txt --editable '.[dev,slow]'
+	$(PIP_INSTALL) '.[dev,slow]'
 	touch $@
 
 # The path is for npm's own scripts, which look for node there.
