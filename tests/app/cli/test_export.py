@@ -53,6 +53,7 @@ def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):
     assert len(read_trc(path).frames) == 7  # from the first pose to the last
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "expected"),
     [

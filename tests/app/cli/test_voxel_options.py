@@ -23,6 +23,7 @@ def test_track_by_voxels(run, placed):
     assert {poses[k].settings["method"] for k in (21, 22)} == {"voxel"}
 
 
+@pytest.mark.slow
 def test_options_of_other_methods_are_refused(run, placed):
     before = sorted(stored(placed))
     for words, expected in (

@@ -247,6 +247,7 @@ def test_exchanged_footage_is_told(run, room, monkeypatch):
     assert "warning" not in run("info", room / "s", "--no-check")[1]
 
 
+@pytest.mark.slow
 def test_a_first_pose_tells_exchanged_footage(run, session, monkeypatch):
     monkeypatch.setattr("tracker.evidence.camera_exchange.find_body_exchange", lambda *_: ("BACK", "LEFT"))
     out = run("init", session, "--joints", SAMPLE / "truth.trc")[1]

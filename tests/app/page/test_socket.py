@@ -182,6 +182,7 @@ async def test_another_group_replaces_the_first_and_closed_ones_rest(controller)
         assert not [m for m in page.told[count:] if m["type"] == "curves"]
 
 
+@pytest.mark.slow
 async def test_a_drag_means_the_frame_that_the_hand_saw(controller):
     controller.navigation.seek(5)
     async with visiting(controller) as page:
@@ -282,6 +283,7 @@ async def test_a_wrong_message_is_one_notice_and_the_socket_stays_open(controlle
     assert record.getMessage().startswith("a page sent a wrong message: expected ")
 
 
+@pytest.mark.slow
 async def test_a_fault_of_the_program_is_a_notice(controller, monkeypatch):
     monkeypatch.setattr(controller.history, "undo", lambda: 1 / 0)
     async with visiting(controller) as page:

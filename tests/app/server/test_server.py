@@ -130,6 +130,7 @@ async def test_files_are_kept_under_the_version_that_the_page_names(client):
     assert "// model/store.js\n" in script
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["nothing.js", "index.html", "model/store.js", "..%2fmain.js", "%2e%2e/pyproject.toml"]
 )
@@ -302,6 +303,7 @@ class TestToken:
             assert "open the address that quadrille open printed" in await response.text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("prefix", ["/", "/static/", "/static/a/", "/viser/", "/ws/"])
 @pytest.mark.parametrize("name", ["a" * 300, "a" * 1900, "a" * 7000, "a/" * 3000, "%C3%A9" * 200, "a" * 70_000, "%00"])
 async def test_long_paths_are_not_found(port, fake_viser, caplog, prefix, name):

@@ -150,6 +150,7 @@ def test_edits_of_a_folder_that_is_away_at_the_end_are_kept(open_with, session, 
     np.testing.assert_array_equal(stored(session)[0].values, edit.values)
 
 
+@pytest.mark.slow
 def test_a_damaged_rescue_file_is_refused_and_changes_nothing(open_with, session, run, places):
     with pytest.raises(TrackerError):
         open_with(edit_on_a_full_disk)

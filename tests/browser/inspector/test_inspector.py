@@ -208,6 +208,7 @@ FIRST = {
 }
 
 
+@pytest.mark.slow
 async def test_words_of_a_beginner_find_something(page):
     await page.keyboard.press("Control+k")
     for query, label in FIRST.items():
@@ -277,6 +278,7 @@ async def test_the_palette_finds_people(page, endpoint):
     await page.locator("[data-section=find]").wait_for()
 
 
+@pytest.mark.slow
 async def test_the_first_steps_find_people_and_show_the_progress(page, endpoint):
     await page.evaluate("document.getElementById('first-steps').hidden = false")
     await page.locator("#first-find").click()
@@ -316,6 +318,7 @@ async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page,
     await page.locator(".acquisition-sizes").wait_for(state="hidden")
 
 
+@pytest.mark.slow
 async def test_sizes_are_acquired_from_voxels_first(page, endpoint):
     await opened(page, "body")
     choice = row(page, "Fit to")

@@ -128,11 +128,13 @@ async def test_keys_work_while_the_scene_has_the_focus_except_those_of_its_camer
     assert endpoint.received == [{"type": "seek", "frame": 13}]
 
 
+@pytest.mark.slow
 async def test_a_page_without_a_graphics_card_asks_the_3d_view_to_wait(page, endpoint):
     """Headless Chromium draws WebGL in software (chromium.FLAGS)."""
     await until(lambda: endpoint.greetings == [{"type": "pause_3d", "pause": True}])
 
 
+@pytest.mark.slow
 async def test_vectors_wait_for_the_images_of_their_own_frame(page, endpoint):
     """A tracker may be some frames ahead of the browser's decoder."""
     for frame in (41, 42):

@@ -79,6 +79,7 @@ async def test_contours_of_other_poses_are_contours_too(page, endpoint, kind):
     await shows(page, f"({pink}) === 0")
 
 
+@pytest.mark.slow
 async def test_the_corner_is_right_about_a_replayed_pose(page, endpoint):
     endpoint.state |= {"point": "l_wrist", "replay": REPLAY}
     await endpoint.broadcast(endpoint.state)

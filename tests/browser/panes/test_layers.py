@@ -154,6 +154,7 @@ async def test_brightness_belongs_to_one_camera_and_is_remembered(page):
     assert await color_at(page) == plain
 
 
+@pytest.mark.slow
 async def test_gamma_lifts_the_shadows_and_leaves_black_and_white(page):
     curve = await page.evaluate(
         """async () => {
@@ -165,6 +166,7 @@ async def test_gamma_lifts_the_shadows_and_leaves_black_and_white(page):
     assert curve == [0, 128, 255]
 
 
+@pytest.mark.slow
 async def test_the_corner_tells_how_the_selected_joint_is_seen(page, endpoint):
     assert await page.locator(".pane-joint:visible").count() == 0
     await page.mouse.click(*await to_client(page, 0, *await handle_of(page, 0, "l_wrist")))

@@ -68,6 +68,7 @@ async def test_no_hand_takes_anything_of_a_frame_that_stands_in(page, endpoint):
     assert COLORED in await page.evaluate(COLORS)
 
 
+@pytest.mark.slow
 async def test_where_the_frame_on_the_screen_is_the_nearest_it_stays_and_is_marked(page, endpoint):
     await visit(page, 40)
     async with slow(page, endpoint, 44):
@@ -88,6 +89,7 @@ async def test_a_hand_that_scrubs_on_is_followed(page, endpoint):
             )
 
 
+@pytest.mark.slow
 async def test_playing_shows_no_stand_ins(page, endpoint):
     await visit(page, 5)
     async with slow(page, endpoint, 5):

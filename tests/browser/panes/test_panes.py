@@ -76,6 +76,7 @@ async def test_a_move_is_told_before_the_browser_gets_to_the_next_frame(page, en
         assert endpoint.heard("drag")[-1]["v"] == pytest.approx(v - 21, abs=0.01)
 
 
+@pytest.mark.slow
 async def test_a_grab_beside_the_joint_keeps_the_distance(page, endpoint):
     u, v = await handle_of(page, 1, "head")
     x, y = await to_client(page, 1, u, v)
@@ -89,6 +90,7 @@ async def test_a_grab_beside_the_joint_keeps_the_distance(page, endpoint):
     assert (last["u"], last["v"]) == (pytest.approx(u, abs=0.5), pytest.approx(v + 35 / scale, abs=0.5))
 
 
+@pytest.mark.slow
 async def test_beyond_twelve_pixels_nothing_is_grabbed_and_the_view_moves(page, endpoint):
     u, v = await handle_of(page, 0, "head")
     x, y = await to_client(page, 0, u, v)
@@ -134,6 +136,7 @@ async def test_dragging_shows_epipolar_lines_elsewhere_and_measures_itself(page)
     assert all(0 < ms < 1000 for ms in latencies)
 
 
+@pytest.mark.slow
 async def test_hover_names_the_joint_in_all_panes(page):
     await page.mouse.move(*await to_client(page, 3, *await handle_of(page, 3, "head")))
     await shows(page, "quadrille.state.hover?.point === 'head'")
@@ -217,6 +220,7 @@ async def test_a_minor_joint_gives_way_to_a_neighbour_until_one_zooms_in(page, e
     assert {m["point"] for m in endpoint.heard("drag")} == {"waist"}
 
 
+@pytest.mark.slow
 async def test_a_minor_joint_in_the_hand_stays_there_as_it_meets_another(page, endpoint):
     await page.mouse.move(*await to_client(page, 0, *await handle_of(page, 0, "waist")))
     await page.mouse.wheel(0, -1400)
@@ -253,6 +257,7 @@ async def test_the_splitter_moves_by_drag_and_key_within_bounds(page):
 
 @pytest.mark.endpoint(n_people=2, n_cameras=6)
 class TestPeople:
+    @pytest.mark.slow
     async def test_six_cameras_and_two_people(self, page, endpoint):
         assert await page.locator(".pane:visible").count() == 6
         await page.locator("#people input").nth(1).check(force=True)

@@ -82,6 +82,7 @@ async def test_a_view_follows_although_the_state_comes_after_the_picture(page, e
     assert await place_in_pane(page, 0, "head") == pytest.approx(before, abs=0.01)
 
 
+@pytest.mark.slow
 async def test_a_hidden_tab_asks_for_no_view(page, endpoint):
     hide = """(hidden) => {
       Object.defineProperty(document, "hidden", { get: () => hidden, configurable: true });
@@ -135,6 +136,7 @@ async def test_a_session_opens_framed_on_the_people_where_they_are_now(page, end
     assert (await place_in_pane(page, 0, "head") < 1).all()
 
 
+@pytest.mark.slow
 async def test_people_who_are_found_are_framed(page, endpoint):
     finding = {
         "type": "finding", "running": True, "stage": "tracking", "share": 1.0, "notes": [], "message": "",

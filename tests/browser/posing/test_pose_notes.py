@@ -38,6 +38,7 @@ async def test_a_limb_that_a_fit_moved_by_itself_is_named_and_taken_back(page, e
     assert len(endpoint.heard("limb_back")) == 2
 
 
+@pytest.mark.slow
 async def test_the_former_place_of_a_limb_is_drawn_and_explained(page, endpoint):
     endpoint.other_kind = "former"
     await endpoint.send_overlay()

@@ -78,6 +78,7 @@ async def test_a_keyboard_alone_does_a_round_of_work(page, endpoint):
     await shows(page, "quadrille.state.shown.frame === 13")
 
 
+@pytest.mark.slow
 async def test_the_live_region_says_what_changed(page, endpoint):
     await page.keyboard.press("Period")
     await shows(page, "document.querySelector('#announcer').textContent.startsWith('frame 13')")
@@ -118,6 +119,7 @@ async def test_nothing_jumps_while_work_is_under_way(page, endpoint):
     assert await page.evaluate("shifts") == []
 
 
+@pytest.mark.slow
 async def test_reduced_motion_is_respected(page):
     await page.emulate_media(reduced_motion="reduce")
     moving = await page.evaluate(
@@ -131,6 +133,7 @@ async def test_reduced_motion_is_respected(page):
     assert moving == []
 
 
+@pytest.mark.slow
 async def test_a_change_of_the_systems_scheme_recolours_the_3d_view_without_loading_it_again(page):
     frame = page.frame_locator("#scene").locator("body")
     ground = "(body) => getComputedStyle(body).backgroundColor"

@@ -18,6 +18,7 @@ async def test_frame_keys(page, endpoint):
         assert await page.locator("#frame").input_value() == str(frame)
 
 
+@pytest.mark.slow
 async def test_frames_end_at_the_ends(page, endpoint):
     for key in ("Home", "Comma", "Shift+Comma"):
         await page.keyboard.press(key)
@@ -91,6 +92,7 @@ async def test_a_field_that_is_done_gives_the_keys_back(page, endpoint):
     assert await page.evaluate("document.activeElement.value") == "far"  # refused: to be corrected
 
 
+@pytest.mark.slow
 async def test_keys_written_into_the_frame_number_go_there(page, endpoint):
     await page.locator("#frame").click()
     await page.keyboard.type("33")
@@ -118,6 +120,7 @@ async def test_a_search_is_watched_and_stopped(page, endpoint):
     await until(lambda: [m["action"] for m in endpoint.heard("search")] == ["frame", "stop", "step", "stop"])
 
 
+@pytest.mark.slow
 async def test_history_and_saving_say_what_they_would_do(page, endpoint):
     assert await page.locator("#undo").get_attribute("title") == "Undo drag l_wrist (Ctrl+Z)"
     assert await page.locator("#redo").is_disabled()
@@ -130,6 +133,7 @@ async def test_history_and_saving_say_what_they_would_do(page, endpoint):
     assert await page.locator("#undo").is_disabled()
 
 
+@pytest.mark.slow
 async def test_notices_are_shown_and_dismissed(page, endpoint):
     notice = {"type": "notice", "level": "error", "text": "the frame 9 is out of range"}
     await endpoint.broadcast(notice)
@@ -220,6 +224,7 @@ async def test_every_control_has_a_name_and_a_tooltip(page):
     assert unnamed == []
 
 
+@pytest.mark.slow
 async def test_that_kernels_are_compiled_is_said_while_they_are(page, endpoint):
     mark = page.locator("#work-compiling b")
     assert not await mark.is_visible()
@@ -232,6 +237,7 @@ async def test_that_kernels_are_compiled_is_said_while_they_are(page, endpoint):
     await mark.wait_for(state="hidden")
 
 
+@pytest.mark.slow
 async def test_work_that_waits_for_kernels_says_so(page, endpoint):
     figures = page.locator("#search-figures")
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "total": 18}
@@ -245,6 +251,7 @@ async def test_work_that_waits_for_kernels_says_so(page, endpoint):
         await expect(figures).to_have_text(text)
 
 
+@pytest.mark.slow
 async def test_the_backward_pass_is_told_from_the_first(page, endpoint):
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "lost": 2}
     for back, text in ((False, "Tracked 4 of 9"), (True, "Checking alternatives")):
@@ -275,6 +282,7 @@ async def test_the_cost_has_a_scale_from_the_good_frames(page, endpoint):
     await page.set_viewport_size({"width": 1440, "height": 900})
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_frames=9)
 async def test_without_good_frames_nothing_is_usual(page):
     assert await page.evaluate(USUAL) == ""

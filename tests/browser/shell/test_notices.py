@@ -22,6 +22,7 @@ async def test_repeated_notices_are_counted_and_logged(page, endpoint):
     assert await page.locator("#notice-log-none").is_visible()
 
 
+@pytest.mark.slow
 async def test_escape_closes_the_last_notice_and_no_more_than_three_stand(page, endpoint):
     for k in range(5):
         await say(endpoint, f"notice {k}")

@@ -113,6 +113,7 @@ async def test_what_suits_the_state_comes_next(page, endpoint):
     assert (await found(page))[:2] == ["Messages", "Pause or continue tracking"]
 
 
+@pytest.mark.slow
 async def test_every_suggestion_is_a_command(page):
     known = await page.evaluate(
         """async () => {

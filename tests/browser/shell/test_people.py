@@ -86,6 +86,7 @@ LANE = """([lane, frame]) => {
 """JavaScript: colours in the lane of a person at a frame, and the dark share of it: stripes."""
 
 
+@pytest.mark.slow
 async def test_a_lane_has_the_colour_of_its_person_and_the_pattern_of_the_status(couple):
     await shows(couple, "document.querySelector('#timeline canvas').width === 1280 * devicePixelRatio")
     for lane, color in enumerate(COLORS[:2]):
@@ -166,6 +167,7 @@ async def test_a_joint_tells_by_whom_it_is_hidden_and_solo_shows_it(couple, endp
     assert "who is dimmed" in await corner.get_attribute("title")
 
 
+@pytest.mark.slow
 async def test_the_top_bar_has_room_while_kernels_are_compiled(couple, endpoint):
     await couple.set_viewport_size({"width": 1280, "height": 720})
     endpoint.state["compiling"] = "contours"

@@ -51,6 +51,7 @@ async def test_all_long_work_is_listed_in_one_place_and_can_be_stopped(page, end
     await shows(page, "document.querySelectorAll('#work .work').length === 0")
 
 
+@pytest.mark.slow
 async def test_the_backward_pass_says_what_it_does_and_that_one_can_go_on(page, endpoint):
     track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "back": True, "total": 490}
     for done in (0, 200, 434):
@@ -62,6 +63,7 @@ async def test_the_backward_pass_says_what_it_does_and_that_one_can_go_on(page, 
     assert await page.locator("#search-stage").inner_text() == "Checking alternatives"
 
 
+@pytest.mark.slow
 async def test_the_time_left_is_that_of_the_work(page):
     """Shares come in steps of any size, at any moment; the time left follows and counts down between them."""
     left = await page.evaluate(
@@ -133,6 +135,7 @@ async def test_a_failure_is_a_sentence_with_its_silhouettes_and_a_way_on(page, e
     assert "Drag the square" in await page.locator(".notice.is-info").inner_text()
 
 
+@pytest.mark.slow
 async def test_a_failure_of_no_single_view_has_no_picture(page, endpoint):
     """Not even where its sentence happens to hold the name of a view."""
     for camera, message in ((2, FAILURE), (None, "Expected the FRONT of a head in the silhouettes, found none.")):

@@ -79,6 +79,7 @@ async def test_curves_and_timeline_share_their_axis(curves, endpoint):
     await shows(curves, "quadrille.state.shown.frame === 93")
 
 
+@pytest.mark.slow
 async def test_gaps_stay_open(curves):
     for index in range(4):
         assert await curves.evaluate(DRAWN, [20, 24, index]) > 0
@@ -116,6 +117,7 @@ async def test_angles_are_drawn_without_jumps_of_a_turn(curves):
     assert known[-1] - known[0] == pytest.approx(7 * 99)
 
 
+@pytest.mark.slow
 async def test_changes_are_taken_over_frame_by_frame(curves, endpoint):
     before = await curves.evaluate("[...quadrille.state.curves.series[0].values]")
     await endpoint.send_curves(np.array([3, 110]), replace=False, shift=100.0)

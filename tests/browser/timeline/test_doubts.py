@@ -61,6 +61,7 @@ async def replace_doubts(page, endpoint, doubts):
     await shows(page, f"quadrille.state.timeline[{max(doubts)}]?.status === 'doubtful'")
 
 
+@pytest.mark.slow
 async def test_doubts_of_one_cause_are_one_entry(page, endpoint):
     right_arm = {k: [0.0, 0.44 if k == 40 else 0.2, 0.03, 0.0, 0.0] for k in (*range(30, 46), *range(52, 60), 75)}
     left_leg = {k: [0.0, 0.0, 0.3, 0.0, 0.0] for k in (47, 110)}
@@ -150,6 +151,7 @@ async def test_a_keyframe_in_doubt_comes_first_and_takes_its_neighbours(page, en
     assert "disagrees" not in await card.inner_text()
 
 
+@pytest.mark.slow
 @pytest.mark.endpoint(n_frames=6)
 async def test_an_empty_list_says_why(page, endpoint):
     await page.keyboard.press("Shift+L")

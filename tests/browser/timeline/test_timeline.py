@@ -328,6 +328,7 @@ BANDS = "(marks) => marks.map((one) => getComputedStyle(one).backgroundImage.mat
 """JavaScript: heights of the bands in the legend."""
 
 
+@pytest.mark.slow
 async def test_each_source_has_bands_of_its_own(page, endpoint):
     """Colour-blind people tell sources apart too: on the timeline as in the legend."""
     plain = {"cost_px": 1.0, "keyframe": False, "status": "", "remark": "", "reviewed": False, "ambiguous": False}

@@ -59,6 +59,7 @@ async def test_a_run_is_watched_paused_and_stopped(page, endpoint):
     assert seen[str(at)]["source"] == "tracked"
 
 
+@pytest.mark.slow
 async def test_backward_by_key_and_escape(page, endpoint):
     await page.keyboard.press("Shift+T")
     await shows(page, "quadrille.state.shown.frame < 11")
@@ -114,6 +115,7 @@ async def test_a_range_is_marked_by_keys(page):
     await shows(page, "quadrille.state.range?.first === 12 && quadrille.state.range.last === 22")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["dark", pytest.param("light", marks=pytest.mark.slow)])
 async def test_statuses_differ_by_colour_and_by_height(page, scheme):
     await page.emulate_media(color_scheme=scheme)
@@ -184,6 +186,7 @@ async def test_the_card_says_what_the_tracker_thinks_of_the_frame(page):
     assert await page.locator("#frame-parts").is_visible()
 
 
+@pytest.mark.slow
 async def test_a_drag_names_the_frame_under_the_hand(page, endpoint):
     async with dragging(page, 0, "head", (5, 5), (9, 9)):
         await until(lambda: endpoint.heard("drag"))

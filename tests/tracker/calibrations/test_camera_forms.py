@@ -113,6 +113,7 @@ def angles_of(R, order):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", list(permutations(range(3))))
 @pytest.mark.parametrize("convention", ["world-to-camera", "camera-to-world", "camera-position"])
 def test_angles_in_place_of_rotation_vectors_are_refused(tmp_path, order, convention):

@@ -78,6 +78,7 @@ def test_pixels_are_as_filmed(camera):
     assert np.array_equal(silhouette.camera.distortion, camera.camera.distortion)
 
 
+@pytest.mark.slow
 def test_the_recording_itself_gives_the_background(camera):
     silhouette = found(replace(camera, background=None))
     assert jaccard(silhouette.mask, person(4)) > 0.9

@@ -306,6 +306,7 @@ def test_too_few_points(known):
         fit_to_points(GAVRILA, targets)
 
 
+@pytest.mark.slow
 def test_fit_to_joint_centers_puts_them_on_the_targets():
     """A reference states anatomical joint centres, not pivots."""
     model = GAVRILA

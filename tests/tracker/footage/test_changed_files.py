@@ -91,6 +91,7 @@ def test_a_video_replaced_by_one_of_the_same_length_in_bytes_is_noticed(clip, vi
     assert video.version == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("settings", "found"),
     [({"n": N - 10}, "found 50;"), ({"n": N + 10}, "found 70;"), ({"times": [2 * i for i in range(N)]}, "time stamps")],

@@ -114,6 +114,7 @@ def test_a_wide_lens_sees_what_is_beside_and_behind_it():
     assert np.isnan(c.pinhole.project(in_world(c, points))).all(axis=-1).tolist() == [True, True, False]
 
 
+@pytest.mark.slow
 def test_no_pixel_shows_what_lies_beyond_the_lens():
     c = fisheye("ends at 66 degrees")
     beyond = in_world(c, directions(40) @ np.diag([1.0, 1.0, -1.0]))

@@ -98,6 +98,7 @@ def test_going_back_works_beside_a_hot_journal(path):
     assert labels(path) == labels(path.with_name("whole.sqlite"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("read_only", [True, False])
 def test_a_journal_that_leads_to_another_file_is_refused(path, read_only, tmp_path):
     """SQLite deletes the file that such a journal names."""

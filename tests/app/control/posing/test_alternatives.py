@@ -92,6 +92,7 @@ def test_who_vouches_for_a_pose_has_chosen(tracked):
     assert (ambiguous(controller, BOB), drawn(controller)) == ([0], set())
 
 
+@pytest.mark.slow
 def test_without_another_pose_there_is_nothing_to_take(tracked):
     controller, *_ = tracked
     controller.navigation.seek(2)

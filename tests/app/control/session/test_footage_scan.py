@@ -67,6 +67,7 @@ def test_what_is_listed_is_shown_and_the_rest_follows(fresh, gate):
     wait_for(lambda: fresh.state.footage == FootageState())
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_a_file_is_said_when_it_comes_out(session, monkeypatch):
     def fail(container, where, report=None):
         raise RecordingError(f"{where} is truncated; copy it again")

@@ -105,6 +105,7 @@ def test_a_stop_changes_nothing(opened, found, tracked):
     assert tracked == []
 
 
+@pytest.mark.slow
 def test_a_person_who_was_placed_meanwhile_wins(opened, found, tracked):
     controller = opened()
     begun(controller)

@@ -54,6 +54,7 @@ def test_a_view_that_contradicts_the_others_is_left_out():
     assert found[0].up @ UP > 0.99
 
 
+@pytest.mark.slow
 def test_views_from_one_side_are_refused():
     one = axes_of(figure()[0])[0]
     with pytest.raises(TrackerError, match="at least 2 views from different sides"):

@@ -128,6 +128,7 @@ def test_the_others_stay_as_they_were_found(scene):
         assert (estimate.notes[0], estimate.statuses[0]) == ("", "doubtful")
 
 
+@pytest.mark.slow
 def test_what_an_end_of_the_run_leaves_open_is_improved_backward_from_the_last_frame_that_is_not_lost(scene):
     model, _, views, first = scene
     found = [f._replace(statuses=("lost" if f.frame in LOST else "doubtful" if f.frame > 4 else "good",))

@@ -88,6 +88,7 @@ def occupied(states, *boxes):
     return Voxels(grid, inside.reshape(grid.shape))
 
 
+@pytest.mark.slow
 def test_voxels_count_for_the_person_whom_they_are_connected_with(states):
     torso = states[1].centers[0]
     limb = (torso - 0.06, torso + np.array([0.9, 0.06, 0.06]))
