@@ -133,6 +133,19 @@ PHRASES = {
     "without_paper": Phrases(
         "add poses of such a frame, or leave out --paper", "add poses of such a frame, or acquire as usual"
     ),
+    "frame_of_file": Phrases("choose another --frame", "go to a frame of the file"),
+    "body_of_table": Phrases(
+        "make the session with the --model, a preset or a file, that the poses are of",
+        "make a session with the body model that the poses are of",
+    ),
+    "check_joint_units": Phrases(
+        "check the units of the file, and --joint-map",
+        "check the units of the file, and which joint each marker stands for",
+    ),
+    "check_world_of_file": Phrases(
+        "check --axes, the units of the file, and that it is in the world of the calibration",
+        "check the axes and units of the file, and that it is in the world of the calibration",
+    ),
     "check_joint_map": Phrases("check --joint-map", "check which joint each marker stands for"),
     "give_joint_map": Phrases(
         "give a --joint-map FILE.toml with a line such as left_shoulder = {marker} for each joint "

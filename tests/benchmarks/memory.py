@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 
-from app.cli.init import init_from_joints
 from app.cli.target import load_target
 from app.cli.track import track
 from app.runtime.malloc_trim import give_back_freed_memory
@@ -24,6 +23,7 @@ from tracker.evaluation.references import read_joints
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.footage.video_writer import VideoWriter
+from tracker.pipeline.given_pose import set_pose_at_joints
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import Session, load_session, save_session
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -105,7 +105,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         session = long_session(words.session, Path(name), words.times)
         at = load_target(session.folder, None, several=False)
-        init_from_joints(at, 0, read_joints(words.joints, session.fps), sizes=False)
+        set_pose_at_joints(at.session, at.people[0], 0, read_joints(words.joints, session.fps), fit_sizes=False)
         print(f"before the first frame: {resident_mb():.0f} MB")
         watch = Watch()
         found = track(at.session, TrackPlan(range(session.n_frames), at.people, TrackSettings()), watch)
