@@ -1,37 +1,64 @@
 """How soon the contours follow a drag: pointer move to all panes painted, measured in Chromium on the sample.
 
 Run by hand, on a quiet machine: `python tests/benchmarks/drag_latency.py`. Prints the median and 95th percentile over
-some 300 moves at 30 per second, in a pane of the real program with the real 3-D view beside it.
+some 300 moves at 30 per second, in a pane of the real program with the real 3-D view beside it; then the same for a
+made-up program that moves a stick figure without solving anything. Its figures are the floor of browser and transport.
 """
 
 import asyncio
+import contextlib
+import socket
+import sys
+from collections.abc import AsyncIterator
 
 import numpy as np
-from sample_page import sample_page
+from playwright.async_api import Page
+from sample_page import ROOT, opened_page, sample_page
 
 from page_driver import handle_of, to_client  # isort: skip  (found by sample_page)
 
 MOVES, INTERVAL_S = 300, 1 / 30
 
 
-async def measure() -> list[float]:
-    async with sample_page() as page:
-        x, y = await to_client(page, 0, *await handle_of(page, 0, "left_wrist"))
-        await page.mouse.move(x, y)
-        await page.mouse.down()
-        for k in range(MOVES):
-            await page.mouse.move(x + 40 * np.sin(k / 12), y - 20 + 30 * np.cos(k / 9))
-            await asyncio.sleep(INTERVAL_S)
-        await page.mouse.up()
-        await asyncio.sleep(1)
-        return await page.evaluate("quadrille.latencies")
+@contextlib.asynccontextmanager
+async def floor_page() -> AsyncIterator[Page]:
+    """The page of the made-up program."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    program = await asyncio.create_subprocess_exec(
+        sys.executable, str(ROOT / "tests" / "support" / "fake_endpoint.py"), str(port), stdout=asyncio.subprocess.PIPE
+    )
+    assert program.stdout is not None
+    await program.stdout.readline()
+    async with opened_page(f"http://127.0.0.1:{port}/") as page:
+        yield page
+    program.terminate()
+    await program.wait()
 
 
-def main() -> None:
-    latencies = asyncio.run(measure())
-    median, p95 = np.percentile(latencies, [50, 95])
-    print(f"{len(latencies)} drag messages: median {median:.0f} ms, p95 {p95:.0f} ms, largest {max(latencies):.0f} ms")
+async def measure(page: Page, joint: str) -> list[float]:
+    """Latencies of the moves of a drag of a joint, ms."""
+    x, y = await to_client(page, 0, *await handle_of(page, 0, joint))
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    for k in range(MOVES):
+        await page.mouse.move(x + 40 * np.sin(k / 12), y - 20 + 30 * np.cos(k / 9))
+        await asyncio.sleep(INTERVAL_S)
+    await page.mouse.up()
+    await asyncio.sleep(1)
+    latencies: list[float] = await page.evaluate("quadrille.latencies")
+    return latencies
+
+
+async def main() -> None:
+    for name, opened, joint in (("program", sample_page, "left_wrist"), ("floor", floor_page, "l_wrist")):
+        async with opened() as page:
+            latencies = await measure(page, joint)
+        median, p95 = np.percentile(latencies, [50, 95])
+        largest = max(latencies)
+        print(f"{name}: {len(latencies)} moves, median {median:.0f} ms, p95 {p95:.0f} ms, largest {largest:.0f} ms")
 
 
 if __name__ == "__main__":
-    main()
+    asyncio.run(main())

@@ -26,12 +26,19 @@ async def sample_page() -> AsyncIterator[Page]:
         shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", folder)
         program = Program(folder)
         await program.start()
-        async with async_playwright() as playwright:
-            browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
-            page = await browser.new_page(viewport={"width": 1440, "height": 900})
-            await page.goto(program.address)
-            await shows(page, "window.quadrille?.state.overlay && window.quadrille.state.state.cost_px", 120)
-            await asyncio.sleep(9)  # the 3-D view has faded in
+        async with opened_page(program.address) as page:
             yield page
-            await browser.close()
         await program.stop()
+
+
+@contextlib.asynccontextmanager
+async def opened_page(address: str) -> AsyncIterator[Page]:
+    """The page at an address, at rest."""
+    async with async_playwright() as playwright:
+        browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)
+        page = await browser.new_page(viewport={"width": 1440, "height": 900})
+        await page.goto(address)
+        await shows(page, "window.quadrille?.state.overlay && window.quadrille.state.state.cost_px", 120)
+        await asyncio.sleep(9)  # the 3-D view has faded in
+        yield page
+        await browser.close()
