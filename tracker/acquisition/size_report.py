@@ -23,11 +23,6 @@ class SizeChange(NamedTuple):
     sigma_m: float
     """Standard deviation of the size after the acquisition, metres."""
 
-    @property
-    def change_m(self) -> float:
-        """Growth of the size, metres."""
-        return self.after_m - self.before_m
-
 
 def size_changes(acquisition: Acquisition) -> list[SizeChange]:
     """List all sizes, those that changed most, by share, first. One side stands for both if they are coupled."""

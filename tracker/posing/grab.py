@@ -116,11 +116,6 @@ class Grab:
     up_world: Array
     """The vertical, (3,), a unit vector."""
 
-    @property
-    def moves_body(self) -> bool:
-        """Whether the whole body moves parallel to the image."""
-        return self.role == "body"
-
     def point_world(self, pose: Array) -> Array:
         """Return the grabbed point in a pose, (3,), metres."""
         return rigid.apply(self.model.kinematics(pose).Ts_world_part[self.part], self.point_part)

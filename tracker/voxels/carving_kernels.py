@@ -1,4 +1,4 @@
-"""Compiled kernels of voxel carving: each voxel alone, and blocks that are divided where a silhouette's edge is.
+"""Compiled kernels of voxel carving: blocks that are divided where a silhouette's edge is.
 
 A block is enclosed in a sphere. The sphere's pixels in a view lie within a square, whose number of silhouette pixels
 an integral image gives. If all squares are uniform the block is decided as a whole (an octree, Szeliski 1993).
@@ -42,23 +42,6 @@ class ViewTables(NamedTuple):
 STACK_COLUMNS = 7
 """Columns of a block on the stack: first voxel i, j, k, edge, and what its parent has settled: views within and outside
 of the silhouettes, and a bit for each settled view."""
-
-
-@njit(**NO_REFCOUNT)
-def carve_each(
-    views: ViewTables, origin: Array, size_m: float, min_views: int, missing: int, occupied: NDArray[np.bool_]
-) -> None:
-    """Fill the occupied voxels, (nx, ny, nz), by testing each one."""
-    for i in range(occupied.shape[0]):
-        for j in range(occupied.shape[1]):
-            for k in range(occupied.shape[2]):
-                n_inside, n_outside = 0, 0
-                x, y, z = origin[0] + i * size_m, origin[1] + j * size_m, origin[2] + k * size_m
-                for v in range(views.sizes.shape[0]):
-                    found = _view_test(views, v, np.float32(x), np.float32(y), np.float32(z), np.float32(0))
-                    n_inside += found == _INSIDE
-                    n_outside += found == _OUTSIDE
-                occupied[i, j, k] = n_inside >= min_views and n_outside <= missing
 
 
 @njit(**NO_REFCOUNT)

@@ -70,21 +70,6 @@ def label_voxels(points: Array, states: Sequence[FilterState], size_m: float, ru
     return Labels(labels, _clouds(moments, size_m))
 
 
-def label_voxels_plainly(points: Array, states: Sequence[FilterState], size_m: float, rule: LabelRule) -> Labels:
-    """Return the same without a compiled kernel: the oracle of `label_voxels`."""
-    centers, rotations, (inverses, added) = _parts(states, size_m, rule.widened)
-    local = np.einsum("mji,nmj->nmi", rotations, points[:, None] - centers)
-    squared = np.einsum("nmi,mij,nmj->nm", local, inverses, local)
-    distances = np.where(squared < rule.gate, squared + added, np.inf)
-    labels = distances.argmin(axis=1).astype(np.int16)
-    labels[~np.isfinite(distances.min(axis=1))] = NO_PART
-    moments = np.zeros((len(centers), N_MOMENTS))
-    for m in range(len(centers)):
-        own = local[labels == m, m]
-        moments[m] = [len(own), *own.sum(axis=0), *(own.T @ own)[_UPPER]]
-    return Labels(labels, _clouds(moments, size_m))
-
-
 def _parts(states: Sequence[FilterState], size_m: float, widened: bool) -> tuple[Array, Array, tuple[Array, Array]]:
     """Return centres and rotations of all parts, and inverse covariances in their frames with what each adds."""
     shapes = np.concatenate([(s.figure.sigma_shares * s.sizes) ** 2 + size_m**2 / 12 for s in states])
