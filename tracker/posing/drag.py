@@ -8,6 +8,7 @@ from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import solve
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.posing.grab import Grab, Holds, limb_points
 from tracker.posing.orient import orient
 from tracker.posing.reaching import HOLD_WEIGHT, QUICK, PointerTarget, as_other_views_placed, reach, restore_held
@@ -18,10 +19,6 @@ _KNOB_M = 0.3
 """Distance to the right by which the pointer turns a knob by one radian, at the joint's depth, metres."""
 _PUSH_GAIN = 2.0
 """Motion in depth of a pushed point, in motions of the pointer at the point's depth."""
-_PUSH_DEPTH_WEIGHT = 0.5
-"""Weight of a pushed point's depth, against 1 for keeping its position in the view."""
-_MIN_PUSH_DEPTH_M = 0.3
-"""Smallest depth of a pushed point, metres."""
 
 _HEADINGS_RAD = (np.radians(np.arange(-90.0, 91.0)), np.radians(np.linspace(-1.0, 1.0, 41)))
 """Turns about the vertical that one move tries, against the last move, coarse and fine."""
@@ -122,9 +119,9 @@ def push(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
     """
     camera = grabbed.camera
     up_m = float(grabbed.pointer_px[1] - np.asarray(pointer_px)[1]) * grabbed.depth_m / camera.K[1, 1]
-    depth = max(_MIN_PUSH_DEPTH_M, grabbed.depth_m + _PUSH_GAIN * up_m)
+    depth = max(NEAR_PLANE_M, grabbed.depth_m + _PUSH_GAIN * up_m)
     target = camera.back_project(grabbed.pointer_px + grabbed.offset_px, depth)
-    return _follow(grabbed, target, pose, _PUSH_DEPTH_WEIGHT)
+    return _follow(grabbed, target, pose, HOLD_WEIGHT)
 
 
 def _follow(grabbed: Grab, target_world: Array, pose: Array, depth_weight: float | None) -> Array:

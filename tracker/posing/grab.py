@@ -23,6 +23,7 @@ Role: TypeAlias = Literal["body", "heading", "lean", "trunk", "limb"]
 """Parts that a dragged point moves: the whole body, its heading (a turn about the vertical), its lean (any turn), the
 bend of the trunk, or one limb."""
 _UP = (0.0, 0.0, 1.0)
+"""The vertical where none is stated."""
 
 
 @dataclass(frozen=True)

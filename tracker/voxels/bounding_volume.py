@@ -9,12 +9,10 @@ import numpy as np
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import NEAR_PLANE_M, viewed_point
+from tracker.geometry.cameras import MAX_LENS_RADIUS, NEAR_PLANE_M, viewed_point
 
 _REACH = 1.5
 """Half the edge of the largest volume, in the mean distance of the cameras from the point that they look at."""
-_MIN_COSINE = 0.05
-"""Cosine of the angle from the axis, 87 degrees, from which silhouettes of a fisheye lens span no pyramid."""
 _PIXEL = 1.0
 """Margin around the box of a silhouette, px: a body may reach nearly to the next pixel's centre."""
 
@@ -99,7 +97,8 @@ def _pyramid(silhouette: ViewSilhouette) -> Array:
     points = np.concatenate([np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in outline]).astype(np.float64)
     corners = np.concatenate([points + d for d in itertools.product((-_PIXEL, _PIXEL), repeat=2)])
     rays = camera.rays(corners) @ camera.T_camera_world[:3, :3].T
-    if not np.all(rays[:, 2] > _MIN_COSINE):  # NaN is beyond the lens
+    # Silhouettes of a fisheye lens that reach farther span no pyramid. NaN is beyond the lens.
+    if not np.all(np.linalg.norm(rays[:, :2], axis=1) < MAX_LENS_RADIUS * rays[:, 2]):
         return np.empty((0, 4))
     slopes = rays[:, :2] / rays[:, 2:]
     (x0, y0), (x1, y1) = slopes.min(axis=0), slopes.max(axis=0)

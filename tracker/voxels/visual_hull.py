@@ -17,17 +17,14 @@ MIN_FIGURE_M3 = 0.008
 """Smallest volume of a figure, cubic metres: a child of a year has 10 litres."""
 _MIN_SHARE = 0.25
 """Smallest volume of a figure, as a share of the largest one."""
-_MIN_NEEDED = 0.15
-"""Share of a figure's silhouette that no other figure explains, in some view. Lines of sight to two people also meet
-where there is no person: such a figure explains nothing by itself."""
+_MATTERS = 0.15
+"""Share of silhouettes by which a figure or a view must matter: somewhat more than an arm. A figure explains so much of
+one that no other does, because lines of sight to two people also meet where there is no person. A view is left out as
+broken if without it, and without no other one, so much more of the others is explained."""
 _MIN_COVERAGE = 0.6
 """Share of its silhouette that the hull explains in a view that agrees with the others."""
 _NEARLY_ALL = 0.95
 """Share of its silhouette that the hull explains in a view that shows people alone, simulated (`test_visual_hull`)."""
-_MIN_GAIN = 0.15
-"""Gain of the others' mean coverage above which a view is left out as broken."""
-_MIN_LEAD = 0.05
-"""Lead of that gain over the gain without any other view."""
 
 
 class VisualHull(NamedTuple):
@@ -69,7 +66,7 @@ def carve_people(
     figures = (
         [v for v in voxels.components(_MIN_SHARE) if v.volume_m3 >= MIN_FIGURE_M3] if voxels.occupied.any() else []
     )
-    figures = needed_figures(seen, figures, _MIN_NEEDED)
+    figures = needed_figures(seen, figures, _MATTERS)
     if not figures:
         raise TrackerError(
             f"expected a figure of at least {1000 * MIN_FIGURE_M3:.0f} litres where the silhouettes meet, found "
@@ -117,12 +114,12 @@ def _carve_consistent(
         contradiction = error
     n = len(silhouettes)
     before = whole[1] if whole else np.zeros(n)
-    if n > 2 and before.min() < 1 - _MIN_GAIN:
+    if n > 2 and before.min() < 1 - _MATTERS:
         without = [_without(i, silhouettes, size_m, settings) for i in range(n)]
         gains = [float(np.delete(w[1] - before, i).mean()) if w else 0.0 for i, w in enumerate(without)]
         best, second = (int(i) for i in np.argsort(gains)[:-3:-1])
         chosen = without[best]
-        if chosen and gains[best] > _MIN_GAIN and gains[best] - gains[second] > _MIN_LEAD:
+        if chosen and gains[best] > _MATTERS >= gains[second]:
             return *chosen, best
     if whole is None:
         raise contradiction or AssertionError

@@ -13,7 +13,7 @@ from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
 _REACH_M = 0.35
 """Distance from the prediction to which voxels are carved, metres: how far a limb may be from where it is predicted."""
-_AXIS = np.linspace(-0.8, 0.8, 5)
+AXIS = np.linspace(-0.8, 0.8, 9)
 """Places along the axis of a part that are looked up, in half sizes."""
 _MIN_SHARE, _MIN_OTHERS = 0.4, 0.7
 """A view whose silhouette holds less of the figures than the first, while that of the second best holds more than the
@@ -43,7 +43,7 @@ def carve_around(silhouettes: Sequence[ViewSilhouette], states: Sequence[FilterS
         states: predicted figures of all people.
         size_m: edge of a voxel, metres.
     """
-    axes = np.concatenate([axis_points(s, _AXIS).reshape(-1, 3) for s in states])
+    axes = np.concatenate([axis_points(s, AXIS).reshape(-1, 3) for s in states])
     seen = [s for s in silhouettes if not s.is_empty]
     shares = np.array([_share_inside(s, axes) for s in seen])
     good = shares >= _MIN_SHARE

@@ -15,6 +15,7 @@ from tracker.tracking.voxel.state import FilterState
 NO_PART = -1
 """Label of a voxel that belongs to no part."""
 _UPPER = np.triu_indices(3)
+"""Rows and columns of the distinct elements of a symmetric matrix."""
 
 
 class PartClouds(NamedTuple):

@@ -17,6 +17,7 @@ from tracker.tracking.voxel.state import FilterState
 MIN_VOXELS = 4
 """Fewest voxels of a part that is measured: fewer have no three principal axes."""
 _ORDERS = np.array(list(itertools.permutations(range(3))))
+"""All orders of three axes, (6, 3)."""
 _SKIN_M = 0.01
 """Spread that the skin of a visual hull adds across a part, metres."""
 _IMPROBABLE = 16.8
