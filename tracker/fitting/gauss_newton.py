@@ -30,7 +30,7 @@ UNKNOWN = 1.0
 JOINT_M = 0.005
 """Standard deviation of a known joint of the same body, metres: markers and rigs repeat a joint to some
 millimetres."""
-OTHER_BODY_M = 0.02
+OTHER_BODY_M = 0.015
 """Standard deviation of a known joint of a body of other sizes, metres: joints of people and those of the built-in body
 differ by 1 to 4 cm (docs/accuracy.md, Joint centres)."""
 LOOSE = 0.5

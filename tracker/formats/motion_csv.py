@@ -14,7 +14,7 @@ from pathlib import Path
 from tracker.files import write_text_atomic
 
 _DIGITS = 7
-"""Significant digits of a value: micrometres within 10 m."""
+"""Decimals of a value: a tenth of a micrometre."""
 
 
 @dataclass(frozen=True)

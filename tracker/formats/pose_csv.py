@@ -34,7 +34,7 @@ VERSION = 1
 
 _TITLE = "# quadrille poses, version "
 _DIGITS = 9
-"""Significant digits of a value, so that a pose is read back to 1e-8 rad."""
+"""Decimals of a value, so that a pose is read back to 1e-9 rad or m."""
 _KIND = TextKind("pose table", TABLE_BYTES, FormatError, "export it again")
 _MAX_COLUMNS = 2000
 """Largest number of columns of values."""

@@ -22,10 +22,10 @@ _PUSH_GAIN = 2.0
 
 _HEADINGS_RAD = (np.radians(np.arange(-90.0, 91.0)), np.radians(np.linspace(-1.0, 1.0, 41)))
 """Turns about the vertical that one move tries, against the last move, coarse and fine."""
-_NEAR_HEADING_M, _SAME_SIDE_M = 0.03, 0.01
-"""Distances in the view that outweigh one radian of turn from the grab and from the last move, metres. A shoulder at
-the outline turns far for little: the first keeps an aim that is slightly off from turning the body. Of two headings
-that look alike the second takes the nearer."""
+_NEAR_HEADING_M = 0.02
+"""Distance in the view that outweighs one radian of turn from the grab or from the last move, metres. A shoulder at
+the outline turns far for little, so that an aim that is slightly off does not turn the body. Of two headings that look
+alike the nearer is taken."""
 _NEAR_SIDE_M = 3e-4
 """Squared distance in the view that outweighs one metre of depth, metres. It decides which way a shoulder at the
 outline is drawn inwards: towards the camera."""
@@ -179,7 +179,7 @@ def _turned_about_vertical(grabbed: Grab, target_world: Array, pose: Array, dept
         missed = grabbed.depth_m * (seen[:, :2] / seen[:, 2:] - target[:2] / target[2])
         cost = np.sum(missed**2, axis=1) + (depth_weight * (seen[:, 2] - target[2])) ** 2
         cost += np.sum(np.einsum("nij,tnj->tni", placed.weights, moves[:, 1:]) ** 2, axis=(1, 2))
-        cost += (_NEAR_HEADING_M * tried) ** 2 + _NEAR_SIDE_M * seen[:, 2] + (_SAME_SIDE_M * (tried - last)) ** 2
+        cost += (_NEAR_HEADING_M * tried) ** 2 + _NEAR_SIDE_M * seen[:, 2] + (_NEAR_HEADING_M * (tried - last)) ** 2
         angle = float(tried[np.argmin(cost)])
     return orient(model, pose, 0, rigid.so3_exp(angle * up) @ T_root[:3, :3], grabbed.unlocked_dofs)
 

@@ -38,8 +38,6 @@ the pointer."""
 _DEPTH_WEIGHT = 0.1
 """Weight of keeping the dragged point's depth. If the limb's lengths allow only one of the two, the point follows the
 pointer."""
-_HELD_DEPTH_WEIGHT = 0.02
-"""The same if the limb has a held point: that point knows the depth better than the view of the drag."""
 _REST_WEIGHT = 0.003
 """Weight of keeping the chain at its pose at the grab, per rad. It determines what the pointer does not, and holds the
 point back by some 0.1 mm."""
@@ -59,9 +57,8 @@ which a degree of freedom counts as a twist."""
 _REACHED_M, _REACHED_DEPTH_M = 0.002, 0.02
 """Tolerances across the line of sight and along it within which a point has reached its target, metres. The pull to the
 rest pose holds a point back in depth by some 4 mm."""
-_NEAR_M, _OTHER_SIDE = 0.05, 0.8
-"""Distance in space from the target beyond which the other sides of a limb are tried, metres; and share of the cost
-below which it goes there."""
+_NEAR_M = 0.05
+"""Distance in space from the target beyond which the other sides of a limb are tried, metres."""
 _STRETCHED = 0.999
 """Share of the full length of a chain from which it counts as stretched; an elbow then bends by 5 degrees."""
 QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
@@ -195,7 +192,7 @@ def reach(
     holds = holds.of(holds.moved_by(model, active_dofs))
     if depth_weight is None:
         target_world, depth_weight = as_other_views_placed(grabbed, target_world)
-        depth_weight = max(depth_weight, _HELD_DEPTH_WEIGHT if len(holds.points) else _DEPTH_WEIGHT)
+        depth_weight = max(depth_weight, _DEPTH_WEIGHT)
     # For a held wrist to stay while the elbow is dragged, the elbow must bend: joints beyond the point follow too.
     beyond = np.any(model.moves[:, model.point_parts[holds.points]], axis=1) & model.limb_dofs
     active = active_dofs | (beyond & grabbed.unlocked_dofs)
@@ -228,7 +225,7 @@ def reach(
     for start in starts:
         in_space = solve(model, start, [PointerTarget(grabbed, target_world, 1.0), *blocks[1:]], active, **_BENT)
         other = solve(model, in_space.pose, blocks, active, **_BENT)
-        if other.cost < min(_OTHER_SIDE * fit.cost, best.cost):
+        if other.cost < best.cost:
             best = other
     return best.pose if best is fit else solve(model, best.pose, blocks, active, **QUICK).pose
 

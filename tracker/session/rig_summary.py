@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from tracker.calibrations.units import MIN_STUDIO_M
 from tracker.formats.camera_section import MAX_OFFSET
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
@@ -21,8 +22,6 @@ _UNDER_FLOOR_M = 0.1
 """Depth of a camera below the floor above which it is noted, metres: the error of a floor that was set by hand."""
 _AGREEMENT = 0.8
 """Mean cosine of the pictures' up direction and an axis above which the cameras stand upright to it (37 degrees)."""
-_MIN_RIG_M = 0.5
-"""Extent of a rig below which distances between its cameras mean nothing, metres: another unit, or a stereo pair."""
 _MAX_TANGENTIAL = 0.05
 """Largest tangential coefficient: at 45 degrees it moves a point by a seventh of the focal length. Radial ones are
 often larger, and stand in its place where programs write k1, k2, k3, p1, p2."""
@@ -109,7 +108,7 @@ def _floor_doubts(names: Sequence[str], centers_world: Array, heights_m: Array, 
 def _place_doubts(names: Sequence[str], centers_world: Array) -> list[str]:
     """Doubt cameras that stand at one place, as copied poses do."""
     apart = np.linalg.norm(centers_world[:, None] - centers_world, axis=-1)
-    if apart.max() < _MIN_RIG_M:  # another unit, which is noted
+    if apart.max() < MIN_STUDIO_M:  # another unit, which is noted, or a stereo pair
         return []
     return [
         f"Cameras '{names[i]}' and '{names[j]}' stand {100 * apart[i, j]:.2g} cm apart: check that the pose of one is "

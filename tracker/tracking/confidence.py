@@ -31,8 +31,6 @@ _MIN_LENGTH_PX = 5.0
 """Shortest contour length that the explained points are divided by, px."""
 _MIN_SHOWN = 0.2
 """A view shows a limb where more of its contour is visible, relative to that seen from the side."""
-_MIN_EXPLAINED = 0.05
-"""Fewest points per pixel of the body's contour to which a part is compared."""
 NEXT_TO_NOTHING = 0.005
 """Added to a feature before its logarithm, body heights or outlier distances, so that smaller ones hardly count."""
 _HEAD = "head"
@@ -264,7 +262,7 @@ def quality(
                 contours.forward(c.parts), contours.shown(c.parts), contours.explained(c.parts),
                 _share_at_limits(model, body.values, c), float(free_spread), contours.second_forward(c.parts, forward),
                 np.inf if c.name == _HEAD else float(color[c.parts[-1]]),
-                contours.explained(c.parts[-1:]) / max(_MIN_EXPLAINED, explained),
+                contours.explained(c.parts[-1:]) / max(NEXT_TO_NOTHING, explained),
                 float(innovations[points].max()),
             )
             for c, points, spread, free_spread in zip(chains, layout.points, spreads, free_spreads, strict=True)

@@ -31,7 +31,7 @@ class CarveSettings(NamedTuple):
     the image of do not count."""
 
 
-DEFAULT_CARVING = CarveSettings()
+_ALL_AGREE = CarveSettings()
 """All views that a voxel is in the image of agree, at least two."""
 
 
@@ -47,7 +47,7 @@ class Carver:
         self.silhouettes = tuple(silhouettes)
         self._tables = _view_tables(silhouettes)
 
-    def carve(self, grid: VoxelGrid, settings: CarveSettings = DEFAULT_CARVING) -> Voxels:
+    def carve(self, grid: VoxelGrid, settings: CarveSettings = _ALL_AGREE) -> Voxels:
         """Return the voxels of a grid whose centres agree with the silhouettes, by dividing blocks."""
         return self._carve_blocks(grid, settings)[0]
 

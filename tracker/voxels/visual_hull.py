@@ -9,7 +9,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.voxels.bounding_volume import bounding_volume
-from tracker.voxels.carving import DEFAULT_CARVING, Carver, CarveSettings
+from tracker.voxels.carving import Carver
 from tracker.voxels.figure_masks import needed_figures, paint
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
@@ -44,9 +44,7 @@ class VisualHull(NamedTuple):
         return least if self.coverages[least] < _NEARLY_ALL else None
 
 
-def carve_people(
-    silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings = DEFAULT_CARVING
-) -> VisualHull:
+def carve_people(silhouettes: Sequence[ViewSilhouette], size_m: float) -> VisualHull:
     """Carve the people of a frame.
 
     A view that the others contradict is left out if at least two others remain.
@@ -54,14 +52,13 @@ def carve_people(
     Args:
         silhouettes: of all views.
         size_m: edge of a voxel, metres.
-        settings: which voxels agree with the silhouettes.
 
     Raises:
         TrackerError: fewer than two views show people, the views contradict each other, or nothing of the size of a
             person is found.
     """
     seen = [s for s in silhouettes if not s.is_empty]
-    voxels, found, broken = _carve_consistent(seen, size_m, settings)
+    voxels, found, broken = _carve_consistent(seen, size_m)
     names = [s.camera.name for s in seen]
     figures = (
         [v for v in voxels.components(_MIN_SHARE) if v.volume_m3 >= MIN_FIGURE_M3] if voxels.occupied.any() else []
@@ -90,14 +87,12 @@ def coverages(voxels: Voxels, silhouettes: Sequence[ViewSilhouette]) -> Array:
     return np.array([_coverage(voxels.grid.centers(indices), voxels.grid.size_m, s) for s in silhouettes])
 
 
-def _carve(silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings) -> Voxels:
-    box = bounding_volume(silhouettes, settings.missing)
-    return Carver(silhouettes).carve(VoxelGrid.over(box.low, box.high, size_m), settings)
+def _carve(silhouettes: Sequence[ViewSilhouette], size_m: float) -> Voxels:
+    box = bounding_volume(silhouettes)
+    return Carver(silhouettes).carve(VoxelGrid.over(box.low, box.high, size_m))
 
 
-def _carve_consistent(
-    silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings
-) -> tuple[Voxels, Array, int]:
+def _carve_consistent(silhouettes: Sequence[ViewSilhouette], size_m: float) -> tuple[Voxels, Array, int]:
     """Carve all views, or all but the one without which the others agree much better.
 
     A view that is left out must stand out: where the others agree about as well without another view, none is.
@@ -108,14 +103,14 @@ def _carve_consistent(
     whole: tuple[Voxels, Array] | None = None
     contradiction: TrackerError | None = None
     try:
-        voxels = _carve(silhouettes, size_m, settings)
+        voxels = _carve(silhouettes, size_m)
         whole = voxels, coverages(voxels, silhouettes)
     except TrackerError as error:
         contradiction = error
     n = len(silhouettes)
     before = whole[1] if whole else np.zeros(n)
     if n > 2 and before.min() < 1 - _MATTERS:
-        without = [_without(i, silhouettes, size_m, settings) for i in range(n)]
+        without = [_without(i, silhouettes, size_m) for i in range(n)]
         gains = [float(np.delete(w[1] - before, i).mean()) if w else 0.0 for i, w in enumerate(without)]
         best, second = (int(i) for i in np.argsort(gains)[:-3:-1])
         chosen = without[best]
@@ -126,12 +121,10 @@ def _carve_consistent(
     return *whole, -1
 
 
-def _without(
-    left_out: int, silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings
-) -> tuple[Voxels, Array] | None:
+def _without(left_out: int, silhouettes: Sequence[ViewSilhouette], size_m: float) -> tuple[Voxels, Array] | None:
     """Return the voxels of all views but one, and the coverages of all; None if the others contradict each other."""
     try:
-        voxels = _carve([s for i, s in enumerate(silhouettes) if i != left_out], size_m, settings)
+        voxels = _carve([s for i, s in enumerate(silhouettes) if i != left_out], size_m)
     except TrackerError:
         return None
     return voxels, coverages(voxels, silhouettes)

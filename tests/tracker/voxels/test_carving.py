@@ -108,8 +108,6 @@ def test_the_bounding_volume_holds_the_solid_closely():
         np.testing.assert_array_less(box.low, np.array([0.1, 0, 0.05]) - AXES)
         np.testing.assert_array_less(np.array([0.1, 0, 0.05]) + AXES, box.high)
         assert np.all(box.high - box.low < 2 * AXES + 0.06)
-        np.testing.assert_allclose(box.center, (0.1, 0, 0.05), atol=0.01)
-        assert box.center_miss_m < 0.02
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import numpy as np
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.state import FilterState
-from tracker.voxels.carving import Carver, CarveSettings
+from tracker.voxels.carving import Carver
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
 _REACH_M = 0.35
@@ -52,10 +52,7 @@ def carve_around(silhouettes: Sequence[ViewSilhouette], states: Sequence[FilterS
     used = [s for s, g in zip(seen, good, strict=True) if g]
     low, high = axes.min(axis=0) - _REACH_M, axes.max(axis=0) + _REACH_M
     grid = VoxelGrid.over(low, high, size_m)
-    if len(used) < 2:
-        voxels = Voxels(grid, np.zeros(grid.shape, dtype=bool))
-    else:
-        voxels = Carver(used).carve(grid, CarveSettings())
+    voxels = Voxels(grid, np.zeros(grid.shape, dtype=bool)) if len(used) < 2 else Carver(used).carve(grid)
     broken = tuple(s.camera.name for s, g in zip(seen, good, strict=True) if not g)
     return FrameVoxels(voxels, broken, tuple(s.camera.name for s in used if _is_cut_off(s)), len(used))
 
