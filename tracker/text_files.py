@@ -34,6 +34,11 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+DOCUMENT_BYTES = 4_000_000
+"""Size above which a document that people write is refused: a calibrated camera takes 1 to 2 kB, and the largest rig
+known has 521 (CMU Panoptic); a body of 20 parts takes 10 kB."""
+TABLE_BYTES = 1_000_000_000
+"""Size above which a table of numbers is refused: an hour of 50 joints at 120 Hz, in digits."""
 _MAX_LINE = 1_000_000
 """Longest line of a table, characters."""
 

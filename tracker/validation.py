@@ -17,6 +17,10 @@ T = TypeVar("T")
 
 MAX_FRAMES = 10_000_000
 """Largest number of frames of a session or table: a day at 100 frames per second."""
+MAX_NUMBER = 1e9
+"""Largest number of a file: no unit of length makes a room so large."""
+ROUNDING = 1e-6
+"""Error of a number of size 1, such as a part of a unit vector, that was written as text."""
 MAX_SIDE_PX = 32_767
 """Largest width and height of a camera's image; OpenCV resamples no larger ones."""
 
@@ -24,7 +28,7 @@ UNPRINTABLE = r"\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\u
 """Characters that names cannot hold, for a regular expression: controls, which terminals obey, line ends, marks that
 turn the direction of writing (Unicode's Bidi_Control), the byte order mark and halves of characters."""
 
-Number: TypeAlias = Annotated[float, Meta(ge=-1e9, le=1e9, description="a finite number within 1e9")]
+Number: TypeAlias = Annotated[float, Meta(ge=-MAX_NUMBER, le=MAX_NUMBER, description="a finite number within 1e9")]
 Vector: TypeAlias = Annotated[tuple[Number, Number, Number], Meta(description="3 finite numbers")]
 Name: TypeAlias = Annotated[
     str,

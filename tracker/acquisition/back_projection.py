@@ -17,15 +17,13 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.cameras import Camera
+from tracker.images.edge_segments import MAX_ANGLE_RAD
+from tracker.images.silhouette_contour import MIN_TRUST
 
 MIN_POINTS = 8
 """Smallest number of points of a contour that is compared."""
 _NEIGHBORS = 6
 """Number of near pieces of contour of which one must run as the edge does."""
-_MIN_COSINE = 0.7
-"""Smallest cosine of the angle between an edge and the contour that explains it."""
-_MIN_TRUST = 0.5
-"""Smallest trust in a silhouette whose contour is used."""
 _MAX_REACH = 2.0
 """Largest distance of a back-projected point from the centre of its part, in bounding radii."""
 
@@ -104,7 +102,7 @@ def explained_points(view: ViewEvidence, bodies: Sequence[PosedBody]) -> tuple[A
     known = np.isfinite(distances)
     near = np.where(known, near, 0)
     sines = np.abs(np.einsum("ni,nki->nk", normals, along[near]))  # 0 where the normal is across the contour
-    alike = known & (sines <= np.sqrt(1 - _MIN_COSINE**2))
+    alike = known & (sines <= np.sin(MAX_ANGLE_RAD))
     found = alike.any(axis=1)
     nearest = near[np.arange(len(near)), np.argmax(alike, axis=1)]
     return np.asarray(points[found], dtype=np.float64), parts[nearest[found]]
@@ -117,7 +115,7 @@ def _all_points(view: ViewEvidence) -> tuple[FloatArray, FloatArray]:
         accepted = np.ones(len(segments.firsts) - 1, np.bool_) if view.accepted is None else view.accepted
         own = np.repeat(accepted, np.diff(segments.firsts))
         points, normals = segments.points_px[own], segments.normals[own]
-    if view.silhouette is not None and view.silhouette.trust >= _MIN_TRUST:
+    if view.silhouette is not None and view.silhouette.trust >= MIN_TRUST:
         contour = view.silhouette.contour
         points, normals = np.concatenate([points, contour.points_px]), np.concatenate([normals, contour.normals])
     return points, normals

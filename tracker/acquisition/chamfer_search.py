@@ -29,8 +29,6 @@ _BLOCKS = (
 exponent around the part stays, because two orthogonal contours do not show it."""
 _PIECE_PX = 1.0
 """Distance of the points of a contour generator, px: points farther apart would blur the distance of two contours."""
-_MAX_SWEEPS = 4
-"""Largest number of sweeps over the blocks at one step size."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +125,7 @@ class _Space:
         best, best_m = sizes, self._distance_m(sizes, parts)
         for level in levels:
             step = half_range * 0.5 ** (level + 1)
-            for _ in range(_MAX_SWEEPS):
+            while True:
                 found, found_m = best, best_m
                 for block in blocks:
                     found, found_m = self._best_around(found, found_m, block, step, half_range, parts)

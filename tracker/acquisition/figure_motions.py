@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.part_motions import motions_by_pose
-from tracker.acquisition.size_parameters import SizeParameters
+from tracker.acquisition.size_parameters import DIFFERENCE, SizeParameters
 from tracker.body.model import BodyModel, PosedBody
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
@@ -14,7 +14,6 @@ from tracker.tracking.voxel.state import FilterState
 
 TIPS = np.array([0, 1, 0, 0, 0, 0, -1, -1, -1, -1])
 """Direction of the free end of each part along its axis: top of the head, fingers and toes; 0 for parts without one."""
-_STEP = 1e-5
 
 
 class FigureSizes(NamedTuple):
@@ -40,8 +39,8 @@ def figure_by_sizes(parameters: SizeParameters, sizes: Array) -> FigureSizes:
     out = np.zeros((len(sizes), *here.shape))
     for k in np.flatnonzero(parameters.of_kinds("height", "build", "length", "girth", "joint", "end", "free_end")):
         moved = sizes.copy()
-        moved[k] += _STEP
-        out[k] = (_lengths(parameters.body(moved)) - here) / _STEP
+        moved[k] += DIFFERENCE
+        out[k] = (_lengths(parameters.body(moved)) - here) / DIFFERENCE
     return FigureSizes(*np.moveaxis(out, 0, -1))
 
 

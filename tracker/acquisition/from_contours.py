@@ -21,7 +21,7 @@ from tracker.acquisition.from_voxels import (
 from tracker.acquisition.size_fit import SightedPerson, SizeFit, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.body.model import BodyModel, PosedBody
-from tracker.compute.progress import Report, unreported
+from tracker.compute.progress import Report, stages, unreported
 from tracker.contours import occluding_contours
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
@@ -38,8 +38,6 @@ from tracker.tracking.view_regions import read_views, visible_pieces_px
 
 SizeMethod = Literal["contours", "voxels"]
 """Whether the fit to contours starts at the body before, or at a fit to voxels."""
-_CHOOSING, _OBSERVING, _VOXELS = 0.1, 0.25, 0.5
-"""Shares of the work up to the ends of the stages before the fit."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +106,9 @@ def acquire_from_contours(
     if not bodies:
         raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
     parameters = SizeParameters(next(iter(bodies.values()))[person].model, settings.coupled, settings.priors)
-    report("choosing frames", 0.0)
+    names = ("choosing frames", "reading contours", "fitting sizes to voxels", "fitting sizes")
+    choosing, reading, measuring, fitting = stages(report, *names)
+    choosing(0.0)
     # Placed joints are used wherever there are few of them; of many, the frames that show most.
     few = 0 < len(placed) <= settings.n_frames
     source = sorted(bodies) if few or not placed else sorted(k for k in bodies if k in placed)
@@ -117,7 +117,7 @@ def acquire_from_contours(
     frames = choose_frames(
         parameters, observer.working_cameras, {k: bodies[k] for k in candidates}, person, settings.n_frames, fixed
     )
-    report("reading contours", _CHOOSING)
+    reading(0.0)
     static_edges = learn_static_edges(observer, {k: bodies[k] for k in candidates})
     sighted, observed, before = [], [], []
     for i, k in enumerate(frames):
@@ -127,25 +127,18 @@ def acquire_from_contours(
         sighted.append(
             SightedPerson(k, own_views(views, bodies[k], person), bodies[k], person, placed.get(k), seen.get(k))
         )
-        report("reading contours", _CHOOSING + (_OBSERVING - _CHOOSING) * (i + 1) / len(frames))
-    begun, by_voxels, fit = _OBSERVING, None, settings.fit
+        reading((i + 1) / len(frames))
+    by_voxels, fit = None, settings.fit
     if settings.voxels is not None:
-        begun, fit = _VOXELS, replace(fit, rounds=fit.rounds[1:])
-
-        def report_voxels(share: float) -> None:
-            report("fitting sizes to voxels", _OBSERVING + (_VOXELS - _OBSERVING) * share)
-
+        fit = replace(fit, rounds=fit.rounds[1:])
         people = {k: (bodies[k][person], *bodies[k][:person], *bodies[k][person + 1 :]) for k in frames}
-        by_voxels = _fit_to_voxels(observer, parameters, people, settings.voxels, report_voxels)
+        by_voxels = _fit_to_voxels(observer, parameters, people, settings.voxels, measuring)
     if not any(len(v.points_px) for s in sighted for v in s.views):
         raise TrackerError(
             f"expected contours of the person on frames {', '.join(map(str, frames))}, found no edges near the body; "
             "place it where the person is"
         )
-    found = fit_sizes_to_contours(
-        parameters, sighted, fit, by_voxels.start if by_voxels else None,
-        lambda share: report("fitting sizes", begun + (1 - begun) * share),
-    )  # fmt: skip
+    found = fit_sizes_to_contours(parameters, sighted, fit, by_voxels.start if by_voxels else None, fitting)
     after = [
         cost_px(views, s.moved(found.body, p).bodies)
         for views, s, p in zip(observed, sighted, found.poses, strict=True)

@@ -7,13 +7,11 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import Remedy, TrackerError
-from tracker.fitting.gauss_newton import PointTargets, fit_to_points
+from tracker.fitting.gauss_newton import JOINT_M, PointTargets, fit_to_points
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 
-JOINT_M = 0.005
-"""Standard deviation of a known joint, metres: markers and rigs repeat a joint to some millimetres."""
 _LENGTHS: Mapping[str, Sequence[tuple[Sequence[str], Sequence[str]]]] = {
     **{
         f"{a}-{b}": [([f"left_{a}"], [f"left_{b}"]), ([f"right_{a}"], [f"right_{b}"])]

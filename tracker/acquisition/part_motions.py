@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.acquisition.size_parameters import SizeArrays
+from tracker.acquisition.size_parameters import DIFFERENCE, SizeArrays
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.fitting.contour_residuals import PieceSums
@@ -21,7 +21,7 @@ from tracker.geometry.cameras import Camera, project_with_jacobian
 from tracker.geometry.shapes import EllipticalCone, Shape, TaperedSuperquadric
 
 N_MOTIONS = 13
-_STEP = 1e-4
+"""Number of motions of a part: 3 of rotation, 3 of translation, 3 half-axes, 2 tapers, 2 exponents."""
 
 
 def sum_motions(
@@ -158,15 +158,15 @@ def _by_exponents(shape: TaperedSuperquadric, points: Array) -> Array:
     """
     unit = TaperedSuperquadric((1.0, 1.0, 1.0), shape.exponents, shape.taper)
     gradient = np.stack(
-        [unit.inside_outside(points + s) - unit.inside_outside(points - s) for s in _STEP * np.eye(3)], axis=1
-    ) / (2 * _STEP * np.array(shape.half_axes))  # fmt: skip
+        [unit.inside_outside(points + s) - unit.inside_outside(points - s) for s in DIFFERENCE * np.eye(3)], axis=1
+    ) / (2 * DIFFERENCE * np.array(shape.half_axes))  # fmt: skip
     steepness = np.maximum(np.sum(gradient**2, axis=1), 1e-12)
     out = np.empty((*points.shape, 2))
-    for k, (s1, s2) in enumerate(_STEP * np.eye(2)):
+    for k, (s1, s2) in enumerate(DIFFERENCE * np.eye(2)):
         e1, e2 = shape.exponents
         after, before = (
             TaperedSuperquadric((1.0, 1.0, 1.0), (e1 + s * s1, e2 + s * s2), shape.taper).inside_outside(points)
             for s in (1, -1)
         )
-        out[:, :, k] = -gradient * ((after - before) / (2 * _STEP) / steepness)[:, None]
+        out[:, :, k] = -gradient * ((after - before) / (2 * DIFFERENCE) / steepness)[:, None]
     return out

@@ -28,6 +28,8 @@ from tracker.fitting.contour_residuals import ContourResiduals, MatchSettings
 from tracker.fitting.gauss_newton import (
     AT_LIMIT,
     INITIAL_DAMPING,
+    MAX_DAMPING,
+    MIN_DAMPING,
     MIN_RETRY_DAMPING,
     NormalEquations,
     PointTargets,
@@ -38,7 +40,6 @@ from tracker.fitting.gauss_newton import (
 from tracker.fitting.pins import PinBlock
 from tracker.geometry.arrays import Array, IntArray
 
-_MIN_DAMPING, _MAX_DAMPING = 1e-6, 1e6
 _TOLERANCE = 1e-4
 """Smallest relative decrease of the cost for another iteration."""
 
@@ -235,11 +236,11 @@ class _Problem:
             there = self._linearize(sizes, poses)
             if there.cost < here.cost:
                 break
-            if self._damping > _MAX_DAMPING:
+            if self._damping > MAX_DAMPING:
                 return False
             self._damping = max(10 * self._damping, MIN_RETRY_DAMPING)
         self.sizes, self.poses, self._here = sizes, poses, there
-        self._damping = max(_MIN_DAMPING, self._damping / 10)
+        self._damping = max(MIN_DAMPING, self._damping / 10)
         return here.cost - there.cost > _TOLERANCE * here.cost
 
     def _moved(self, step: Array) -> tuple[Array, list[Array]]:

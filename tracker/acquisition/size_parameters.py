@@ -25,7 +25,10 @@ _LENGTH, _GIRTHS, _CENTER, _HALF, _TAPER, _EXPONENTS, _JOINT = (
 """Columns of the changes of a part. The logarithm of its length stretches flesh and joints along its main axis, and
 those of its girths stretch it across. Shifts of the flesh's centre, of its half-axes and of its own joint on the parent
 are fractions of the height."""
-_N_COLUMNS = 16
+_N_COLUMNS = _JOINT.stop
+DIFFERENCE = 1e-4
+"""Step of parameters or unit coordinates by which derivatives are taken as differences: far above rounding and far
+below the spread of people."""
 _EXPONENT_LIMITS, _TAPER_LIMIT = (0.15, 1.0), 0.8
 """Limits of shapes: convex, with finite derivatives."""
 _LIMB_JOINTS, _LIMB_PARTS = ("shoulder", "elbow", "hip", "knee"), ("upper_arm", "forearm", "thigh", "calf")

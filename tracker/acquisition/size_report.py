@@ -5,12 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.from_contours import Acquisition
-from tracker.acquisition.size_parameters import SizeParameters
+from tracker.acquisition.size_parameters import DIFFERENCE, SizeParameters
 from tracker.body.dimensions import dimensions_of, mirror_part, with_height_of_stature
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel
-
-_STEP = 1e-4
 
 
 class SizeChange(NamedTuple):
@@ -23,20 +21,15 @@ class SizeChange(NamedTuple):
     sigma_m: float
     """Standard deviation of the size after the acquisition, metres."""
 
-    @property
-    def change_m(self) -> float:
-        """Growth of the size, metres."""
-        return self.after_m - self.before_m
-
 
 def size_changes(acquisition: Acquisition) -> list[SizeChange]:
     """List all sizes, those that changed most, by share, first. One side stands for both if they are coupled."""
     parameters, fit = acquisition.parameters, acquisition.fit
     before, after = (_measured(parameters, b) for b in (parameters.body(np.zeros_like(fit.sizes)), fit.body))
     J = np.empty((len(after), len(fit.sizes)))
-    for i, step in enumerate(_STEP * np.eye(len(fit.sizes))):
+    for i, step in enumerate(DIFFERENCE * np.eye(len(fit.sizes))):
         more = _measured(parameters, parameters.body(fit.sizes + step))
-        J[:, i] = [(more[n] - after[n]) / _STEP for n in after]
+        J[:, i] = [(more[n] - after[n]) / DIFFERENCE for n in after]
     sigmas = np.sqrt(np.einsum("ij,jk,ik->i", J, fit.covariance, J))
     rows = [SizeChange(n, before[n], after[n], float(s)) for n, s in zip(after, sigmas, strict=True)]
     return sorted(rows, key=lambda r: -abs(np.log(r.after_m / r.before_m)))

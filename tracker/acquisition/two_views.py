@@ -16,9 +16,8 @@ from tracker.acquisition.chamfer_search import ChamferSearchSettings, search_sha
 from tracker.acquisition.from_contours import Acquisition, cost_px, learn_static_edges, own_views
 from tracker.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
-from tracker.body.model import PosedBody, parts_of
-from tracker.compute.progress import Report, unreported
-from tracker.contours import occluding_contours
+from tracker.body.model import PosedBody
+from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.cameras import Camera
@@ -26,10 +25,6 @@ from tracker.tracking.view_regions import read_views
 
 MAX_OFF_RAD = np.radians(35.0)
 """Largest angle between a view and the person's front or side, and of two views from a right angle."""
-_ALIKE_RAD = np.radians(2.0)
-"""Views whose angles differ by less are chosen by the occluded share of the contour."""
-_CHOOSING, _OBSERVING = 0.05, 0.15
-"""Shares of the work up to the ends of the stages before the search."""
 
 
 @dataclass(frozen=True)
@@ -83,19 +78,17 @@ def acquire_from_two_views(
     """
     if not bodies:
         raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
-    report("choosing views", 0.0)
+    choosing, reading, searching = stages(report, "choosing views", "reading contours", "searching shapes")
+    choosing(0.0)
     chosen = choose_views(observer.working_cameras, bodies, person, settings.views)
     frame, front, side, _ = chosen
-    report("reading contours", _CHOOSING)
+    reading(0.0)
     static_edges = learn_static_edges(observer, bodies)
     views = read_views(observer, frame, bodies[frame], static_edges)
     own = own_views(views, bodies[frame], person)
     sighted = SightedPerson(frame, [own[front], own[side]], bodies[frame], person)
     parameters = SizeParameters(bodies[frame][person].model, settings.coupled, settings.priors)
-    found = search_shapes(
-        parameters, sighted, settings.search,
-        report=lambda share: report("searching shapes", _OBSERVING + (1 - _OBSERVING) * share),
-    )  # fmt: skip
+    found = search_shapes(parameters, sighted, settings.search, searching)
     names = tuple(observer.working_cameras[i].name for i in (front, side))
     if not np.isfinite(found.chamfer_before_m):
         raise TrackerError(
@@ -142,8 +135,7 @@ def choose_views(
             f"{np.degrees(MAX_OFF_RAD):.0f} degrees, found {but}",
             Remedy("without_paper"),
         )
-    alike = [f for f in found if f.off_rad <= min(best + _ALIKE_RAD, MAX_OFF_RAD)]
-    return min(alike, key=lambda f: sum(_occluded(bodies[f.frame], person, cameras[i]) for i in (f.front, f.side)))
+    return min(found, key=lambda f: f.off_rad)
 
 
 def _direction_rad(body: PosedBody, camera: Camera) -> float:
@@ -159,13 +151,3 @@ def _off_rad(front_rad: float, side_rad: float) -> float:
     side = np.arcsin(np.abs(np.cos(side_rad)))
     between = np.arcsin(np.abs(np.cos(front_rad - side_rad)))
     return float(max(front, side, between))
-
-
-def _occluded(bodies: Sequence[PosedBody], person: int, camera: Camera) -> float:
-    """Return which share of a person's contour is occluded or outside the image."""
-    contour = occluding_contours.trace(bodies, camera)
-    parts = parts_of([b.model for b in bodies], person)
-    own = (contour.parts >= parts.start) & (contour.parts < parts.stop)
-    middles = (contour.pieces_px[own, :2] + contour.pieces_px[own, 2:]) / 2
-    hidden = contour.occluded[own] | np.any((middles < 0) | (middles >= camera.size), axis=1)
-    return float(hidden.mean()) if len(hidden) else 1.0

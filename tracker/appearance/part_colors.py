@@ -33,18 +33,15 @@ from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.images.color_histogram import BINS, bin_of
 
 _SMOOTHING_BINS = 0.7
+"""Standard deviation of the Gaussian that smooths histograms, bins: light and noise move a colour to the next bin."""
 _ACROSS = 3
 """Samples across each part."""
-_MAX_NATS = 3.0
-"""Largest score of one pixel."""
 _DOUBT = 0.02
 """Share of arbitrary pixels under a part: a colour that was never seen there is not impossible."""
-_MIN_VIEW_SAMPLES = 6
-"""Smallest number of samples of a part in a view for a score of its own there."""
-_TWIN_SHARE = 0.2
-"""Share of the colours of a part's counterpart on the other side in its own: sleeves are mostly alike."""
-_SAME = 0.25
-"""Share of the usual mean log ratio below which colours have changed much."""
+_MAX_NATS = 3.0
+"""Largest score of one pixel, nats: one sample, even of the purest colour, must not outweigh the rest of a part."""
+MIN_SAMPLES = 6
+"""Smallest number of samples of a part, in a view or in all, for a score of its own there."""
 
 
 class PartColors(NamedTuple):
@@ -110,7 +107,7 @@ class Colors:
         self._own = parts_of([b.model for b in bodies], person)
 
     def learn(self, before: PartColors | None = None, share: float = 1.0) -> PartColors:
-        """Learn the colours under the parts at the current poses; left and right parts share some of theirs.
+        """Learn the colours under the parts at the current poses; a part that is not seen has those of the other side.
 
         Args:
             before: learnt so far; None at first.
@@ -127,14 +124,14 @@ class Colors:
         usual = None
         if before is not None:
             now, samples = _mean_by_part(before.log_ratios[parts, colors], parts, len(model.parts))
-            trusted = (samples > 0) & (now > _SAME * before.usual)
+            trusted = (samples > 0) & (now > 0)
             seen = before.shares + share * trusted[:, None] * (seen - before.shares)
             around = before.around + share * (around - before.around)
             usual = before.usual
         # Half of the alternative to a part's colours is the rest of the body, however small it is in the image.
         other = 0.5 * _smoothed(around) + 0.5 * _share(_smoothed(seen.sum(axis=0)))
         blank = seen.sum(axis=1, keepdims=True) == 0
-        own = np.where(blank, seen[counterparts], (1 - _TWIN_SHARE) * seen + _TWIN_SHARE * seen[counterparts])
+        own = np.where(blank, seen[counterparts], seen)
         own = _smoothed(np.array([_share(s) for s in own]))
         ratios = np.log(((1 - _DOUBT) * own + _DOUBT * other + 1e-7) / (other + 1e-7))
         ratios[own.sum(axis=1) == 0] = 0.0
@@ -150,7 +147,7 @@ class Colors:
         parts, colors, views = self._samples(pose)
         nats = known.log_ratios[parts, colors]
         means, samples = _mean_by_part(nats, views * n_parts + parts, len(self._views) * n_parts)
-        by_view = np.where(samples < _MIN_VIEW_SAMPLES, np.nan, means).reshape(-1, n_parts)
+        by_view = np.where(samples < MIN_SAMPLES, np.nan, means).reshape(-1, n_parts)
         return ColorScore(float(nats.sum()), *_mean_by_part(nats, parts, n_parts), by_view)
 
     def nats(self, poses: Array, known: PartColors) -> Array:

@@ -20,8 +20,6 @@ HEIGHT_LIMITS_M = (0.3, 3.0)
 """Least and largest height of a body, metres."""
 _MIN_M, _MAX_SHARE = 0.005, 0.7
 """Shortest dimension of a part, metres; longest, as a share of the body's height."""
-_RESOLUTION = (40, 24)
-"""Rings and sectors of a part whose extent is measured."""
 _SIDES = ("left_", "right_")
 _WIDTHS = ("shoulder", "hip")
 """Pairs of joints, left and right, whose distance is a dimension of its own if one part carries both."""
@@ -120,8 +118,7 @@ def stature_m(model: BodyModel) -> float:
     Ts = model.kinematics(model.neutral()).Ts_world_part
     ends = []
     for shape, center, T in zip(model.shapes, model.centers_part, Ts, strict=True):
-        rings, sectors = _RESOLUTION
-        z = (shape.grid(rings, sectors)[0].reshape(-1, 3) + center) @ T[2, :3] + T[2, 3]
+        z = (shape.triangles().vertices + center) @ T[2, :3] + T[2, 3]
         ends += [float(z.min()), float(z.max())]
     return max(ends) - min(ends)
 

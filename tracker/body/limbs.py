@@ -8,6 +8,10 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 
+BENT_RAD = float(np.radians(20.0))
+"""Bend of an elbow or knee from which it determines the twist of its limb, rad: the wrist then lies a third of the
+forearm's length beside the line of the upper arm."""
+
 
 class Limb(NamedTuple):
     """A chain of parts that can be lost independently of the rest."""

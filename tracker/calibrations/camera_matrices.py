@@ -5,17 +5,15 @@ from typing import Any
 
 import numpy as np
 
+from tracker.formats.camera_section import FOUR_DIGITS
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.validation import ROUNDING
 
 _MAX_SKEW = 0.1
 """Largest skew of a lens as a share of its focal length, 6 degrees: sensors are rectangles, and fits differ by less."""
 _MAX_ASPECT = 2.0
 """Largest ratio of the focal lengths: anamorphic footage has up to 2."""
-_UNIT = 1e-3
-"""Error of the length of a quaternion that is printed with four digits."""
-ROUNDING = 1e-6
-"""Relative size below which a number of a matrix is rounding."""
 
 
 class ProjectionError(ValueError):
@@ -51,7 +49,7 @@ def homogeneous(value: Any) -> Array | None:
 def rotation_of_quaternion(wxyz: Any) -> Array | None:
     """Return the rotation, (3, 3), of four numbers w, x, y and z; None unless their length is 1."""
     q = plain_array(wxyz)
-    return rigid.matrix_from_quaternion(q) if q.shape == (4,) and abs(np.linalg.norm(q) - 1) < _UNIT else None
+    return rigid.matrix_from_quaternion(q) if q.shape == (4,) and abs(np.linalg.norm(q) - 1) < FOUR_DIGITS else None
 
 
 def is_transposed(matrix: Any) -> bool:

@@ -82,6 +82,7 @@ _MIN_FOCAL = 0.25
 """Smallest focal length as a share of the principal point, which lies near the middle: half of a view of 152 degrees.
 Wider lenses are fisheyes, whose focal lengths are longer at the same view."""
 _SHORTER = {14: 12, 12: 8, 8: 5}
+"""Counts of OpenCV's coefficients, and to how many they are cut where the others are 0."""
 _UNIT = re.compile(r"^(length|translation|world|distance)?units?$|^units?(of)?(length|translation)s?$")
 """Keys, without case and separators, whose value is the unit of the translations."""
 _OTHER_UNITS = ("px", "pixel", "pixels", "deg", "degree", "degrees", "rad", "radian", "radians")

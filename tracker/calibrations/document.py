@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from tracker.calibrations.foreign import name_binary, named
 from tracker.errors import CalibrationError
@@ -84,11 +83,6 @@ def _syntax(text: str) -> str | None:
             return "json"
         return "yaml" if _YAML_LINE.fullmatch(line) else None
     return None
-
-
-def is_element(data: Any, tag: str) -> bool:
-    """Return whether data is the root element of XML with this tag."""
-    return isinstance(data, ElementTree.Element) and data.tag == tag
 
 
 def refuse(document: Document, camera: str | None, expected: str, found: str, advice: str) -> CalibrationError:

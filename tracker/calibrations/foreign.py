@@ -27,6 +27,7 @@ _SUFFIXES = {
     ".cal": ("a calibration of OptiTrack or a project of another program", _POSE2SIM),
     ".c3d": ("a file of markers", "export the calibration of the cameras"),
 }
+"""The same for files that are known by their suffix alone."""
 
 
 def named(path: Path, found: str, advice: str) -> CalibrationError:

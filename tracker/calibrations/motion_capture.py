@@ -11,9 +11,8 @@ import numpy as np
 from tracker.calibrations.camera_matrices import rotation_of_quaternion
 from tracker.calibrations.camera_words import Section
 from tracker.calibrations.document import Document, refuse
+from tracker.calibrations.pose_conventions import OPENGL
 
-_FLIPPED = np.diag([1.0, -1.0, -1.0])
-"""From Qualisys's axes of a camera (y up, z backwards) to OpenCV's."""
 _SUBPIXELS = 64.0
 """Qualisys counts the sensor in 64ths of a pixel."""
 
@@ -59,7 +58,7 @@ def read_qualisys(document: Document) -> dict[str, Section]:
             intrinsic[k] / subpixels for k in ("focalLengthU", "focalLengthV", "centerPointU", "centerPointV")
         )
         lens = np.array([intrinsic.get(k) for k in _LENS])
-        R = _FLIPPED @ np.array([[transform[f"r{i}{j}"] for j in (1, 2, 3)] for i in (1, 2, 3)])
+        R = OPENGL[:3, :3] @ np.array([[transform[f"r{i}{j}"] for j in (1, 2, 3)] for i in (1, 2, 3)])
         position = np.array([transform[k] for k in "xyz"])
         found[name] = {
             "name": name,

@@ -29,7 +29,7 @@ _REWRITE = {
     "row-vectors": "transpose R alone: R' = R^T, t' = t",
     "camera-position": "replace t alone: t' = -R t",
 }
-_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """From a camera's axes in OpenGL (y up, z backwards) to OpenCV's."""
 
 # Degrees; measured on simulated rigs of 2 to 8 cameras in rings, arcs, corners and rows, aimed up to 12 degrees beside
@@ -64,7 +64,7 @@ def read_pose(T_stated: Array, convention: PoseConvention) -> Array:
         T = rigid.transform(R, -R @ t)
     else:
         T = T_stated
-    return _OPENGL @ T if convention.endswith("-opengl") else T
+    return OPENGL @ T if convention.endswith("-opengl") else T
 
 
 def costs(Ts_stated: Sequence[Array]) -> dict[PoseConvention, float]:

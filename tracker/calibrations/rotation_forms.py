@@ -9,7 +9,7 @@ from itertools import permutations
 
 import numpy as np
 
-from tracker.calibrations.camera_matrices import ROUNDING, plain_array, rotation_of_quaternion
+from tracker.calibrations.camera_matrices import plain_array, rotation_of_quaternion
 from tracker.calibrations.camera_words import Section
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.pose_conventions import best_cost, in_words, is_clearly_worse
@@ -17,7 +17,7 @@ from tracker.errors import CalibrationError, Remedy
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.rigid import so3_exp
-from tracker.validation import quoted
+from tracker.validation import ROUNDING, quoted
 
 _ORDERS = {"w, x, y, z": (0, 1, 2, 3), "x, y, z, w": (3, 0, 1, 2)}
 """Places of w, x, y and z among the four numbers."""

@@ -7,15 +7,13 @@ import numpy as np
 from tracker.errors import CalibrationError, Remedy
 from tracker.formats.camera_section import METRES, CameraEntry, Units
 from tracker.geometry.arrays import Array
-from tracker.geometry.camera_rig import axes_point
+from tracker.geometry.camera_rig import MIN_APART_M, axes_point
 
 MAX_STUDIO_M = 100.0
 """Distance from the point at which cameras look, or from the origin, at which none shows a person:
 1.7 m are 15 px high there in a picture of 1,000 px and 60 degrees."""
 MIN_STUDIO_M = 0.5
 """Distance nearer than which cameras show no person: at it, a lens of 60 degrees sees 58 cm."""
-_MIN_APART_M = 0.02
-"""Extent of a rig of parallel cameras, metres: no stereo camera for people is narrower."""
 _LIKELY_M = (1.0, 30.0)
 """Distances of usual studios: a unit that gives one is offered first."""
 _WORDS = {"m": "metres", "cm": "centimetres", "mm": "millimetres"}
@@ -39,7 +37,7 @@ def check_units(entries: Sequence[CameraEntry], where: str, units: Units, square
     distance_m, place, sees_point = _distance(entries)
     in_units = distance_m / METRES[units]
     squares = "multiply the translations by the side of a square of the board in metres"
-    least = MIN_STUDIO_M if sees_point else _MIN_APART_M
+    least = MIN_STUDIO_M if sees_point else MIN_APART_M
     # Metres are the default of a file that may show a table or a head; another unit was chosen.
     found = f"{in_units:.3g}" if in_units < 1000 else f"{in_units:.0f}"
     limit = f"within {MAX_STUDIO_M:g} m" if distance_m > MAX_STUDIO_M else f"at least {least:g} m"

@@ -22,7 +22,7 @@ from platformdirs import user_cache_path
 from tracker.compute.kernel_keys import KernelKeys, UnknownSourceError
 from tracker.files import write_text_atomic
 
-_PACKAGE = Path(__file__).resolve().parents[1]
+_PACKAGE = Path(__file__).resolve().parent.parent
 STAGES = ("posing", "contours", "evidence", "cost", "tracking")
 """Groups of kernels in the order in which a new user needs them; each needs some of the groups before it."""
 _MARK, _KEYS, _STAGE = "compiled-", "keys-", "stage-"
@@ -30,10 +30,8 @@ _ORDINARY = _PACKAGE / "__pycache__"
 """Folder in which numba keeps kernels by itself."""
 _OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO")
 """Environment variables of numba, without their prefix, that change compiled code."""
-_N_STATES = 12
-"""Number of versions of the kernels, such as branches, that stay in the cache."""
-_N_KEY_FILES = 60
-"""Number of versions of the sources whose kernel keys stay in the cache."""
+_N_VERSIONS = 12
+"""Number of versions, such as branches, whose kernels and whose keys stay in the cache."""
 _PRUNE_AGE_S = 86400.0
 """Minimum age of a kernel that is deleted: a younger one may belong to a version that is still being compiled."""
 
@@ -189,12 +187,12 @@ def _version() -> str:
 def record_compiled() -> None:
     """Mark that all kernels are compiled, and delete those of old versions."""
     compiled_mark().write_text("\n".join(kernel_keys().values()), "utf-8")
-    for old in (*_newest_first(f"{_KEYS}*.json")[_N_KEY_FILES:], *_newest_first(f"{_STAGE}{_version()}-*")):
+    for old in (*_newest_first(f"{_KEYS}*.json")[_N_VERSIONS:], *_newest_first(f"{_STAGE}{_version()}-*")):
         old.unlink(missing_ok=True)
     marks = _newest_first(f"{_MARK}*")
-    for old in marks[_N_STATES:]:
+    for old in marks[_N_VERSIONS:]:
         old.unlink(missing_ok=True)
-    used = {key for mark in marks[:_N_STATES] for key in _text(mark).split()}
+    used = {key for mark in marks[:_N_VERSIONS] for key in _text(mark).split()}
     newest = max((m.stat().st_mtime for m in marks[:1]), default=0.0)
     for kernel in _newest_first("*.nb[ic]"):
         key = kernel.name.rpartition("-")[2].split(".")[0]

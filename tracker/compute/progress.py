@@ -1,5 +1,6 @@
 """How long work reports its progress."""
 
+from collections.abc import Callable
 from typing import Protocol
 
 
@@ -30,6 +31,15 @@ def part_of(report: Report, begin: float, end: float, stage: str = "") -> Report
         report(stage or own, begin + (end - begin) * share, text)
 
     return reported
+
+
+def stages(report: Report, *names: str) -> list[Callable[[float], None]]:
+    """Return what each stage of some work gives its share to, 0 to 1. All stages take the same part of the whole."""
+
+    def stage(i: int, name: str) -> Callable[[float], None]:
+        return lambda share: report(name, (i + share) / len(names))
+
+    return [stage(i, name) for i, name in enumerate(names)]
 
 
 def unreported(stage: str, share: float, text: str = "", /) -> None:

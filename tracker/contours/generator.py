@@ -8,6 +8,7 @@ surface points.
 
 import numpy as np
 
+from tracker.compute.float32 import ONE, TINY, ZERO
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.surfaces import N_RINGS, N_SECTORS, Surfaces
@@ -15,9 +16,6 @@ from tracker.geometry.arrays import Array, FloatArray
 
 MAX_POINTS = 512
 """Room for the points of one generator."""
-_ON_AXIS = 1e-9
-"""Smallest distance of an eye from the axis at which its direction is defined, unit coordinates."""
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)
 
 
 @njit(inline="always", **FAST_MATH)
@@ -44,23 +42,23 @@ def revolved_generator(
         Number of points.
     """
     distance = np.sqrt(eye[0] * eye[0] + eye[1] * eye[1])
-    inverse = np.float32(1.0 / max(distance, _ON_AXIS))
+    inverse = np.float32(1.0 / max(distance, TINY))
     eye_z = np.float32(eye[2])
     n = 0
-    c0 = r0 = z0 = n0 = _ZERO
+    c0 = r0 = z0 = n0 = ZERO
     for i in range(n_profile):
         r1, z1, n1 = profile[part, 0, i], profile[part, 1, i], profile[part, 3, i]
         c1 = (r1 + profile[part, 2, i] * (z1 - eye_z)) * inverse
         if i > 0:
-            first, last = min(max(c0, -_ONE), _ONE), min(max(c1, -_ONE), _ONE)
-            if first != last or abs(first) < _ONE:
+            first, last = min(max(c0, -ONE), ONE), min(max(c1, -ONE), ONE)
+            if first != last or abs(first) < ONE:
                 n = _strip(c0, c1, n0, n1, first, last, r0, z0, r1, z1, turn, n, half)
         c0, r0, z0, n0 = c1, r1, z1, n1
     if n < 3:
         return 0
     cos_eye, sin_eye = np.float32(eye[0]) * inverse, np.float32(eye[1]) * inverse
-    if distance < _ON_AXIS:  # any direction is right
-        cos_eye, sin_eye = _ONE, _ZERO
+    if distance < TINY:  # any direction is right
+        cos_eye, sin_eye = ONE, ZERO
     for k in range(n):
         mirrored = 2 * n - 2 - k
         x, y = cos_eye * half[0, k], sin_eye * half[1, k]
@@ -82,9 +80,9 @@ def _strip(
     the strip, so the position t where cos d = c follows from `(1 - t) n0 (c - c0) = t n1 (c1 - c)`, with n its outward
     component. Here c is cos d at a profile point; first and last are c0 and c1 clipped to [-1, 1].
     """
-    s0, s1 = np.sqrt(_ONE - first * first), np.sqrt(_ONE - last * last)
+    s0, s1 = np.sqrt(ONE - first * first), np.sqrt(ONE - last * last)
     if n == 0:
-        t = _ZERO if first == c0 else n0 * (first - c0) / (n0 * (first - c0) + n1 * (c1 - first))
+        t = ZERO if first == c0 else n0 * (first - c0) / (n0 * (first - c0) + n1 * (c1 - first))
         r = r0 + t * (r1 - r0)
         half[0, 0], half[1, 0], half[2, 0] = r * first, r * s0, z0 + t * (z1 - z0)
         n = 1
@@ -93,18 +91,18 @@ def _strip(
         count = min(int(angle / turn) + 1, MAX_POINTS // 2 - n)
         step = angle / np.float32(count) if last < first else -angle / np.float32(count)
         squared = step * step
-        cos_step = _ONE - squared * (np.float32(1 / 2) - squared * np.float32(1 / 24))
-        sin_step = step * (_ONE - squared * (np.float32(1 / 6) - squared * np.float32(1 / 120)))
-        c, s, is_rim, t = first, s0, r0 == r1 and z0 == z1, _ZERO
+        cos_step = ONE - squared * (np.float32(1 / 2) - squared * np.float32(1 / 24))
+        sin_step = step * (ONE - squared * (np.float32(1 / 6) - squared * np.float32(1 / 120)))
+        c, s, is_rim, t = first, s0, r0 == r1 and z0 == z1, ZERO
         for _ in range(1, count):
             c, s = c * cos_step - s * sin_step, s * cos_step + c * sin_step
             if not is_rim:  # one division per point takes as long as everything else
-                t = min(max(n0 * (c - c0) / (n0 * (c - c0) + n1 * (c1 - c)), _ZERO), _ONE)
+                t = min(max(n0 * (c - c0) / (n0 * (c - c0) + n1 * (c1 - c)), ZERO), ONE)
             r = r0 + t * (r1 - r0)
             half[0, n], half[1, n], half[2, n] = r * c, r * s, z0 + t * (z1 - z0)
             n += 1
     if n < MAX_POINTS // 2:
-        t = _ONE if last == c1 else n0 * (last - c0) / (n0 * (last - c0) + n1 * (c1 - last))
+        t = ONE if last == c1 else n0 * (last - c0) / (n0 * (last - c0) + n1 * (c1 - last))
         r = r0 + t * (r1 - r0)
         half[0, n], half[1, n], half[2, n] = r * last, r * s1, z0 + t * (z1 - z0)
         n += 1
@@ -114,11 +112,11 @@ def _strip(
 @njit(inline="always", **FAST_MATH)
 def _arccos(x: np.float32) -> np.float32:
     """Return the arc cosine within 7e-5 rad (Abramowitz and Stegun 4.4.45), in a third of the exact function's time."""
-    a = min(abs(x), _ONE)
+    a = min(abs(x), ONE)
     angle = np.float32(-0.0187293) * a + np.float32(0.0742610)
     angle = (angle * a - np.float32(0.2121144)) * a + np.float32(1.5707288)
-    angle *= np.sqrt(_ONE - a)
-    return angle if x >= _ZERO else np.float32(np.pi) - angle
+    angle *= np.sqrt(ONE - a)
+    return angle if x >= ZERO else np.float32(np.pi) - angle
 
 
 @njit(**FAST_MATH)

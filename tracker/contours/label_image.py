@@ -14,8 +14,6 @@ from tracker.contours.occluding_contours import part_poses
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 
-_RINGS, _SECTORS = 16, 24
-
 
 class _Mesh(NamedTuple):
     """Triangles of all parts of some bodies."""
@@ -57,7 +55,7 @@ def _mesh(models: tuple[BodyModel, ...]) -> _Mesh:
     parts = [(s, c) for m in models for s, c in zip(m.shapes, m.centers_part, strict=True)]
     assert len(parts) < 256, len(parts)
     for part, (shape, center) in enumerate(parts):
-        vertices, corners_of = shape.triangles(_RINGS, _SECTORS)
+        vertices, corners_of = shape.triangles()
         corners = vertices + center
         points.append(corners)
         owners.append(np.full(len(corners), part, np.int32))

@@ -19,6 +19,8 @@ from tracker.geometry.arrays import Array, FloatArray
 
 PIECE_PX = 4.0
 """Longest piece of contour that is scored or occluded as a whole, px."""
+JOINED = 10
+"""Largest number of pieces of a segment: longer segments would reach too many points."""
 _THIN2 = np.float32(0.1**2)
 """Squared distance from the line between its neighbours below which a projected point is left out, px^2."""
 

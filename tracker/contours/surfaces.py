@@ -24,6 +24,7 @@ of revolution."""
 ALONG = SECTION + N_SECTION + 1
 """Offset of the table of size along the axis."""
 SOLID = ALONG + N_ALONG + 1
+"""Count of the numbers of a solid."""
 
 
 class Surfaces(NamedTuple):

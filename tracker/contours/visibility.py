@@ -8,18 +8,16 @@ part does not fill its quadric, its own shape is tested on the common interval.
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.compute.float32 import FAR, ONE, TINY, ZERO
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.surfaces import ALONG, N_ALONG, N_SECTION, SECTION
 from tracker.geometry.arrays import FloatArray
+from tracker.geometry.segment_distance import LANES
 
 JOINT_MARGIN_M = 0.03
 """Distance in front of an adjoining part at which a contour becomes visible, metres."""
 
-LANES = 16
-"""Numbers per vector; buffers of points have this many to spare."""
-_TINY, _FAR = np.float32(1e-9), np.float32(1e9)
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote the kernels' arithmetic to float64
 _TRIES = (0.5, 0.25, 0.75, 0.001)
 """Places in the common interval of line and quadric at which the shape is tested, far end (0) to near one (1)."""
 
@@ -44,25 +42,25 @@ def _meet_quadric(
         y = q10 * a + q11 * b + q12 * c + q13
         z = q20 * a + q21 * b + q22 * c + q23
         dx, dy, dz = ex - x, ey - y, ez - z
-        w, dw = _ONE + k * z, k * dz
+        w, dw = ONE + k * z, k * dz
         A = dx * dx + dy * dy + bulge * dz * dz - dw * dw
-        A = A if abs(A) > _TINY else _TINY
+        A = A if abs(A) > TINY else TINY
         B = x * dx + y * dy + bulge * z * dz - w * dw
         C = x * x + y * y + bulge * z * z - w * w
         disc = B * B - A * C
-        root = np.sqrt(max(disc, _ZERO))
-        inverse = _ONE / A
+        root = np.sqrt(max(disc, ZERO))
+        inverse = ONE / A
         s0, s1 = (-B - root) * inverse, (-B + root) * inverse
         # A line steeper than the cone (A < 0) is inside beyond one of the roots, on the side of the cone's base.
-        low = s0 if A > _ZERO else (s0 if dw > _ZERO else -_FAR)
-        high = s1 if A > _ZERO else (_FAR if dw > _ZERO else s1)
-        dz = dz if abs(dz) > _TINY else _TINY
-        per_z = _ONE / dz
-        e0, e1 = (-_ONE - z) * per_z, (_ONE - z) * per_z
+        low = s0 if A > ZERO else (s0 if dw > ZERO else -FAR)
+        high = s1 if A > ZERO else (FAR if dw > ZERO else s1)
+        dz = dz if abs(dz) > TINY else TINY
+        per_z = ONE / dz
+        e0, e1 = (-ONE - z) * per_z, (ONE - z) * per_z
         low = max(max(low, behind), min(e0, e1))
-        high = min(min(high, _ONE), max(e0, e1))
+        high = min(min(high, ONE), max(e0, e1))
         shared[0, i] = low
-        shared[1, i] = high if disc > _ZERO else -_FAR
+        shared[1, i] = high if disc > ZERO else -FAR
 
 
 @njit(**FAST_MATH)
@@ -76,14 +74,14 @@ def _is_inside(part: int, solids: FloatArray, x: np.float32, y: np.float32, z: n
     below = solids[part, cell]
     size = below + (at - np.float32(k)) * (solids[part, cell + np.uint64(1)] - below)
     if solids[part, 7] > 0:
-        size *= _ONE + solids[part, 5] * z
+        size *= ONE + solids[part, 5] * z
         return x * x + y * y < size * size
-    x = abs(x / (_ONE + solids[part, 5] * z))
-    y = abs(y / (_ONE + solids[part, 6] * z))
+    x = abs(x / (ONE + solids[part, 5] * z))
+    y = abs(y / (ONE + solids[part, 6] * z))
     larger, smaller = max(x, y), min(x, y)
     if larger >= size:
         return False
-    at = smaller / max(larger, _TINY) * np.float32(N_SECTION)
+    at = smaller / max(larger, TINY) * np.float32(N_SECTION)
     k = np.uint64(min(at, np.float32(N_SECTION - 1)))
     cell = np.uint64(SECTION) + k
     below = solids[part, cell]

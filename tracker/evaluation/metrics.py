@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.body.limbs import BENT_RAD
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError, Remedy
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
@@ -16,8 +17,6 @@ from tracker.geometry.arrays import Array
 
 LOST_M = 0.15
 """A frame with a limb joint off by more is lost, metres."""
-BENT_RAD = float(np.radians(20.0))
-"""An elbow or knee bent by less does not determine the twist of its limb."""
 
 Alignment = Literal["none", "rigid-all"]
 

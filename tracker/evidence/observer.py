@@ -35,8 +35,8 @@ from tracker.images.working_view import fit_region
 
 FOREGROUND_MARGIN = 0.012
 """Width of the margin around the silhouette in which edges count, as a fraction of the longer side of the image."""
-_WORKERS = 2
 _FRAMES_AHEAD = 2
+"""Frames that are read ahead, each by a thread of its own."""
 
 
 class _Ahead(NamedTuple):
@@ -74,7 +74,7 @@ class Observer:
         self._in_recording = in_recording
         # OpenCV's own threads would compete with the threads of other views.
         self._pool, self._pool_ahead = (
-            ThreadPoolExecutor(_WORKERS, name, initializer=cv2.setNumThreads, initargs=(1,))
+            ThreadPoolExecutor(_FRAMES_AHEAD, name, initializer=cv2.setNumThreads, initargs=(1,))
             for name in ("observe", "observe ahead")
         )
         self._views = [Foreground(c, self._pool) for c in self.cameras]

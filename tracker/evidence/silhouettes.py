@@ -30,6 +30,7 @@ from tracker.images.background_subtraction import (
     smooth_image,
     subtract_background,
 )
+from tracker.images.image_statistics import SPACING_PX
 from tracker.images.silhouette_cleaning import clean_silhouette
 from tracker.images.working_view import WorkingView
 
@@ -38,8 +39,6 @@ SilhouetteSource = Literal["mask", "background", "recording", "none"]
 
 N_LEARNED = 25
 """Number of frames from which the empty scene is learnt where the session has none."""
-_SPACING_PX = 8
-"""Distance between the samples that measure exposure and noise, px."""
 _ANYONE = 255
 """Value of a mask where it does not say which person it is."""
 
@@ -127,7 +126,7 @@ class SilhouetteFinder:
         return ViewSilhouette(clean.mask, camera, clean.quality, origin, changes.anything & ~clean.mask)
 
     def _changes(self, smooth: Image, model: BackgroundModel) -> Changes:
-        samples, empty = (x[::_SPACING_PX, ::_SPACING_PX].reshape(-1, 3) for x in (smooth, model.image))
+        samples, empty = (x[::SPACING_PX, ::SPACING_PX].reshape(-1, 3) for x in (smooth, model.image))
         colors, empty_colors = samples.astype(np.float32), empty.astype(np.float32)
         usable = has_usable_exposure(empty_colors)
         gain: FloatArray = exposure_gain(colors[usable], empty_colors[usable])

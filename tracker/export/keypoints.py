@@ -15,7 +15,6 @@ from tracker.geometry.cameras import Camera
 
 ABSENT, OCCLUDED, VISIBLE = 0, 1, 2
 """COCO's visibility flags."""
-_RINGS, _SECTORS = 8, 12
 _SILHOUETTE_PX = 400
 """Longer side of the mask in which the area of a silhouette is counted, px."""
 
@@ -102,6 +101,6 @@ def _surface_world(body: PosedBody) -> tuple[Array, IntArray]:
 def _surface(model: BodyModel) -> tuple[Array, IntArray, IntArray]:
     """Return points of the surface of a body in their parts' frames, (n, 3), metres, their parts, and these ends."""
     shapes = zip(model.shapes, model.centers_part, strict=True)
-    parts = [shape.triangles(_RINGS, _SECTORS).vertices + center for shape, center in shapes]
+    parts = [shape.triangles().vertices + center for shape, center in shapes]
     counts = [len(points) for points in parts]
     return np.concatenate(parts), np.repeat(np.arange(len(parts)), counts), np.cumsum(counts)[:-1]

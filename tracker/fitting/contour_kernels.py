@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tracker.compute.float32 import ONE, ZERO
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours import occluding_contours
@@ -12,8 +13,6 @@ from tracker.fitting.contour_arrays import ACROSS, SLIDING, ContourTerm, Scratch
 from tracker.fitting.segment_matching import match_points, pack_visible, store_static
 from tracker.fitting.twists import add_twists
 from tracker.images.distance_transform import bilinear
-
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote the kernel's arithmetic to float64
 
 
 @njit(**FAST_MATH)
@@ -37,7 +36,7 @@ def _model_to_image(
         for k in range(np.uint64(firsts[part]), np.uint64(firsts[part + 1])):
             x, y, length = q[0, k], q[1, k], q[2, k]
             # Outside the image there is no evidence for or against a contour.
-            if x < _ZERO or y < _ZERO or x > right or y > bottom:
+            if x < ZERO or y < ZERO or x > right or y > bottom:
                 continue
             d, along_u, along_v = bilinear(image, width, height, x, y)
             cut = min(d, theta)
@@ -106,11 +105,11 @@ def _image_to_model(
         w, u, v, dx, dy, count = pull[j], us[j] - q[0, k], vs[j] - q[1, k], q[2, k], q[3, k], of[1, k]
         t = (u * dx + v * dy) * q[4, k]
         i = np.uint64(of[0, k] + min(max(int(t * np.float32(count)), 0), count - 1))
-        if t > _ZERO and t < _ONE:
+        if t > ZERO and t < ONE:
             pulls[0, i] += w
             pulls[1, i] -= w * (u * q[5, k] + v * q[6, k])
             continue
-        if t > _ZERO:
+        if t > ZERO:
             u, v = u - dx, v - dy
         d = np.sqrt(u * u + v * v)
         if d < np.float32(1e-3):

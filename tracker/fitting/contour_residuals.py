@@ -44,7 +44,7 @@ from tracker.fitting.twists import twists_to_dofs
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.segment_distance import sort_points, stack_rows
 
-_CAPTURE = 2.0
+CAPTURE = 2.0
 """Edge points farther than this many outlier distances from the predicted contours are left out for good."""
 
 MIN_DECREASE = 0.1
@@ -76,15 +76,13 @@ class MatchSettings:
     motion of the contour on the surface (B of Eq. 31)."""
 
 
-_UNBOUNDED = 1e6
+UNBOUNDED = 1e6
 """A scale at which residuals of any size count in full."""
 
 
 def paper_match(motion: Literal["rigid", "sliding"] = "sliding") -> MatchSettings:
     """Return the weights of KRH08 Eq. 60: model to image, a sum of squares in px^2 with every pixel of contour."""
-    return MatchSettings(
-        scale=_UNBOUNDED, model_to_image=1.0, image_to_model=0.0, information_per_px=1.0, motion=motion
-    )
+    return MatchSettings(scale=UNBOUNDED, model_to_image=1.0, image_to_model=0.0, information_per_px=1.0, motion=motion)
 
 
 _MOTIONS = {"across": ACROSS, "rigid": RIGID, "sliding": SLIDING}
@@ -174,7 +172,7 @@ class ContourResiduals:
         if not everywhere:
             near = contours or [occluding_contours.trace(bodies, v.camera) for v in views]
         points = [
-            points_to_match(v, contour, _CAPTURE * theta, settings.edges, settings.silhouette)
+            points_to_match(v, contour, CAPTURE * theta, settings.edges, settings.silhouette)
             for v, contour, theta in zip(views, near, thetas, strict=True)
         ]
         sorted_points = [sort_points(p, v.camera.size) for p, v in zip(points, views, strict=True)]

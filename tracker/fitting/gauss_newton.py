@@ -19,14 +19,25 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, IntArray
 
 INITIAL_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-9, 1e8
+"""Damping of the first step, as a share of the diagonal (Marquardt 1963), the least one, and the one beyond which no
+step lowers the cost."""
 MIN_RETRY_DAMPING = 1e-2
 """Smallest damping after a refused step; less would hardly change the step."""
 AT_LIMIT = 1e-9
 """Distance from a limit that counts as at the limit, rad or metres."""
-_UNKNOWN = 1.0
-"""Variance of an unobserved degree of freedom, rad^2 or m^2."""
-_PLACE_M = 0.02
-"""Standard deviation between joints and their known positions, because bodies differ in size, metres."""
+UNKNOWN = 1.0
+"""Standard deviation of a degree of freedom that nothing shows, rad or m."""
+JOINT_M = 0.005
+"""Standard deviation of a known joint of the same body, metres: markers and rigs repeat a joint to some
+millimetres."""
+OTHER_BODY_M = 0.015
+"""Standard deviation of a known joint of a body of other sizes, metres: joints of people and those of the built-in body
+differ by 1 to 4 cm (docs/accuracy.md, Joint centres)."""
+LOOSE = 0.5
+"""Standard deviation of what known joints do not determine, such as the twist of a straight arm, rad or m: so much
+larger than theirs that it yields to any."""
+CLOSE_ENOUGH = 1e-3
+"""Step below which a pose that is shown or filtered is final, rad or m: no joint moves by more than a millimetre."""
 
 
 class NormalEquations(NamedTuple):
@@ -251,9 +262,9 @@ def covariance(model: BodyModel, fit: Fit) -> Array:
     """Return the covariance of a fitted pose, (n_dofs, n_dofs), rad and metres, from its normal matrix.
 
     It is valid if the blocks' weights are inverse standard deviations. Unobserved degrees of freedom have variance
-    `_UNKNOWN`. Joint limits are not taken into account.
+    `UNKNOWN`. Joint limits are not taken into account.
     """
-    return np.asarray(np.linalg.inv(fit.hessian + np.eye(model.n_dofs) / _UNKNOWN), dtype=np.float64)
+    return np.asarray(np.linalg.inv(fit.hessian + np.eye(model.n_dofs) / UNKNOWN**2), dtype=np.float64)
 
 
 def fit_to_points(
@@ -281,7 +292,7 @@ def fit_to_points(
         )
     indices = np.array([model.point_names.index(n) for n in known])
     targets = np.stack(list(known.values()))
-    block = PointTargets(indices, targets, np.full(len(indices), 1 / _PLACE_M), centers)
+    block = PointTargets(indices, targets, np.full(len(indices), 1 / OTHER_BODY_M), centers)
     if near is not None:
         starts = [near]
     else:
@@ -296,7 +307,7 @@ def fit_to_points(
     # Without this prior a body of other sizes would bend unnaturally to come closer to the positions.
     usual = PosePrior.of_spreads(model)
     # A weak pull to the start determines what the points do not, such as the twist of a straight arm.
-    rest = np.full(model.n_dofs, 1e-3 / _PLACE_M)
+    rest = np.full(model.n_dofs, 1e-3 / OTHER_BODY_M)
 
     def fitted(start: Array) -> Fit:
         return solve(model, start, [block, usual, PosePrior(start if near is None else near, rest)], max_iterations=100)

@@ -31,19 +31,14 @@ SOFTNESS = 0.6
 class SelfPenetration:
     """Penetration between parts of one body that neither adjoin nor touch in the neutral pose; see `ResidualBlock`."""
 
-    sigma_m: float = SIGMA_M
-    """Standard deviation of the depth, metres."""
-    softness: float = SOFTNESS
-    """Share of a part's radius that may be pressed in without cost."""
-
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         return _linearized(self.term(model), model, kinematics)
 
     def term(self, model: BodyModel) -> "PenetrationTerm":
         """Return the arguments of `add_penetration` for a body."""
-        Ts, apart = np.empty((len(model.parts), 4, 4)), separable_parts(model, self.softness)
-        return _penetration_term((model,), Ts, apart, self.softness, 0, _weight(self.sigma_m))
+        Ts, apart = np.empty((len(model.parts), 4, 4)), separable_parts(model, SOFTNESS)
+        return _penetration_term((model,), Ts, apart, SOFTNESS, 0, _weight(SIGMA_M))
 
 
 class BodyPenetration:
@@ -57,17 +52,13 @@ class BodyPenetration:
         bodies: Sequence[PosedBody],
         person: int,
         weight: float,
-        sigma_m: float = SIGMA_M,
-        softness: float = SOFTNESS,
     ) -> None:
         """Place the parts of the others.
 
         Args:
             bodies: all bodies.
             person: index of the body that is fitted.
-            weight: weight of the squared depths; 1 is that of `sigma_m`.
-            sigma_m: standard deviation of the depth, metres.
-            softness: share of a part's radius that may be pressed in without cost.
+            weight: weight of the squared depths; 1 is that of `SIGMA_M`.
         """
         self._models, self._person = tuple(b.model for b in bodies), person
         self._Ts = np.concatenate([b.kinematics.Ts_world_part for b in bodies])
@@ -75,7 +66,7 @@ class BodyPenetration:
         mine = np.zeros(len(self._Ts), dtype=bool)
         mine[self._own] = True
         self._apart = mine[:, None] != mine
-        self._weight, self._softness = np.sqrt(weight) * _weight(sigma_m), softness
+        self._weight = np.sqrt(weight) * _weight(SIGMA_M)
 
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
@@ -85,7 +76,7 @@ class BodyPenetration:
         """Return the arguments of `add_penetration` for the person's model."""
         assert model is self._models[self._person]
         Ts = self._Ts.copy()  # several threads may call this
-        return _penetration_term(self._models, Ts, self._apart, self._softness, self._own.start, self._weight)
+        return _penetration_term(self._models, Ts, self._apart, SOFTNESS, self._own.start, self._weight)
 
 
 class PenetrationTerm(NamedTuple):

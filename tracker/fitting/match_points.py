@@ -12,14 +12,16 @@ from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import SCENE_SPACING_PX, ViewEvidence
 from tracker.geometry.arrays import FloatArray, IntArray
+from tracker.images.silhouette_contour import SAME_PX
 
 N_COLUMNS = 7
 """Columns of a point: u, v, the normal's u and v, the weight, the number of points it stands for, and the number of
 those on the silhouette."""
 _AREA_PX = 8
 """Size of the areas that are classified as near a contour or not, px. It only saves work, so coarse areas suffice."""
-_SAME_PX, _SAME_COS = 2.0, 0.9
-"""Largest distance, px, and smallest cosine of the angle between a silhouette point and the edge that it lies on."""
+_SAME_COS = 0.9
+"""Smallest cosine of the angle between a silhouette point and the edge that it lies on: 26 degrees, because both point
+for the same line."""
 
 
 def points_to_match(
@@ -78,7 +80,7 @@ def _merge(points: FloatArray, n_edges: int, cells: IntArray) -> int:
                     continue
                 du, dv = u - points[k, 0], v - points[k, 1]
                 squared = du * du + dv * dv
-                if squared < best and abs(du * nu + dv * nv) <= _SAME_PX:
+                if squared < best and abs(du * nu + dv * nv) <= SAME_PX:
                     nearest, best = k, squared
         if nearest >= 0:
             for k in range(4, N_COLUMNS):

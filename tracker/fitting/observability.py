@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.pieces import PIECE_PX
+from tracker.fitting.gauss_newton import UNKNOWN
 from tracker.fitting.twists import twists_to_dofs
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
@@ -24,8 +25,6 @@ OBSERVABLE_RAD, OBSERVABLE_M = float(np.radians(10.0)), 0.03
 """Largest standard deviation of an observable degree of freedom, rad and metres."""
 _SHARE_OF_PRIOR = 0.8
 """Largest standard deviation of an observable degree of freedom, in that without any view."""
-_UNKNOWN = 1.0
-"""Standard deviation of a degree of freedom before any view is seen, rad or metres."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +150,7 @@ def observe_pose(
 def prior_information(model: BodyModel, noise: ContourNoise) -> Array:
     """Return the information before any view is seen, (n_dofs + n_places,), 1/rad^2 or 1/m^2; see `ViewInformation`."""
     places_m = np.full(_n_places(model, noise), noise.joint_share * model.height_m)
-    return 1.0 / np.concatenate([np.minimum(model.spreads, _UNKNOWN), places_m]) ** 2
+    return 1.0 / np.concatenate([np.minimum(model.spreads, UNKNOWN), places_m]) ** 2
 
 
 def view_information(

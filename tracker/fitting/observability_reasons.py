@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.body.limbs import display_name
+from tracker.body.limbs import BENT_RAD, display_name
 from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.observability import ContourNoise, Observability, observe_pose
 from tracker.geometry.arrays import Array
@@ -12,8 +12,6 @@ from tracker.geometry.cameras import Camera
 
 _BEND_RAD = float(np.radians(60.0))
 """Bend of a straight joint that is tried: by then the part beyond it swings clearly."""
-_STRAIGHT_RAD = float(np.radians(20.0))
-"""Largest bend of a joint that counts as straight."""
 _HIDDEN_PX = 1.0
 """Largest visible length of contour of parts that no view shows, working px."""
 
@@ -100,7 +98,7 @@ class _Bent:
                 or np.isfinite(model.spreads[bend])
             ):
                 continue
-            if abs(self._value(model, bend)) > _STRAIGHT_RAD:
+            if abs(self._value(model, bend)) > BENT_RAD:
                 continue
             if self._sigmas_alone(model, bend)[dof] < 0.5 * float(found.sigmas_alone[dof]):
                 return joint.name

@@ -3,20 +3,18 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.compute.float32 import FAR2, ONE, ZERO
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
-from tracker.contours.pieces import PIECE_PX
+from tracker.contours.pieces import JOINED, PIECE_PX
 from tracker.contours.static_cache import StaticContours, mark_covered_segments, store_pieces, trace_static
 from tracker.contours.surfaces import Surfaces
 from tracker.fitting.contour_arrays import Scratch, ViewArrays
 from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.geometry.segment_distance import LANES, cells_within
 
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote the kernel's arithmetic to float64
-_FAR2 = np.float32(1e12)
 _NONE = np.int32(-1)
-_JOINED = 10
-"""Largest number of pieces of a segment: longer segments would reach too many points."""
+"""Index where no segment is near."""
 
 
 @njit(**FAST_MATH)
@@ -56,11 +54,11 @@ def nearest_oriented_segment(
                 i = first + j
                 from_u, from_v = u[i] - x, v[i] - y
                 t = (from_u * dx + from_v * dy) * inverse
-                t = t if t > _ZERO else _ZERO
-                t = t if t < _ONE else _ONE
+                t = t if t > ZERO else ZERO
+                t = t if t < ONE else ONE
                 off_u, off_v = from_u - t * dx, from_v - t * dy
                 alike = nu[i] * nx + nv[i] * ny
-                squared = off_u * off_u + off_v * off_v + weight * (_ONE - alike * alike)
+                squared = off_u * off_u + off_v * off_v + weight * (ONE - alike * alike)
                 closer = squared < best[i]
                 # Later segments have larger indices. As a plain choice this would be a masked store, which is slow.
                 found = index if closer else _NONE
@@ -87,7 +85,7 @@ def pack_visible(n_parts: int, scratch: Scratch) -> int:
             pieces[0, packed], pieces[1, packed], pieces[2, packed] = half * (x + x1), half * (y + y1), length
             pieces[3, packed], pieces[4, packed] = nx, ny
             pieces[5, packed], pieces[6, packed], pieces[7, packed] = middles[0, i], middles[1, i], middles[2, i]
-            if edges[i] != edge or of_segment[1, n - one] == _JOINED:
+            if edges[i] != edge or of_segment[1, n - one] == JOINED:
                 edge = edges[i]
                 segments[0, n], segments[1, n], segments[5, n], segments[6, n] = x, y, nx, ny
                 of_segment[0, n], of_segment[1, n], of_segment[2, n] = packed, 0, part
@@ -96,7 +94,7 @@ def pack_visible(n_parts: int, scratch: Scratch) -> int:
             of_segment[1, k] += 1
             dx, dy = x1 - segments[0, k], y1 - segments[1, k]
             segments[2, k], segments[3, k] = dx, dy
-            segments[4, k] = _ONE / max(dx * dx + dy * dy, np.float32(1e-12))
+            segments[4, k] = ONE / max(dx * dx + dy * dy, np.float32(1e-12))
             packed += one
     scratch.firsts[n_parts] = packed
     return int(n)
@@ -124,7 +122,7 @@ def match_points(
     start, stop = views.firsts[view], views.firsts[view + 1]
     best, nearest, wanted, of, n = scratch.best, scratch.nearest, scratch.wanted, scratch.of_segment, stop - start
     if static.best.shape[0] == 0:
-        best[:n], nearest[:n], wanted[:n_segments] = _FAR2, _NONE, True
+        best[:n], nearest[:n], wanted[:n_segments] = FAR2, _NONE, True
     else:
         for j in range(np.uint64(n)):
             best[j], nearest[j] = static.best[np.uint64(start) + j], _NONE
@@ -141,12 +139,12 @@ def _rematch_covered(view: int, n_segments: int, views: ViewArrays, static: Stat
     start, stop, reach = views.firsts[view], views.firsts[view + 1], np.float32(views.thetas[view])
     best, segments, before, limit = scratch.best, scratch.segments, static.nearest[start:stop], reach * reach
     us, vs = views.points[0][start:stop], views.points[1][start:stop]
-    u0 = v0 = _FAR2
-    u1 = v1 = -_FAR2
+    u0 = v0 = FAR2
+    u1 = v1 = -FAR2
     for j in range(np.uint64(stop - start)):
         if best[j] < limit and static.covered[before[j]]:
             u0, u1, v0, v1 = min(u0, us[j]), max(u1, us[j]), min(v0, vs[j]), max(v1, vs[j])
-            best[j] = _FAR2
+            best[j] = FAR2
     u0, u1, v0, v1 = u0 - reach, u1 + reach, v0 - reach, v1 + reach
     for k in range(np.uint64(n_segments)):
         x, y = segments[0, k], segments[1, k]
@@ -174,5 +172,5 @@ def store_static(
         visible += 1
     start, stop = views.firsts[view], views.firsts[view + 1]
     best, nearest = static.best[start:stop], static.nearest[start:stop]
-    best[:], nearest[:], scratch.wanted[:n_segments] = _FAR2, _NONE, True
+    best[:], nearest[:], scratch.wanted[:n_segments] = FAR2, _NONE, True
     _match_segments(view, n_segments, views, turn, scratch, best, nearest)

@@ -16,6 +16,7 @@ _ON_SIDE = 0.999
 """Largest height of a point on the curved surface, in half its length. Points beyond lie on the rim of an end, which is
 fixed to the part."""
 _TINY = 1e-300
+"""Least divisor where a slope and its bound are 0."""
 
 
 @njit(inline="always", **FAST_MATH)

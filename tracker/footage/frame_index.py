@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 VERSION = 1
+"""Version of the stored lists; with another one they are made again."""
 
 
 class Index(NamedTuple):

@@ -1,9 +1,8 @@
 """Compare frame rates: equal within rounding, and one clock though written differently."""
 
 RATE_TOLERANCE = 5e-4
-"""Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much."""
-_NTSC_TOLERANCE = 2e-4
-"""Relative rounding of television's rates as files write them: 23.98 is 24000/1001 within 1.7e-4."""
+"""Relative difference above which two frame rates differ; 29.97 and 30 differ by twice as much,
+and 23.98 differs from 24000/1001 by a third."""
 _CAMERA_RATES = (24000 / 1001, 24.0, 25.0, 30000 / 1001, 30.0, 50.0, 60000 / 1001, 60.0, 100.0, 120.0, 200.0, 240.0)
 """Frame rates of cameras and of television, 1/s."""
 
@@ -17,7 +16,7 @@ def nominal_rate(rate: float) -> float:
     """Return the whole rate by which television's rate goes, 1/s: 30 for 30000/1001; other rates as they are."""
     whole = round(rate * 1.001)
     is_of_television = whole > 0 and (whole % 24 == 0 or whole % 30 == 0)
-    return float(whole) if is_of_television and abs(rate * 1.001 / whole - 1) <= _NTSC_TOLERANCE else rate
+    return float(whole) if is_of_television and abs(rate * 1.001 / whole - 1) <= RATE_TOLERANCE else rate
 
 
 def same_clock(rate: float, other: float) -> bool:

@@ -23,6 +23,7 @@ _EVERY_PACKETS = 4000
 _BREATH_PACKETS = 100
 """Number of packets after which other threads get a turn: the page's requests need the same interpreter."""
 _BREATH_S = 0.0005
+"""Length of such a turn, s; one that waits for the interpreter takes it at once."""
 
 
 class PacketScan(NamedTuple):

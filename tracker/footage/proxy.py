@@ -27,15 +27,18 @@ from tracker.footage.frame_index import stamp_of
 from tracker.footage.image_file import decode_image
 from tracker.footage.video import Footage
 from tracker.geometry.arrays import Image
-from tracker.text_files import TextKind, read_json
+from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
 from tracker.validation import check
 
 FOLDER = "proxies"
 VERSION = 1
+"""Version of the files; with another one they are made again."""
 _QUALITY = 88
+"""JPEG's quality, of 100."""
 _FLUSH_FRAMES = 100
+"""Number of frames after which what is written goes to the disk, so that a crash costs no more."""
 _END = np.dtype("<u8")
-_KIND = TextKind("proxy", 100_000, RecordingError, "delete it")
+_KIND = TextKind("proxy", DOCUMENT_BYTES, RecordingError, "delete it")
 
 
 class _About(msgspec.Struct):

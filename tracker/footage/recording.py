@@ -19,6 +19,7 @@ from tracker.footage.video import open_footage
 from tracker.geometry.arrays import Image
 
 DEFAULT_CACHE_BYTES = 256 * 2**20
+"""Memory of decoded frames of all cameras, bytes: 72 frames of four cameras of 640x480."""
 _Key = tuple[int, int, int]
 """Camera, version of its footage, frame."""
 

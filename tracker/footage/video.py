@@ -26,7 +26,8 @@ from tracker.footage.passed_frames import MAX_BYTES
 from tracker.footage.video_decoder import VideoDecoder, open_container
 from tracker.geometry.arrays import Image, IntArray
 
-_ATTEMPTS = 2  # a frame is read again if the file was replaced meanwhile
+_ATTEMPTS = 2
+"""Number of times that a frame is read: again if the file was replaced meanwhile."""
 
 
 class VideoFile:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 GROUP_OF_PICTURES = 12
+"""Distance of key frames, frames: as many are decoded at most to show one."""
 RATE_FACTOR = 19
 """x264's constant rate factor: some 10 KB for a noisy frame of 640x480."""
 

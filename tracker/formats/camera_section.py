@@ -22,11 +22,13 @@ Units = Literal["m", "cm", "mm"]
 METRES: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres per unit."""
 
-_ROTATION_TOLERANCE = 1e-3  # a rotation matrix printed with four digits still passes
+FOUR_DIGITS = 1e-3
+"""Error of a rotation matrix or a unit quaternion that is printed with four digits."""
 _MAX_TURN_RAD = 2 * np.pi + 1e-6
 """Longest Rodrigues vector: programs write at most half a turn, and optimizers stay within one."""
-_CENTRAL = 0.25
-"""Share of the picture at each side in which no principal point lies."""
+MAX_OFFSET = 0.25
+"""Distance of a principal point from the middle, as a share of the side of the picture: lenses are mounted in the
+middle, and pictures are seldom cropped to a half."""
 
 _Pixels: TypeAlias = Annotated[float, Meta(ge=1, le=MAX_SIDE_PX, multiple_of=1)]
 _Size: TypeAlias = Annotated[
@@ -97,7 +99,7 @@ class CameraEntry:
                 f"camera '{self.name}': expected the key 'size' in the calibration, found none; add the width and "
                 "height of the pictures"
             )
-        if self.size is None and self.eccentricity(size) > 0.5 - _CENTRAL:
+        if self.size is None and self.eccentricity(size) > MAX_OFFSET:
             raise CalibrationError(
                 f"camera '{self.name}': the calibration states no image size, and its principal point "
                 f"{self.K[0, 2]:.0f}, {self.K[1, 2]:.0f} is not that of footage of {size[0]}x{size[1]} pixels; "
@@ -143,7 +145,7 @@ def _rotation(value: list[Any], where: str) -> Array:
         return rigid.so3_exp(rotation)
     error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     determinant = float(np.linalg.det(rotation))
-    if error > _ROTATION_TOLERANCE or determinant < 0:
+    if error > FOUR_DIGITS or determinant < 0:
         raise CalibrationError(
             f"{where}: 'rotation' is not a rotation: expected orthonormal rows and determinant 1, "
             f"found rows off by {error:.2g} and determinant {determinant:.3g}; calibrate again"

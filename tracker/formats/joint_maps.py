@@ -13,7 +13,7 @@ import msgspec
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.trc import MarkerTable
-from tracker.text_files import TextKind, read_toml
+from tracker.text_files import DOCUMENT_BYTES, TextKind, read_toml
 from tracker.validation import Name, check
 
 LIMB_JOINTS = tuple(
@@ -22,7 +22,7 @@ LIMB_JOINTS = tuple(
 """The joints over which errors are averaged."""
 JOINTS = (*LIMB_JOINTS, "neck", "head")
 
-_KIND = TextKind("joint map", 100_000, FormatError)
+_KIND = TextKind("joint map", DOCUMENT_BYTES, FormatError)
 _JointMapFile = msgspec.defstruct(
     "_JointMapFile", [(joint, Name | None, None) for joint in JOINTS], forbid_unknown_fields=True
 )
@@ -81,8 +81,8 @@ BODY_25 = JointMap(
 # COCO's own names of the limbs equal the project's; tools that write COCO joints as TRC use the names of BODY_25.
 KNOWN = (OWN, CMU, BODY_25)
 
-# A file with fewer limb joints under a convention's names does not follow it.
 _MIN_JOINTS = 4
+"""Fewest limb joints under the names of a convention by which a file follows it."""
 
 
 def guess_joint_map(markers: Sequence[str], source: str) -> JointMap:

@@ -22,18 +22,23 @@ from msgspec import Meta
 from tracker.body.model import BodyModel
 from tracker.body.parts import Axis, Joint, Landmark, Part, SearchGroup
 from tracker.errors import ModelError
-from tracker.text_files import TextKind, parse_toml, read_text
+from tracker.text_files import DOCUMENT_BYTES, TextKind, parse_toml, read_text
 from tracker.validation import UNPRINTABLE, Color, Name, Vector, check, check_version
 
 VERSION = 1
+"""Version of the files; a newer one is refused."""
 DEFAULT_HEIGHT_M = 1.75
+"""Height of an adult where none is given, metres."""
 PRESETS = tuple(
-    sorted(f.name[:-5] for f in (resources.files("tracker") / "body" / "models").iterdir() if f.name.endswith(".toml"))
+    sorted(
+        f.name.removesuffix(".toml")
+        for f in (resources.files("tracker") / "body" / "models").iterdir()
+        if f.name.endswith(".toml")
+    )
 )
 
 
-_KIND = TextKind("body model", 500_000, ModelError)
-"""A model of 20 parts takes 10 kB."""
+_KIND = TextKind("body model", DOCUMENT_BYTES, ModelError)
 
 _Height: TypeAlias = Annotated[float, Meta(ge=0.3, le=3.0, description="a height of 0.3 to 3 metres")]
 _Fraction: TypeAlias = Annotated[float, Meta(ge=-10, le=10)]

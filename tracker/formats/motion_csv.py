@@ -14,6 +14,7 @@ from pathlib import Path
 from tracker.files import write_text_atomic
 
 _DIGITS = 7
+"""Decimals of a value: a tenth of a micrometre."""
 
 
 @dataclass(frozen=True)

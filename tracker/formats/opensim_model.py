@@ -22,9 +22,11 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.euler import Order, continuous_euler_angles
 
 GRAVITY = 9.80665
+"""Standard gravity, m/s^2."""
 _DENSITY = 1000.0
-_FREE_M, _FREE_RAD = 100.0, 100.0
-"""Range of a coordinate without limits, metres and rad."""
+"""Density of a body, kg/m^3: about that of water, in which people just float."""
+_FREE = 100.0
+"""Half the range of a coordinate without limits, metres or rad: more than any room, and any number of turns."""
 _EULER: Order = "XYZ"
 
 
@@ -52,10 +54,10 @@ def coordinate_joints(model: BodyModel) -> list[CoordinateJoint]:
         found = tuple(next(names) for _ in wanted)
         if _turns_by_euler(model, joint.name):
             axes: tuple[tuple[float, float, float], ...] = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
-            ranges: tuple[tuple[float, float], ...] = ((-_FREE_RAD, _FREE_RAD),) * 3
+            ranges: tuple[tuple[float, float], ...] = ((-_FREE, _FREE),) * 3
         else:
             axes = tuple(a.direction for a in joint.axes)
-            ranges = tuple((max(a.limits[0], -_FREE_RAD), min(a.limits[1], _FREE_RAD)) for a in joint.axes)
+            ranges = tuple((max(a.limits[0], -_FREE), min(a.limits[1], _FREE)) for a in joint.axes)
         out.append(CoordinateJoint(found, axes, ranges, joint.free, _turns_by_euler(model, joint.name)))
     return out
 
@@ -193,7 +195,7 @@ def _joint(
 
 def _coordinates(joint: ET.Element, coordinates: CoordinateJoint) -> None:
     rows = ET.SubElement(joint, "coordinates")
-    ranges = ((-_FREE_M, _FREE_M),) * 3 * coordinates.is_free + coordinates.ranges
+    ranges = ((-_FREE, _FREE),) * 3 * coordinates.is_free + coordinates.ranges
     for name, limits in zip(coordinates.names, ranges, strict=True):
         row = ET.SubElement(rows, "Coordinate", name=name)
         _text(row, "range", _vector(limits))

@@ -26,16 +26,18 @@ from tracker.errors import FormatError
 from tracker.files import write_text_atomic
 from tracker.formats.number_rows import NumberRows
 from tracker.geometry.arrays import Array
-from tracker.text_files import TextKind, read_lines, refuse_lost
-from tracker.validation import Name, check_version, quoted
+from tracker.text_files import TABLE_BYTES, TextKind, read_lines, refuse_lost
+from tracker.validation import MAX_NUMBER, Name, check_version, quoted
 
 VERSION = 1
+"""Version of the tables; a newer one is refused."""
 
 _TITLE = "# quadrille poses, version "
 _DIGITS = 9
-_KIND = TextKind("pose table", 1_000_000_000, FormatError, "export it again")
+"""Decimals of a value, so that a pose is read back to 1e-9 rad or m."""
+_KIND = TextKind("pose table", TABLE_BYTES, FormatError, "export it again")
 _MAX_COLUMNS = 2000
-_MAX_VALUE = 1e9
+"""Largest number of columns of values."""
 _FACTORS = {"_deg": float(np.radians(1.0)), "_m": 1.0, ".qw": 1.0, ".qx": 1.0, ".qy": 1.0, ".qz": 1.0}
 """Suffixes of the columns, and what their values are multiplied by."""
 
@@ -120,7 +122,7 @@ def read_pose_table(path: str | Path) -> PoseTable:
     for number, line in enumerate(lines, n_head + 2):
         if line.strip():
             rows.add(line, number)
-    frames, values = rows.table(_MAX_VALUE)
+    frames, values = rows.table(MAX_NUMBER)
     if frames[0] < 0:
         raise FormatError(f"{where}: expected frames from 0, found {frames[0]}; correct it")
     values *= factors

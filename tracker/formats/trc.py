@@ -19,8 +19,8 @@ from tracker.errors import FormatError
 from tracker.files import write_text_atomic
 from tracker.formats.number_rows import NumberRows, not_a_number
 from tracker.geometry.arrays import Array
-from tracker.text_files import LOST, TextKind, read_lines, refuse_lost
-from tracker.validation import MAX_FRAMES, FrameRate, check, quoted
+from tracker.text_files import LOST, TABLE_BYTES, TextKind, read_lines, refuse_lost
+from tracker.validation import MAX_FRAMES, MAX_NUMBER, FrameRate, check, quoted
 
 METRES_BY_WORD = {
     word: metres
@@ -34,12 +34,11 @@ METRES_BY_WORD = {
     for word in words.split()
 }
 """Metres per unit, by the words that OpenSim (`Units`) and others write, in any case."""
-_KIND = TextKind("TRC file", 1_000_000_000, FormatError, "export it again")
+_KIND = TextKind("TRC file", TABLE_BYTES, FormatError, "export it again")
 _Line: TypeAlias = tuple[int, str]
 """Number of a line in its file, from 1, and its text with its end."""
 _MAX_POINTS = 1000
-_MAX_COORDINATE = 1e9
-"""Largest coordinate of a file, in its own units."""
+"""Largest number of points of a file."""
 _MAX_TIME = 1e13
 """Largest time of a file, s: Unix time in milliseconds, which is named as a contradiction to DataRate, is some 2e12."""
 
@@ -207,7 +206,7 @@ def _read_rows(
                 "end the line if it is complete"
             )
         rows.add(text, number)  # some writers end rows with tabs, some drop them
-    return rows.table(_MAX_COORDINATE, {2: _MAX_TIME})
+    return rows.table(MAX_NUMBER, {2: _MAX_TIME})
 
 
 def _rate(text: str | None, where: str) -> float:

@@ -7,6 +7,8 @@ import numpy as np
 
 from tracker.geometry.arrays import Array
 
+MIN_APART_M = 0.02
+"""Least distance of two cameras, metres: no stereo camera for people is narrower."""
 MIN_SPREAD_RAD = float(np.radians(8.0))
 """Largest angle between two optical axes below which they count as parallel: their point is then undetermined."""
 

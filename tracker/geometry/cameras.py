@@ -20,10 +20,10 @@ from tracker.geometry.lenses import (
     fisheye_project,
 )
 
-_MAX_LENS_RADIUS = 20.0
-"""Tangent of the widest angle from the optical axis at which the distortion is examined: 87 degrees."""
+MAX_LENS_RADIUS = 20.0
+"""Tangent of the widest angle from the optical axis, 87 degrees, at which a lens is examined."""
 
-_BORDER_SAMPLES = 257
+BORDER_SAMPLES = 257
 """Points along each side of an image that its undistorted image is fitted to."""
 BEYOND_PX = -32000.0
 """Column of what no lens shows, in maps of OpenCV, which are 16 bit wide."""
@@ -218,7 +218,7 @@ class Camera:
         if self.fisheye:
             limit = fisheye_limit(self.distortion)
             return float(np.tan(limit)) if limit < np.pi / 2 else np.inf
-        radii = np.linspace(0.0, _MAX_LENS_RADIUS, 4001)
+        radii = np.linspace(0.0, MAX_LENS_RADIUS, 4001)
         points = np.stack([radii, np.zeros_like(radii)], axis=-1)
         steps = np.diff(self._slopes_to_px(distort_slopes(points, self.distortion))[:, 0])
         falls = np.flatnonzero(steps <= 0)
@@ -292,7 +292,7 @@ class Camera:
 def _border(size: tuple[int, int]) -> Array:
     """Return points along the border of an image, (n, 2), px."""
     low, (right, bottom) = -0.5, np.array(size) - 0.5
-    u, v = np.linspace(low, right, _BORDER_SAMPLES), np.linspace(low, bottom, _BORDER_SAMPLES)
+    u, v = np.linspace(low, right, BORDER_SAMPLES), np.linspace(low, bottom, BORDER_SAMPLES)
     sides = ((u, low), (u, bottom), (low, v), (right, v))
     return np.concatenate([np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in sides])
 
@@ -333,14 +333,13 @@ def viewed_point(cameras: Sequence[Camera]) -> Array:
     return np.linalg.solve(A, (across @ centers[..., None]).sum(axis=0)[:, 0] + 1e-3 * front)
 
 
-def epipolar_segment(source: Camera, target: Camera, point_px: Array, near_m: float = 0.1) -> Array | None:
+def epipolar_segment(source: Camera, target: Camera, point_px: Array) -> Array | None:
     """Project the viewing ray of a pixel of `source` into the image of `target`.
 
     Args:
         source: the camera in which the point was seen.
         target: the camera in which to draw.
         point_px: the point in undistorted pixels of `source`, (2,).
-        near_m: depth in the target camera at which the visible part of the ray begins, metres.
 
     Returns:
         The end points of the visible segment in undistorted pixels of `target`, (2, 2), clipped to its image,
@@ -352,10 +351,10 @@ def epipolar_segment(source: Camera, target: Camera, point_px: Array, near_m: fl
     # The part of the ray t >= 0 in front of the target: z(t) = o_z + t d_z >= near.
     t_low, t_high = 0.0, np.inf
     if abs(direction[2]) < 1e-12:
-        if origin[2] < near_m:
+        if origin[2] < NEAR_PLANE_M:
             return None
     else:
-        t_near = (near_m - origin[2]) / direction[2]
+        t_near = (NEAR_PLANE_M - origin[2]) / direction[2]
         t_low, t_high = (max(0.0, t_near), t_high) if direction[2] > 0 else (t_low, t_near)
     if t_high <= t_low:
         return None

@@ -9,10 +9,10 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 
 Order = Literal["XYZ", "ZXY"]
-_AXES = {"X": np.array([1.0, 0, 0]), "Y": np.array([0, 1.0, 0]), "Z": np.array([0, 0, 1.0])}
+_AXES = dict(zip("XYZ", np.eye(3), strict=True))
+"""Unit vectors by the names of the axes."""
 _LOCK_RAD = 1e-5
 """Distance of the middle angle from a quarter turn at which the first and the third axis coincide."""
-_TURN = 2 * np.pi
 
 
 def euler_matrix(angles: Array, order: Order) -> Array:
@@ -46,7 +46,8 @@ def continuous_euler_angles(R: Array, order: Order) -> Array:
         if abs(abs(angles[1]) - np.pi / 2) < _LOCK_RAD:
             angles = _unlocked(R[i], angles[1], before[2], order)
         other = np.array([angles[0] + np.pi, np.pi - angles[1], angles[2] + np.pi])
-        near = [a + _TURN * np.round((before - a) / _TURN) for a in (angles, other)]
+        turn = 2 * np.pi
+        near = [a + turn * np.round((before - a) / turn) for a in (angles, other)]
         before = found[i] = min(near, key=lambda a: float(np.abs(a - before).sum()))
     return found
 

@@ -6,10 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.geometry.arrays import FloatArray
-from tracker.geometry.cameras import Camera
-
-_NOWHERE_PX = -1e6
-"""Undistorted column and row of pixels that have none."""
+from tracker.geometry.cameras import BEYOND_PX, Camera
 
 
 class Lens(NamedTuple):
@@ -45,5 +42,5 @@ def undistortion_map(lens: Lens) -> tuple[FloatArray, FloatArray]:
     camera = lens.camera
     original_px = np.stack(np.meshgrid(np.arange(camera.width), np.arange(camera.height)), axis=-1)
     found = camera.undistort_points(original_px.astype(np.float64))
-    found = np.nan_to_num(np.clip(found, _NOWHERE_PX, -_NOWHERE_PX), nan=_NOWHERE_PX).astype(np.float32)
+    found = np.nan_to_num(np.clip(found, BEYOND_PX, -BEYOND_PX), nan=BEYOND_PX).astype(np.float32)
     return np.ascontiguousarray(found[..., 0]), np.ascontiguousarray(found[..., 1])

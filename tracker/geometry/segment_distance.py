@@ -10,20 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.compute.float32 import FAR, FAR2, HALF, ONE, TINY, ZERO
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.geometry.arrays import FloatArray, IntArray
 
-_ZERO, _HALF, _ONE = (
-    np.float32(0.0),
-    np.float32(0.5),
-    np.float32(1.0),
-)  # literals would make the kernel's arithmetic float64
-_FAR, _FAR2 = np.float32(1e6), np.float32(1e12)
-_SHORT = np.float32(1e-6)
-"""A shorter segment has no direction, px."""
 LANES = 16
-"""Points processed together."""
+"""Numbers that are processed together; buffers of points have this many to spare."""
 STRIP_PX = 128
 """Width of the strips. Narrower strips hold fewer points out of reach, but fill fewer vectors with points within."""
 
@@ -66,7 +59,7 @@ def sort_points(points: FloatArray, size: tuple[int, int]) -> RowSortedPoints:
     """Sort points (N, 2 + more) of an image of the given width and height; points outside count as on its border."""
     n_strips = -(-size[0] // STRIP_PX)
     filled = np.zeros((points.shape[1], _room_for(len(points))), np.float32)
-    filled[:2] = _FAR
+    filled[:2] = FAR
     begins = np.zeros((n_strips, size[1] + 1), np.int64)
     _sort(np.ascontiguousarray(points, np.float32), np.empty(len(points), np.int64), begins, filled)
     return RowSortedPoints(filled, begins)
@@ -136,7 +129,7 @@ def _keep_within(
                     kept += 1
                 i += 1
             rows[strip, row] = kept
-    points[:2, kept:], points[2:, kept:] = _FAR, _ZERO
+    points[:2, kept:], points[2:, kept:] = FAR, ZERO
     return kept
 
 
@@ -183,16 +176,16 @@ def nearest_segment(
         reach: largest distance of interest, px.
         out: the distances, (N,), px.
     """
-    out[: u.shape[0]] = _FAR2
+    out[: u.shape[0]] = FAR2
     far = np.float32(reach)
     for k in range(n):
         x, y, dx, dy = segments.u[k], segments.v[k], segments.du[k], segments.dv[k]
         left, right, top, bottom = cells_within(x, y, x + dx, y + dy, far, rows)
         # Coordinates along and across the segment, from its middle.
         length = np.sqrt(dx * dx + dy * dy)
-        along_u, along_v = (dx / length, dy / length) if length > _SHORT else (_ONE, _ZERO)
-        half = _HALF * length
-        x, y = x + _HALF * dx, y + _HALF * dy
+        along_u, along_v = (dx / length, dy / length) if length > TINY else (ONE, ZERO)
+        half = HALF * length
+        x, y = x + HALF * dx, y + HALF * dy
         for strip in range(left, right + 1):
             first, last = np.uint64(rows[strip, top]), np.uint64(rows[strip, bottom])
             # Round up to whole vectors; the extra points are nearby at worst. Unsigned indices let it vectorize.
@@ -201,7 +194,7 @@ def nearest_segment(
                 from_u, from_v = u[i] - x, v[i] - y
                 across = from_v * along_u - from_u * along_v
                 beyond = abs(from_u * along_u + from_v * along_v) - half
-                beyond = beyond if beyond > _ZERO else _ZERO
+                beyond = beyond if beyond > ZERO else ZERO
                 squared = across * across + beyond * beyond
                 out[i] = squared if squared < out[i] else out[i]
     for k in range(u.shape[0]):

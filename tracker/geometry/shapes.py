@@ -7,15 +7,12 @@ cross-section are solids of revolution, determined by their profile.
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-
-if TYPE_CHECKING:
-    import trimesh
 
 _FLAT = 1e-6
 """Component away from the axis of the normal of a flat end: almost 0, so that its slope is finite."""
@@ -119,10 +116,6 @@ class TaperedSuperquadric:
         """Return a closed surface in the shape's frame."""
         return _closed(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
 
-    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> "trimesh.Trimesh":
-        """Return the closed surface as a mesh of trimesh."""
-        return _mesh(self.triangles(n_rings, n_sectors))
-
     @cached_property
     def girth_bound(self) -> float:
         """Factor by which an elliptic cross-section must grow to enclose the superelliptic one."""
@@ -189,10 +182,6 @@ class EllipticalCone:
         """Return a closed surface in the shape's frame."""
         return _closed(self.grid(n_rings, n_sectors)[0], self.half_axes[2])
 
-    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> "trimesh.Trimesh":
-        """Return the closed surface as a mesh of trimesh."""
-        return _mesh(self.triangles(n_rings, n_sectors))
-
     def profile(self, tolerance_m: float) -> Profile:
         """Return the profile in unit coordinates: two points of one slope, which give two straight rulings."""
         k = self.taper
@@ -223,10 +212,6 @@ class Ellipsoid:
     def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
         """Return a closed surface in the shape's frame."""
         return self._superquadric.triangles(n_rings, n_sectors)
-
-    def mesh(self, n_rings: int = 24, n_sectors: int = 32) -> "trimesh.Trimesh":
-        """Return the closed surface as a mesh of trimesh."""
-        return _mesh(self.triangles(n_rings, n_sectors))
 
     def profile(self, tolerance_m: float) -> Profile | None:
         """Return the profile in unit coordinates, thinned to chords within a tolerance."""
@@ -312,9 +297,3 @@ def _closed(rings: Array, end: float) -> Triangles:
         ]
     )
     return Triangles(vertices, faces)
-
-
-def _mesh(triangles: Triangles) -> "trimesh.Trimesh":
-    import trimesh  # imported lazily: takes 0.5 s to load
-
-    return trimesh.Trimesh(*triangles, process=False)

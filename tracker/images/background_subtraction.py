@@ -22,10 +22,12 @@ MAX_HIGHLIGHT = 1.3
 """Brightness of the brightest highlight, as a share of the unlit background."""
 NOISE_SIGMAS = 5.0
 """Smallest difference that counts as a change, in standard deviations of the background at that pixel."""
-_DARK, _BRIGHT = 20.0, 235.0  # gray levels between which a ratio of colours is reliable
+_DARK, _BRIGHT = 20.0, 235.0
+"""Gray levels between which a ratio of colours is reliable."""
 _MIN_SAMPLES = 50
-_MIN_GAIN_CHANGE = 0.01
-_SAME, _SHADOW, _NEW = 0, 1, 2  # classes of a pixel
+"""Fewest usable samples whose median gives a gain."""
+_SAME, _SHADOW, _NEW = 0, 1, 2
+"""Classes of a pixel."""
 
 
 def smooth_image(image: Image) -> Image:
@@ -43,7 +45,7 @@ def change_threshold(differences: NDArray[np.float32]) -> float:
         differences: largest difference over the channels between smoothed frame and smoothed background, at samples
             spread over the whole image, (n,).
     """
-    return max(MIN_DIFFERENCE, 5.0 * float(median(differences)))
+    return max(MIN_DIFFERENCE, NOISE_SIGMAS * float(median(differences)))
 
 
 def has_usable_exposure(empty_colors: NDArray[np.float32]) -> Mask:
@@ -67,8 +69,6 @@ def exposure_gain(colors: NDArray[np.float32], empty_colors: NDArray[np.float32]
 
 def apply_gain(image: Image, gain: NDArray[np.float32]) -> Image:
     """Multiply the channels of an image, (H, W, 3), by a gain, (3,)."""
-    if np.abs(gain - 1.0).max() < _MIN_GAIN_CHANGE:
-        return image
     table = np.clip(np.round(np.arange(256)[:, None] * gain), 0, 255).astype(np.uint8)
     return np.asarray(cv2.LUT(np.ascontiguousarray(image), table[None]), dtype=np.uint8)
 

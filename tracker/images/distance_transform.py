@@ -3,11 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.compute.float32 import ZERO
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.geometry.arrays import FloatArray
-
-_ZERO = np.float32(0.0)  # a Python float would promote the kernel's arithmetic to float64
 
 
 @njit(**FAST_MATH)
@@ -28,9 +27,9 @@ def bilinear(
         v: row, px.
     """
     right, bottom = np.float32(width - 1), np.float32(height - 1)
-    u = u if u > _ZERO else _ZERO
+    u = u if u > ZERO else ZERO
     u = u if u < right else right
-    v = v if v > _ZERO else _ZERO
+    v = v if v > ZERO else ZERO
     v = v if v < bottom else bottom
     last_column, last_row = np.int32(width - 2), np.int32(height - 2)
     column, row = np.int32(u), np.int32(v)
@@ -87,7 +86,7 @@ def _measure(edges: NDArray[np.uint8], limit: np.float32, rows: FloatArray, out:
             before, before2, here = (i + 2) % 3, (i + 1) % 3, i % 3
             if turn == 0:
                 for x in range(np.uint64(width)):
-                    rows[3, x] = _ZERO if edges[y, x] else limit
+                    rows[3, x] = ZERO if edges[y, x] else limit
             else:
                 for x in range(np.uint64(width)):
                     rows[3, x] = out[y, x]

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.compute.float32 import ONE, TINY, ZERO
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.geometry.arrays import FloatArray, IntArray
@@ -24,11 +25,10 @@ STRAYS = 3
 """Number of consecutive deviating pixels that end a segment; single ones are noise."""
 MAX_ANGLE_RAD = float(np.radians(45.0))
 """Largest angle between an edge and a contour that it may belong to, rad."""
-_STRIDE = 2  # pixels from one sample to the next
+_STRIDE = 2
+"""Pixels from one sample of a segment to the next."""
 _NONE_LEFT = -10
-_ZERO, _ONE = np.float32(0.0), np.float32(1.0)  # Python floats would promote the kernel's arithmetic to float64
-_SHORT2 = np.float32(1e-6)
-"""Smallest squared length of a piece, px^2."""
+"""Score of a pixel that has no neighbour left: below any score."""
 
 
 class EdgeSegments(NamedTuple):
@@ -258,8 +258,8 @@ def nearest_parallel_segment(
     for k in range(pieces.shape[0]):
         x, y, x1, y1 = pieces[k, 0], pieces[k, 1], pieces[k, 2], pieces[k, 3]
         dx, dy = x1 - x, y1 - y
-        length2 = max(dx * dx + dy * dy, _SHORT2)
-        inverse, widest = _ONE / length2, across * length2
+        length2 = max(dx * dx + dy * dy, TINY)
+        inverse, widest = ONE / length2, across * length2
         left, right, top, bottom = cells_within(x, y, x1, y1, far, rows)
         for strip in range(left, right + 1):
             first, last = np.uint64(rows[strip, top]), np.uint64(rows[strip, bottom])
@@ -267,8 +267,8 @@ def nearest_parallel_segment(
                 i = first + j
                 from_u, from_v = u[i] - x, v[i] - y
                 t = (from_u * dx + from_v * dy) * inverse
-                t = t if t > _ZERO else _ZERO
-                t = t if t < _ONE else _ONE
+                t = t if t > ZERO else ZERO
+                t = t if t < ONE else ONE
                 off_u, off_v = from_u - t * dx, from_v - t * dy
                 turned = nu[i] * dx + nv[i] * dy
                 squared = off_u * off_u + off_v * off_v

@@ -16,7 +16,8 @@ from tracker.images.background_subtraction import SMOOTHING_PX
 
 SPACING_PX = 20
 """Distance between neighbouring samples, working px."""
-_MIN_SAMPLES = 8  # smallest number of samples along each axis
+_MIN_SAMPLES = 8
+"""Smallest number of samples along each axis: fewer show too little of a small image."""
 _TAPS = 9
 """Side of the patch that smoothing (7) and a derivative (3) read, working px."""
 

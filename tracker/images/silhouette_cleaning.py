@@ -48,19 +48,14 @@ def without_rims(mask: Mask) -> Mask:
     return np.asarray(cv2.morphologyEx(mask.view(np.uint8), cv2.MORPH_OPEN, _disc(_RIM, mask))) > 0
 
 
-def largest_components(mask: Mask, min_share: float = MIN_COMPONENT) -> Mask:
-    """Keep the connected components of a mask, (H, W), that are not much smaller than the largest one.
-
-    Args:
-        mask: the mask.
-        min_share: smallest area of a component, as a share of the largest one.
-    """
+def largest_components(mask: Mask) -> Mask:
+    """Keep the connected components of a mask, (H, W), that are not much smaller than the largest one."""
     n, labels, statistics, _ = cv2.connectedComponentsWithStats(mask.view(np.uint8), connectivity=8)
     if n < 2:
         return np.zeros_like(mask)
     areas = statistics[:, cv2.CC_STAT_AREA].astype(np.float64)
     areas[0] = 0
-    kept = areas >= max(min_share * areas.max(), MIN_AREA * mask.size)
+    kept = areas >= max(MIN_COMPONENT * areas.max(), MIN_AREA * mask.size)
     return np.asarray(kept[labels])
 
 

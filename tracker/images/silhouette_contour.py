@@ -8,17 +8,22 @@ from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
 from tracker.geometry.arrays import FloatArray, Mask
+from tracker.images.edge_segments import MAX_ANGLE_RAD
 from tracker.images.edges import Edges
 
 MIN_LENGTH_PX = 24
 """Contours of fewer pixels surround specks and pinholes, and are left out."""
 _NORMAL_WINDOW = (7, 7)
-_NEAR_PX = 2  # largest distance between a contour point and its edge along each axis
-_ALIGNED = 0.7  # cosine of the angle between the contour's normal and the image's gradient
+"""Window over which a silhouette is blurred before its normals are taken, px: wider than the steps of its pixels."""
+SAME_PX = 2
+"""Largest distance of a contour point from the image edge that it lies on, px."""
 _NO_TRUST, _FULL_TRUST = 0.5, 0.9
 """Shares of the contour with an image edge along it, for no trust and for full trust."""
-_MAX_PLAUSIBLE_FILL, _MIN_IMPLAUSIBLE_FILL = 0.5, 0.75
-"""Shares of the region that a silhouette fills: at most plausible, and no longer plausible."""
+MAX_FILL = 0.75
+"""Share of the region that a silhouette fills from which it is not plausible: changed light fills all of it."""
+MIN_TRUST = 0.5
+"""Trust below which a silhouette is left out where it alone decides."""
+_ALONG = np.float32(np.cos(MAX_ANGLE_RAD))
 
 
 class SilhouetteContour(NamedTuple):
@@ -82,10 +87,8 @@ def contour_trust(contour: SilhouetteContour, silhouette: Mask, edges: Edges) ->
         return 0.0
     along = _count_along(contour, edges.found, edges.gradients) / len(contour.points_px)
     seen = (along - _NO_TRUST) / (_FULL_TRUST - _NO_TRUST)
-    plausible = (_MIN_IMPLAUSIBLE_FILL - cv2.countNonZero(silhouette.view(np.uint8)) / silhouette.size) / (
-        _MIN_IMPLAUSIBLE_FILL - _MAX_PLAUSIBLE_FILL
-    )
-    return min(max(seen, 0.0), 1.0) * min(max(plausible, 0.0), 1.0)
+    is_plausible = cv2.countNonZero(silhouette.view(np.uint8)) < MAX_FILL * silhouette.size
+    return min(max(seen, 0.0), 1.0) if is_plausible else 0.0
 
 
 @njit(nogil=True, cache=True)
@@ -96,7 +99,7 @@ def _count_along(contour: SilhouetteContour, found: NDArray[np.uint8], gradients
         u, v = int(contour.points_px[i, 0]), int(contour.points_px[i, 1])
         gu, gv = np.float32(gradients[0, v, u]), np.float32(gradients[1, v, u])
         across = abs(gu * contour.normals[i, 0] + gv * contour.normals[i, 1])
-        if across <= np.float32(_ALIGNED) * np.sqrt(gu * gu + gv * gv):
+        if across <= _ALONG * np.sqrt(gu * gu + gv * gv):
             continue
         count += _is_near(found, u, v)
     return count
@@ -106,8 +109,8 @@ def _count_along(contour: SilhouetteContour, found: NDArray[np.uint8], gradients
 def _is_near(found: NDArray[np.uint8], u: int, v: int) -> bool:
     """Return whether an edge map, (H, W), has an edge near a pixel."""
     height, width = found.shape
-    for row in range(max(0, v - _NEAR_PX), min(height, v + _NEAR_PX + 1)):
-        for column in range(max(0, u - _NEAR_PX), min(width, u + _NEAR_PX + 1)):
+    for row in range(max(0, v - SAME_PX), min(height, v + SAME_PX + 1)):
+        for column in range(max(0, u - SAME_PX), min(width, u + SAME_PX + 1)):
             if found[row, column]:
                 return True
     return False

@@ -18,8 +18,9 @@ WORKING_AREA_PX = 640 * 480
 MIN_REGION_PX = 16
 """Smallest width and height of a region, px; edges and distances need neighbours."""
 _REGION_STEP_PX = 8
-# Pixels around a region of the footage that bilinear interpolation may read.
+"""Raster of the borders of regions, px: small motions do not change them."""
 _MARGIN_PX = 2
+"""Pixels around a region of the footage that bilinear interpolation may read."""
 
 
 def working_scale(camera: Camera) -> float:

@@ -17,6 +17,7 @@ from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 
 _MAX_ACCELERATION_M_S2 = 90.0
+"""Largest acceleration of hands in everyday and in vigorous motion, m/s^2; see above."""
 _MIN_THRESHOLD_M, _MAX_THRESHOLD_M = 0.05, 0.25
 """Smaller residuals are tracking noise; larger ones are inconsistent at any frame rate."""
 

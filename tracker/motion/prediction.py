@@ -10,6 +10,7 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 
 MAX_ORDER = 2
+"""Highest degree of a motion model: GD96 Sect. 4.2 predicts with constant acceleration."""
 
 
 @dataclass(frozen=True)

@@ -22,22 +22,20 @@ from tracker.motion.prediction import unwrapped
 
 _RADIUS_M = 0.05
 """Radius of gyration of a part about its own axis, metres: turning an outstretched limb moves none of its joints."""
-_KEYFRAME_VARIANCE = 1e-10
-"""Variance of a fixed pose, rad^2 or m^2; 0 would make matrices singular."""
 _FLOOR_VARIANCE = 1e-9
-"""Least variance of a measurement, rad^2 or m^2, likewise."""
+"""Variance of a fixed pose, and the least one of a measurement, rad^2 or m^2: that of 0.03 mm. With 0
+matrices would be singular."""
 _LINEAR = 0.05
 """Largest standard deviation of a measurement, rad or metres. Covariance and Jacobians are linearized at the tracked
 pose; a rotation that the images do not show would otherwise take the pose out of the range where they hold."""
 _UNTRUSTED = 100.0
-"""Factor of the standard deviation of a degree of freedom that is not measured."""
+"""Factor of the standard deviation of a degree of freedom that is not measured, as of all before the first frame."""
 _START_VELOCITY = 5.0
 """Standard deviation of the velocity before the first frame, rad/s or m/s."""
-_START_SCALE = 100.0
-"""Variance before the first frame, relative to that of its measurement."""
-_FIRST_DENSITY, _LEAST_DENSITY = 1.0, 1e-9
-"""Spectral density of the first iteration, and the least one, m^2/s^3."""
+_FIRST_DENSITY = 1.0
+"""Spectral density at the first iteration, m^2/s^3: points change their speed by 1 m/s within a second."""
 _ITERATIONS = 10
+"""Number of iterations of expectation maximization."""
 _LEAST_FRAMES = 3
 """Fewer frames show no acceleration."""
 _BLOCK_FRAMES, _OVERLAP_FRAMES = 500, 60
@@ -102,7 +100,7 @@ class _Smoother:
         eye = np.eye(model.n_dofs)
         scale = np.where(track.trusted[used], 1.0, _UNTRUSTED)
         self._R = _within_linear_range(track.covariances[used]) * scale[:, :, None] * scale[:, None, :]
-        self._R[self._fixed] = _KEYFRAME_VARIANCE * eye
+        self._R[self._fixed] = _FLOOR_VARIANCE * eye
         self._inertia = np.array([_inertia(model, p) for p in poses])
         self._inverse_inertia = np.linalg.inv(self._inertia)
 
@@ -113,7 +111,7 @@ class _Smoother:
             energies: list[float] = []
             self._pass(q, energies)
             if energies:
-                q = max(float(np.mean(energies)), _LEAST_DENSITY)
+                q = max(float(np.mean(energies)), _FLOOR_VARIANCE)
         return q
 
     def smooth(self, q: float) -> Array:
@@ -154,7 +152,7 @@ class _Smoother:
         predicted: list[_Gaussian] = []
         filtered: list[_Gaussian] = []
         x, P = np.concatenate([self.measured[0], np.zeros(n)]), np.zeros((2 * n, 2 * n))
-        P[:n, :n], P[n:, n:] = _START_SCALE * self._R[0], _START_VELOCITY**2 * np.eye(n)
+        P[:n, :n], P[n:, n:] = _UNTRUSTED**2 * self._R[0], _START_VELOCITY**2 * np.eye(n)
         for t in range(n_frames):
             if t:
                 dt = float(self._steps_s[t - 1])

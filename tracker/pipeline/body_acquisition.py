@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
-from tracker.acquisition.from_joints import JOINT_M, place_joints
+from tracker.acquisition.from_joints import place_joints
 from tracker.acquisition.two_views import TwoViewSettings, acquire_from_two_views
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, part_of, unreported
@@ -228,7 +228,7 @@ def _placed(stored: StoredPose, observed: Sequence[PointObservation]) -> PointTa
     record, model = stored.record, stored.body.model
     joints = record.settings.get("joints")
     if joints:
-        return place_joints(model, {n: np.array(p, dtype=np.float64) for n, p in joints.items()}, JOINT_M)
+        return place_joints(model, {n: np.array(p, dtype=np.float64) for n, p in joints.items()})
     if not {"manual", "pinned", "imported"} & set(record.sources):
         return None  # a tracked pose that was confirmed shows where the flesh is, not the joints
     if observed:

@@ -7,15 +7,9 @@ character stands at the person's place, and its lowest point is as high above th
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, solve
+from tracker.fitting.gauss_newton import JOINT_M, LOOSE, PointTargets, PosePrior, ResidualBlock, solve
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane
-
-_JOINT_M = 0.005
-"""Standard deviation of a joint's position, metres."""
-_LOOSE_RAD, _LOOSE_M = 0.5, 10.0
-"""Standard deviations of the angles of the same name, rad, and of the root's place, metres. They determine only what
-the joints do not, such as the twist of a straight arm."""
 
 
 def drive_character(pose: Array, source: BodyModel, character: BodyModel, floor: GroundPlane) -> Array:
@@ -39,11 +33,12 @@ def drive_character(pose: Array, source: BodyModel, character: BodyModel, floor:
                 wanted[child] = wanted[parent] + length_m * bone / np.linalg.norm(bone)
     points = np.array([i for i, n in enumerate(character.point_names) if n in wanted], dtype=np.int64)
     targets = np.array([wanted[character.point_names[i]] for i in points])
-    near, start = np.where(character.dof_is_length, 1 / _LOOSE_M, 1 / _LOOSE_RAD), _named_alike(pose, source, character)
+    start = _named_alike(pose, source, character)
     blocks: list[ResidualBlock] = [
-        PointTargets(points, targets, np.full(len(points), 1 / _JOINT_M)), PosePrior(start, near),
-    ]  # fmt: skip
-    found = solve(character, start, blocks, max_iterations=50, tolerance=1e-5).pose
+        PointTargets(points, targets, np.full(len(points), 1 / JOINT_M)),
+        PosePrior(start, np.full(character.n_dofs, 1 / LOOSE)),
+    ]
+    found = solve(character, start, blocks).pose
     return _on_floor(found, character, places, character.height_m / source.height_m, floor)
 
 

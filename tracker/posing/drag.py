@@ -8,6 +8,7 @@ from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import solve
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.posing.grab import Grab, Holds, limb_points
 from tracker.posing.orient import orient
 from tracker.posing.reaching import HOLD_WEIGHT, QUICK, PointerTarget, as_other_views_placed, reach, restore_held
@@ -18,17 +19,13 @@ _KNOB_M = 0.3
 """Distance to the right by which the pointer turns a knob by one radian, at the joint's depth, metres."""
 _PUSH_GAIN = 2.0
 """Motion in depth of a pushed point, in motions of the pointer at the point's depth."""
-_PUSH_DEPTH_WEIGHT = 0.5
-"""Weight of a pushed point's depth, against 1 for keeping its position in the view."""
-_MIN_PUSH_DEPTH_M = 0.3
-"""Smallest depth of a pushed point, metres."""
 
 _HEADINGS_RAD = (np.radians(np.arange(-90.0, 91.0)), np.radians(np.linspace(-1.0, 1.0, 41)))
 """Turns about the vertical that one move tries, against the last move, coarse and fine."""
-_NEAR_HEADING_M, _SAME_SIDE_M = 0.03, 0.01
-"""Distances in the view that outweigh one radian of turn from the grab and from the last move, metres. A shoulder at
-the outline turns far for little: the first keeps an aim that is slightly off from turning the body. Of two headings
-that look alike the second takes the nearer."""
+_NEAR_HEADING_M = 0.02
+"""Distance in the view that outweighs one radian of turn from the grab or from the last move, metres. A shoulder at
+the outline turns far for little, so that an aim that is slightly off does not turn the body. Of two headings that look
+alike the nearer is taken."""
 _NEAR_SIDE_M = 3e-4
 """Squared distance in the view that outweighs one metre of depth, metres. It decides which way a shoulder at the
 outline is drawn inwards: towards the camera."""
@@ -122,9 +119,9 @@ def push(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
     """
     camera = grabbed.camera
     up_m = float(grabbed.pointer_px[1] - np.asarray(pointer_px)[1]) * grabbed.depth_m / camera.K[1, 1]
-    depth = max(_MIN_PUSH_DEPTH_M, grabbed.depth_m + _PUSH_GAIN * up_m)
+    depth = max(NEAR_PLANE_M, grabbed.depth_m + _PUSH_GAIN * up_m)
     target = camera.back_project(grabbed.pointer_px + grabbed.offset_px, depth)
-    return _follow(grabbed, target, pose, _PUSH_DEPTH_WEIGHT)
+    return _follow(grabbed, target, pose, HOLD_WEIGHT)
 
 
 def _follow(grabbed: Grab, target_world: Array, pose: Array, depth_weight: float | None) -> Array:
@@ -182,7 +179,7 @@ def _turned_about_vertical(grabbed: Grab, target_world: Array, pose: Array, dept
         missed = grabbed.depth_m * (seen[:, :2] / seen[:, 2:] - target[:2] / target[2])
         cost = np.sum(missed**2, axis=1) + (depth_weight * (seen[:, 2] - target[2])) ** 2
         cost += np.sum(np.einsum("nij,tnj->tni", placed.weights, moves[:, 1:]) ** 2, axis=(1, 2))
-        cost += (_NEAR_HEADING_M * tried) ** 2 + _NEAR_SIDE_M * seen[:, 2] + (_SAME_SIDE_M * (tried - last)) ** 2
+        cost += (_NEAR_HEADING_M * tried) ** 2 + _NEAR_SIDE_M * seen[:, 2] + (_NEAR_HEADING_M * (tried - last)) ** 2
         angle = float(tried[np.argmin(cost)])
     return orient(model, pose, 0, rigid.so3_exp(angle * up) @ T_root[:3, :3], grabbed.unlocked_dofs)
 

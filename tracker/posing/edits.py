@@ -9,10 +9,10 @@ from tracker.body.model import BodyModel
 from tracker.body.parts import Joint
 from tracker.geometry.arrays import Array, IntArray
 from tracker.posing.orient import orient
+from tracker.validation import ROUNDING
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])
 """Reflection that swaps the body's left and right: y points to the left in every part's frame."""
-_AXIS_TOLERANCE = 1e-6
 
 
 def copy_dofs(model: BodyModel, pose: Array, other: Array, dofs: NDArray[np.bool_]) -> Array:
@@ -68,7 +68,7 @@ def _has_same_axes(joint: Joint, other: Joint) -> bool:
     if joint.kind != other.kind or joint.dof_names != other.dof_names:
         return False
     one, two = (np.array([a.direction for a in j.axes]) for j in (joint, other))
-    return np.allclose(one, two, atol=_AXIS_TOLERANCE)
+    return np.allclose(one, two, atol=ROUNDING)
 
 
 def joint_of(model: BodyModel, point: str | None) -> int:
@@ -137,4 +137,4 @@ def _signs(joint: Joint, other: Joint) -> Array | None:
     wanted = -np.array([a.direction for a in other.axes]) @ _MIRROR
     own = np.array([a.direction for a in joint.axes])
     signs = np.sign(np.sum(own * wanted, axis=1))
-    return signs if np.allclose(own, signs[:, None] * wanted, atol=_AXIS_TOLERANCE) else None
+    return signs if np.allclose(own, signs[:, None] * wanted, atol=ROUNDING) else None

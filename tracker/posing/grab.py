@@ -23,6 +23,7 @@ Role: TypeAlias = Literal["body", "heading", "lean", "trunk", "limb"]
 """Parts that a dragged point moves: the whole body, its heading (a turn about the vertical), its lean (any turn), the
 bend of the trunk, or one limb."""
 _UP = (0.0, 0.0, 1.0)
+"""The vertical where none is stated."""
 
 
 @dataclass(frozen=True)
@@ -115,11 +116,6 @@ class Grab:
     """The grabbed point, known across the lines of sight of other views in which it was placed; None without any."""
     up_world: Array
     """The vertical, (3,), a unit vector."""
-
-    @property
-    def moves_body(self) -> bool:
-        """Whether the whole body moves parallel to the image."""
-        return self.role == "body"
 
     def point_world(self, pose: Array) -> Array:
         """Return the grabbed point in a pose, (3,), metres."""

@@ -13,9 +13,6 @@ from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.shapes import Shape
 
-_RINGS, _SECTORS = 10, 20
-"""Resolution of a hull: it is accurate to some 1% of the part's girth."""
-
 
 class PartHull(NamedTuple):
     """Convex hull of a part in a view, whatever occludes it."""
@@ -83,7 +80,7 @@ def point_on_part(body: PosedBody, camera: Camera, part: int, pointer_px: Array)
 @lru_cache(maxsize=32)
 def _surfaces(model: BodyModel) -> Array:
     """Return the centre of each part, then points on its surface, (n_parts, 1 + n, 3), in the part's frame, metres."""
-    surfaces = [shape.triangles(_RINGS, _SECTORS).vertices for shape in model.shapes]
+    surfaces = [shape.triangles().vertices for shape in model.shapes]
     return np.stack([np.vstack([c, s + c]) for s, c in zip(surfaces, model.centers_part, strict=True)])
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import ContourResiduals
-from tracker.fitting.gauss_newton import ResidualBlock, solve, value_mask
+from tracker.fitting.gauss_newton import CLOSE_ENOUGH, OTHER_BODY_M, ResidualBlock, solve, value_mask
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.pins import PinBlock, pin_block
 from tracker.geometry.arrays import Array
@@ -29,12 +29,9 @@ _REACHES = (2.0, 1.0)
 _TRUST_RAD, _TRUST_M = 0.3, 0.1
 """Standard deviations of the initial pose of a round: a user places a limb less precisely than a tracker predicts
 it."""
-_LIMB_RAD, _TRUNK_RAD, _PLACE_M = 0.3, 0.05, 0.02
-"""Standard deviations for pins alone: joints, the body's rotation, its position. One pin moves a limb, several the
-body."""
-_HELD_M = 0.02
-"""Standard deviation of a point that was placed by hand, where edges are fitted: bodies differ in size, metres."""
-_ITERATIONS, _TOLERANCE = 30, 1e-3
+_TRUNK_RAD = 0.05
+"""Standard deviation of the body's rotation for pins alone, rad: less than that of a limb, since one pin moves a
+limb, and only several move the body."""
 
 
 class FrameFit(NamedTuple):
@@ -83,7 +80,7 @@ def fit_frame(
     for person in people:
         block, model = blocks[person], models[person]
         if block is not None or held[person]:
-            sigma = np.where(model.dof_is_length, _PLACE_M, np.where(model.dof_joint == 0, _TRUNK_RAD, _LIMB_RAD))
+            sigma = np.where(model.dof_is_length, OTHER_BODY_M, np.where(model.dof_joint == 0, _TRUNK_RAD, _TRUST_RAD))
             now[person], pinned[person] = _fit_one(model, now[person], block, held[person], sigma, active[person])
     for reach in _REACHES if views is not None else ():
         for person in people:
@@ -113,11 +110,12 @@ def _held_blocks(
     here = {name: views for name, views in held.items() if name not in {at.point for at in seen}}
     blocks: list[ResidualBlock] = []
     if here:
-        blocks.append(holds_at(body.model, body.values, here).scaled(1 / _HELD_M))
+        blocks.append(holds_at(body.model, body.values, here).scaled(1 / OTHER_BODY_M))
     if seen:
         block = pin_block(body.model, cameras, seen)
         places = body.points_world[block.points]
-        held_px = [c.K[0, 0] * _HELD_M / abs(float(c.depths(at))) for c, at in zip(block.cameras, places, strict=True)]
+        at_depths_m = [abs(float(c.depths(at))) for c, at in zip(block.cameras, places, strict=True)]
+        held_px = [c.K[0, 0] * OTHER_BODY_M / d for c, d in zip(block.cameras, at_depths_m, strict=True)]
         blocks.append(replace(block, sigmas_px=np.hypot(block.sigmas_px, held_px)))
     return blocks
 
@@ -134,7 +132,7 @@ def _fit_one(
     blocks = [*evidence, *prior_blocks(model, pose, sigmas), *([pins] if pins is not None else [])]
     # No kernel covers points that are pinned or held.
     has_points = pins is not None or not all(isinstance(b, ContourResiduals) for b in evidence)
-    fit = (solve if has_points else solver_of(model))(model, pose, blocks, active_dofs, _ITERATIONS, _TOLERANCE)
+    fit = (solve if has_points else solver_of(model))(model, pose, blocks, active_dofs, tolerance=CLOSE_ENOUGH)
     if pins is None:
         return fit.pose, np.zeros(len(model.value_names), dtype=bool)
     by_pins = np.diag(pins.linearize(model, fit.pose, model.kinematics(fit.pose)).hessian)

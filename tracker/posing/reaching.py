@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Kinematics
-from tracker.body.limbs import limbs
+from tracker.body.limbs import BENT_RAD, limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import (
     AT_LIMIT,
@@ -33,12 +33,11 @@ class _Solving(TypedDict):
 
 
 HOLD_WEIGHT = 0.5
-"""Weight of keeping a held point of the dragged limb, against 1 per metre for being under the pointer."""
+"""Weight of keeping a held point of the dragged limb, or a pushed point's depth, against 1 per metre for being under
+the pointer."""
 _DEPTH_WEIGHT = 0.1
 """Weight of keeping the dragged point's depth. If the limb's lengths allow only one of the two, the point follows the
 pointer."""
-_HELD_DEPTH_WEIGHT = 0.02
-"""The same if the limb has a held point: that point knows the depth better than the view of the drag."""
 _REST_WEIGHT = 0.003
 """Weight of keeping the chain at its pose at the grab, per rad. It determines what the pointer does not, and holds the
 point back by some 0.1 mm."""
@@ -58,16 +57,10 @@ which a degree of freedom counts as a twist."""
 _REACHED_M, _REACHED_DEPTH_M = 0.002, 0.02
 """Tolerances across the line of sight and along it within which a point has reached its target, metres. The pull to the
 rest pose holds a point back in depth by some 4 mm."""
-_NEAR_M, _OTHER_SIDE = 0.05, 0.8
-"""Distance in space from the target beyond which the other sides of a limb are tried, metres; and share of the cost
-below which it goes there."""
-_BEND_RAD = 0.35
-"""Angle by which the last joint of a chain is bent to leave the singularity of a straight limb, rad."""
+_NEAR_M = 0.05
+"""Distance in space from the target beyond which the other sides of a limb are tried, metres."""
 _STRETCHED = 0.999
 """Share of the full length of a chain from which it counts as stretched; an elbow then bends by 5 degrees."""
-_KEPT_M, _UNMOVED_M = 0.002, 1e-5
-"""Distances up to which a held point counts as brought back, and as never moved, metres."""
-
 QUICK: _Solving = {"max_iterations": 15, "tolerance": 1e-4}
 """Solver settings of a move: dozens a second, each from the result of the last one."""
 _BENT: _Solving = {"max_iterations": 6, "tolerance": 1e-3}
@@ -199,7 +192,7 @@ def reach(
     holds = holds.of(holds.moved_by(model, active_dofs))
     if depth_weight is None:
         target_world, depth_weight = as_other_views_placed(grabbed, target_world)
-        depth_weight = max(depth_weight, _HELD_DEPTH_WEIGHT if len(holds.points) else _DEPTH_WEIGHT)
+        depth_weight = max(depth_weight, _DEPTH_WEIGHT)
     # For a held wrist to stay while the elbow is dragged, the elbow must bend: joints beyond the point follow too.
     beyond = np.any(model.moves[:, model.point_parts[holds.points]], axis=1) & model.limb_dofs
     active = active_dofs | (beyond & grabbed.unlocked_dofs)
@@ -232,7 +225,7 @@ def reach(
     for start in starts:
         in_space = solve(model, start, [PointerTarget(grabbed, target_world, 1.0), *blocks[1:]], active, **_BENT)
         other = solve(model, in_space.pose, blocks, active, **_BENT)
-        if other.cost < min(_OTHER_SIDE * fit.cost, best.cost):
+        if other.cost < best.cost:
             best = other
     return best.pose if best is fit else solve(model, best.pose, blocks, active, **QUICK).pose
 
@@ -278,9 +271,9 @@ def restore_held(model: BodyModel, pose: Array, holds: Holds, unlocked_dofs: NDA
             continue
 
         def is_done(found: Array, of_limb: Holds = of_limb) -> bool:
-            return bool(np.all(of_limb.distances(model, found) < _KEPT_M))
+            return bool(np.all(of_limb.distances(model, found) < _REACHED_M))
 
-        if np.any(of_limb.distances(model, pose) > _UNMOVED_M):
+        if np.any(of_limb.distances(model, pose) > AT_LIMIT):
             blocks: list[ResidualBlock] = [of_limb, _rest_prior(model, pose)]
             pose = _solve_bending(model, pose, blocks, own & unlocked_dofs, is_done).pose
     return pose
@@ -313,7 +306,7 @@ def _solve_bending(
     joint, first = model.dof_joint[active_dofs][[-1, 0]]
     if joint == first or is_done(fit.pose):
         return fit
-    for bend in (_BEND_RAD, -_BEND_RAD):
+    for bend in (BENT_RAD, -BENT_RAD):
         start = model.clip(model.retract(pose, np.where(active_dofs & (model.dof_joint == joint), bend, 0.0)))
         bent = solve(model, start, blocks, active_dofs=active_dofs, **_BENT)
         if bent.cost < fit.cost:
@@ -332,7 +325,7 @@ def _is_at_limit(model: BodyModel, pose: Array, active_dofs: NDArray[np.bool_]) 
 def _relaxed(model: BodyModel) -> Array:
     """Return the neutral pose with elbows and knees slightly bent, (n_values,)."""
     hinges = np.array([len(joint.axes) == 1 for joint in model.joints])[model.dof_joint]
-    return model.clip(model.retract(model.neutral(), np.where(hinges, _BEND_RAD, 0.0)))
+    return model.clip(model.retract(model.neutral(), np.where(hinges, BENT_RAD, 0.0)))
 
 
 def _is_near(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_world: Array) -> bool:

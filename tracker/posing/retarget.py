@@ -6,17 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, solve
+from tracker.fitting.gauss_newton import JOINT_M, LOOSE, PointTargets, PosePrior, ResidualBlock, solve
 from tracker.fitting.pins import pin_block
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
-
-_JOINT_M = 0.005
-"""Standard deviation of a joint's position, metres."""
-_LOOSE_RAD, _LOOSE_M = 0.5, 0.5
-"""Standard deviations of the pose itself. They determine only what the joints do not, such as the twist of a straight
-arm."""
 
 
 def retarget_pose(
@@ -44,11 +38,10 @@ def retarget_pose(
         return pose
     points = np.array([i for i, n in enumerate(target.point_names) if n in source.point_names], dtype=np.int64)
     places = source.points_world(pose)[[source.point_names.index(target.point_names[i]) for i in points]]
-    near = np.where(target.dof_is_length, 1 / _LOOSE_M, 1 / _LOOSE_RAD)
     blocks: list[ResidualBlock] = [
-        PointTargets(points, places, np.full(len(points), 1 / _JOINT_M)),
-        PosePrior(pose, near),
+        PointTargets(points, places, np.full(len(points), 1 / JOINT_M)),
+        PosePrior(pose, np.full(target.n_dofs, 1 / LOOSE)),
     ]
     if pins:
         blocks.append(pin_block(target, cameras, pins))
-    return solve(target, pose, blocks, active_dofs, max_iterations=30, tolerance=1e-5).pose
+    return solve(target, pose, blocks, active_dofs).pose

@@ -6,20 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import Tree, forward_kinematics
+from tracker.compute.float32 import HALF, ZERO
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH
 from tracker.contours.occluding_contours import trace_pieces
-from tracker.contours.pieces import PIECE_PX, Pieces, place_parts
+from tracker.contours.pieces import JOINED, PIECE_PX, Pieces, place_parts
 from tracker.contours.surfaces import Surfaces
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.segment_distance import Segments, nearest_segment
 from tracker.images.distance_transform import bilinear
 
-_ZERO, _HALF, _ONE = np.float32(0.0), np.float32(0.5), np.float32(1.0)  # Python floats would promote to float64
 _PAPER = np.bool_(True)  # a literal would compile `_robust_mean` once more
-_JOINED = 10
-"""Largest number of consecutive pieces on one straight edge that are joined to one segment: longer segments would reach
-too many points."""
 
 
 class ScoredViews(NamedTuple):
@@ -111,9 +108,9 @@ def _robust_mean(d: FloatArray, w: FloatArray, n: int, theta: float, paper: bool
 def _distance(image: FloatArray, width: int, height: int, u: np.float32, v: np.float32) -> np.float32:
     """Return the distance at a pixel; outside the image, that of the nearest border pixel plus the distance to it."""
     inside = bilinear(image, width, height, u, v)[0]
-    half_u, half_v = _HALF * np.float32(width - 1), _HALF * np.float32(height - 1)
+    half_u, half_v = HALF * np.float32(width - 1), HALF * np.float32(height - 1)
     off_u, off_v = abs(u - half_u) - half_u, abs(v - half_v) - half_v
-    off_u, off_v = off_u if off_u > _ZERO else _ZERO, off_v if off_v > _ZERO else _ZERO
+    off_u, off_v = off_u if off_u > ZERO else ZERO, off_v if off_v > ZERO else ZERO
     return inside + np.sqrt(off_u * off_u + off_v * off_v)
 
 
@@ -128,7 +125,7 @@ def _forward(n: int, image: FloatArray, width: int, height: int, theta: float, v
     for i in range(np.uint64(n)):
         d = _distance(image, width, height, visible[0, i], visible[1, i])
         length = np.sqrt(visible[2, i])
-        spared += float(length * (limit - d if d < limit else _ZERO))
+        spared += float(length * (limit - d if d < limit else ZERO))
         weight += float(length)
     return theta - spared / weight if weight > 0.0 else theta
 
@@ -154,14 +151,14 @@ def _take_visible(n: int, pieces: Pieces, visible: FloatArray, segments: Segment
             edge = -1
             continue
         x0, y0, x1, y1 = ends[0, i], ends[1, i], ends[2, i], ends[3, i]
-        if edges[i] != edge or joined == _JOINED:
+        if edges[i] != edge or joined == JOINED:
             edge, joined = edges[i], 0
             su[k], sv[k] = x0, y0
             k += np.uint64(1)
         joined += 1
         last = k - np.uint64(1)
         du[last], dv[last] = x1 - su[last], y1 - sv[last]
-        visible[0, m], visible[1, m] = _HALF * (x0 + x1), _HALF * (y0 + y1)
+        visible[0, m], visible[1, m] = HALF * (x0 + x1), HALF * (y0 + y1)
         visible[2, m] = (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)
         m += np.uint64(1)
     return np.int64(m), np.int64(k)

@@ -34,10 +34,12 @@ if sys.platform != "win32":
 LOCK_FILE = "lock.json"
 
 _MAX_BYTES = 10_000
+"""Size of a lock file that is read: a lock holds some short texts."""
 _WRITING_S = 2.0
 """Time after which a lock file without content is one that a full disk or a power cut left, s. Its writer, where the
 file does not appear whole, takes milliseconds."""
 _LOOK_S = 0.05
+"""Time between two looks at a lock, s."""
 _FIRST_NAMESPACE = "pid:[4026531836]"
 """The namespace of processes outside of any container (`PROC_PID_INIT_INO` of Linux)."""
 

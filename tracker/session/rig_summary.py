@@ -6,30 +6,22 @@ from itertools import combinations
 
 import numpy as np
 
+from tracker.calibrations.units import MIN_STUDIO_M
+from tracker.formats.camera_section import MAX_OFFSET
+from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
-from tracker.geometry.camera_rig import axes_point
+from tracker.geometry.camera_rig import MIN_APART_M, axes_point
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import UP_ROTATIONS
 
 _MAX_AIM_RAD = np.radians(30.0)
 """Angle between an axis and the common point above which the cameras do not look at one point: half a usual lens."""
-_PERSON_M = 1.7
-"""Height of an adult, metres."""
 _MIN_PERSON_SHARE = 0.04
 """Share of the picture's longer side that a person fills, below which no limb can be seen: 40 of 1000 pixels."""
 _UNDER_FLOOR_M = 0.1
 """Depth of a camera below the floor above which it is noted, metres: the error of a floor that was set by hand."""
 _AGREEMENT = 0.8
 """Mean cosine of the pictures' up direction and an axis above which the cameras stand upright to it (37 degrees)."""
-_DISAGREEMENT = 0.5
-"""The same mean, below which the stated up axis is doubted (60 degrees)."""
-_MIN_RIG_M = 0.5
-"""Extent of a rig below which distances between its cameras mean nothing, metres: another unit, or a stereo pair."""
-_MIN_APART_M = 0.01
-"""Distance of two cameras below which one pose is a copy, metres: bodies of cameras are wider."""
-_MAX_OFFSET = 0.25
-"""Distance of a principal point from the middle, as a share of the picture's side: lenses are mounted in the middle,
-and pictures are seldom cropped to a half."""
 _MAX_TANGENTIAL = 0.05
 """Largest tangential coefficient: at 45 degrees it moves a point by a seventh of the focal length. Radial ones are
 often larger, and stand in its place where programs write k1, k2, k3, p1, p2."""
@@ -93,7 +85,7 @@ def _far_doubts(cameras: Sequence[Camera], distances_m: Array | None) -> list[st
     if distances_m is None:
         return []
     focal_px = np.array([c.K[1, 1] for c in cameras])
-    heights_px = float(np.median(focal_px * _PERSON_M / distances_m))
+    heights_px = float(np.median(focal_px * DEFAULT_HEIGHT_M / distances_m))
     if heights_px >= _MIN_PERSON_SHARE * float(np.median([max(c.size) for c in cameras])):
         return []
     return [
@@ -116,13 +108,13 @@ def _floor_doubts(names: Sequence[str], centers_world: Array, heights_m: Array, 
 def _place_doubts(names: Sequence[str], centers_world: Array) -> list[str]:
     """Doubt cameras that stand at one place, as copied poses do."""
     apart = np.linalg.norm(centers_world[:, None] - centers_world, axis=-1)
-    if apart.max() < _MIN_RIG_M:  # another unit, which is noted
+    if apart.max() < MIN_STUDIO_M:  # another unit, which is noted, or a stereo pair
         return []
     return [
         f"Cameras '{names[i]}' and '{names[j]}' stand {100 * apart[i, j]:.2g} cm apart: check that the pose of one is "
         "not a copy of the other's."
         for i, j in combinations(range(len(names)), 2)
-        if apart[i, j] < _MIN_APART_M
+        if apart[i, j] < MIN_APART_M
     ]
 
 
@@ -130,7 +122,7 @@ def _lens_doubts(cameras: Sequence[Camera]) -> list[str]:
     """Doubt principal points and tangential distortion that no usual lens has."""
     offsets = [np.abs((c.K[:2, 2] + 0.5) / c.size - 0.5).max() for c in cameras]
     tangential = [0.0 if c.fisheye else np.abs(np.append(c.distortion[2:4], 0.0)).max() for c in cameras]
-    aside = [f"'{c.name}'" for c, offset in zip(cameras, offsets, strict=True) if offset > _MAX_OFFSET]
+    aside = [f"'{c.name}'" for c, offset in zip(cameras, offsets, strict=True) if offset > MAX_OFFSET]
     strong = [f"'{c.name}'" for c, size in zip(cameras, tangential, strict=True) if size > _MAX_TANGENTIAL]
     doubts = []
     if aside:
@@ -150,6 +142,6 @@ def _up_doubts(Ts_world_camera: Array, up: str) -> list[str]:
     """Doubt the up axis where the upper sides of all pictures point along another one."""
     cosines = {name: float(np.mean(-Ts_world_camera[:, :3, 1] @ R[:, 2])) for name, R in UP_ROTATIONS.items()}
     best = max(cosines, key=lambda name: cosines[name])
-    if best == up or cosines[best] < _AGREEMENT or cosines[up] > _DISAGREEMENT:
+    if best == up or cosines[best] < _AGREEMENT:
         return []
     return [f"The upper sides of the pictures point along {best}, not {up}: check which axis points up."]

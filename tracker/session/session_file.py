@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import Meta
 
 from tracker.errors import SessionError
-from tracker.text_files import TextKind, read_toml
+from tracker.text_files import DOCUMENT_BYTES, TextKind, read_toml
 from tracker.validation import (
     MAX_FRAMES,
     Color,
@@ -30,8 +30,7 @@ version 2 has a floor, version 3 a camera with a `declared_fps`, version 4 one w
 Up: TypeAlias = Literal["x", "-x", "y", "-y", "z", "-z"]
 UPS: tuple[str, ...] = get_args(Up)
 
-_KIND = TextKind("session", 500_000, SessionError, "correct it or make a new session")
-"""A camera takes 100 bytes."""
+_KIND = TextKind("session", DOCUMENT_BYTES, SessionError, "correct it or make a new session")
 
 _PersonName: TypeAlias = Annotated[
     str,

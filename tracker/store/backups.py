@@ -20,6 +20,7 @@ from tracker.store.recovery import JOURNALS, check_files
 FOLDER = "backups"
 """Folder of the backups, beside the store."""
 _N_KEPT = 3
+"""Number of backups that stay."""
 
 
 class Restored(NamedTuple):

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from tracker.store import checksums
 
 VERSION = 7
+"""Version of the store; older ones are upgraded, newer ones are refused."""
 
 _SCHEMA = """
 CREATE TABLE edits (

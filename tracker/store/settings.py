@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta
 
 from tracker.errors import DamagedStoreError
-from tracker.validation import MAX_FRAMES, Name, Number, Vector, check
+from tracker.validation import MAX_FRAMES, ROUNDING, Name, Number, Vector, check
 
 _Frame: TypeAlias = Annotated[int, Meta(ge=0, lt=MAX_FRAMES, description=f"a frame from 0 to {MAX_FRAMES - 1}")]
 _FrameText: TypeAlias = Annotated[str, Meta(pattern=r"^[0-9]{1,8}\Z", description="the number of a frame")]
@@ -19,8 +19,6 @@ _Id: TypeAlias = Annotated[int, Meta(ge=1, le=2**62, description="the number of 
 _IdText: TypeAlias = Annotated[str, Meta(pattern=r"^[0-9]{1,19}\Z", description="the number of an edit")]
 _Names: TypeAlias = Annotated[list[Name], Meta(max_length=1000)]
 _Base64: TypeAlias = Annotated[str, Meta(pattern=r"^([A-Za-z0-9+/]{4})*([A-Za-z0-9+/]{2}==|[A-Za-z0-9+/]{3}=)?\Z")]
-_ROUNDING = 1e-6
-"""Error of the length of a unit vector that was stored as text."""
 _Point: TypeAlias = tuple[Number, Number]
 
 
@@ -40,7 +38,7 @@ class _Floor(msgspec.Struct):
     offset_m: Number | None = None
 
     def __post_init__(self) -> None:
-        if self.normal is not None and (self.offset_m is None or abs(math.hypot(*self.normal) - 1) > _ROUNDING):
+        if self.normal is not None and (self.offset_m is None or abs(math.hypot(*self.normal) - 1) > ROUNDING):
             raise ValueError("expected a unit vector as 'normal' with 'offset_m', found another plane")
 
 

@@ -15,29 +15,24 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.appearance.part_colors import ColorScore, PartColors
+from tracker.appearance.part_colors import MIN_SAMPLES, ColorScore, PartColors
 from tracker.body.limbs import Limb, limb_display_name, limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
 from tracker.geometry.arrays import Array, IntArray
+from tracker.images.silhouette_contour import MIN_TRUST
 from tracker.tracking.view_regions import px_per_m
 
 Status = Literal["good", "doubtful", "lost"]
 
-_MIN_SAMPLES = 12
-"""Fewest colour samples of a part that count."""
 _MIN_LENGTH_PX = 5.0
 """Shortest contour length that the explained points are divided by, px."""
-_MIN_TRUST = 0.5
-"""Silhouettes trusted less are left out."""
 _MIN_SHOWN = 0.2
 """A view shows a limb where more of its contour is visible, relative to that seen from the side."""
-_MIN_EXPLAINED = 0.05
-"""Fewest points per pixel of the body's contour to which a part is compared."""
-_STILL = 0.005
-"""Innovations that differ by less hardly count, body heights."""
+NEXT_TO_NOTHING = 0.005
+"""Added to a feature before its logarithm, body heights or outlier distances, so that smaller ones hardly count."""
 _HEAD = "head"
 """Name of the limb that looks different from each side."""
 _UNCERTAIN = " uncertain"
@@ -178,7 +173,7 @@ def features(pose: PoseQuality, limb: LimbFeatures) -> Array:
         np.clip(limb.end_color, -2, 1),
         min(limb.end_explained, 2),
         limb.at_limits,
-        np.log(min(limb.innovation, 0.5) + _STILL),
+        np.log(min(limb.innovation, 0.5) + NEXT_TO_NOTHING),
         pose.trunk_forward,
         np.log(max(1, pose.views)),
     ])  # fmt: skip
@@ -249,11 +244,11 @@ def quality(
     color, worst_drop = np.full(len(model.parts), np.inf), np.zeros(len(model.parts))
     if colors is not None:
         score, known = colors
-        color = np.where(score.samples >= _MIN_SAMPLES, score.parts, np.inf)
+        color = np.where(score.samples >= MIN_SAMPLES, score.parts, np.inf)
         worst_drop = np.nan_to_num(known.usual - score.views, nan=-np.inf).max(axis=0, initial=-np.inf)
     spreads, free_spreads = scale * _end_spreads(body, fits, layout.ends)
     innovations = np.linalg.norm(model.points_world(predicted) - body.points_world, axis=1) / model.height_m
-    trusted = np.array([v.silhouette is not None and v.silhouette.trust > _MIN_TRUST for v in views], dtype=bool)
+    trusted = np.array([v.silhouette is not None and v.silhouette.trust > MIN_TRUST for v in views], dtype=bool)
     contours = _Contours(costs, far, beside_px, n_views)
     forward, explained = contours.forward(slice(None)), contours.explained(slice(None))
     return PoseQuality(
@@ -267,7 +262,7 @@ def quality(
                 contours.forward(c.parts), contours.shown(c.parts), contours.explained(c.parts),
                 _share_at_limits(model, body.values, c), float(free_spread), contours.second_forward(c.parts, forward),
                 np.inf if c.name == _HEAD else float(color[c.parts[-1]]),
-                contours.explained(c.parts[-1:]) / max(_MIN_EXPLAINED, explained),
+                contours.explained(c.parts[-1:]) / max(NEXT_TO_NOTHING, explained),
                 float(innovations[points].max()),
             )
             for c, points, spread, free_spread in zip(chains, layout.points, spreads, free_spreads, strict=True)

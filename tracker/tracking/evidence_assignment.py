@@ -27,13 +27,12 @@ from tracker.evidence.view_evidence import (
     with_all_segments,
     with_segments,
 )
+from tracker.fitting.contour_residuals import CAPTURE
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.images.edge_segments import MAX_ANGLE_RAD, EdgeSegments, Samples, nearest_parallel_segment, sample_segments
 
 _OWNERSHIP_RATIO = 0.5
 """Evidence is foreign to a body if its distance to another one is below this share of that to the body."""
-_REACH = 2.0
-"""Distances are truncated here, in outlier distances."""
 
 
 class EvidencePool:
@@ -182,7 +181,7 @@ def _assign(
         theta_px: outlier distance, px.
         out: is filled.
     """
-    reach, n_people = _REACH * theta_px, out.near.shape[0]
+    reach, n_people = CAPTURE * theta_px, out.near.shape[0]
     place_parts(Ts, surfaces, pieces)
     n = trace_pieces(P, eye, surfaces, PIECE_PX, pieces)
     store_contour(pieces, contour)

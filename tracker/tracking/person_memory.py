@@ -15,9 +15,9 @@ from tracker.tracking.confidence import PoseQuality, Status, classify
 
 _MAX_BACKOFF_FRAMES = 8
 """Longest back-off of a limb that seems lost."""
-_CALM_BACKOFF_FRAMES, _MAX_CALM_BACKOFF_FRAMES = 31, 64
-"""First and longest back-off of a limb that does not seem lost itself, where there are several people: the unexplained
-part of the silhouette may be anybody's."""
+_CALM_BACKOFF_FRAMES = 31
+"""Back-off of a limb that does not seem lost itself, where there are several people: the unexplained part of the
+silhouette may be anybody's."""
 _WORSE_NATS = 2.0
 """The back-off of a limb ends where its search odds are higher by this than before the search that failed, nats. That
 search has not seen what now contradicts the limb."""
@@ -28,6 +28,7 @@ _LEARN_FRAMES = 3
 _TRACKED_SHARE, _KEYFRAME_SHARE = 0.15, 0.5
 """Weight of a tracked frame, and of a keyframe, against the colours learnt before."""
 _HISTORY_FRAMES = 8
+"""Number of poses that are kept: the longest window of a prediction, that of GD96's mode."""
 
 
 class PersonMemory:
@@ -97,7 +98,7 @@ class PersonMemory:
         """
         candidates, alone = self.search_candidates(quality), self.alone
         doubtful = [] if alone else [x for x in candidates if x.name in quality.doubtful_limbs(alone)]
-        longest = _MAX_BACKOFF_FRAMES if alone or doubtful else _MAX_CALM_BACKOFF_FRAMES
+        longest = _MAX_BACKOFF_FRAMES if alone or doubtful else _CALM_BACKOFF_FRAMES
         urgent = {*quality.missing_limbs, *quality.lost_limbs}
 
         def cooled_down(limb: Limb) -> bool:
@@ -118,7 +119,7 @@ class PersonMemory:
         """
         calm = not (self.alone or limb.name in before.doubtful_limbs(self.alone))
         longer = max(_CALM_BACKOFF_FRAMES if calm else 1, 2 * self._backoffs.get(limb.name, (0, 0))[1] + 1)
-        self._backoffs[limb.name] = (self._n_frames, 0 if found else min(_MAX_CALM_BACKOFF_FRAMES, longer))
+        self._backoffs[limb.name] = (self._n_frames, 0 if found else min(_CALM_BACKOFF_FRAMES, longer))
         self._odds_searched[limb.name] = before.search_odds_of(limb.name)
 
     def _is_worse(self, limb: Limb, quality: PoseQuality) -> bool:

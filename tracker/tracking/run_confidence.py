@@ -10,7 +10,7 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS, probabilities
+from tracker.tracking.confidence import LOST_ODDS, NEXT_TO_NOTHING, OFF_ODDS, probabilities
 
 _WEIGHTS = np.array([1.623, 2.136, -1.529, -1.445, 4.644, -1.302, 1.014, 0.628])
 """Weights of `run_features`, in their order."""
@@ -23,10 +23,8 @@ _TRUNK = 6
 """Index of the trunk's distance to the edges among the features of `confidence`."""
 _AROUND = 2
 """Number of frames before and after a frame whose steps by smoothing count for it."""
-_MAX_STEP, _LEAST_STEP = 0.5, 0.005
-"""Steps beyond the first, and differences below the second, hardly count, body heights."""
-_LEAST_TRUNK = 0.005
-"""Smaller distances of the trunk hardly count, outlier distances."""
+_MAX_STEP = 0.5
+"""Larger steps count as this one, body heights."""
 
 DOUBTFUL_FROM, LOST_FROM = probabilities(np.array([OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT, LOST_ODDS])).tolist()
 """Probabilities of a lost limb above which it is doubtful, and lost."""
@@ -54,8 +52,8 @@ def run_features(frame_features: Array, steps: Array) -> Array:
     """
     padded = np.pad(steps, ((_AROUND, _AROUND), (0, 0)))
     largest = np.lib.stride_tricks.sliding_window_view(padded, 2 * _AROUND + 1, axis=0).max(axis=-1)
-    trunk = np.log(frame_features[..., _TRUNK].mean() + _LEAST_TRUNK)
-    of_run = np.stack([np.log(np.minimum(largest, _MAX_STEP) + _LEAST_STEP), np.full_like(steps, trunk)], axis=-1)
+    trunk = np.log(frame_features[..., _TRUNK].mean() + NEXT_TO_NOTHING)
+    of_run = np.stack([np.log(np.minimum(largest, _MAX_STEP) + NEXT_TO_NOTHING), np.full_like(steps, trunk)], axis=-1)
     return np.concatenate([frame_features[..., _OF_FRAME], of_run], axis=-1)
 
 

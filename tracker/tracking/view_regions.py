@@ -10,29 +10,23 @@ from tracker.contours.occluding_contours import Contour
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray
-from tracker.geometry.cameras import Camera, Region
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera, Region
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.images.working_view import region_around
 
-_MIN_DEPTH_M = 0.3
-"""Smallest depth used for the image scale, metres. Bodies nearer to a camera, or behind it, count as this near."""
-_REGION_MARGIN_M = 0.22
-"""Margin around the joints: flesh and the error of the prediction."""
-_AHEAD_MARGIN_M = 0.25
-"""The same two frames ahead, where a prediction is less accurate."""
+_MARGIN_M = 0.25
+"""Margin around the joints: flesh and the error of a prediction two frames ahead."""
 _MIN_MARGIN_M = 0.19
 """A region chosen ahead is used if at least this margin is left when the frame is predicted again."""
 
 
-def regions(
-    cameras: Sequence[Camera], bodies: Sequence[PosedBody], margin_m: float = _REGION_MARGIN_M
-) -> list[Region | None]:
+def regions(cameras: Sequence[Camera], bodies: Sequence[PosedBody], margin_m: float = _MARGIN_M) -> list[Region | None]:
     """Return the region around all bodies in each view; None for the whole image."""
     points = np.concatenate([b.points_world for b in bodies])
     out: list[Region | None] = []
     for camera in cameras:
         depths = camera.depths(points)
-        if depths.min() < 2 * _REGION_MARGIN_M:  # too near for its contour to lie around the joints' images
+        if depths.min() < 2 * _MARGIN_M:  # too near for its contour to lie around the joints' images
             out.append(None)
             continue
         margin = margin_m * camera.K[0, 0] / float(np.median(depths))
@@ -42,7 +36,7 @@ def regions(
 
 def regions_ahead(cameras: Sequence[Camera], bodies: Sequence[PosedBody]) -> list[Region | None]:
     """Return the regions of a frame that is read ahead, around all bodies as predicted two frames on."""
-    return regions(cameras, bodies, _AHEAD_MARGIN_M)
+    return regions(cameras, bodies)
 
 
 def confirmed_regions(
@@ -82,4 +76,4 @@ def read_views(
 def px_per_m(cameras: Sequence[Camera], body: PosedBody) -> float:
     """Return the length of a metre at a body in the images, px: the median over the views."""
     middle = body.points_world.mean(axis=0)
-    return float(np.median([c.K[0, 0] / max(c.depths(middle), _MIN_DEPTH_M) for c in cameras]))
+    return float(np.median([c.K[0, 0] / max(c.depths(middle), NEAR_PLANE_M) for c in cameras]))

@@ -9,12 +9,10 @@ import numpy as np
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import NEAR_PLANE_M, viewed_point
+from tracker.geometry.cameras import MAX_LENS_RADIUS, NEAR_PLANE_M, viewed_point
 
 _REACH = 1.5
 """Half the edge of the largest volume, in the mean distance of the cameras from the point that they look at."""
-_MIN_COSINE = 0.05
-"""Cosine of the angle from the axis, 87 degrees, from which silhouettes of a fisheye lens span no pyramid."""
 _PIXEL = 1.0
 """Margin around the box of a silhouette, px: a body may reach nearly to the next pixel's centre."""
 
@@ -26,13 +24,9 @@ class BoundingVolume(NamedTuple):
     """Lowest corner, (3,), metres."""
     high: Array
     """Highest corner, (3,), metres."""
-    center: Array
-    """The point nearest to the rays through the silhouettes' centroids, (3,), metres."""
-    center_miss_m: float
-    """Largest distance of such a ray from that point, metres."""
 
 
-def bounding_volume(silhouettes: Sequence[ViewSilhouette], missing: int = 0) -> BoundingVolume:
+def bounding_volume(silhouettes: Sequence[ViewSilhouette]) -> BoundingVolume:
     """Return the box around the intersection of the pyramids that the silhouettes' boxes span.
 
     A side of a box at the image's border does not bound the person, who may be cut off there. A silhouette that a
@@ -40,7 +34,6 @@ def bounding_volume(silhouettes: Sequence[ViewSilhouette], missing: int = 0) -> 
 
     Args:
         silhouettes: of all views. Views with an empty silhouette are left out.
-        missing: number of views that may be broken. The box holds what all but any so many views allow.
 
     Raises:
         TrackerError: fewer than two views show people, or the views show nothing in common.
@@ -57,33 +50,13 @@ def bounding_volume(silhouettes: Sequence[ViewSilhouette], missing: int = 0) -> 
     around = [s.camera for s in seen]
     middle = viewed_point(around)
     reach = _REACH * float(np.mean([np.linalg.norm(c.center_world - middle) for c in around]))
-    center, miss = _center(seen)
-    boxes = []
-    for kept in itertools.combinations(seen, max(2, len(seen) - missing)):
-        box = _intersection([_pyramid(s) for s in kept], middle - reach, middle + reach)
-        if box is not None:
-            boxes.append(box)
-    if not boxes:
+    box = _intersection([_pyramid(s) for s in seen], middle - reach, middle + reach)
+    if box is None:
         raise TrackerError(
             "expected silhouettes of the same people in all views, found none in common; check that the calibration is "
             "of these cameras, that no camera has moved, and that the videos start at the same time"
         )
-    low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
-    return BoundingVolume(low, high, center, miss)
-
-
-def _center(silhouettes: Sequence[ViewSilhouette]) -> tuple[Array, float]:
-    rays, centers = [], []
-    for s in silhouettes:
-        v, u = np.nonzero(s.mask)
-        ray = s.camera.rays(np.array([u.mean(), v.mean()]))
-        if np.isfinite(ray).all():
-            rays.append(ray)
-            centers.append(s.camera.center_world)
-    across = np.eye(3) - np.einsum("ni,nj->nij", rays, rays)
-    point = np.linalg.lstsq(across.sum(axis=0), np.einsum("nij,nj->i", across, centers), rcond=None)[0]
-    misses = np.linalg.norm(np.einsum("nij,nj->ni", across, point - np.array(centers)), axis=-1)
-    return point, float(misses.max())
+    return BoundingVolume(*box)
 
 
 def _pyramid(silhouette: ViewSilhouette) -> Array:
@@ -99,7 +72,8 @@ def _pyramid(silhouette: ViewSilhouette) -> Array:
     points = np.concatenate([np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in outline]).astype(np.float64)
     corners = np.concatenate([points + d for d in itertools.product((-_PIXEL, _PIXEL), repeat=2)])
     rays = camera.rays(corners) @ camera.T_camera_world[:3, :3].T
-    if not np.all(rays[:, 2] > _MIN_COSINE):  # NaN is beyond the lens
+    # Silhouettes of a fisheye lens that reach farther span no pyramid. NaN is beyond the lens.
+    if not np.all(np.linalg.norm(rays[:, :2], axis=1) < MAX_LENS_RADIUS * rays[:, 2]):
         return np.empty((0, 4))
     slopes = rays[:, :2] / rays[:, 2:]
     (x0, y0), (x1, y1) = slopes.min(axis=0), slopes.max(axis=0)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tracker.compute.threads import N_HELPERS, map_chunked
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import FloatArray, IntArray
-from tracker.voxels.carving_kernels import STACK_COLUMNS, ViewTables, carve_blocks, carve_each
+from tracker.voxels.carving_kernels import STACK_COLUMNS, ViewTables, carve_blocks
 from tracker.voxels.sensor_lookup import Lens, SensorLookup, lens_of, lookup_of_lens
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
@@ -31,7 +31,7 @@ class CarveSettings(NamedTuple):
     the image of do not count."""
 
 
-DEFAULT_CARVING = CarveSettings()
+_ALL_AGREE = CarveSettings()
 """All views that a voxel is in the image of agree, at least two."""
 
 
@@ -47,21 +47,12 @@ class Carver:
         self.silhouettes = tuple(silhouettes)
         self._tables = _view_tables(silhouettes)
 
-    def carve(self, grid: VoxelGrid, settings: CarveSettings = DEFAULT_CARVING) -> Voxels:
+    def carve(self, grid: VoxelGrid, settings: CarveSettings = _ALL_AGREE) -> Voxels:
         """Return the voxels of a grid whose centres agree with the silhouettes, by dividing blocks."""
         return self._carve_blocks(grid, settings)[0]
 
-    def carve_brute_force(self, grid: VoxelGrid, settings: CarveSettings = DEFAULT_CARVING) -> Voxels:
-        """Return the same voxels by testing each one: the oracle of `carve`."""
-        occupied = np.zeros(grid.shape, dtype=bool)
-        carve_each(self._tables, grid.origin, grid.size_m, settings.min_views, settings.missing, occupied)
-        return Voxels(grid, occupied)
-
-    def count_tests(self, grid: VoxelGrid, settings: CarveSettings = DEFAULT_CARVING) -> int:
-        """Return the number of blocks and voxels that `carve` tests."""
-        return self._carve_blocks(grid, settings)[1]
-
     def _carve_blocks(self, grid: VoxelGrid, settings: CarveSettings) -> tuple[Voxels, int]:
+        """Return the voxels, and the number of blocks and voxels that were tested."""
         occupied = np.zeros(grid.shape, dtype=bool)
         n_threads = N_HELPERS if occupied.size > _MIN_VOXELS_SHARED else 1
         stacks = [np.empty((7 * _BLOCK.bit_length() + 1, STACK_COLUMNS), np.int64) for _ in range(n_threads)]

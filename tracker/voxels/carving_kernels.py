@@ -1,4 +1,4 @@
-"""Compiled kernels of voxel carving: each voxel alone, and blocks that are divided where a silhouette's edge is.
+"""Compiled kernels of voxel carving: blocks that are divided where a silhouette's edge is.
 
 A block is enclosed in a sphere. The sphere's pixels in a view lie within a square, whose number of silhouette pixels
 an integral image gives. If all squares are uniform the block is decided as a whole (an octree, Szeliski 1993).
@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array, FloatArray, IntArray
-from tracker.geometry.cameras import NEAR_PLANE_M
-from tracker.voxels.sensor_lookup import BEYOND_LENS
+from tracker.geometry.cameras import BEYOND_PX, NEAR_PLANE_M
 
-_UNSEEN, _OUTSIDE, _INSIDE, _MIXED_SEEN, _MIXED = 0, 1, 2, 3, 4
-"""Class of a block in a view: out of the image, out of the silhouette, within it, or different things of its voxels
-(with `_MIXED_SEEN` some may be within the silhouette, with `_MIXED` none)."""
+_UNSEEN, _OUTSIDE, _INSIDE = 1, 2, 4
+"""Flags of a block in a view: some of its voxels may be out of the image, out of the silhouette, or within it."""
+_ANY = _UNSEEN | _OUTSIDE | _INSIDE
 
 
 class ViewTables(NamedTuple):
@@ -42,23 +41,6 @@ class ViewTables(NamedTuple):
 STACK_COLUMNS = 7
 """Columns of a block on the stack: first voxel i, j, k, edge, and what its parent has settled: views within and outside
 of the silhouettes, and a bit for each settled view."""
-
-
-@njit(**NO_REFCOUNT)
-def carve_each(
-    views: ViewTables, origin: Array, size_m: float, min_views: int, missing: int, occupied: NDArray[np.bool_]
-) -> None:
-    """Fill the occupied voxels, (nx, ny, nz), by testing each one."""
-    for i in range(occupied.shape[0]):
-        for j in range(occupied.shape[1]):
-            for k in range(occupied.shape[2]):
-                n_inside, n_outside = 0, 0
-                x, y, z = origin[0] + i * size_m, origin[1] + j * size_m, origin[2] + k * size_m
-                for v in range(views.sizes.shape[0]):
-                    found = _view_test(views, v, np.float32(x), np.float32(y), np.float32(z), np.float32(0))
-                    n_inside += found == _INSIDE
-                    n_outside += found == _OUTSIDE
-                occupied[i, j, k] = n_inside >= min_views and n_outside <= missing
 
 
 @njit(**NO_REFCOUNT)
@@ -141,12 +123,12 @@ def _decide(
         if settled >> v & 1:
             continue
         found = _view_test(views, v, x, y, z, radius)
-        if found <= _INSIDE:
+        if found & (found - 1) == 0:  # all voxels alike
             settled |= 1 << v
         n_inside += found == _INSIDE
-        n_maybe += found in (_INSIDE, _MIXED_SEEN)
+        n_maybe += found & _INSIDE != 0
         n_outside += found == _OUTSIDE
-        n_maybe_outside += found in (_OUTSIDE, _MIXED_SEEN, _MIXED)
+        n_maybe_outside += found & _OUTSIDE != 0
         if n_outside > rule[1]:
             decided = 0
             break
@@ -159,14 +141,14 @@ def _decide(
 
 @njit(inline="always", **NO_REFCOUNT)
 def _view_test(views: ViewTables, v: int, x: float, y: float, z: float, radius: float) -> int:
-    """Return what one view says of the voxels whose centres lie within a sphere."""
+    """Return the flags of the voxels whose centres lie within a sphere, in one view."""
     P = views.projections[v]
     depth = P[2, 0] * x + P[2, 1] * y + P[2, 2] * z + P[2, 3]
     near = np.float32(NEAR_PLANE_M)
     if depth + radius < near:
         return _UNSEEN
     if depth - radius < near:
-        return _MIXED_SEEN if radius > 0 else _UNSEEN
+        return _ANY if radius > 0 else _UNSEEN
     inverse = np.float32(1.0) / depth
     sx = (P[0, 0] * x + P[0, 1] * y + P[0, 2] * z + P[0, 3]) * inverse
     sy = (P[1, 0] * x + P[1, 1] * y + P[1, 2] * z + P[1, 3]) * inverse
@@ -188,11 +170,11 @@ def _view_test(views: ViewTables, v: int, x: float, y: float, z: float, radius: 
     if fx < -entries or fy < -entries or fx > columns - 1 + entries or fy > rows - 1 + entries:
         return _UNSEEN
     if fx < entries or fy < entries or fx > columns - 1 - entries or fy > rows - 1 - entries:
-        return _MIXED_SEEN
+        return _ANY
     at = views.lookup_layout[v, 0] + int(fy + np.float32(0.5)) * columns + int(fx + np.float32(0.5))
     u, w = int(views.lookups[at, 0]), int(views.lookups[at, 1])
-    if u == BEYOND_LENS:
-        return _MIXED_SEEN
+    if u == BEYOND_PX:
+        return _ANY
     d = int(entries / scale * views.lookup_scale[v, 3]) + 1  # one for the rounding of both pixels
     u0, v0, u1, v1 = u - d, w - d, u + d + 1, w + d + 1
     width, height = views.sizes[v, 0], views.sizes[v, 1]
@@ -201,8 +183,8 @@ def _view_test(views: ViewTables, v: int, x: float, y: float, z: float, radius: 
     whole = u0 >= 0 and v0 >= 0 and u1 <= width and v1 <= height
     count = _count(views, v, u0, v0, u1, v1)
     if count == 0:
-        return _OUTSIDE if whole else _MIXED
-    return _INSIDE if whole and count == (u1 - u0) * (v1 - v0) else _MIXED_SEEN
+        return _OUTSIDE if whole else _UNSEEN | _OUTSIDE
+    return _INSIDE if whole and count == (u1 - u0) * (v1 - v0) else _ANY
 
 
 @njit(inline="always", **NO_REFCOUNT)

@@ -39,20 +39,3 @@ def principal_axes(points: Array, size_m: float) -> PrincipalAxes:
     variances, axes = np.linalg.eigh(deviations.T @ deviations / len(points) + np.eye(3) * size_m**2 / 12)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     return PrincipalAxes(center, axes, np.sqrt(variances))
-
-
-def ellipsoid_half_axes(found: PrincipalAxes) -> Array:
-    """Return the half-axes of a solid ellipsoid along its principal axes, (3,), metres."""
-    return np.asarray(ELLIPSOID * found.sigmas)
-
-
-def cylinder_half_axes(found: PrincipalAxes, axis: int = 2) -> Array:
-    """Return the half-axes of a solid elliptical cylinder along its principal axes, (3,), metres.
-
-    Args:
-        found: principal axes.
-        axis: index of the principal axis along which the cylinder lies; the longest one unless it is a disc.
-    """
-    factors = np.full(3, CYLINDER_ACROSS)
-    factors[axis] = CYLINDER_ALONG
-    return np.asarray(factors * found.sigmas)

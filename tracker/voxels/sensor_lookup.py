@@ -12,16 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import Camera
+from tracker.geometry.cameras import BEYOND_PX, BORDER_SAMPLES, Camera
 from tracker.geometry.lens_tables import Lens, lens_of
 
 _STEPS_PER_PX = 2
 """Entries of the table per raw pixel along each axis."""
 _MAX_ENTRIES = 4096
 """Largest number of entries along each axis. Wide lenses have long borders."""
-BEYOND_LENS = -32000
-"""Column and row of points beyond the lens, which it does not show."""
-_BORDER_SAMPLES = 64
 _ROWS_AT_ONCE = 64
 """Rows of the table that are filled at a time: all rows of a wide lens would take gigabytes."""
 
@@ -56,7 +53,7 @@ def lookup_of_lens(lens: Lens) -> SensorLookup:
     n_columns, n_rows = (int(np.ceil(n)) + 1 for n in (high - low) / step)
     x, rows = low[0] + step * np.arange(n_columns), low[1] + step * np.arange(n_rows)
     exact = np.concatenate([_exact_pixels(camera, x, y) for y in np.array_split(rows, -(-n_rows // _ROWS_AT_ONCE))])
-    pixels = np.round(np.clip(exact, BEYOND_LENS, -BEYOND_LENS)).astype(np.int16)
+    pixels = np.round(np.clip(exact, BEYOND_PX, -BEYOND_PX)).astype(np.int16)
     return SensorLookup(pixels, low, step, _steepest(exact) / step)
 
 
@@ -65,7 +62,7 @@ def _exact_pixels(camera: Camera, x: Array, y: Array) -> Array:
     points = np.stack([*np.meshgrid(x, y), np.ones((len(y), len(x)))], axis=-1).reshape(-1, 3)
     exact = camera.project(points)
     # Beyond the lens the polynomial bends back: nothing is seen there.
-    exact[~camera.within_lens(camera.pinhole.project(points)) | np.isnan(exact).any(axis=-1)] = BEYOND_LENS
+    exact[~camera.within_lens(camera.pinhole.project(points)) | np.isnan(exact).any(axis=-1)] = BEYOND_PX
     return exact.reshape(len(y), len(x), 2)
 
 
@@ -73,7 +70,7 @@ def _border(camera: Camera) -> tuple[Array, Array]:
     """Return the lowest and highest sensor coordinates of the image, (2,) each; of a fisheye's, as undistorted."""
     seen = camera.pinhole if camera.fisheye else camera
     width, height = seen.size
-    u, v = np.linspace(-1, width, _BORDER_SAMPLES), np.linspace(-1, height, _BORDER_SAMPLES)
+    u, v = np.linspace(-1, width, BORDER_SAMPLES), np.linspace(-1, height, BORDER_SAMPLES)
     sides = [np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in ((u, -1), (u, height), (-1, v), (width, v))]
     rays = seen.rays(np.concatenate(sides))
     xy = rays[:, :2] / rays[:, 2:]
@@ -82,7 +79,7 @@ def _border(camera: Camera) -> tuple[Array, Array]:
 
 def _steepest(pixels: Array) -> float:
     """Return the largest change of a pixel coordinate per step of the table, for a step in any direction of a box."""
-    valid = np.asarray((pixels > BEYOND_LENS).all(axis=-1), dtype=bool)
+    valid = np.asarray((pixels > BEYOND_PX).all(axis=-1), dtype=bool)
     along_x = np.abs(np.diff(pixels, axis=1))[valid[:, 1:] & valid[:, :-1]].max(axis=0)
     along_y = np.abs(np.diff(pixels, axis=0))[valid[1:] & valid[:-1]].max(axis=0)
     return float((along_x + along_y).max())

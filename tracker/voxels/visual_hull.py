@@ -9,7 +9,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.voxels.bounding_volume import bounding_volume
-from tracker.voxels.carving import DEFAULT_CARVING, Carver, CarveSettings
+from tracker.voxels.carving import Carver
 from tracker.voxels.figure_masks import needed_figures, paint
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
@@ -17,17 +17,14 @@ MIN_FIGURE_M3 = 0.008
 """Smallest volume of a figure, cubic metres: a child of a year has 10 litres."""
 _MIN_SHARE = 0.25
 """Smallest volume of a figure, as a share of the largest one."""
-_MIN_NEEDED = 0.15
-"""Share of a figure's silhouette that no other figure explains, in some view. Lines of sight to two people also meet
-where there is no person: such a figure explains nothing by itself."""
+_MATTERS = 0.15
+"""Share of silhouettes by which a figure or a view must matter: somewhat more than an arm. A figure explains so much of
+one that no other does, because lines of sight to two people also meet where there is no person. A view is left out as
+broken if without it, and without no other one, so much more of the others is explained."""
 _MIN_COVERAGE = 0.6
 """Share of its silhouette that the hull explains in a view that agrees with the others."""
 _NEARLY_ALL = 0.95
 """Share of its silhouette that the hull explains in a view that shows people alone, simulated (`test_visual_hull`)."""
-_MIN_GAIN = 0.15
-"""Gain of the others' mean coverage above which a view is left out as broken."""
-_MIN_LEAD = 0.05
-"""Lead of that gain over the gain without any other view."""
 
 
 class VisualHull(NamedTuple):
@@ -47,9 +44,7 @@ class VisualHull(NamedTuple):
         return least if self.coverages[least] < _NEARLY_ALL else None
 
 
-def carve_people(
-    silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings = DEFAULT_CARVING
-) -> VisualHull:
+def carve_people(silhouettes: Sequence[ViewSilhouette], size_m: float) -> VisualHull:
     """Carve the people of a frame.
 
     A view that the others contradict is left out if at least two others remain.
@@ -57,19 +52,18 @@ def carve_people(
     Args:
         silhouettes: of all views.
         size_m: edge of a voxel, metres.
-        settings: which voxels agree with the silhouettes.
 
     Raises:
         TrackerError: fewer than two views show people, the views contradict each other, or nothing of the size of a
             person is found.
     """
     seen = [s for s in silhouettes if not s.is_empty]
-    voxels, found, broken = _carve_consistent(seen, size_m, settings)
+    voxels, found, broken = _carve_consistent(seen, size_m)
     names = [s.camera.name for s in seen]
     figures = (
         [v for v in voxels.components(_MIN_SHARE) if v.volume_m3 >= MIN_FIGURE_M3] if voxels.occupied.any() else []
     )
-    figures = needed_figures(seen, figures, _MIN_NEEDED)
+    figures = needed_figures(seen, figures, _MATTERS)
     if not figures:
         raise TrackerError(
             f"expected a figure of at least {1000 * MIN_FIGURE_M3:.0f} litres where the silhouettes meet, found "
@@ -93,14 +87,12 @@ def coverages(voxels: Voxels, silhouettes: Sequence[ViewSilhouette]) -> Array:
     return np.array([_coverage(voxels.grid.centers(indices), voxels.grid.size_m, s) for s in silhouettes])
 
 
-def _carve(silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings) -> Voxels:
-    box = bounding_volume(silhouettes, settings.missing)
-    return Carver(silhouettes).carve(VoxelGrid.over(box.low, box.high, size_m), settings)
+def _carve(silhouettes: Sequence[ViewSilhouette], size_m: float) -> Voxels:
+    box = bounding_volume(silhouettes)
+    return Carver(silhouettes).carve(VoxelGrid.over(box.low, box.high, size_m))
 
 
-def _carve_consistent(
-    silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings
-) -> tuple[Voxels, Array, int]:
+def _carve_consistent(silhouettes: Sequence[ViewSilhouette], size_m: float) -> tuple[Voxels, Array, int]:
     """Carve all views, or all but the one without which the others agree much better.
 
     A view that is left out must stand out: where the others agree about as well without another view, none is.
@@ -111,30 +103,28 @@ def _carve_consistent(
     whole: tuple[Voxels, Array] | None = None
     contradiction: TrackerError | None = None
     try:
-        voxels = _carve(silhouettes, size_m, settings)
+        voxels = _carve(silhouettes, size_m)
         whole = voxels, coverages(voxels, silhouettes)
     except TrackerError as error:
         contradiction = error
     n = len(silhouettes)
     before = whole[1] if whole else np.zeros(n)
-    if n > 2 and before.min() < 1 - _MIN_GAIN:
-        without = [_without(i, silhouettes, size_m, settings) for i in range(n)]
+    if n > 2 and before.min() < 1 - _MATTERS:
+        without = [_without(i, silhouettes, size_m) for i in range(n)]
         gains = [float(np.delete(w[1] - before, i).mean()) if w else 0.0 for i, w in enumerate(without)]
         best, second = (int(i) for i in np.argsort(gains)[:-3:-1])
         chosen = without[best]
-        if chosen and gains[best] > _MIN_GAIN and gains[best] - gains[second] > _MIN_LEAD:
+        if chosen and gains[best] > _MATTERS >= gains[second]:
             return *chosen, best
     if whole is None:
         raise contradiction or AssertionError
     return *whole, -1
 
 
-def _without(
-    left_out: int, silhouettes: Sequence[ViewSilhouette], size_m: float, settings: CarveSettings
-) -> tuple[Voxels, Array] | None:
+def _without(left_out: int, silhouettes: Sequence[ViewSilhouette], size_m: float) -> tuple[Voxels, Array] | None:
     """Return the voxels of all views but one, and the coverages of all; None if the others contradict each other."""
     try:
-        voxels = _carve([s for i, s in enumerate(silhouettes) if i != left_out], size_m, settings)
+        voxels = _carve([s for i, s in enumerate(silhouettes) if i != left_out], size_m)
     except TrackerError:
         return None
     return voxels, coverages(voxels, silhouettes)

@@ -60,10 +60,10 @@ def seen(view, model, values):
     w, h = SIZE
     painted = np.zeros((h * PAINTED, w * PAINTED), np.uint8)
     for T, shape, center in zip(part_poses([PosedBody(model, values)]), model.shapes, model.centers_part, strict=True):
-        mesh = shape.mesh(64, 96)
-        px = view.project(rigid.apply(T, np.asarray(mesh.vertices) + center))
+        mesh = shape.triangles(64, 96)
+        px = view.project(rigid.apply(T, mesh.vertices + center))
         corners = np.round(((px + 0.5) * PAINTED - 0.5) * 16).astype(np.int32)
-        for face in corners[np.asarray(mesh.faces)]:
+        for face in corners[mesh.faces]:
             cv2.fillConvexPoly(painted, face, 255, shift=4)
     return np.repeat(cv2.resize(painted, SIZE, interpolation=cv2.INTER_AREA)[..., None], 3, axis=-1)
 

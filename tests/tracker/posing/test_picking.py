@@ -21,8 +21,8 @@ def test_outlines_hold_the_images_of_their_parts(body):
     found = part_hulls([body], [SIDE])[0]
     assert [o.part for o in found] == list(range(len(body.model.parts)))
     for outline in found:
-        mesh = body.model.shapes[outline.part].mesh(40, 60)
-        points = rigid.apply(Ts[outline.part], np.asarray(mesh.vertices) + body.model.centers_part[outline.part])
+        mesh = body.model.shapes[outline.part].triangles(40, 60)
+        points = rigid.apply(Ts[outline.part], mesh.vertices + body.model.centers_part[outline.part])
         polygon = outline.polygon_px.astype(np.float32)
         inside = [cv2.pointPolygonTest(polygon, tuple(map(float, p)), True) for p in SIDE.project(points)]
         assert min(inside) > -0.5

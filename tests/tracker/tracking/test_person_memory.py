@@ -122,7 +122,7 @@ def test_limbs_that_nothing_speaks_against_wait_longer(gavrila):
         for limb in due:
             memory.record_search(limb, everything, found=False)
         memory.update(memory.history[-1], NoColors(), "doubtful", keyframe=False)
-    assert np.flatnonzero(frames).tolist() == [0, 32, 96]
+    assert np.flatnonzero(frames).tolist() == [0, 32, 64, 96]
     assert set(frames) == {0, 4}
     # Once it seems lost itself it is due at once.
     (limb,) = memory.limbs_to_search(seen(memory, astray=("right_calf",)))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import ContourResiduals, paper_match
+from tracker.fitting.contour_residuals import UNBOUNDED, ContourResiduals, paper_match
 from tracker.fitting.gauss_newton import iterate
 from tracker.geometry.arrays import Array
 from tracker.tracking.contour.image_contours import with_unlimited_distances
@@ -18,8 +18,6 @@ from tracker.tracking.estimation.settings import TOLERANCE
 
 START = "start"
 """Name of the pose before the first iteration."""
-_NO_LIMIT_PX = 1e5
-"""An outlier distance that no residual reaches, px of the footage."""
 
 
 class FitIteration(NamedTuple):
@@ -52,7 +50,7 @@ def paper_residuals(
         settings: whether the sliding term is part of the Jacobian.
     """
     motion: Literal["rigid", "sliding"] = "sliding" if settings.sliding else "rigid"
-    return ContourResiduals(unlimited, bodies, person, paper_match(motion), _NO_LIMIT_PX, everywhere=True)
+    return ContourResiduals(unlimited, bodies, person, paper_match(motion), UNBOUNDED, everywhere=True)
 
 
 def fit_by_iterations(

@@ -8,18 +8,16 @@ import numpy as np
 from tracker.body.limbs import display_name
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import Status
-from tracker.tracking.voxel.figure import LIMBS
-from tracker.tracking.voxel.frame_voxels import FrameVoxels, axis_points, occupied_near
+from tracker.tracking.voxel.figure import HEAD, LIMBS, TORSO
+from tracker.tracking.voxel.frame_voxels import AXIS, FrameVoxels, axis_points, occupied_near
 from tracker.tracking.voxel.state import FilterState
 from tracker.voxels.voxel_grid import Voxels
 
-_AXIS = np.linspace(-0.75, 0.75, 10)
-"""Places along the axis of a part that are looked up, in half sizes."""
 _LOST_SHARE, _DOUBTFUL_SHARE = 0.5, 0.85
 """A limb of whose axis less lies in voxels is lost, or doubtful."""
-_LOST_VOLUME, _DOUBTFUL_VOLUME = 0.75, 0.4
+_UNEXPLAINED = 0.4
 """Volume that no part explains, in volumes of a forearm, above which a limb partly outside of the voxels is lost, and
-above which a pose is doubtful."""
+any other pose is doubtful."""
 _BESIDE_M, _FOOT_M = 0.07, 0.30
 """Distance from the surface of a part beyond which voxels are not its skin, and from a calf's end within which they are
 a foot, metres."""
@@ -60,7 +58,7 @@ def assess(
     """
     if frame.n_views < 2:
         return FigureAssessment("lost", "fewer than two views show anybody: the body is where it was predicted")
-    inside = occupied_near(frame.voxels, axis_points(state, _AXIS)).mean(axis=1)
+    inside = occupied_near(frame.voxels, axis_points(state, AXIS)).mean(axis=1)
     if inside.max() == 0.0:
         return FigureAssessment(
             "lost", "no voxels near the body: the silhouettes are empty or disagree; check that no camera has moved"
@@ -72,16 +70,16 @@ def assess(
     if lost:
         display = display_name(min(lost, key=lambda n: shares[n]))
         return FigureAssessment("lost", f"{display} outside of the voxels", lost)
-    if inside[:2].min() < _LOST_SHARE:
+    if inside[[TORSO, HEAD]].min() < _LOST_SHARE:
         return FigureAssessment("lost", "trunk or head outside of the voxels")
     # A limb that is elsewhere has left its place. Where all limbs lie in voxels, the hull may hold a phantom.
-    if volume > _LOST_VOLUME and shares[worst] < _DOUBTFUL_SHARE:
+    if volume > _UNEXPLAINED and shares[worst] < _DOUBTFUL_SHARE:
         return FigureAssessment("lost", "voxels that no part explains: a limb is elsewhere")
     if coarse:
         return FigureAssessment("doubtful", "; ".join(coarse))
     if shares[worst] < _DOUBTFUL_SHARE:
         return FigureAssessment("doubtful", f"{display_name(worst)} partly outside of the voxels")
-    if volume > _DOUBTFUL_VOLUME:
+    if volume > _UNEXPLAINED:
         return FigureAssessment("doubtful", "voxels that no part explains")
     if unexplained.touches:
         return FigureAssessment("doubtful", "touches another person in the voxels")
@@ -118,7 +116,7 @@ def unexplained_voxels(voxels: Voxels, states: Sequence[FilterState]) -> list[Un
     for p, state in enumerate(states):
         distances[p] = _distances(points, state)
         is_free &= distances[p] > _BESIDE_M
-        for calf in (8, 9):
+        for calf in (LIMBS["left_leg"][1], LIMBS["right_leg"][1]):
             foot = state.centers[calf] - state.sizes[calf, 2] * state.rotations[calf, :, 2]
             is_free &= np.linalg.norm(points - foot, axis=1) > _FOOT_M
     if len(states) == 1:

@@ -7,7 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, covariance, solve
+from tracker.fitting.gauss_newton import (
+    CLOSE_ENOUGH,
+    LOOSE,
+    OTHER_BODY_M,
+    PointTargets,
+    PosePrior,
+    ResidualBlock,
+    covariance,
+    solve,
+)
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
@@ -15,15 +24,8 @@ from tracker.tracking.voxel.kalman import product
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState, Layout, point_jacobians
 
-_PLACE_M = 0.015
-"""Standard deviation between the joints of a figure and those of a body whose trunk bends, metres."""
-_NEAR_RAD, _NEAR_M = 0.5, 0.5
-"""Standard deviations of the pose of the frame before, where the joints do not determine it: the twist of a straight
-limb, rad and metres."""
 _START_RATE, _START_SPEED = 2.0, 0.5
 """Standard deviations of unknown angular velocities, rad/s, and of the torso's velocity, m/s."""
-_MAX_ITERATIONS = 15
-_TOLERANCE = 1e-3
 
 
 class BodyPose(NamedTuple):
@@ -98,11 +100,10 @@ def pose_of(
     J = point_jacobians(state, points.parts, points.shares)
     JP = product(J.reshape(-1, state.layout.n), state.covariance).reshape(J.shape)
     variances = np.einsum("pij,pij->p", JP, J) / 3
-    rest = np.where(model.dof_is_length, 1 / _NEAR_M, 1 / _NEAR_RAD)
     blocks: list[ResidualBlock] = [
-        PointTargets(np.array([names[n] for n in points.names]), targets, 1 / np.sqrt(variances + _PLACE_M**2)),
+        PointTargets(np.array([names[n] for n in points.names]), targets, 1 / np.sqrt(variances + OTHER_BODY_M**2)),
         PosePrior.of_spreads(model),
-        PosePrior(near, rest),
+        PosePrior(near, np.full(model.n_dofs, 1 / LOOSE)),
     ]
-    fit = solve(model, near if start is None else start, blocks, active_dofs, _MAX_ITERATIONS, _TOLERANCE)
+    fit = solve(model, near if start is None else start, blocks, active_dofs, tolerance=CLOSE_ENOUGH)
     return BodyPose(fit.pose, covariance(model, fit))

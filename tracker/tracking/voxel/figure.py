@@ -17,12 +17,16 @@ PARTS = (
     "left_forearm", "right_forearm", "left_calf", "right_calf",
 )  # fmt: skip
 """Names of the parts: 0, 1, 2a, 2b, 3a, 3b, 4a, 4b, 5a, 5b of the paper."""
-PARENTS = (-1, 0, 0, 0, 0, 0, 2, 3, 4, 5)
-"""Index of the part that each part hangs on."""
 N_PARTS = len(PARTS)
-TORSO, HEAD = 0, 1
-LIMBS = {"left_arm": (2, 6), "right_arm": (3, 7), "left_leg": (4, 8), "right_leg": (5, 9)}
-"""Upper and lower part of each limb."""
+TORSO, HEAD = PARTS.index("torso"), PARTS.index("head")
+LIMBS = {
+    f"{side}_{limb}": (PARTS.index(f"{side}_{upper}"), PARTS.index(f"{side}_{lower}"))
+    for limb, upper, lower in (("arm", "upper_arm", "forearm"), ("leg", "thigh", "calf"))
+    for side in ("left", "right")
+}
+"""Indices of the upper and the lower part of each limb."""
+PARENTS = tuple(next((upper for upper, lower in LIMBS.values() if lower == i), TORSO) for i in range(N_PARTS))
+"""Index of the part that each part hangs on; the torso hangs on itself."""
 ROOTS = {
     "head": "neck", "left_upper_arm": "left_shoulder", "right_upper_arm": "right_shoulder", "left_thigh": "left_hip",
     "right_thigh": "right_hip", "left_forearm": "left_elbow", "right_forearm": "right_elbow",

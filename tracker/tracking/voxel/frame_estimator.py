@@ -127,7 +127,7 @@ class VoxelEstimator:
             levels = self._levels[p]
             return joined(
                 linearize(state, parts, settings.measurement, levels.is_resolved, state.layout.sizes),
-                measure_together(state, clouds, levels.pairs),
+                measure_together(state, clouds, levels.pairs, settings.measurement.across_m),
             )
 
         return update(states[p], measure, settings.start_iterations if first else settings.iterations)

@@ -8,12 +8,12 @@ import numpy as np
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
 from tracker.tracking.voxel.state import FilterState
-from tracker.voxels.carving import Carver, CarveSettings
+from tracker.voxels.carving import Carver
 from tracker.voxels.voxel_grid import VoxelGrid, Voxels
 
 _REACH_M = 0.35
 """Distance from the prediction to which voxels are carved, metres: how far a limb may be from where it is predicted."""
-_AXIS = np.linspace(-0.8, 0.8, 5)
+AXIS = np.linspace(-0.8, 0.8, 9)
 """Places along the axis of a part that are looked up, in half sizes."""
 _MIN_SHARE, _MIN_OTHERS = 0.4, 0.7
 """A view whose silhouette holds less of the figures than the first, while that of the second best holds more than the
@@ -43,7 +43,7 @@ def carve_around(silhouettes: Sequence[ViewSilhouette], states: Sequence[FilterS
         states: predicted figures of all people.
         size_m: edge of a voxel, metres.
     """
-    axes = np.concatenate([axis_points(s, _AXIS).reshape(-1, 3) for s in states])
+    axes = np.concatenate([axis_points(s, AXIS).reshape(-1, 3) for s in states])
     seen = [s for s in silhouettes if not s.is_empty]
     shares = np.array([_share_inside(s, axes) for s in seen])
     good = shares >= _MIN_SHARE
@@ -52,10 +52,7 @@ def carve_around(silhouettes: Sequence[ViewSilhouette], states: Sequence[FilterS
     used = [s for s, g in zip(seen, good, strict=True) if g]
     low, high = axes.min(axis=0) - _REACH_M, axes.max(axis=0) + _REACH_M
     grid = VoxelGrid.over(low, high, size_m)
-    if len(used) < 2:
-        voxels = Voxels(grid, np.zeros(grid.shape, dtype=bool))
-    else:
-        voxels = Carver(used).carve(grid, CarveSettings())
+    voxels = Voxels(grid, np.zeros(grid.shape, dtype=bool)) if len(used) < 2 else Carver(used).carve(grid)
     broken = tuple(s.camera.name for s, g in zip(seen, good, strict=True) if not g)
     return FrameVoxels(voxels, broken, tuple(s.camera.name for s in used if _is_cut_off(s)), len(used))
 

@@ -15,6 +15,7 @@ from tracker.tracking.voxel.state import FilterState
 NO_PART = -1
 """Label of a voxel that belongs to no part."""
 _UPPER = np.triu_indices(3)
+"""Rows and columns of the distinct elements of a symmetric matrix."""
 
 
 class PartClouds(NamedTuple):
@@ -67,21 +68,6 @@ def label_voxels(points: Array, states: Sequence[FilterState], size_m: float, ru
     moments = np.zeros((len(centers), N_MOMENTS))
     packed = np.column_stack([metrics[0][:, *_UPPER], metrics[1]])
     label_and_sum(np.ascontiguousarray(points), centers, rotations, packed, rule.gate, labels, moments)
-    return Labels(labels, _clouds(moments, size_m))
-
-
-def label_voxels_plainly(points: Array, states: Sequence[FilterState], size_m: float, rule: LabelRule) -> Labels:
-    """Return the same without a compiled kernel: the oracle of `label_voxels`."""
-    centers, rotations, (inverses, added) = _parts(states, size_m, rule.widened)
-    local = np.einsum("mji,nmj->nmi", rotations, points[:, None] - centers)
-    squared = np.einsum("nmi,mij,nmj->nm", local, inverses, local)
-    distances = np.where(squared < rule.gate, squared + added, np.inf)
-    labels = distances.argmin(axis=1).astype(np.int16)
-    labels[~np.isfinite(distances.min(axis=1))] = NO_PART
-    moments = np.zeros((len(centers), N_MOMENTS))
-    for m in range(len(centers)):
-        own = local[labels == m, m]
-        moments[m] = [len(own), *own.sum(axis=0), *(own.T @ own)[_UPPER]]
     return Labels(labels, _clouds(moments, size_m))
 
 

@@ -18,14 +18,11 @@ from tracker.tracking.voxel.labels import PartClouds
 from tracker.tracking.voxel.state import FilterState
 from tracker.voxels.voxel_grid import Voxels
 
-_MERGED, _APART = 0.4, 0.25
-"""Share of the side of a thigh or calf that touches that of the other leg, above which the two are one, and below
-which they are two."""
-_SWALLOWED, _WHOLE = 0.2, 0.35
-"""Share of a part's volume in its voxels, below which others have taken them, and above which it stands out."""
-_JOINT_M = 0.02
-"""Standard deviation of the centre of parts that are measured together, metres."""
-_LEG_PAIRS = ((4, 5), (8, 9))
+_MERGED = 0.4
+"""Share of the side of a thigh or calf that touches that of the other leg, above which the two are one."""
+_SWALLOWED = 0.2
+"""Share of a part's volume in its voxels, below which others have taken them."""
+_LEG_PAIRS = tuple(zip(LIMBS["left_leg"], LIMBS["right_leg"], strict=True))
 """Parts of the left and the right leg that are measured together."""
 
 
@@ -63,7 +60,7 @@ class DetailLevels(NamedTuple):
 def find_levels(
     before: DetailLevels, state: FilterState, voxels: Voxels, labels: NDArray[np.int16], first_label: int, patience: int
 ) -> DetailLevels:
-    """Return which parts stand apart from the parts beside them; a part changes its level clearly or not at all.
+    """Return which parts stand apart from the parts beside them.
 
     A coarser level waits: legs that pass each other touch for a few frames only, and the prediction tells them apart.
 
@@ -85,9 +82,9 @@ def find_levels(
     shares = np.zeros(N_PARTS)
     for leg, other in (pair for a, b in _LEG_PAIRS for pair in ((a, b), (b, a))):
         shares[leg] = _touching(grid, at[own == leg], other) * size_m**2 / (4 * sizes[leg, 1] * sizes[leg, 2])
-    finer, coarser = (shares < _APART) & (volumes > _WHOLE), (shares > _MERGED) | (volumes < _SWALLOWED)
+    coarser = (shares > _MERGED) | (volumes < _SWALLOWED)
     n_merged = np.where(coarser, before.n_merged + 1, 0)
-    resolved = np.where(before.is_resolved, n_merged < patience, finer)
+    resolved = np.where(before.is_resolved, n_merged < patience, ~coarser)
     for upper, lower in LIMBS.values():  # an upper arm beside the trunk still begins a forearm that stands out
         resolved[upper] |= resolved[lower]
     resolved[:2] = True
@@ -102,7 +99,7 @@ def _touching(grid: NDArray[np.int16], own: NDArray[np.int64], part: int) -> int
 
 
 def measure_together(
-    state: FilterState, clouds: PartClouds, pairs: tuple[tuple[int, int], ...]
+    state: FilterState, clouds: PartClouds, pairs: tuple[tuple[int, int], ...], sigma_m: float
 ) -> LinearizedMeasurement | None:
     """Linearize the common centre of pairs of parts, or None if there are none with voxels.
 
@@ -110,6 +107,7 @@ def measure_together(
         state: the figure.
         clouds: the voxels of its parts.
         pairs: indices of the parts.
+        sigma_m: standard deviation of the centre of a part, metres.
     """
     rows, jacobians = [], []
     for pair in pairs:
@@ -123,7 +121,7 @@ def measure_together(
     if not rows:
         return None
     H: Array = np.concatenate(jacobians)
-    return LinearizedMeasurement(np.concatenate(rows), H, np.eye(len(H)) * _JOINT_M**2)
+    return LinearizedMeasurement(np.concatenate(rows), H, np.eye(len(H)) * sigma_m**2)
 
 
 def carried(before: FilterState, state: FilterState, levels: DetailLevels) -> Array:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.fitting.gauss_newton import UNKNOWN
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.voxel.figure import N_PARTS
@@ -17,12 +18,11 @@ from tracker.tracking.voxel.state import FilterState
 MIN_VOXELS = 4
 """Fewest voxels of a part that is measured: fewer have no three principal axes."""
 _ORDERS = np.array(list(itertools.permutations(range(3))))
+"""All orders of three axes, (6, 3)."""
 _SKIN_M = 0.01
 """Spread that the skin of a visual hull adds across a part, metres."""
 _IMPROBABLE = 16.8
 """Normalized innovation of the six rows of a part that one in a hundred exceeds."""
-_MAX_TURN_VARIANCE = 1.0
-"""Largest variance of a measured angle, rad^2: axes are matched with the predicted ones to within 45 degrees."""
 
 
 class MeasurementNoise(NamedTuple):
@@ -116,7 +116,7 @@ def linearize(
     spreads[:, 2] = np.maximum(noise.across_m, noise.along * sizes[:, 2])
     R[:, :3, :3] = (rotations * (spreads**2 * doubt[:, None])[:, None]) @ np.swapaxes(rotations, 1, 2)
     turn_variances = _turn_variances(found, noise)[parts] * doubt[:, None]
-    R[:, 3 + xyz, 3 + xyz] = np.minimum(turn_variances, _MAX_TURN_VARIANCE)
+    R[:, 3 + xyz, 3 + xyz] = np.minimum(turn_variances, UNKNOWN**2)
     if with_sizes:
         residual[:, 6:] = found.sizes[parts] - sizes
         H[one, 6 + xyz, state.layout.sizes_at.start + columns] = 1.0
@@ -194,4 +194,4 @@ def _turn_variances(found: PartAxes, noise: MeasurementNoise) -> Array:
     s = found.variances
     one, other = s[:, [1, 2, 0]], s[:, [2, 0, 1]]
     n = np.maximum(found.volumes / noise.independent_m3, 1.0)[:, None]
-    return np.asarray(np.minimum(base + one * other / (n * np.maximum((one - other) ** 2, 1e-16)), _MAX_TURN_VARIANCE))
+    return np.asarray(np.minimum(base + one * other / (n * np.maximum((one - other) ** 2, 1e-16)), UNKNOWN**2))

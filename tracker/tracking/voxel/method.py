@@ -43,6 +43,7 @@ VOXEL_SIZE = Option(
     lambda s: round(1000 * s.voxel_m, 6), lambda s, mm: replace(s, voxel_m=mm / 1000),
     limits=(1000 * MIN_VOXEL_M, 1000 * MAX_VOXEL_M), step=5,
 )  # fmt: skip
+"""Shown in millimetres, stored in metres."""
 SIZES = Option(
     "sizes", "Part sizes", "when part sizes are estimated: never, on the first frame, or on all frames",
     "first by default, always in the paper's mode", "choice", lambda s: s.sizes,

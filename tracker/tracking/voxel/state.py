@@ -18,9 +18,8 @@ MIN_SIZE_M = 0.01
 """Smallest half size of a part, metres."""
 _COLUMNS = 3 * np.arange(N_PARTS)[:, None] + np.arange(3)
 """Columns of the error state that belong to each part, from the first of their kind, (10, 3)."""
-_ON_CHAIN = np.eye(N_PARTS)
+_ON_CHAIN = np.diag([float(part != TORSO) for part in range(N_PARTS)])
 """Whether each part lies on the way from the torso to a part, (10, 10); the torso itself does not."""
-_ON_CHAIN[TORSO, TORSO] = 0.0
 for _part in range(1, N_PARTS):
     _ON_CHAIN[_part] += _ON_CHAIN[PARENTS[_part]]
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from filter_states import some_state
+from plain_voxels import label_voxels_plainly
 
 from tracker.formats.model_toml import load_model
 from tracker.tracking.voxel.body_pose import state_of
-from tracker.tracking.voxel.labels import NO_PART, LabelRule, label_voxels, label_voxels_plainly
+from tracker.tracking.voxel.labels import NO_PART, LabelRule, label_voxels
 from tracker.tracking.voxel.settings import VoxelSettings
 
 

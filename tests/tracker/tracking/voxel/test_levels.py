@@ -46,7 +46,7 @@ def test_closed_legs_are_measured_as_one_and_parted_again():
     levels, state, clouds = levels_of(arms_deg=35, legs_deg=-4.5)
     assert levels.notes == ("legs closed: measured as one",)
     assert levels.pairs
-    together = measure_together(state, clouds, levels.pairs)
+    together = measure_together(state, clouds, levels.pairs, 0.02)
     assert together.jacobian.shape == (3 * len(levels.pairs), state.layout.n)
     again, _, _ = levels_of(before=levels, arms_deg=35, legs_deg=12)
     assert again.is_resolved.all()
