@@ -223,7 +223,7 @@ async def worst_listed(hour):
         return None
     text = (await rows.first.inner_text()).split("\n")
     frames = next(line for line in text if line.startswith("frame")).partition(" ")[2]
-    first, last = (int(n) for n in (frames.split("–") * 2)[:2])
+    first, last = (int(n) for n in (frames.partition(",")[0].split("–") * 2)[:2])  # perhaps "24–27, in 2 stretches"
     await hour.stranger.click("#doubt-list .doubt >> nth=0")
     await hour.stranger.until(ARRIVED)
     return f"{', '.join(text[:-1])}, {frames}", first, last

@@ -105,7 +105,9 @@ async def test_nothing_jumps_while_work_is_under_way(page, endpoint):
         }"""
     )
     await page.keyboard.press("f")
-    await shows(page, "!quadrille.state.state.job.running && quadrille.state.state.job.message", timeout_s=20.0)
+    await shows(page, "quadrille.state.state.job.evaluations > 1000")
+    await page.keyboard.press("Escape")
+    await shows(page, "!quadrille.state.state.job.running && quadrille.state.state.job.message")
     await page.keyboard.press("t")
     await shows(page, "quadrille.state.state.track.done > 12", timeout_s=20.0)
     await page.keyboard.press("Escape")
