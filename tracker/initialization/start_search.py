@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
-from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior, moved_m
+from tracker.fitting.hypothesis import SAME_POSE_M, distance_m
+from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.estimation.start_pose import roughly_known, search_start
 from tracker.tracking.person_memory import PersonMemory
@@ -16,8 +17,6 @@ from tracker.tracking.view_regions import read_views
 
 _MAX_ROUNDS, _N_DRAWS = 2, 3
 """Largest number of rounds, each with the evidence around the pose of the one before, and draws of samples in each."""
-_SETTLED_M = 0.01
-"""The search ends where nothing moves farther in a round, metres."""
 
 
 def search_around(
@@ -39,6 +38,6 @@ def search_around(
         problem = FrameProblem(read_views(observer, frame, everybody), priors, wide)
         memory = PersonMemory(body.model, body.values, alone=alone)
         before, body = body, search_start(problem, 0, everybody, memory, _N_DRAWS)
-        if moved_m(before, body) < _SETTLED_M:
+        if distance_m(before, body) < SAME_POSE_M:
             break
     return body

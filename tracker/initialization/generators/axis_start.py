@@ -5,15 +5,17 @@ ones given the others. The best twists are refined, trunk and limbs in turn, at 
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import chain_poses
-from tracker.body.limbs import Limb
-from tracker.body.model import BodyModel
+from tracker.body.limbs import Limb, limbs
+from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.gauss_newton import fit_to_points, value_mask
+from tracker.fitting.hypothesis import Hypothesis, distinct
+from tracker.fitting.limb_exchange import exchanged, paired_limbs
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.initialization.generators.body_axis import SHOULDERS, BodyAxis
@@ -37,27 +39,12 @@ _TRUNK_SHARE, _TRUNK_M = 0.5, 0.10
 """Spread of the trunk's directions as a share of that of the limbs, and of its place, metres per rad."""
 _N_SEARCHED, _N_KEPT = 12, 5
 """Twists that are searched on, and starts that are returned of those that face any way."""
-_LIMB_JOINTS = (("knee", "ankle"), ("elbow", "wrist"))
 _N_EXCHANGED = 3
 """Starts whose legs and whose arms are exchanged too: a leg before the other is easily taken for it."""
 _DOWNWARDS = 1.1
 """Factor on the cost of a body with the head at the lower end of its axis."""
-_APART_RAD = np.radians(80)
-"""Angle between two ways of facing, rad: a body looks nearly the same from behind."""
-_DISTINCT_M = 0.08
-"""Smallest mean distance of the joints of two starts, metres."""
-
-
-class AxisStart(NamedTuple):
-    """A start pose on the axis of a body."""
-
-    axis: BodyAxis
-    pose: Array
-    """(n_values,)."""
-    forward: Array
-    """Unit direction in which the trunk faces, (3,)."""
-    cost: float
-    """Cost against the silhouettes, see `SilhouetteOverlap`."""
+AxisStart: TypeAlias = tuple[Hypothesis, BodyAxis]
+"""A start on an axis of the body; its cost is that against the silhouettes, see `SilhouetteOverlap`."""
 
 
 def search_on_axes(
@@ -72,50 +59,39 @@ def search_on_axes(
         up: vertical axis of the world, (3,). A body upside down must fit better than one that is upright.
     """
     limb_search = _Search(model, overlap)
+    pairs = paired_limbs(limbs(model))
 
-    def weighed(start: AxisStart) -> float:
-        return start.cost * (_DOWNWARDS if start.axis.up @ up < 0 else 1.0)
+    def found(pose: Array, cost: float, axis: BodyAxis) -> AxisStart:
+        return Hypothesis(PosedBody(model, pose), "axis", cost * (_DOWNWARDS if axis.up @ up < 0 else 1.0)), axis
 
-    coarse = sorted((start for axis in axes for start in _coarse(limb_search, axis)), key=weighed)
+    def refined(start: AxisStart) -> AxisStart:
+        return found(*limb_search.refined(start[0].pose), start[1])
+
+    coarse = sorted((found(*at, axis) for axis in axes for at in _coarse(limb_search, axis)), key=_cost)
     # A body looks nearly the same from behind: the best twists that face the other way are searched on too.
     chosen = coarse[:_N_SEARCHED]
-    chosen += [s for s in coarse[_N_SEARCHED:] if _faces_elsewhere(s, coarse[0])][:2]
-    found = sorted((AxisStart(s.axis, *limb_search.refined(s.pose)) for s in chosen), key=weighed)
-    for start in found[:_N_EXCHANGED]:
-        exchanged = [_exchanged(model, start.pose, joints) for joints in _LIMB_JOINTS]
-        found += [AxisStart(start.axis, *limb_search.refined(pose)) for pose in exchanged]
-    kept: list[AxisStart] = []
-    for start in sorted(found, key=weighed):
-        if all(_is_distinct(model, start, other) for other in kept):
-            kept.append(start)
-    others = [s for s in kept[_N_KEPT:] if _faces_elsewhere(s, kept[0])][:1]
-    return kept[:_N_KEPT] + (others if not any(_faces_elsewhere(s, kept[0]) for s in kept[:_N_KEPT]) else [])
+    chosen += [s for s in coarse[_N_SEARCHED:] if s[0].faces_away_from(coarse[0][0])][:2]
+    starts = sorted(map(refined, chosen), key=_cost)
+    for start, axis in starts[:_N_EXCHANGED]:
+        starts += [refined((start.at(exchanged(start.body, pair)), axis)) for pair in pairs]
+    axis_of = {id(start): axis for start, axis in starts}
+    first, *others = [(start, axis_of[id(start)]) for start in distinct([start for start, _ in starts])]
+    kept = [first, *others[: _N_KEPT - 1]]
+    if not any(s.faces_away_from(first[0]) for s, _ in kept):
+        kept += [s for s in others[_N_KEPT - 1 :] if s[0].faces_away_from(first[0])][:1]
+    return kept
 
 
-def _exchanged(model: BodyModel, pose: Array, joints: Sequence[str]) -> Array:
-    """Return the pose in which the left and the right limb take each other's place, as far as joints allow."""
-    points = model.named_points_world(pose)
-    pairs = [(f"left_{j}", f"right_{j}") for j in joints if f"left_{j}" in points]
-    for left, right in pairs:
-        points[left], points[right] = points[right], points[left]
-    return fit_to_points(model, points, pose).pose
+def _cost(start: AxisStart) -> float:
+    return start[0].cost
 
 
-def _faces_elsewhere(start: AxisStart, other: AxisStart) -> bool:
-    return bool(start.forward @ other.forward < np.cos(_APART_RAD))
-
-
-def _is_distinct(model: BodyModel, start: AxisStart, other: AxisStart) -> bool:
-    off = model.points_world(start.pose) - model.points_world(other.pose)
-    return bool(np.linalg.norm(off, axis=1).mean() > _DISTINCT_M)
-
-
-def _coarse(limb_search: "_Search", axis: BodyAxis) -> list[AxisStart]:
-    """Return for each twist on an axis the best pose among a few."""
+def _coarse(limb_search: "_Search", axis: BodyAxis) -> list[tuple[Array, float]]:
+    """Return for each twist on an axis the best pose among a few, and its cost."""
     found, near = [], None
     for i in range(_N_TWISTS):
         near = _trunk(limb_search.model, axis, _frame(axis.up, 2 * np.pi * i / _N_TWISTS), near)
-        found.append(AxisStart(axis, *limb_search.limbs_placed(near)))
+        found.append(limb_search.limbs_placed(near))
     return found
 
 
@@ -127,8 +103,8 @@ class _Search:
         self._limbs, self._parts = moving_limbs(model), np.arange(len(model.parts))
         self._root = np.flatnonzero(model.dof_joint == 0)
 
-    def limbs_placed(self, pose: Array) -> tuple[Array, Array, float]:
-        """Search the limbs all over their joint limits; return the pose, the direction it faces and its cost."""
+    def limbs_placed(self, pose: Array) -> tuple[Array, float]:
+        """Search the limbs all over their joint limits; return the pose and its cost."""
         model, trunk = self.model, trunk_parts(self.model)
         covered = self._overlap.nothing()
         Ts = model.kinematics(pose).Ts_world_part
@@ -144,9 +120,9 @@ class _Search:
         for _ in range(_SWEEPS):
             for limb, poses in zip(self._limbs, tried, strict=True):
                 pose, _ = self._best_of_limb(pose, limb, self._with_limb(pose, limb, poses))
-        return self._found(pose)
+        return pose, float(self._total(pose[None])[0])
 
-    def refined(self, pose: Array) -> tuple[Array, Array, float]:
+    def refined(self, pose: Array) -> tuple[Array, float]:
         """Search around a pose, trunk and limbs in turn; see `limbs_placed`."""
         model, best = self.model, self._total(pose[None])[0]
         for spread in _FINER_RAD:
@@ -160,11 +136,7 @@ class _Search:
                 near, cost = self._best_of_limb(pose, limb, model.clip(model.retract(pose, steps)))
                 if cost < best:
                     pose, best = near, cost
-        return self._found(pose)
-
-    def _found(self, pose: Array) -> tuple[Array, Array, float]:
-        forward = self.model.kinematics(pose).Ts_world_part[0, :3, 0]
-        return pose, forward, float(self._total(pose[None])[0])
+        return pose, float(best)
 
     def _with_limb(self, pose: Array, limb: Limb, poses: Array) -> Array:
         """Return the pose with one limb as in each of some poses, (n, n_values)."""

@@ -8,6 +8,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import Remedy, TrackerError
 from tracker.fitting.gauss_newton import fit_to_points
+from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.initialization.generators.head_template import Head, find_head, find_upper_head
@@ -19,11 +20,9 @@ from tracker.voxels.voxel_grid import Voxels
 SIDES = ("left", "right")
 _JOINTS = {"arm": ("elbow", "wrist"), "leg": ("knee", "ankle")}
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
-_FOOT_M, _BEND_M, _MOTION_M = 0.06, 0.06, 0.12
-"""Units of the cues for where a person faces, metres. The cues are a foot before its ankle, a knee or elbow beside the
-line through its limb, and the way to the next frames."""
-SURE = 1.0
-"""Sum of these cues from which on left and right are known."""
+_FOOT, _BEND, _MOTION = 50.0, 25.0, 25.0
+"""Logarithm of the odds of a way of facing per metre of a cue, nats/m. The cues are a foot before its ankle, a knee or
+elbow beside the line through its limb, and the way to the next frames. Feet 6 cm ahead decide alone (`CLEAR_NATS`)."""
 _SAME_HEAD_M = 0.11
 """Distance up to which two heads are the same, metres."""
 _ONE_LEG = 0.25
@@ -40,12 +39,12 @@ class FigureParts(NamedTuple):
     limbs: dict[str, LimbRegion]
     """Limbs that stand out, by name: `left_arm` and so on."""
     facing: float
-    """Sum of the cues for the direction; below `SURE` left and right may be exchanged."""
+    """Logarithm of the odds of the direction by the cues, nats; below `CLEAR_NATS` left and right may be exchanged."""
 
     @property
     def is_facing_sure(self) -> bool:
         """Whether left and right are known by the cues."""
-        return self.facing >= SURE
+        return self.facing >= CLEAR_NATS
 
     @property
     def unresolved(self) -> tuple[str, ...]:
@@ -96,7 +95,7 @@ def locate_parts(figure: Voxels, graph: VoxelGraph, head: Head, motion: Array | 
     torso = find_torso(grown, head.neck / head.scale, head.is_head)
     limbs = find_limbs(grown, graph, torso, head.is_head)
     moved = None if motion is None else motion / head.scale
-    facing = facing_cues(grown, torso.axes[:, 0], torso.axes[:, 2], moved) + _bends(torso, limbs)
+    facing = facing_nats(grown, torso.axes[:, 0], torso.axes[:, 2], moved) + _bends(torso, limbs)
     if facing < 0:
         torso = torso.turned_round()
     own = {n: limb.scaled(head.scale) for n, limb in _by_side(torso, limbs, len(figure.indices)).items()}
@@ -157,12 +156,12 @@ def _bends(torso: Torso, limbs: Sequence[LimbRegion]) -> float:
     for limb in limbs:
         bend = float((limb.middle - (limb.proximal + limb.distal) / 2) @ forward)
         sign = 1.0 if limb.kind == "leg" else -1.0
-        total += sign * 0.5 * float(np.clip(bend / _BEND_M, -1, 1)) if limb.is_bent else 0.0
+        total += sign * float(np.clip(_BEND * bend, -1.5, 1.5)) if limb.is_bent else 0.0
     return total
 
 
-def facing_cues(figure: Voxels, forward: Array, up: Array, motion: Array | None) -> float:
-    """Return the sum of the cues of feet and motion that a person faces in a direction; from `SURE` on it is known.
+def facing_nats(figure: Voxels, forward: Array, up: Array, motion: Array | None) -> float:
+    """Return the logarithm of the odds that a person faces in a direction, by feet and motion, nats.
 
     Args:
         figure: voxels of the person.
@@ -175,7 +174,7 @@ def facing_cues(figure: Voxels, forward: Array, up: Array, motion: Array | None)
     low = points[along < along.min() + 0.06]
     above = points[(along > along.min() + 0.10) & (along < along.min() + 0.22)]
     if len(low) and len(above):
-        total += float(np.clip((low.mean(axis=0) - above.mean(axis=0)) @ forward / _FOOT_M, -1.5, 1.5))
+        total += float(np.clip((low.mean(axis=0) - above.mean(axis=0)) @ forward * _FOOT, -4.5, 4.5))
     if motion is not None:
-        total += float(np.clip(motion @ forward / _MOTION_M, -2, 2))
+        total += float(np.clip(motion @ forward * _MOTION, -6, 6))
     return total

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from itertools import combinations
 
 from tracker.body.model import PosedBody
+from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonFit, with_body
-from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN
 
 _MAX_PRIOR_INCREASE = 60.0
 """Largest increase in prior cost (nats) at which swapping two people is still tried."""
@@ -37,7 +37,7 @@ def identity_swaps(
             refined = problem.refine(i, swapped, fits[i])
             swapped = with_body(swapped, i, refined.body)
             there += refined.fit.cost - color_weight * problem.color_nats(i, swapped)
-        if there < here + MIN_COST_GAIN:
+        if there < here + CLEAR_NATS:
             swaps[p, q] = tuple(b.values for b in swapped)
     return swaps
 

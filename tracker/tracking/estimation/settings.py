@@ -52,8 +52,6 @@ class RecoverSettings:
     """Whether the next limb is searched from each of them; else once, and its places are scored with each."""
     min_decrease: float = 0.0
     """Smallest decrease of the cost for another iteration with the whole body."""
-    margin: float = 40.0
-    """Largest excess cost (nats) of a pose that is kept for the next limb: more than a limb can make up for."""
     colors: float = 0.2
     """Weight of the colours against edges. Neighbouring pixels are correlated, so it is well below 1."""
     trust_rad: float = 1.0
@@ -118,6 +116,11 @@ def at_stride(settings: EstimationSettings, stride: int) -> EstimationSettings:
         settings, trust_rad=stride * settings.trust_rad, trust_m=stride * settings.trust_m,
         predict=replace(motion, bound_rad=stride * motion.bound_rad, bound_m=stride * motion.bound_m),
     )  # fmt: skip
+
+
+def trust(model: BodyModel, settings: EstimationSettings) -> Array:
+    """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""
+    return np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
 
 
 def chamfer_cost(
