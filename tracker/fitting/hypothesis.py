@@ -37,8 +37,6 @@ class Hypothesis:
     """Negative logarithm of its likelihood, nats, up to a constant of the evidence; infinite before it is known."""
     fit: Fit | None = None
     """The fit that refined it; None if it is a proposal."""
-    facing_nats: float = 0.0
-    """Logarithm of the odds of its way of facing against the opposite one, by cues that contours do not hold."""
     is_measured: bool = True
     """Whether the height of the body was measured, or was known."""
     notes: tuple[str, ...] = ()

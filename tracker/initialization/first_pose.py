@@ -22,7 +22,7 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.initialization.generators.person_scene import PersonScene, silhouette_axes
 from tracker.initialization.generators.start_generators import GENERATORS
-from tracker.initialization.own_figure import figure_motion, others_on_frame, own_figure
+from tracker.initialization.own_figure import others_on_frame, own_figure
 from tracker.initialization.silhouette_check import check_against_silhouettes
 from tracker.initialization.standing_heights import StandingHeights
 from tracker.initialization.start_choice import compare_starts
@@ -32,12 +32,9 @@ from tracker.tracking.confidence import Status, worst
 from tracker.voxels.figure_masks import FigureMask, figure_masks
 from tracker.voxels.shadows import recover_from_shadows
 from tracker.voxels.visual_hull import VisualHull, carve_people
-from tracker.voxels.voxel_grid import Voxels
 
 VOXEL_M = 0.025
 """Edge of a voxel, metres."""
-_MOTION_FRAMES = 6
-"""Frames over which the motion of a figure is measured."""
 ENOUGH_FRAMES = 2
 """Number of frames with good starts whose heights agree that end the trial of `auto`."""
 _OTHER_FRAMES = 5
@@ -67,7 +64,7 @@ class FirstPose(NamedTuple):
     cost_px: float
     """Mean cost of the short track, px of the footage."""
     is_facing_sure: bool
-    """Whether cues or costs tell left from right."""
+    """Whether the contours tell left from right."""
     notes: tuple[str, ...]
     """Sentences on what is not sure."""
     lines_px: Mapping[str, Array] = MappingProxyType({})
@@ -182,7 +179,7 @@ class _Trial:
         def scenes(frame: int, person: int) -> list[PersonScene]:
             self._step()
             views = silhouettes(frame, person)
-            return [PersonScene(f, views, (), floor, None) for f in carve_people(views, self._size_m).figures]
+            return [PersonScene(f, views, (), floor) for f in carve_people(views, self._size_m).figures]
 
         return _Source(silhouettes, StandingHeights(scenes, self._session.n_frames, len(self._session.people)))
 
@@ -280,8 +277,7 @@ def _on_frame(
     others = others_on_frame(session, person, frame, known)
     figure = own_figure(session, person, hull, others)
     masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
-    motion = _motion(task, source, figure, frame)
-    scene = PersonScene(figure, silhouettes, masks, floor_plane(session.up, session.floor), motion)
+    scene = PersonScene(figure, silhouettes, masks, floor_plane(session.up, session.floor))
     model = session.people[person].model
     height_m = source.heights.around(scene, frame, person) if has_preset_sizes(model) else None
     proposals = _proposals(scene, model if height_m is None else model.with_height(height_m), generators)
@@ -343,22 +339,12 @@ def _lines_px(session: Session, scene: PersonScene) -> dict[str, Array]:
     return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in axes}
 
 
-def _motion(task: _Task, source: _Source, figure: Voxels, frame: int) -> Array | None:
-    """Return the way of a figure to a later frame, (3,), metres; None if it cannot be found."""
-    ahead = frame + _MOTION_FRAMES < task.session.n_frames
-    other = frame + (_MOTION_FRAMES if ahead else -_MOTION_FRAMES)
-    if other < 0:
-        return None
-    way = figure_motion(figure, source.silhouettes(other, task.person), 2 * task.size_m)
-    return None if way is None else way * (1.0 if ahead else -1.0)
-
-
 def _notes(
     start: Hypothesis, is_sure: bool, hull: VisualHull, silhouettes: Sequence[ViewSilhouette]
 ) -> tuple[str, ...]:
     notes = list(start.notes)
     if not is_sure:
-        notes.append("left and right are not sure: feet, bends, motion and joint limits do not tell them apart")
+        notes.append("left and right are not sure: a pose that faces the other way is about as good")
     if hull.broken:
         notes.append(f"view {hull.broken[0]} was left out: the others agree without it; check whether it has moved")
     if not start.is_measured:

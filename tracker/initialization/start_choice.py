@@ -23,13 +23,13 @@ class ComparedStarts(NamedTuple):
 
     @property
     def is_facing_sure(self) -> bool:
-        """Whether cues or costs tell left from right."""
+        """Whether the contours tell left from right."""
         best = self.tracked[0].start
         tracked, searched = (
             [s.cost for s in own if s.faces_away_from(best)] for own in ([t.start for t in self.tracked], self.searched)
         )
         gaps = [c - best.cost for c in tracked] or [c - self.searched[0].cost for c in searched]
-        return best.facing_nats >= CLEAR_NATS or (bool(gaps) and min(gaps) > CLEAR_NATS)
+        return bool(gaps) and min(gaps) > CLEAR_NATS
 
     @property
     def rivals_note(self) -> str:

@@ -88,14 +88,13 @@ class StartFitter:
     def scored(self, starts: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return hypotheses with their costs on the frame, all on common evidence, the best first."""
         costs = self._costs(self.frame, [s.body for s in starts])
-        return sorted((replace(s, cost=c) for s, c in zip(starts, costs - _facing(starts), strict=True)), key=_cost)
+        return sorted((replace(s, cost=c) for s, c in zip(starts, costs, strict=True)), key=lambda s: s.cost)
 
     def compared(self, tracks: Sequence[StartTrack]) -> list[StartTrack]:
         """Return tracks with the sums of their costs over all frames, on common evidence, the best first."""
-        starts = [t.start for t in tracks]
-        costs = -_facing(starts)
-        for frame in tracks[0].poses:
-            costs = costs + self._costs(frame, [PosedBody(t.start.model, t.poses[frame]) for t in tracks])
+        costs = sum(
+            self._costs(frame, [PosedBody(t.start.model, t.poses[frame]) for t in tracks]) for frame in tracks[0].poses
+        )
         scored = [t._replace(start=replace(t.start, cost=c)) for t, c in zip(tracks, costs, strict=True)]
         return sorted(scored, key=lambda t: t.start.cost)
 
@@ -136,11 +135,3 @@ def track_back(track: StartTrack) -> tuple[list[Hypothesis], bool]:
         if distance_m(track.start.body, end.body) > SAME_POSE_M:
             found.append(end)
     return found, is_lost
-
-
-def _facing(starts: Sequence[Hypothesis]) -> Array:
-    return np.array([s.facing_nats for s in starts])
-
-
-def _cost(start: Hypothesis) -> float:
-    return start.cost

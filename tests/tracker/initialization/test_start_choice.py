@@ -24,8 +24,8 @@ def pose(x_m=0.0, **angles):
     return out
 
 
-def start(x_m=0.0, facing_nats=0.0, name="voxels", cost=0.0, **angles):
-    return Hypothesis(PosedBody(MODEL, pose(x_m, **angles)), name, cost, facing_nats=facing_nats)
+def start(x_m=0.0, name="voxels", cost=0.0, **angles):
+    return Hypothesis(PosedBody(MODEL, pose(x_m, **angles)), name, cost)
 
 
 class Fitter:
@@ -109,11 +109,10 @@ def outcome(best, *others, searched=()):
     return ComparedStarts([best, *searched], tracks, False)
 
 
-def test_left_and_right_are_sure_by_cues_or_by_costs():
+def test_left_and_right_are_sure_by_costs():
     turn = np.flatnonzero((MODEL.dof_joint == 0) & ~MODEL.dof_is_length)[-1]
     away = HERE.at(MODEL.retract(HERE.pose, 3.0 * np.eye(MODEL.n_dofs)[turn]))
     assert away.faces_away_from(HERE)
-    assert outcome(start(facing_nats=CLEAR_NATS)).is_facing_sure
     assert not outcome(HERE).is_facing_sure
     assert outcome(HERE, replace(away, cost=CLEAR_NATS + 0.1)).is_facing_sure
     assert not outcome(HERE, replace(away, cost=CLEAR_NATS - 0.1)).is_facing_sure

@@ -13,7 +13,7 @@ from tracker.initialization import start_fit
 from tracker.initialization.start_fit import StartFitter, StartTrack, short_tracks, track_back
 
 MODEL = load_model("gavrila34")
-START = Hypothesis(PosedBody(MODEL, MODEL.neutral()), "test", facing_nats=2.0)
+START = Hypothesis(PosedBody(MODEL, MODEL.neutral()), "test")
 
 
 def moved(pose, by_m):
@@ -121,18 +121,18 @@ def test_a_person_who_is_lost_on_a_track(fits, lost):
     assert track_back(found)[1]
 
 
-def test_costs_are_summed_over_the_frames_less_what_the_cues_say(monkeypatch):
+def test_costs_are_summed_over_the_frames(monkeypatch):
     """All starts of a frame are scored on the same evidence, around all of them."""
-    away, seen = Hypothesis(PosedBody(MODEL, moved(MODEL.neutral(), 1.0)), facing_nats=-2.0), []
+    away, seen = Hypothesis(PosedBody(MODEL, moved(MODEL.neutral(), 1.0))), []
     monkeypatch.setattr(start_fit, "common_evidence", lambda _, frame, guesses, __: seen.append(len(guesses)) or frame)
     monkeypatch.setattr(
         start_fit, "scorer_without_prediction",
         lambda frame, *_: SimpleNamespace(costs_with_priors=lambda model, poses: 10.0 * frame + poses[:, 0]),
     )  # fmt: skip
     own = fitter()
-    assert [h.cost for h in own.scored([away, START])] == [50.0 - 2.0, 51.0 + 2.0]
+    assert [h.cost for h in own.scored([away, START])] == [50.0, 51.0]
     tracks = [StartTrack(h, "good", 1.0, {5: h.pose, 7: moved(h.pose, 3.0)}) for h in (away, START)]
-    assert [t.start.cost for t in own.compared(tracks)] == [50 + 73 - 2, 51 + 74 + 2]
+    assert [t.start.cost for t in own.compared(tracks)] == [50 + 73, 51 + 74]
     assert seen == [2, 2, 2]
 
 

@@ -11,13 +11,12 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.hypothesis import Hypothesis
-from tracker.geometry.arrays import Array
 from tracker.initialization.generators.axis_start import search_on_axes
 from tracker.initialization.generators.body_axis import BodyAxis, find_body_axes
 from tracker.initialization.generators.person_scene import PersonScene, silhouette_axes
 from tracker.initialization.generators.silhouette_overlap import SilhouetteOverlap
-from tracker.initialization.generators.stature import UPRIGHT, height_of_parts, possible_parts, standing_height
-from tracker.initialization.generators.voxel_start import facing_nats, start_pose, turned_round
+from tracker.initialization.generators.stature import height_of_parts, possible_parts, standing_height
+from tracker.initialization.generators.voxel_start import start_pose, turned_round
 from tracker.voxels.part_size import principal_axes
 
 _AXES_TRIED = 3
@@ -41,14 +40,10 @@ def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Hy
         height_m = None if is_known else height_of_parts(scene, parts)
         own = model if height_m is None else model.with_height(height_m)
         is_measured = is_known or height_m is not None
-        for sign, own_parts in ((1.0, parts), (-1.0, turned_round(parts))):
-            notes = (
-                *_listed("not resolved by the voxels, which show them as one with the body", own_parts.unresolved),
-                *_listed("straight, with the middle joint by usual proportions", own_parts.straight),
-            )
-            body = PosedBody(own, start_pose(own, own_parts))
-            facing = sign * parts.facing
-            starts.append(Hypothesis(body, "voxels", np.inf, None, facing, is_measured, notes))
+        for facing in (parts, turned_round(parts)):
+            notes = _listed("not resolved by the voxels, which show them as one with the body", facing.unresolved)
+            body = PosedBody(own, start_pose(own, facing))
+            starts.append(Hypothesis(body, "voxels", is_measured=is_measured, notes=notes))
     return starts
 
 
@@ -89,11 +84,6 @@ GENERATORS: dict[str, StartGenerator] = {"voxels": from_voxels, "axis": from_axi
 """Each generator by name, in the order of their cost, in which they are tried."""
 
 
-def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:
-    """Return the direction from the feet upwards, (3,): a standing person's soles are on the ground, bent or not."""
-    return scene.up if axis.up @ scene.up > UPRIGHT else axis.up
-
-
 def _on_axes(
     generator: str, scene: PersonScene, model: BodyModel, axes: Sequence[BodyAxis], is_measured: bool
 ) -> list[Hypothesis]:
@@ -102,7 +92,6 @@ def _on_axes(
     return [
         replace(
             start, source=generator,
-            facing_nats=facing_nats(scene.figure, start.forward, _feet_up(scene, axis), scene.motion),
             is_measured=is_measured, notes=_listed("the axis contradicts the others in view", axis.left_out),
         )
         for start, axis in search_on_axes(model, overlap, axes, scene.up)
