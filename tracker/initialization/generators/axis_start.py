@@ -5,17 +5,16 @@ ones given the others. The best twists are refined, trunk and limbs in turn, at 
 """
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import chain_poses
-from tracker.body.limbs import Limb, limbs
+from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.gauss_newton import fit_to_points, value_mask
 from tracker.fitting.hypothesis import Hypothesis, distinct
-from tracker.fitting.limb_exchange import exchanged, paired_limbs
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.initialization.generators.body_axis import SHOULDERS, BodyAxis
@@ -37,61 +36,36 @@ _N_FINER = 64
 """Poses that are tried around the best one of trunk and of each limb in each round, a power of two."""
 _TRUNK_SHARE, _TRUNK_M = 0.5, 0.10
 """Spread of the trunk's directions as a share of that of the limbs, and of its place, metres per rad."""
-_N_SEARCHED, _N_KEPT = 12, 5
-"""Twists that are searched on, and starts that are returned of those that face any way."""
-_N_EXCHANGED = 3
-"""Starts whose legs and whose arms are exchanged too: a leg before the other is easily taken for it."""
-_DOWNWARDS = 1.1
-"""Factor on the cost of a body with the head at the lower end of its axis."""
-AxisStart: TypeAlias = tuple[Hypothesis, BodyAxis]
-"""A start on an axis of the body; its cost is that against the silhouettes, see `SilhouetteOverlap`."""
+_N_SEARCHED = 6
+"""Twists of those that face each way that are searched on: a body looks nearly the same from behind."""
 
 
-def search_on_axes(
-    model: BodyModel, overlap: SilhouetteOverlap, axes: Sequence[BodyAxis], up: Array
-) -> list[AxisStart]:
-    """Return start poses of a body on one of some axes, the cheapest first, one that faces the other way among them.
+def search_on_axes(model: BodyModel, overlap: SilhouetteOverlap, axes: Sequence[BodyAxis]) -> list[Hypothesis]:
+    """Return distinct starts of a body on one of some axes, the best first; costs are those of `SilhouetteOverlap`.
 
     Args:
         model: the body.
         overlap: with the silhouettes of the person.
         axes: places of the head that are tried; at least one.
-        up: vertical axis of the world, (3,). A body upside down must fit better than one that is upright.
     """
-    limb_search = _Search(model, overlap)
-    pairs = paired_limbs(limbs(model))
-
-    def found(pose: Array, cost: float, axis: BodyAxis) -> AxisStart:
-        return Hypothesis(PosedBody(model, pose), "axis", cost * (_DOWNWARDS if axis.up @ up < 0 else 1.0)), axis
-
-    def refined(start: AxisStart) -> AxisStart:
-        return found(*limb_search.refined(start[0].pose), start[1])
-
-    coarse = sorted((found(*at, axis) for axis in axes for at in _coarse(limb_search, axis)), key=_cost)
-    # A body looks nearly the same from behind: the best twists that face the other way are searched on too.
-    chosen = coarse[:_N_SEARCHED]
-    chosen += [s for s in coarse[_N_SEARCHED:] if s[0].faces_away_from(coarse[0][0])][:2]
-    starts = sorted(map(refined, chosen), key=_cost)
-    for start, axis in starts[:_N_EXCHANGED]:
-        starts += [refined((start.at(exchanged(start.body, pair)), axis)) for pair in pairs]
-    axis_of = {id(start): axis for start, axis in starts}
-    first, *others = [(start, axis_of[id(start)]) for start in distinct([start for start, _ in starts])]
-    kept = [first, *others[: _N_KEPT - 1]]
-    if not any(s.faces_away_from(first[0]) for s, _ in kept):
-        kept += [s for s in others[_N_KEPT - 1 :] if s[0].faces_away_from(first[0])][:1]
-    return kept
+    search = _Search(model, overlap)
+    coarse = sorted((h for axis in axes for h in _coarse(search, axis)), key=lambda h: h.cost)
+    ways = [[h for h in coarse if h.faces_away_from(coarse[0]) is away][:_N_SEARCHED] for away in (False, True)]
+    found = []
+    for start in (h for way in ways for h in way):
+        pose, cost = search.refined(start.pose)
+        found.append(replace(start.at(pose), cost=cost))
+    return distinct(found)
 
 
-def _cost(start: AxisStart) -> float:
-    return start[0].cost
-
-
-def _coarse(limb_search: "_Search", axis: BodyAxis) -> list[tuple[Array, float]]:
-    """Return for each twist on an axis the best pose among a few, and its cost."""
+def _coarse(search: "_Search", axis: BodyAxis) -> list[Hypothesis]:
+    """Return for each twist on an axis the best pose among a few."""
+    notes = (f"the axis contradicts the others in view {', '.join(axis.left_out)}",) if axis.left_out else ()
     found, near = [], None
     for i in range(_N_TWISTS):
-        near = _trunk(limb_search.model, axis, _frame(axis.up, 2 * np.pi * i / _N_TWISTS), near)
-        found.append(limb_search.limbs_placed(near))
+        near = _trunk(search.model, axis, _frame(axis.up, 2 * np.pi * i / _N_TWISTS), near)
+        pose, cost = search.limbs_placed(near)
+        found.append(Hypothesis(PosedBody(search.model, pose), cost=cost, notes=notes))
     return found
 
 

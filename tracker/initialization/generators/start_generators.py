@@ -41,7 +41,8 @@ def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Hy
         own = model if height_m is None else model.with_height(height_m)
         is_measured = is_known or height_m is not None
         for facing in (parts, turned_round(parts)):
-            notes = _listed("not resolved by the voxels, which show them as one with the body", facing.unresolved)
+            listed = ", ".join(n.replace("_", " ") for n in facing.unresolved)
+            notes = (f"not resolved by the voxels, which show them as one with the body: {listed}",) if listed else ()
             body = PosedBody(own, start_pose(own, facing))
             starts.append(Hypothesis(body, "voxels", is_measured=is_measured, notes=notes))
     return starts
@@ -89,14 +90,5 @@ def _on_axes(
 ) -> list[Hypothesis]:
     masks, cameras = zip(*scene.clear_views, strict=True)
     overlap = SilhouetteOverlap(model, masks, cameras, scene.figure.points_world.mean(axis=0))
-    return [
-        replace(
-            start, source=generator,
-            is_measured=is_measured, notes=_listed("the axis contradicts the others in view", axis.left_out),
-        )
-        for start, axis in search_on_axes(model, overlap, axes, scene.up)
-    ]  # fmt: skip
-
-
-def _listed(text: str, names: Sequence[str]) -> tuple[str, ...]:
-    return (f"{text}: {', '.join(n.replace('_', ' ') for n in names)}",) if names else ()
+    starts = search_on_axes(model, overlap, axes)
+    return [replace(start, source=generator, is_measured=is_measured) for start in starts]
