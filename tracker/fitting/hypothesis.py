@@ -18,6 +18,8 @@ from tracker.geometry.arrays import Array, IntArray
 SAME_POSE_M = 0.10
 """Two poses are the same if no point of the body is farther apart, metres: the width of a limb. Contours nearer than
 that overlap, so that refinement leads from one pose to the other."""
+SETTLED_M = 0.01
+"""A pose has settled if no point of the body moves farther, metres: a third of the mean error of tracked joints."""
 CLEAR_NATS = 3.0
 """Difference of the costs from which one hypothesis is clearly better, nats: it is then about 20 times more likely."""
 

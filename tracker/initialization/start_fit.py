@@ -92,8 +92,12 @@ class StartFitter:
 
     def compared(self, tracks: Sequence[StartTrack]) -> list[StartTrack]:
         """Return tracks with the sums of their costs over all frames, on common evidence, the best first."""
-        costs = sum(
-            self._costs(frame, [PosedBody(t.start.model, t.poses[frame]) for t in tracks]) for frame in tracks[0].poses
+        costs = np.sum(
+            [
+                self._costs(frame, [PosedBody(t.start.model, t.poses[frame]) for t in tracks])
+                for frame in tracks[0].poses
+            ],
+            axis=0,
         )
         scored = [t._replace(start=replace(t.start, cost=c)) for t, c in zip(tracks, costs, strict=True)]
         return sorted(scored, key=lambda t: t.start.cost)

@@ -23,10 +23,6 @@ from tracker.tracking.estimation.settings import MAX_ITERATIONS, OWN_TRUST, TOLE
 _N_SAMPLES = 16
 _SCALE = 2.0
 """Factor of the standard deviations. Refinement leads smaller steps back to where they began."""
-_FREE = 3.0
-"""Factor of the standard deviations of a refinement, with which its start hardly counts in the covariance."""
-_MAX_STEP = 1.2
-"""Largest change of a degree of freedom, rad or metres. It limits degrees of freedom that no contour determines."""
 
 
 def search_along_covariance(
@@ -71,13 +67,12 @@ def _blocks(scorer: PoseScorer, held: PosePrior) -> list[ResidualBlock]:
 def _samples(model: BodyModel, pose: Array, scorer: PoseScorer, sigma: Array, draw: int = 0) -> Sequence[Array]:
     """Return poses drawn around a pose, (n_values,) each."""
     free = np.flatnonzero(np.ones(model.n_dofs, dtype=bool) if scorer.active_dofs is None else scorer.active_dofs)
-    blocks = _blocks(scorer, PosePrior(pose, 1 / (_FREE * sigma)))
+    blocks = _blocks(scorer, PosePrior(pose, 1 / sigma))
     around = solver_of(model)(model, pose, blocks, scorer.active_dofs, 0)
     # Steps with the inverse Hessian as covariance. Its eigenvalues would take a hundred times as long.
     factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])
     steps = np.zeros((_N_SAMPLES, model.n_dofs))
-    drawn = _SCALE * np.linalg.solve(factor.T, _normal(_N_SAMPLES, len(free), draw).T).T
-    steps[:, free] = np.clip(drawn, -_MAX_STEP, _MAX_STEP)
+    steps[:, free] = _SCALE * np.linalg.solve(factor.T, _normal(_N_SAMPLES, len(free), draw).T).T
     return [model.clip(model.retract(pose, step)) for step in steps]
 
 

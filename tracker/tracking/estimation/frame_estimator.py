@@ -8,8 +8,6 @@ cheapest refined pose wins.
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import Limb, limb_display_name
 from tracker.body.model import PosedBody
@@ -18,7 +16,7 @@ from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton import Fit, with_locked_dofs
-from tracker.fitting.hypothesis import SAME_POSE_M, distance_m, limbs_elsewhere
+from tracker.fitting.hypothesis import SAME_POSE_M, SETTLED_M, distance_m, limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.assessment import PersonEstimate, assess, estimate_fixed, finalize
 from tracker.tracking.estimation.covariance_search import search_along_covariance
@@ -30,15 +28,13 @@ from tracker.tracking.estimation.frame_problem import (
     with_body,
 )
 from tracker.tracking.estimation.identity_swaps import identity_swaps
-from tracker.tracking.estimation.limb_recovery import for_several, search_limbs
+from tracker.tracking.estimation.limb_recovery import search_limbs
 from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
 
 _MAX_LIMBS = 2
 """Number of limbs of a person that are searched in a frame, the most likely lost first."""
-_OTHERS_MOVED_M, _SELF_MOVED_M = 0.002, 0.01
-"""A person is refined again where another, or they themselves, moved farther since, metres."""
 
 
 class FrameEstimator:
@@ -110,9 +106,8 @@ class FrameEstimator:
         for _ in range(self.settings.rounds if len(self.bodies) > 1 else 0):
             done = True
             for person, before in fits.items():
-                limits = np.where(np.arange(len(self.bodies)) == person, _SELF_MOVED_M, _OTHERS_MOVED_M)
-                pairs = zip(before.bodies, self.bodies, limits, strict=True)
-                if not all(distance_m(then, now) < limit for then, now, limit in pairs):
+                pairs = zip(before.bodies, self.bodies, strict=True)
+                if not all(distance_m(then, now) < SETTLED_M for then, now in pairs):
                     fits[person] = self.move(person, self.problem.refine(person, self.bodies, before))
                     done = False
             if done:
@@ -175,7 +170,7 @@ class FrameEstimator:
             return found
         scorer = PoseScorer.of(
             residuals, priors, Colors(own, *problem.around(person, bodies)), memory.part_colors,
-            recover if len(bodies) == 1 else for_several(recover), memory.active_dofs,
+            recover, memory.active_dofs,
         )  # fmt: skip
         notes, evaluations = list[str](), 0
         searched = self._search_body(person, fit, scorer) if quality.is_body_lost else None
@@ -183,10 +178,11 @@ class FrameEstimator:
             evaluations, fit = searched
             notes.append("body searched")
         others = (memory.history[-1], problem.people[person].predicted)
-        best, *alternatives = search_limbs(model, limbs, scorer.scored(model, fit), others, scorer)
+        start = scorer.scored(model, fit)
+        best, *alternatives = search_limbs(model, limbs, start, others, scorer)
         relocated = limbs_elsewhere(PosedBody(model, fit.pose), best.body)
         for limb in limbs:
-            memory.record_search(limb, quality, limb.name in relocated)
+            memory.record_search(limb, quality, best is not start)
             if limb.name in relocated:
                 notes.append(f"{limb_display_name(limb.name)} relocated")
         if samples:

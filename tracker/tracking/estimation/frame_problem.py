@@ -17,7 +17,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals, PartCosts
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solver_of
-from tracker.fitting.hypothesis import Hypothesis, distance_m
+from tracker.fitting.hypothesis import SETTLED_M, Hypothesis, distance_m
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import PoseQuality
@@ -30,9 +30,6 @@ from tracker.tracking.estimation.settings import (
     trust,
 )
 from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
-
-_SAME_ASSIGNMENT_M = 0.01
-"""Evidence is assigned again where a person has moved farther, metres."""
 
 _ROUNDING_PX2 = 1 / 12
 """Variance of rounding to whole pixels, px^2."""
@@ -255,7 +252,7 @@ def with_body(bodies: Bodies, person: int, body: PosedBody) -> Bodies:
 
 def _are_near(before: Sequence[PosedBody], now: Sequence[PosedBody]) -> bool:
     """Return whether evidence assigned to people in some poses may be used for others."""
-    return all(distance_m(a, b) < _SAME_ASSIGNMENT_M for a, b in zip(before, now, strict=True))
+    return all(distance_m(a, b) < SETTLED_M for a, b in zip(before, now, strict=True))
 
 
 def penetration(bodies: Bodies, person: int, settings: EstimationSettings) -> list[ResidualBlock]:

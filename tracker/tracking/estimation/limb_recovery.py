@@ -8,7 +8,6 @@ beam search.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -22,22 +21,11 @@ from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import BEAM_NATS, CLEAR_NATS, SAME_POSE_M, Hypothesis, apart, distinct
 from tracker.geometry.arrays import Array, IntArray
+from tracker.search.even_points import even_points
 from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, RecoverSettings
 
 T = TypeVar("T")
-
-
-def for_several(settings: RecoverSettings) -> RecoverSettings:
-    """Return the settings for one of several people, with about half the work in each search.
-
-    Limbs of people who occlude each other are searched several times as often, and a person who is found is refined
-    again with the others.
-    """
-    return replace(
-        settings, scored=min(32, settings.scored), restart_per_candidate=False, min_decrease=MIN_DECREASE,
-        refine_margin=10.0,
-    )  # fmt: skip
 
 
 def search_limbs(
@@ -63,12 +51,8 @@ def search_limbs(
     beam = [start]
     for limb in limbs:
         beam = [x for x in beam if x.cost < beam[0].cost + BEAM_NATS]
-        last = limb is limbs[-1]
-        max_cost = beam[0].cost + (settings.refine_margin if last else max(settings.refine_margin, BEAM_NATS))
         away = [p for x in limbs if x is not limb for p in x.parts]
-        poses = [x.pose for x in beam]
-        groups = [[pose] for pose in poses] if settings.restart_per_candidate else [poses]
-        found = [x for group in groups for x in _search_limb(model, limb, away, group, others, scorer, max_cost)]
+        found = _search_limb(model, limb, away, beam, others, scorer)
         beam = distinct([*beam, *found], settings.beam_width)
     best = beam[0] if beam[0].cost < start.cost - CLEAR_NATS else start
     rest = [x for x in (*beam, start) if x is not best and x.cost < best.cost + CLEAR_NATS]
@@ -76,8 +60,8 @@ def search_limbs(
 
 
 def _search_limb(
-    model: BodyModel, limb: Limb, away: list[int], beam: Sequence[Array], others: Sequence[Array], scorer: PoseScorer,
-    max_cost: float,
+    model: BodyModel, limb: Limb, away: list[int], beam: Sequence[Hypothesis], others: Sequence[Array],
+    scorer: PoseScorer,
 ) -> list[Hypothesis]:  # fmt: skip
     """Return the best poses of one limb, refined with the whole body.
 
@@ -85,27 +69,27 @@ def _search_limb(
         model: the body.
         limb: the limb to search.
         away: indices of parts that occlude nothing while poses are ranked: those of other lost limbs.
-        beam: poses of the body, (n_values,) each. They differ in parts that are away. Places of the limb are ranked
-            around the first, and then scored with each.
+        beam: poses of the body, which differ in parts that are away. Places of the limb are ranked around the first,
+            and then scored with each.
         others: poses whose limb is tried as it is.
         scorer: compares poses.
-        max_cost: a pose whose limb, refined alone, costs as much is discarded.
     """
 
     def limb_only(scorer: PoseScorer, pose: Array) -> Hypothesis:
         return scorer.scored(model, solver_of(model)(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE))
 
     def whole_body(scorer: PoseScorer, pose: Array) -> Hypothesis:
-        min_decrease = scorer.settings.min_decrease
-        fit = solver_of(model)(model, pose, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, min_decrease)
-        return scorer.scored(model, fit)
+        dofs = scorer.active_dofs
+        return scorer.scored(
+            model, solver_of(model)(model, pose, scorer.blocks, dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+        )
 
     of_limb = scorer.restricted_to(limb)
-    poses = _candidates(model, limb, away, beam[0], others, of_limb)
+    poses = _candidates(model, limb, away, beam[0].pose, others, of_limb)
     if len(beam) > 1:
-        poses = np.array([*poses, *(_with_limb(model, k, pose, limb) for k in beam[1:] for pose in poses)])
+        poses = np.array([*poses, *(_with_limb(model, k.pose, pose, limb) for k in beam[1:] for pose in poses)])
         poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: scorer.settings.n_limb_refined]]
-    tried = [x for x in of_limb.each(limb_only, poses) if x.cost < max_cost]
+    tried = [x for x in of_limb.each(limb_only, poses) if x.cost < beam[0].cost + BEAM_NATS]
     return scorer.each(whole_body, [x.pose for x in distinct(tried, scorer.settings.n_refined)])
 
 
@@ -118,18 +102,13 @@ def _candidates(
     proposals = _proposals(model, limb, here, settings)
     scores = np.concatenate(_map_split(score, proposals))
     best = _best_apart(model, limb, proposals, scores, settings.n_local_search)
-    dofs, n_rounds = np.flatnonzero(limb.dofs), len(settings.perturbations_rad)
+    dofs = np.flatnonzero(limb.dofs)
     # Each pose improves by itself, so that threads do not wait for one another between rounds.
-    for rounds in (range(n_rounds // 2), range(n_rounds // 2, n_rounds)):
-        steps = [
-            np.random.default_rng(i).normal(
-                0.0, settings.perturbations_rad[i], (len(best), settings.perturbations, len(dofs))
-            )
-            for i in rounds
-        ]
-        improved = _map_split(lambda *share: _perturbed(model, dofs, score, *share), best, *steps)
-        best, scores = (np.concatenate(x) for x in zip(*improved, strict=True))
-        best = best[np.sort(np.argsort(-scores, kind="stable")[: settings.scored])]
+    rounds = [
+        np.random.default_rng(i).normal(0.0, spread, (len(best), settings.perturbations, len(dofs)))
+        for i, spread in enumerate(settings.perturbations_rad)
+    ]
+    best = np.concatenate(_map_split(lambda *share: _perturbed(model, dofs, score, *share), best, *rounds))
     best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
     return _best_apart(model, limb, best, -scorer.costs(best), settings.n_limb_refined)
 
@@ -170,7 +149,7 @@ def _with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Arr
 def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSettings) -> Array:
     """Return poses with the limb elsewhere, (n, n_values): every other one nearby, the rest within the joint limits."""
     dofs = np.flatnonzero(limb.dofs)
-    even, normal = _even(settings.proposals, len(dofs))
+    even, normal = even_points(settings.proposals, len(dofs))
     low, high = model.limits[dofs].T
     low, high = np.maximum(low, -np.pi), np.minimum(high, np.pi)
     now = model.difference(values, model.neutral())[dofs]
@@ -190,8 +169,8 @@ def _map_split(work: Callable[..., T], *arrays: Array) -> list[T]:
 
 def _perturbed(
     model: BodyModel, dofs: IntArray, score: Callable[[Array], Array], poses: Array, *rounds: Array
-) -> tuple[Array, Array]:
-    """Improve poses by random perturbation: in each round each pose takes its best step, or none.
+) -> Array:
+    """Improve poses, (n, n_values), by random perturbation: in each round each takes its best step, or none.
 
     Args:
         model: the body.
@@ -199,19 +178,14 @@ def _perturbed(
         score: returns the scores of poses, (n,).
         poses: (n, n_values).
         rounds: steps of each round, (n, n_steps, len(dofs)).
-
-    Returns:
-        The poses, (n, n_values), and their scores, (n,).
     """
-    scores = np.empty(0) if rounds else score(poses)
     for steps in rounds:
         (n, n_steps), n_values = steps.shape[:2], poses.shape[1]
         moved = _moved(model, np.repeat(poses, n_steps, axis=0), dofs, steps.reshape(n * n_steps, len(dofs)))
         around = np.concatenate([poses[:, None], moved.reshape(n, n_steps, n_values)], axis=1)
-        of_each = score(around.reshape(n * (1 + n_steps), n_values)).reshape(n, 1 + n_steps)
-        at = np.arange(n), of_each.argmax(axis=1)
-        poses, scores = around[at], of_each[at]
-    return poses, scores
+        scores = score(around.reshape(n * (1 + n_steps), n_values)).reshape(n, 1 + n_steps)
+        poses = around[np.arange(n), scores.argmax(axis=1)]
+    return poses
 
 
 def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Array:
@@ -223,14 +197,3 @@ def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Arra
     changes = np.zeros((len(poses), model.n_dofs))
     changes[:, dofs] = steps
     return np.array([model.clip(model.retract(pose, change)) for pose, change in zip(poses, changes, strict=True)])
-
-
-@lru_cache(maxsize=16)
-def _even(n: int, dims: int) -> tuple[Array, Array]:
-    """Return points that fill the unit cube evenly, (n, dims), and the same normally distributed (Sobol sequence)."""
-    # Imported lazily: these take 0.3 s to load.
-    from scipy.special import ndtri
-    from scipy.stats import qmc
-
-    even = np.asarray(qmc.Sobol(dims, seed=7).random(n))
-    return even, np.asarray(ndtri(0.002 + 0.996 * even))

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis, distance_m, distinct
+from tracker.fitting.hypothesis import CLEAR_NATS, SETTLED_M, Hypothesis, distance_m, distinct
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.pose_score import PoseScorer
 
@@ -21,8 +21,6 @@ ROUNDS = 2
 """How often candidates are propagated forward through all frames and back."""
 _MAX_CANDIDATES = 12
 """Candidates that are kept on a frame."""
-_SAME_M = 0.01
-"""A refinement of a pose that a pass found is another candidate if some point moved farther, metres."""
 _ACCELERATION_SIGMA_M = 0.05
 """Standard deviation of a point from its straight continuation over two frames, metres. Half of it is pose error."""
 _MAX_ACCELERATION_COST = 20.0
@@ -68,7 +66,7 @@ class Candidates:
     def add(self, poses: Array, scorer: PoseScorer) -> None:
         """Add poses, (n, n_values), that differ from those that were found, and discard the most expensive ones."""
         found, others = self.hypotheses[: self._n_found], self.hypotheses[self._n_found :]
-        new = [h for h in self._scored(poses, scorer) if min(distance_m(h.body, f.body) for f in found) > _SAME_M]
+        new = [h for h in self._scored(poses, scorer) if min(distance_m(h.body, f.body) for f in found) > SETTLED_M]
         self.hypotheses = [*found, *distinct([*others, *new], _MAX_CANDIDATES - self._n_found)]
 
     def alternatives(self, chosen: int) -> list[Array]:

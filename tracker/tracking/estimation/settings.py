@@ -35,9 +35,7 @@ class RecoverSettings:
     reach_rad: float = float(np.radians(35))
     """Spread of the proposals around the pose, rad; the other half fill the joint limits."""
     n_local_search: int = 48
-    """Proposals that are improved by random perturbation."""
-    scored: int = 48
-    """Proposals that go through all rounds, and whose contours are scored."""
+    """Proposals that are improved by random perturbation, and whose contours are scored."""
     perturbations: int = 16
     """Steps tried around each proposal in a round."""
     perturbations_rad: tuple[float, ...] = tuple(np.radians([16.0, 11.0, 7.0, 4.0]).tolist())
@@ -48,17 +46,10 @@ class RecoverSettings:
     """Proposals that are refined with the whole body."""
     beam_width: int = 3
     """Poses that are kept while the next limb is searched."""
-    restart_per_candidate: bool = True
-    """Whether the next limb is searched from each of them; else once, and its places are scored with each."""
-    min_decrease: float = 0.0
-    """Smallest decrease of the cost for another iteration with the whole body."""
     colors: float = 0.2
     """Weight of the colours against edges. Neighbouring pixels are correlated, so it is well below 1."""
     trust_rad: float = 1.0
     """Standard deviation of the prediction of a limb that seems lost, rad: nearly none."""
-    refine_margin: float = np.inf
-    """Largest excess cost (nats) of a proposal whose limb is refined alone, to be refined with the whole body; at least
-    the margin where another limb follows."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import ResidualBlock
-from tracker.fitting.hypothesis import distance_m
+from tracker.fitting.hypothesis import SAME_POSE_M, distance_m
 from tracker.fitting.limb_exchange import exchanged, paired_limbs
 from tracker.tracking.estimation.assessment import PersonEstimate, estimate_at
 from tracker.tracking.estimation.covariance_search import search_along_covariance
@@ -28,9 +28,8 @@ from tracker.tracking.person_memory import PersonMemory
 
 _START_RAD, _START_M = 0.35, 0.15
 """Standard deviation of a start placed by hand, rad and metres: about twice the error that people leave."""
-_MAX_ROUNDS = 4
-_SETTLED_M = 0.01
-"""The search ends where nobody moves farther in a round, metres."""
+MAX_ROUNDS = 2
+"""Largest number of rounds of a search, each with the evidence around the poses of the one before."""
 
 
 class StartFrame(NamedTuple):
@@ -75,11 +74,11 @@ def settle_starts(
     if not doubted or not any(len(v.points_px) for v in first.views):
         return {}
     wide, bodies = roughly_known(settings), start
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         problem, last = FrameProblem(observe(bodies), known, wide), bodies
         for person in doubted:
             bodies = with_body(bodies, person, search_start(problem, person, bodies, memories[person]))
-        if all(distance_m(a, b) < _SETTLED_M for a, b in zip(last, bodies, strict=True)):
+        if all(distance_m(a, b) < SAME_POSE_M for a, b in zip(last, bodies, strict=True)):
             break
     found = FrameProblem(observe(bodies), known, wide)
     return {p: bodies[p] for p in doubted if _contradiction(estimate_at(found, p, bodies)) <= _contradiction(before[p])}

@@ -12,8 +12,9 @@ from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.formats.model_toml import load_model
+from tracker.search.even_points import even_points
 from tracker.tracking.estimation import limb_recovery
-from tracker.tracking.estimation.limb_recovery import for_several, search_limbs
+from tracker.tracking.estimation.limb_recovery import search_limbs
 from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import RecoverSettings
 
@@ -101,8 +102,7 @@ def test_a_lost_leg_is_found(gavrila):
     assert staged.off_m(staged.search(leg), leg.parts) < 0.03
 
 
-@pytest.mark.parametrize("settings", [RecoverSettings(), for_several(RecoverSettings())])
-def test_limbs_that_are_lost_together(gavrila, settings):
+def test_limbs_that_are_lost_together(gavrila):
     """An arm on a leg that went elsewhere: neither finds its place while the other is in the way."""
     n_found = 0
     for seed in (1, 2, 3):
@@ -111,67 +111,38 @@ def test_limbs_that_are_lost_together(gavrila, settings):
         staged = Staged(gavrila, truth, wrong)
         suspects = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")]
         assert all(staged.off_m(staged.here, x.parts) > 0.15 for x in suspects)
-        scorer = replace(staged.scorer, settings=settings)
-        found = search_limbs(gavrila, suspects, staged.here, (), scorer)[0]
+        found = search_limbs(gavrila, suspects, staged.here, (), staged.scorer)[0]
         n_found += all(staged.off_m(found, x.parts) < 0.03 for x in suspects)
     assert n_found >= 2
 
 
-def test_for_several_places_are_looked_for_once(gavrila, monkeypatch):
-    """However many poses the first limb leaves; from each of them where there is one person."""
+def test_places_are_looked_for_once_for_each_limb(gavrila, monkeypatch):
+    """However many poses the first limb leaves."""
     truth, looked = posed(gavrila, 1), []
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
     candidates = limb_recovery._candidates
     monkeypatch.setattr(limb_recovery, "_candidates", lambda *a: looked.append(a) or candidates(*a))
     monkeypatch.setattr(limb_recovery, "BEAM_NATS", 1e6)
-    suspects, n_looked = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")], []
-    for settings in (RecoverSettings(), for_several(RecoverSettings())):
-        looked.clear()
-        staged.scorer = replace(staged.scorer, settings=settings)
-        found = search_limbs(gavrila, suspects, staged.here, (), staged.scorer)[0]
-        assert staged.off_m(found, suspects[0].parts) < 0.03
-        n_looked.append(len(looked))
-    assert n_looked[0] > n_looked[1] == 2
+    suspects = [limb_of(gavrila, n) for n in ("left_forearm", "left_calf")]
+    found = search_limbs(gavrila, suspects, staged.here, (), staged.scorer)[0]
+    assert staged.off_m(found, suspects[0].parts) < 0.03
+    assert len(looked) == 2
 
 
-def test_the_whole_body_is_refined_only_with_what_comes_near_the_best(gavrila, monkeypatch):
+def test_the_whole_body_is_refined_only_with_poses_near_the_best(gavrila, monkeypatch):
     truth, n_refined = posed(gavrila, 1), []
     staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
     each = PoseScorer.each
     monkeypatch.setattr(
         PoseScorer, "each", lambda self, work, poses: n_refined.append(len(poses)) or each(self, work, poses)
     )
-    arm, leg = (limb_of(gavrila, n) for n in ("left_forearm", "left_calf"))
-
-    def refined(limbs, **settings):
-        """Whether poses were refined, the limb alone and the whole body, limb by limb; whether the arm was found."""
+    arm = limb_of(gavrila, "left_forearm")
+    for beam, is_refined in ((40.0, True), (-np.inf, False)):
         n_refined.clear()
-        scorer = replace(staged.scorer, settings=replace(for_several(RecoverSettings()), **settings))
-        best = search_limbs(gavrila, limbs, staged.here, (), scorer)[0]
-        return [n > 0 for n in n_refined], staged.off_m(best, arm.parts) < 0.03
-
-    assert refined([arm]) == ([True, True], True)
-    assert refined([arm], refine_margin=-np.inf) == ([True, False], False)
-    # What one limb leaves may be made good by the next.
-    assert refined([arm, leg], refine_margin=-np.inf) == ([True, True, True, False], True)
-    # Of somebody alone nothing is left out, whatever the limb: three of a leg that stands where it should.
-    monkeypatch.setattr(limb_recovery, "BEAM_NATS", 1e-6)
-    refined([leg, arm], refine_margin=np.inf)
-    assert n_refined[1] == RecoverSettings().n_refined
-
-
-def test_the_best_places_are_perturbed_to_the_end(gavrila, monkeypatch):
-    """As many as are scored; before, all."""
-    truth, rows = posed(gavrila, 1), []
-    staged = Staged(gavrila, truth, turned(gavrila, truth, **LOST["60 degrees off"]))
-    improved = limb_recovery._perturbed
-    monkeypatch.setattr(limb_recovery, "_map_split", lambda work, *arrays: [work(*arrays)])
-    monkeypatch.setattr(limb_recovery, "_perturbed", lambda *a: rows.append([len(x) for x in a[3:]]) or improved(*a))
-    staged.scorer = replace(
-        staged.scorer, settings=RecoverSettings(n_local_search=24, scored=6, perturbations_rad=(0.2, 0.1, 0.1))
-    )
-    assert staged.off_m(staged.search(limb_of(gavrila, "left_forearm")), limb_of(gavrila, "left_forearm").parts) < 0.03
-    assert rows == [[24, 24], [6, 6, 6]]
+        monkeypatch.setattr(limb_recovery, "BEAM_NATS", beam)
+        found = limb_recovery._search_limb(gavrila, arm, [], [staged.here], (), staged.scorer)
+        assert [n > 0 for n in n_refined] == [True, is_refined]
+        assert bool(found) is is_refined
 
 
 def test_best_places_apart(gavrila):
@@ -237,7 +208,7 @@ def test_the_same_every_time(gavrila):
     wrong = turned(gavrila, truth, **LOST["60 degrees off"])
     twice = []
     for _ in range(2):
-        limb_recovery._even.cache_clear()  # as in another run of the program
+        even_points.cache_clear()  # as in another run of the program
         twice.append(Staged(gavrila, truth, wrong).search(limb_of(gavrila, "left_forearm")))
     np.testing.assert_array_equal(twice[0].pose, twice[1].pose)
     assert twice[0].cost == twice[1].cost
