@@ -85,9 +85,9 @@ def distance_m(one: PosedBody, other: PosedBody) -> float:
     return float(np.linalg.norm(one.points_world - other.points_world, axis=1).max())
 
 
-def limbs_elsewhere(one: PosedBody, other: PosedBody) -> tuple[str, ...]:
-    """Return the names of the limbs that are not the same in two poses."""
-    is_apart = np.linalg.norm(one.points_world - other.points_world, axis=1) > SAME_POSE_M
+def limbs_elsewhere(one: PosedBody, other: PosedBody, apart_m: float = SAME_POSE_M) -> tuple[str, ...]:
+    """Return the names of the limbs of which a point is farther apart in two poses."""
+    is_apart = np.linalg.norm(one.points_world - other.points_world, axis=1) > apart_m
     parts = set(one.model.point_parts[is_apart].tolist())
     return tuple(limb.name for limb in limbs(one.model) if not parts.isdisjoint(limb.parts.tolist()))
 

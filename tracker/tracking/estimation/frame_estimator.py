@@ -180,14 +180,14 @@ class FrameEstimator:
         others = (memory.history[-1], problem.people[person].predicted)
         start = scorer.scored(model, fit)
         best, *alternatives = search_limbs(model, limbs, start, others, scorer)
-        relocated = limbs_elsewhere(PosedBody(model, fit.pose), best.body)
+        moved, relocated = (limbs_elsewhere(start.body, best.body, m) for m in (SETTLED_M, SAME_POSE_M))
         for limb in limbs:
-            memory.record_search(limb, quality, best is not start)
+            memory.record_search(limb, quality, limb.name in moved)
             if limb.name in relocated:
                 notes.append(f"{limb_display_name(limb.name)} relocated")
         if samples:
             sampled = search_along_covariance(model, best, scorer, problem.sigma(person))
-            memory.record_sampling(distance_m(sampled.body, best.body) > SAME_POSE_M)
+            memory.record_sampling(distance_m(sampled.body, best.body) > SETTLED_M)
             best = sampled
         assert best.fit is not None
         return found._replace(
