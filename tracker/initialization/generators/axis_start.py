@@ -28,6 +28,7 @@ from tracker.initialization.generators.silhouette_overlap import SilhouetteOverl
 
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _N_TWISTS = 12
+"""Twists about the axis that are tried, 30 degrees apart."""
 _N_AGAIN, _SWEEPS = 256, 2
 """Poses of a limb that are tried again after the other limbs are known, and how often."""
 _FINER_RAD = tuple(np.radians([40.0, 30.0, 20.0, 15.0, 10.0, 8.0, 6.0, 4.0, 3.0]).tolist())

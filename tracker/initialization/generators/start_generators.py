@@ -20,6 +20,7 @@ from tracker.initialization.generators.voxel_start import start_pose, turned_rou
 from tracker.voxels.part_size import principal_axes
 
 _AXES_TRIED = 3
+"""Places of the head along the axis that are tried, the best first."""
 _RAISED = (0.0, 0.10, 0.20)
 """Tops of the head that a search tries, below the end of the figure, as fractions of the height: hands may be above."""
 

@@ -21,6 +21,7 @@ from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE
 
 _N_SAMPLES = 16
+"""Poses that are drawn and refined in a search."""
 _SCALE = 2.0
 """Factor of the standard deviations. Refinement leads smaller steps back to where they began."""
 
