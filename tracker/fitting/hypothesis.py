@@ -12,7 +12,7 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.jit import njit
-from tracker.fitting.gauss_newton import Fit, covariance
+from tracker.fitting.gauss_newton import Fit
 from tracker.geometry.arrays import Array, IntArray
 
 SAME_POSE_M = 0.10
@@ -38,7 +38,7 @@ class Hypothesis:
     cost: float = np.inf
     """Negative logarithm of its likelihood, nats, up to a constant of the evidence; infinite before it is known."""
     fit: Fit | None = None
-    """The fit that refined it; None if it is a proposal."""
+    """The fit that refined it, of which `gauss_newton.covariance` is the covariance; None if it is a proposal."""
     is_measured: bool = True
     """Whether the height of the body was measured, or was known."""
     notes: tuple[str, ...] = ()
@@ -58,11 +58,6 @@ class Hypothesis:
     def pose(self) -> Array:
         """The pose, (n_values,)."""
         return self.body.values
-
-    @property
-    def covariance(self) -> Array | None:
-        """Covariance of the pose, (n_dofs, n_dofs), rad and metres; None before it is refined."""
-        return None if self.fit is None else covariance(self.model, self.fit)
 
     @property
     def forward(self) -> Array:

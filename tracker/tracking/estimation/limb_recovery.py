@@ -90,7 +90,7 @@ def _search_limb(
         poses = np.array([*poses, *(_with_limb(model, k.pose, pose, limb) for k in beam[1:] for pose in poses)])
         poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: scorer.settings.n_limb_refined]]
     tried = [x for x in of_limb.each(limb_only, poses) if x.cost < beam[0].cost + BEAM_NATS]
-    return scorer.each(whole_body, [x.pose for x in distinct(tried, scorer.settings.n_refined)])
+    return scorer.each(whole_body, [x.pose for x in distinct(tried, scorer.settings.beam_width)])
 
 
 def _candidates(

@@ -42,10 +42,8 @@ class RecoverSettings:
     """Their standard deviation, rad, round by round."""
     n_limb_refined: int = 10
     """Proposals whose limb is refined alone."""
-    n_refined: int = 3
-    """Proposals that are refined with the whole body."""
     beam_width: int = 3
-    """Poses that are kept while the next limb is searched."""
+    """Proposals that are refined with the whole body, and poses that are kept while the next limb is searched."""
     colors: float = 0.2
     """Weight of the colours against edges. Neighbouring pixels are correlated, so it is well below 1."""
     trust_rad: float = 1.0
