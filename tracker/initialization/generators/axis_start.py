@@ -1,7 +1,7 @@
 """Search the twist and the limbs of a body on its axis, coarse to fine, by the silhouettes (GD96 Sect. 4.1).
 
-At each of some twists the limbs are searched among poses spread over their joint limits, then again among the better
-ones given the others. The best twists are refined, trunk and limbs in turn, at ever smaller spreads.
+At each of some twists the limbs are searched among poses spread over their joint limits, one after the other. The best
+twists are refined, trunk and limbs in turn, at ever smaller spreads.
 """
 
 from collections.abc import Sequence
@@ -29,8 +29,6 @@ from tracker.initialization.generators.silhouette_overlap import SilhouetteOverl
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _N_TWISTS = 12
 """Twists about the axis that are tried, 30 degrees apart."""
-_N_AGAIN, _SWEEPS = 256, 2
-"""Poses of a limb that are tried again after the other limbs are known, and how often."""
 _FINER_RAD = tuple(np.radians([40.0, 30.0, 20.0, 15.0, 10.0, 8.0, 6.0, 4.0, 3.0]).tolist())
 """Spreads of the poses that are tried around the best one, rad, round by round."""
 _N_FINER = 64
@@ -84,17 +82,12 @@ class _Search:
         covered = self._overlap.nothing()
         Ts = model.kinematics(pose).Ts_world_part
         costs = 1 + self._overlap.cover(Ts[trunk], trunk, covered)
-        tried = []
         for limb, changes in zip(self._limbs, changes_within_limits(model), strict=True):
             poses = self._with_limb(pose, limb, model.clip(model.retract(model.neutral(), changes)))
             totals, view_costs = self._costs(pose, limb, poses, covered, costs)
-            order = np.argsort(totals)
-            pose, costs = poses[order[0]], view_costs[order[0]]
+            best = int(np.argmin(totals))
+            pose, costs = poses[best], view_costs[best]
             self._overlap.cover(model.kinematics(pose).Ts_world_part[limb.parts], limb.parts, covered)
-            tried.append(poses[order[:_N_AGAIN]])
-        for _ in range(_SWEEPS):
-            for limb, poses in zip(self._limbs, tried, strict=True):
-                pose, _ = self._best_of_limb(pose, limb, self._with_limb(pose, limb, poses))
         return pose, float(self._total(pose[None])[0])
 
     def refined(self, pose: Array) -> tuple[Array, float]:
