@@ -26,7 +26,7 @@ CLEAR_NATS = 3.0
 
 BEAM_NATS = 40.0
 """Difference of the costs up to which a hypothesis is kept for a later comparison, nats: more than another limb, or
-other frames, make up for. Starts that were 54 nats worse on one frame were 400 or more worse on seven."""
+other frames, make up for. Starts that were 54 nats worse on one frame were 380 or more worse on seven."""
 
 
 @dataclass(frozen=True, eq=False)
