@@ -25,8 +25,8 @@ def init_from_silhouettes(
         progress: says what was tried.
 
     Returns:
-        `frame` and `people`, a list of `person`, `method`, `height_m`, `status`, `cost_px`, `unresolved`, `straight`,
-        `facing_sure`, `notes`.
+        `frame` and `people`, a list of `person`, `method`, `height_m`, `status`, `cost_px`, `facing_sure`,
+        `notes`.
 
     Raises:
         TrackerError: everybody has a pose, or no frame shows the people well enough; nothing is stored then.
@@ -49,7 +49,7 @@ def init_from_silhouettes(
         else:
             first = find_first_poses(session, observer, people, [frame], (method,), voxel_m)
         bodies = {i: p.model for i, p in first.poses.items()}
-        poses = {i: p.fitted.pose for i, p in first.poses.items()}
+        poses = {i: p.start.pose for i, p in first.poses.items()}
         opened.store_found(FoundPeople(first, bodies, poses, {}), f"init from {method}")
     return first_poses_record(session, first)
 
@@ -59,12 +59,10 @@ def first_poses_record(session: "Session", first: "FirstPoses") -> dict[str, Any
     people = [
         {
             "person": session.people[i].name,
-            "method": p.candidate.generator,
+            "method": p.start.source,
             "height_m": p.model.height_m,
-            "status": p.fitted.status,
-            "cost_px": p.fitted.cost_px,
-            "unresolved": list(p.candidate.unresolved),
-            "straight": list(p.candidate.straight),
+            "status": p.status,
+            "cost_px": p.cost_px,
             "facing_sure": p.is_facing_sure,
             "notes": list(p.notes),
         }

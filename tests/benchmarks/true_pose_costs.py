@@ -20,12 +20,9 @@ from calibrate_status import SECOND, SECOND_SEED
 from sections import put_section, table
 
 from tracker.acquisition.from_joints import height_from_joints
-from tracker.appearance.part_colors import Colors
 from tracker.body.model import BodyModel, PosedBody
-from tracker.contours import occluding_contours
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
-from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
@@ -38,10 +35,10 @@ from tracker.simulate import Simulation, simulate
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.estimate import TrackedFrame
-from tracker.tracking.estimation.pose_paths import FrameCost
+from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
+from tracker.tracking.estimation.settings import trust
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
-from tracker.tracking.view_regions import regions, visible_pieces_px
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
 HEADS = (
@@ -140,20 +137,18 @@ def measure(dancer: Dancer, settings: TrackSettings) -> list[FrameResult]:
 
 def _compare(dancer: Dancer, observer: Observer, settings: TrackSettings, frame: int, tracked: Array) -> FrameResult:
     """Compare the tracked pose of a frame, (n_values,), with the pose refined from the truth."""
-    model, cameras = dancer.model, observer.working_cameras
+    model = dancer.model
     true = fit_to_points(model, dancer.joints[frame], centers=True).pose
     guesses = [(PosedBody(model, pose),) for pose in (true, tracked)]
-    visible = [np.concatenate([visible_pieces_px(occluding_contours.trace(g, c)) for g in guesses]) for c in cameras]
-    where = regions(cameras, [body for g in guesses for body in g])
-    views = observer.evidence(frame, where, visible, edges=settings.edges)
-    residuals = ContourResiduals(views, guesses[0], 0, settings.match, settings.theta_px, everywhere=True)
-    cost_of = FrameCost(model, residuals, Colors(views, guesses[0], 0), None, [], settings, None)
-    once = cost_of.refined([true])[0]
-    refined = np.array([once, cost_of.refined([once])[0]])
-    best = refined[int(cost_of.costs(refined).argmin())]
+    views = common_evidence(observer, frame, guesses, settings)
+    scorer, sigma = scorer_without_prediction(views, guesses[0], 0, settings), trust(model, settings)
+    once = scorer.refined(model, [true], sigma)[0]
+    refined = np.array([once, scorer.refined(model, [once], sigma)[0]])
+    best = refined[int(scorer.costs_with_priors(model, refined).argmin())]
     step = model.difference(tracked, best)
-    line = cost_of.costs(np.array([model.retract(best, share * step) for share in np.linspace(0.0, 1.0, _ON_LINE)]))
-    cost, tracked_cost = cost_of.costs(np.array([best, tracked])).tolist()
+    between = np.array([model.retract(best, share * step) for share in np.linspace(0.0, 1.0, _ON_LINE)])
+    line = scorer.costs_with_priors(model, between)
+    cost, tracked_cost = scorer.costs_with_priors(model, np.array([best, tracked])).tolist()
     return FrameResult(
         tracked_cost - cost, cost, float(line.max()) - max(cost, tracked_cost), _error_mm(dancer, frame, tracked),
         _error_mm(dancer, frame, best),

@@ -54,9 +54,8 @@ def main() -> None:
                 print(f"{frame:4d} {error}")
                 continue
             rows += [_row(pose, references, frame) for pose in found.poses.values()]
-    before, after, sides = np.array([r[:3] for r in rows]).T
-    print(f"{len(rows)} starts: before {before.mean():.0f} mm, worst {before.max():.0f}; ", end="")
-    print(f"after {after.mean():.0f} mm, worst {after.max():.0f}; left right in {sides.mean():.0%}")
+    errors, sides = np.array(rows).T
+    print(f"{len(rows)} starts: {errors.mean():.0f} mm, worst {errors.max():.0f}; left right in {sides.mean():.0%}")
 
 
 def _row(found, references, frame):
@@ -65,19 +64,19 @@ def _row(found, references, frame):
     for reference in references:
         row = int(np.flatnonzero(reference.frames == frame)[0])
         points = dict(zip(reference.names, reference.points[row], strict=True))
-        before, after = (_errors(found.model, pose, points) for pose in (found.candidate.pose, found.fitted.pose))
+        after = _errors(found.model, found.start.pose, points)
         left = points["left_shoulder"] - points["right_shoulder"] + points["left_hip"] - points["right_hip"]
-        own = found.model.named_points_world(found.fitted.pose)
+        own = found.model.named_points_world(found.start.pose)
         mine = own["left_shoulder"] - own["right_shoulder"] + own["left_hip"] - own["right_hip"]
-        errors.append((np.mean(before), np.mean(after), float(mine @ left > 0)))
+        errors.append((np.mean(after), float(mine @ left > 0)))
     best = min(errors)
     listed = " ".join(found.notes)
-    print(f"{frame:4d} before {best[0]:4.0f} after {best[1]:4.0f} left {'right' if best[2] else 'WRONG'}", end=" ")
+    print(f"{frame:4d} off {best[0]:4.0f} mm, left {'right' if best[1] else 'WRONG'}", end=" ")
     print(
-        f"{found.candidate.generator} {'sure' if found.is_facing_sure else 'unsure'} {found.candidate.cues:.1f}",
+        f"{found.start.source} {'sure' if found.is_facing_sure else 'unsure'}",
         end=" ",
     )
-    print(f"{found.model.height_m:.2f} m {found.fitted.status} {found.fitted.cost_px:.2f} px {listed[:150]}")
+    print(f"{found.model.height_m:.2f} m {found.status} {found.cost_px:.2f} px {listed[:150]}")
     return best
 
 

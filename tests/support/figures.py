@@ -85,15 +85,15 @@ def cameras_about_a_figure(n=4):
     return [camera_at(f"c{i}", place, (0.0, 0.0, 0.9), focal=560.0) for i, place in enumerate(places)]
 
 
-def scene_of(voxels, silhouettes, motion=None):
+def scene_of(voxels, silhouettes):
     """What is known of a figure that is alone."""
-    return PersonScene(voxels, silhouettes, figure_masks(silhouettes, voxels), GroundPlane(UP, 0.0), motion)
+    return PersonScene(voxels, silhouettes, figure_masks(silhouettes, voxels), GroundPlane(UP, 0.0))
 
 
-def parts_of(voxels, motion=None):
+def parts_of(voxels):
     """The parts of a figure with its most likely head."""
     graph = neighbor_graph(voxels)
-    return locate_parts(voxels, graph, possible_heads(voxels, graph, UP)[0], motion)
+    return locate_parts(voxels, graph, possible_heads(voxels, graph, UP)[0])
 
 
 def legs(silhouette):

@@ -1,7 +1,7 @@
 """Fit poses with one Gauss-Newton solver and its residual blocks: points, priors, pins, penetration and contours.
 
 The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use `gauss_newton`
-(`solve`, `fit_to_points` and the plain blocks), `gauss_newton_compiled.solver_of`, `contour_residuals`,
-`interpenetration` and `pins`. `observability`, `observability_reasons` and `added_camera` say how well views constrain
-a pose.
+(`solve`, `fit_to_points` and the plain blocks), `gauss_newton_compiled.solver_of`, `hypothesis`, `limb_exchange`,
+`contour_residuals`, `interpenetration` and `pins`. `observability`, `observability_reasons` and `added_camera` say how
+well views constrain a pose.
 """

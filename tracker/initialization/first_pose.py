@@ -2,7 +2,7 @@
 
 On each frame that is tried generators propose start poses (`tracker.initialization.generators`), one for each way of
 facing. Each is fitted to the contours. The best are searched around and tracked over a few frames in both directions.
-The cheapest track is kept. It is doubtful where another start costs as much, or where it loses the person.
+The most likely track is kept. It is doubtful where another start is as likely, or where it loses the person.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,33 +12,29 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import BodyModel
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder, ViewSilhouette
+from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import has_preset_sizes
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.initialization.generators.person_scene import PersonScene, silhouette_axes
-from tracker.initialization.generators.start_generators import GENERATORS, StartCandidate
-from tracker.initialization.generators.voxel_start import SURE
-from tracker.initialization.own_figure import figure_motion, others_on_frame, own_figure
+from tracker.initialization.generators.start_generators import GENERATORS
+from tracker.initialization.own_figure import others_on_frame, own_figure
 from tracker.initialization.silhouette_check import check_against_silhouettes
 from tracker.initialization.standing_heights import StandingHeights
-from tracker.initialization.start_choice import Start, compare_starts, face_opposite, weighed_px
-from tracker.initialization.start_fit import FittedStart, StartFitter, short_tracks
-from tracker.initialization.start_rivals import rivals_note
+from tracker.initialization.start_choice import compare_starts
+from tracker.initialization.start_fit import StartFitter, StartTrack, short_tracks
 from tracker.session.session import Session
-from tracker.tracking.confidence import worst
+from tracker.tracking.confidence import Status, worst
 from tracker.voxels.figure_masks import FigureMask, figure_masks
 from tracker.voxels.shadows import recover_from_shadows
 from tracker.voxels.visual_hull import VisualHull, carve_people
-from tracker.voxels.voxel_grid import Voxels
 
 VOXEL_M = 0.025
 """Edge of a voxel, metres."""
-_MOTION_FRAMES = 6
-"""Frames over which the motion of a figure is measured."""
 ENOUGH_FRAMES = 2
 """Number of frames with good starts whose heights agree that end the trial of `auto`."""
 _OTHER_FRAMES = 5
@@ -47,8 +43,6 @@ HEIGHT_SIGMA = 0.02
 """Standard deviation of the logarithm of a height that was measured: shoes, hair and a voxel at both ends."""
 _HEIGHTS_AGREE = 3 * HEIGHT_SIGMA
 """Largest difference of the logarithms of two heights that agree: 97% of pairs of one person do."""
-_SURE_RATIO = 1.05
-"""Ratio of the cost of the cheapest track that faces the other way above which left and right are known."""
 _LARGER = 0.02
 """Share by which some silhouette grows with what looks like shadows, above which it is worth another start."""
 
@@ -63,11 +57,14 @@ class FirstPose(NamedTuple):
     """A first pose and how it was found."""
 
     frame: int
-    candidate: StartCandidate
-    """The start before the fit to contours, and the body; of another height than before where it was measured."""
-    fitted: FittedStart
+    start: Hypothesis
+    """The pose and the body, whose height may have been measured."""
+    status: Status
+    """As the tracker gives it, at most doubtful where something speaks against the start."""
+    cost_px: float
+    """Mean cost of the short track, px of the footage."""
     is_facing_sure: bool
-    """Whether cues or costs tell left from right."""
+    """Whether the contours tell left from right."""
     notes: tuple[str, ...]
     """Sentences on what is not sure."""
     lines_px: Mapping[str, Array] = MappingProxyType({})
@@ -77,7 +74,7 @@ class FirstPose(NamedTuple):
     @property
     def model(self) -> BodyModel:
         """The body."""
-        return self.candidate.model
+        return self.start.model
 
 
 class FirstPoses(NamedTuple):
@@ -90,12 +87,12 @@ class FirstPoses(NamedTuple):
     @property
     def cost_px(self) -> float:
         """Mean cost of their short tracks, px of the footage."""
-        return float(np.mean([p.fitted.cost_px for p in self.poses.values()]))
+        return float(np.mean([p.cost_px for p in self.poses.values()]))
 
     @property
     def is_good(self) -> bool:
         """Whether the fits of all are good."""
-        return all(p.fitted.status == "good" for p in self.poses.values())
+        return all(p.status == "good" for p in self.poses.values())
 
 
 def find_first_poses(
@@ -182,7 +179,7 @@ class _Trial:
         def scenes(frame: int, person: int) -> list[PersonScene]:
             self._step()
             views = silhouettes(frame, person)
-            return [PersonScene(f, views, (), floor, None) for f in carve_people(views, self._size_m).figures]
+            return [PersonScene(f, views, (), floor) for f in carve_people(views, self._size_m).figures]
 
         return _Source(silhouettes, StandingHeights(scenes, self._session.n_frames, len(self._session.people)))
 
@@ -200,7 +197,7 @@ class _Trial:
             return
         self.found.append(FirstPoses(frame, own))
         self._show(frame, self.found[-1])
-        statuses = ", ".join(p.fitted.status for p in own.values())
+        statuses = ", ".join(p.status for p in own.values())
         cost = f"cost {self.found[-1].cost_px:.2f} px over a short track"
         self._say(f"frame {frame}, {' and '.join(generators)}: {statuses}, {cost}")
 
@@ -258,11 +255,11 @@ def _best_on_frame(
             poses.append(_on_frame(task, frame, source, silhouettes, generators, found))
         except TrackerError as error:
             errors.append(error)
-        if poses and poses[-1].fitted.status == "good":
+        if poses and poses[-1].status == "good":
             break
     if not poses:
         raise errors[0]
-    return min(poses, key=lambda p: (p.fitted.status != "good", p.fitted.cost_px))
+    return min(poses, key=lambda p: (p.status != "good", p.cost_px))
 
 
 def _are_larger(silhouettes: Sequence[ViewSilhouette], before: Sequence[ViewSilhouette]) -> bool:
@@ -276,44 +273,39 @@ def _on_frame(
 ) -> FirstPose:  # fmt: skip
     session, observer, _, person, size_m, step = task
     hull = carve_people(silhouettes, size_m)
-    known = {i: PosedBody(pose.model, pose.fitted.pose) for i, pose in found.items()}
+    known = {i: pose.start.body for i, pose in found.items()}
     others = others_on_frame(session, person, frame, known)
     figure = own_figure(session, person, hull, others)
     masks = figure_masks(silhouettes, figure, [f for f in hull.figures if f is not figure])
-    motion = _motion(task, source, figure, frame)
-    scene = PersonScene(figure, silhouettes, masks, floor_plane(session.up, session.floor), motion)
+    scene = PersonScene(figure, silhouettes, masks, floor_plane(session.up, session.floor))
     model = session.people[person].model
     height_m = source.heights.around(scene, frame, person) if has_preset_sizes(model) else None
-    candidates = _candidates(scene, model if height_m is None else model.with_height(height_m), generators)
+    proposals = _proposals(scene, model if height_m is None else model.with_height(height_m), generators)
     fitter = StartFitter(observer, frame, short_tracks(frame, session.n_frames), tuple(others), step)
-    searched, tracked, is_lost = compare_starts(fitter, candidates, lambda runs: _filling(runs, silhouettes, masks))
-    best, fit = tracked[0]
-    # Starts whose tracks were not worth it cost much more on the frame alone.
-    opposite, untracked = ([weighed_px(s) for s in own if face_opposite(s[0], best)] for own in (tracked, searched))
-    opposite = opposite or untracked
-    is_sure = best.cues >= SURE or (bool(opposite) and min(opposite) > _SURE_RATIO * weighed_px(tracked[0]))
-    notes = _notes(best, is_sure, hull, silhouettes)
+    compared = compare_starts(fitter, proposals, lambda tracks: _filling(tracks, silhouettes, masks))
+    best = compared.tracked[0]
+    notes = _notes(best.start, compared.is_facing_sure, hull, silhouettes)
     doubts = [
-        check_against_silhouettes(PosedBody(best.model, fit.pose), silhouettes, masks).note,
-        rivals_note([(PosedBody(c.model, f.pose), weighed_px((c, f))) for c, f in tracked]),
-        "the person is lost on a short track from here" if is_lost else "",
+        check_against_silhouettes(best.start.body, silhouettes, masks).note,
+        compared.rivals_note,
+        "the person is lost on a short track from here" if compared.is_lost else "",
     ]
-    status = worst([fit.status, "doubtful"]) if any(doubts) else fit.status
-    fitted = FittedStart(fit.pose, status, fit.cost_px)
-    return FirstPose(frame, best, fitted, is_sure, (*notes, *filter(None, doubts)), _lines_px(session, scene))
+    status = worst([best.status, "doubtful"]) if any(doubts) else best.status
+    notes = (*notes, *filter(None, doubts))
+    lines = _lines_px(session, scene)
+    return FirstPose(frame, best.start, status, best.cost_px, compared.is_facing_sure, notes, lines)
 
 
 def _filling(
-    tracked: Sequence[Start], silhouettes: Sequence[ViewSilhouette],
-    masks: Sequence[FigureMask],
-) -> list[Start]:  # fmt: skip
+    tracked: Sequence[StartTrack], silhouettes: Sequence[ViewSilhouette], masks: Sequence[FigureMask]
+) -> list[StartTrack]:
     """Return the starts whose bodies fill the silhouettes.
 
     Raises:
         TrackerError: none does.
     """
-    checks = [check_against_silhouettes(PosedBody(c.model, f.pose), silhouettes, masks) for c, f in tracked]
-    kept = [start for start, check in zip(tracked, checks, strict=True) if not check.is_refused]
+    checks = [check_against_silhouettes(t.start.body, silhouettes, masks) for t in tracked]
+    kept = [track for track, check in zip(tracked, checks, strict=True) if not check.is_refused]
     if not kept:
         raise TrackerError(
             f"expected a body that fills the silhouettes, found none: {checks[0].note}",
@@ -323,9 +315,9 @@ def _filling(
     return kept
 
 
-def _candidates(scene: PersonScene, model: BodyModel, generators: Sequence[str]) -> list[StartCandidate]:
+def _proposals(scene: PersonScene, model: BodyModel, generators: Sequence[str]) -> list[Hypothesis]:
     """Return the starts of all generators; those that fail are left out unless all do."""
-    found, errors = list[StartCandidate](), list[TrackerError]()
+    found, errors = list[Hypothesis](), list[TrackerError]()
     is_known = not has_preset_sizes(model)
     for name in generators:
         try:
@@ -347,37 +339,19 @@ def _lines_px(session: Session, scene: PersonScene) -> dict[str, Array]:
     return {a.camera.name: a.lines_px * (widths[a.camera.name] / a.camera.width) for a in axes}
 
 
-def _motion(task: _Task, source: _Source, figure: Voxels, frame: int) -> Array | None:
-    """Return the way of a figure to a later frame, (3,), metres; None if it cannot be found."""
-    ahead = frame + _MOTION_FRAMES < task.session.n_frames
-    other = frame + (_MOTION_FRAMES if ahead else -_MOTION_FRAMES)
-    if other < 0:
-        return None
-    way = figure_motion(figure, source.silhouettes(other, task.person), 2 * task.size_m)
-    return None if way is None else way * (1.0 if ahead else -1.0)
-
-
 def _notes(
-    best: StartCandidate, is_sure: bool, hull: VisualHull, silhouettes: Sequence[ViewSilhouette]
+    start: Hypothesis, is_sure: bool, hull: VisualHull, silhouettes: Sequence[ViewSilhouette]
 ) -> tuple[str, ...]:
-    notes = []
+    notes = list(start.notes)
     if not is_sure:
-        notes.append("left and right are not sure: feet, bends, motion and joint limits do not tell them apart")
-    if best.unresolved:
-        listed = ", ".join(n.replace("_", " ") for n in best.unresolved)
-        notes.append(f"not resolved by the voxels, which show them as one with the body: {listed}")
-    if best.straight:
-        listed = ", ".join(n.replace("_", " ") for n in best.straight)
-        notes.append(f"straight, with the middle joint by usual proportions: {listed}")
+        notes.append("left and right are not sure: a pose that faces the other way is about as good")
     if hull.broken:
         notes.append(f"view {hull.broken[0]} was left out: the others agree without it; check whether it has moved")
-    if best.axis is not None and best.axis.left_out:
-        notes.append(f"the axis contradicts the others in view {', '.join(best.axis.left_out)}")
+    if not start.is_measured:
+        notes.append(f"the height stays {start.model.height_m:.2f} m: the person does not stand upright")
     cut = [s.camera.name for s in silhouettes if _is_cut_off(s)]
     if cut:
         notes.append(f"cut off by the image in view {', '.join(cut)}")
-    if not best.is_measured:
-        notes.append(f"the height stays {best.model.height_m:.2f} m: the person does not stand upright")
     return tuple(notes)
 
 

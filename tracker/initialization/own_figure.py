@@ -6,11 +6,9 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.errors import Remedy, TrackerError
-from tracker.evidence.silhouettes import ViewSilhouette
-from tracker.geometry.arrays import Array
 from tracker.session.session import Session
 from tracker.store.stored_poses import read_stored_poses
-from tracker.voxels.visual_hull import VisualHull, carve_people
+from tracker.voxels.visual_hull import VisualHull
 from tracker.voxels.voxel_grid import Voxels
 
 _OWN_M = 0.4
@@ -76,20 +74,3 @@ def own_figure(session: Session, person: int, hull: VisualHull, others: Sequence
 def _is_in(figure: Voxels, body: PosedBody) -> bool:
     trunk = body.points_world.mean(axis=0)
     return bool(np.linalg.norm(figure.points_world.mean(axis=0) - trunk) < _OWN_M)
-
-
-def figure_motion(figure: Voxels, later: Sequence[ViewSilhouette], size_m: float) -> Array | None:
-    """Return the way of a figure to another frame, (3,), metres; None if it cannot be found.
-
-    Args:
-        figure: voxels of the person.
-        later: silhouettes of the other frame.
-        size_m: edge of a voxel for that frame, metres.
-    """
-    try:
-        found = carve_people(later, size_m).figures
-    except TrackerError:
-        return None
-    begin = figure.points_world.mean(axis=0)
-    ways = [f.points_world.mean(axis=0) - begin for f in found]
-    return min(ways, key=lambda way: float(np.linalg.norm(way)))

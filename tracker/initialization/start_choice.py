@@ -1,90 +1,59 @@
-"""Compare the starts of a person on a frame: fit all, search around some, and track from the best."""
+"""Compare hypotheses of a start on a frame: fit all, search around some, and track the best."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
-import numpy as np
+from tracker.body.limbs import limb_display_name, limbs
+from tracker.fitting.hypothesis import BEAM_NATS, CLEAR_NATS, Hypothesis, distinct, limbs_elsewhere
+from tracker.initialization.start_fit import StartFitter, StartTrack, track_back
 
-from tracker.body.model import PosedBody
-from tracker.geometry.arrays import Array
-from tracker.initialization.generators.start_generators import StartCandidate
-from tracker.initialization.start_fit import FittedStart, StartFitter, track_back
-
-_N_TRACKED = 4
-"""Starts of a frame that are tracked."""
-_SAME_M = 0.03
-"""Mean distance of the joints up to which two fits are the same, metres."""
-_CUES_PX = 0.05
-"""Reduction of the cost of a track for each cue for its direction, px."""
-_TRACKED_RATIO = 1.25
-"""Ratio of the costs on the frame of the start above which a start is not tracked."""
-_OPPOSITE = 0.0
-"""Largest cosine of the angle between two directions that count as opposite."""
-
-Start: TypeAlias = tuple[StartCandidate, FittedStart]
+_N_SEARCHED = 4
+"""Starts of a frame that are searched around."""
 
 
 class ComparedStarts(NamedTuple):
     """The starts of a person, compared."""
 
-    searched: list[Start]
-    """The starts that were searched, with their costs on the frame."""
-    tracked: list[Start]
-    """The starts that were tracked and fill the silhouettes, the cheapest first."""
+    searched: list[Hypothesis]
+    """The starts that were searched, with their costs on the frame, the best first."""
+    tracked: list[StartTrack]
+    """The starts that were tracked and fill the silhouettes, with their costs on all frames, the best first."""
     is_lost: bool
-    """Whether the person is lost on a short track from the cheapest."""
+    """Whether the person is lost on a short track from the best."""
+
+    @property
+    def is_facing_sure(self) -> bool:
+        """Whether the contours tell left from right."""
+        best = self.tracked[0].start
+        tracked, searched = (
+            [s.cost for s in own if s.faces_away_from(best)] for own in ([t.start for t in self.tracked], self.searched)
+        )
+        gaps = [c - best.cost for c in tracked] or [c - self.searched[0].cost for c in searched]
+        return bool(gaps) and min(gaps) > CLEAR_NATS
+
+    @property
+    def rivals_note(self) -> str:
+        """A sentence on the limbs that are elsewhere in starts about as good as the best; empty if none is."""
+        best, *others = (t.start for t in self.tracked)
+        close = [o for o in others if o.cost < best.cost + CLEAR_NATS]
+        found = {limb for o in close for limb in limbs_elsewhere(best.body, o.body)}
+        names = [limb_display_name(limb.name) for limb in limbs(best.model) if limb.name in found]
+        return f"another start is about as good, with {', '.join(names)} elsewhere" if names else ""
 
 
 def compare_starts(
-    fitter: StartFitter, candidates: Sequence[StartCandidate], filling: Callable[[Sequence[Start]], list[Start]]
+    fitter: StartFitter, proposals: Sequence[Hypothesis], filling: Callable[[Sequence[StartTrack]], list[StartTrack]]
 ) -> ComparedStarts:
     """Fit, search and track starts. A different pose after tracking there and back is another start."""
-
-    def tracked(candidate: StartCandidate, fit: FittedStart) -> Start:
-        return candidate, fitter.track(PosedBody(candidate.model, fit.pose), fit)
-
-    tried = [(c, fitter.fit(PosedBody(c.model, c.pose))) for c in candidates]
-    searched = [(c, fitter.search(PosedBody(c.model, f.pose))) for c, f in _kept(_distinct(tried))]
-    runs = [tracked(*start) for start in _worth_a_track(_distinct(searched))]
-    best, fit = filling(sorted(runs, key=weighed_px))[0]
-    returned = track_back(PosedBody(best.model, fit.pose), fit)
-    runs += [tracked(best, fitter.search(PosedBody(best.model, pose))) for pose in returned.poses]
-    found = filling(sorted(runs, key=weighed_px))
-    is_lost = returned.is_lost if found[0][1] is fit else found[0][1].is_lost
-    return ComparedStarts(searched, found, is_lost)
-
-
-def _worth_a_track(searched: Sequence[Start]) -> list[Start]:
-    """Return the starts that short tracks may make the best ones."""
-    most = _TRACKED_RATIO * min(map(weighed_px, searched))
-    return [s for s in searched if weighed_px(s) <= most]
-
-
-def _distinct(fits: Sequence[Start]) -> list[Start]:
-    """Return the fits without those that end where the fit of an earlier start does: methods give the best first."""
-    kept, others = list[Start](), list[Array]()
-    for candidate, fit in fits:
-        points = candidate.model.points_world(fit.pose)
-        if all(np.linalg.norm(points - o, axis=1).mean() > _SAME_M for o in others):
-            kept.append((candidate, fit))
-            others.append(points)
-    return kept
-
-
-def face_opposite(start: StartCandidate, other: StartCandidate) -> bool:
-    """Return whether two starts face opposite ways."""
-    return bool(start.forward @ other.forward < _OPPOSITE)
-
-
-def weighed_px(start: Start) -> float:
-    """Return the cost of a start, px, less what the cues say for its direction."""
-    return start[1].cost_px - _CUES_PX * start[0].cues
-
-
-def _kept(tried: Sequence[Start]) -> list[Start]:
-    """Return the starts to track: the cheapest ones, and the cheapest that faces the other way than the first."""
-    order = sorted(tried, key=weighed_px)
-    kept, rest = order[:_N_TRACKED], order[_N_TRACKED:]
-    if not any(face_opposite(c, kept[0][0]) for c, _ in kept):
-        kept += [t for t in rest if face_opposite(t[0], kept[0][0])][:1]
-    return kept
+    tried = distinct(fitter.scored([fitter.fit(p) for p in proposals]))
+    kept, rest = tried[:_N_SEARCHED], tried[_N_SEARCHED:]
+    if not any(h.faces_away_from(kept[0]) for h in kept):
+        kept += [h for h in rest if h.faces_away_from(kept[0])][:1]
+    searched = distinct(fitter.scored([fitter.search(h) for h in kept]))
+    runs = [fitter.track(h) for h in searched if h.cost < searched[0].cost + BEAM_NATS]
+    best, *_ = tracked = filling(fitter.compared(runs))
+    returned, is_lost = track_back(best)
+    if returned:
+        runs += [fitter.track(fitter.search(h)) for h in returned]
+        tracked = filling(fitter.compared(runs))
+    return ComparedStarts(searched, tracked, is_lost if tracked[0].poses is best.poses else tracked[0].is_lost)

@@ -1,11 +1,11 @@
-"""Fit start poses to the contours of a frame, and compare them by short tracks in both directions.
+"""Fit hypotheses of a start to a frame, track them a few frames in both directions, and score them there in nats.
 
 In a wrong local minimum a limb keeps its place only until it moves. A short track that comes back may then end in the
-right pose, which is another start.
+right pose, which is another hypothesis.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import NamedTuple
 
@@ -13,52 +13,42 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
+from tracker.fitting.hypothesis import SAME_POSE_M, Hypothesis, distance_m
 from tracker.geometry.arrays import Array
-from tracker.initialization.start_rivals import limbs_elsewhere
 from tracker.initialization.start_search import search_around
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import PoseEstimate
+from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
-_LOST_PX, _DOUBTFUL_PX = 2.0, 0.5
-"""Penalties for a lost and for a doubtful frame of a short track, px."""
-_RETURNED_M = 0.05
-"""A track comes back to another pose if a joint of a limb is farther from the start, metres."""
 _TRACK_STEPS = (2, 4, 6)
 """Frames after and before a start over which starts are compared."""
 _SETTINGS = TrackSettings(backward_pass=False)
 
 
-class FittedStart(NamedTuple):
-    """A start pose after the fit to contours."""
+class StartTrack(NamedTuple):
+    """A hypothesis of a start, tracked over a few frames in both directions."""
 
-    pose: Array
-    """(n_values,)."""
+    start: Hypothesis
+    """On the frame of the start; its cost is that of all frames once tracks are compared."""
     status: Status
-    """As the tracker gives it."""
+    """On that frame, as the tracker gives it."""
     cost_px: float
-    """Mean cost over the frames that were fitted, px of the footage; lost frames cost more."""
+    """Mean chamfer cost of the frames, px of the footage. It is shown, and compares different frames."""
+    poses: Mapping[int, Array]
+    """By frame, the pose, (n_values,)."""
     is_lost: bool = False
-    """Whether the person was lost on a short track."""
+    """Whether the person is lost on one of the frames."""
     returning: tuple[Iterator[PoseEstimate], ...] = ()
-    """The ways back of short tracks, which have not been tracked yet."""
-
-
-class Returned(NamedTuple):
-    """The ends of short tracks that came back to the frame of a start."""
-
-    poses: list[Array]
-    """End poses that differ from the start, (n_values,) each."""
-    is_lost: bool
-    """Whether the person was lost on a short track, there or back."""
+    """The ways back, which have not been tracked yet."""
 
 
 @dataclass(frozen=True)
 class StartFitter:
-    """Fits starts of one person on a frame."""
+    """Fits, tracks and scores hypotheses of one person on a frame."""
 
     observer: Observer
     """Of the recording."""
@@ -71,38 +61,56 @@ class StartFitter:
     step: Callable[[], None] = lambda: None
     """Called after each frame that is fitted and before each search. An exception that it raises ends the work."""
 
-    def fit(self, start: PosedBody) -> FittedStart:
+    def fit(self, start: Hypothesis) -> Hypothesis:
         """Fit a start to the frame."""
         (found,) = self._estimates(start, [self.frame])
-        return FittedStart(found.poses[0], found.statuses[0], _cost_px(found))
+        return start.at(found.poses[0])
 
-    def search(self, start: PosedBody) -> FittedStart:
-        """Search around a start, and fit the result twice."""
+    def search(self, start: Hypothesis) -> Hypothesis:
+        """Search around a start, and fit the result."""
         self.step()
-        fitted = self.fit(search_around(self.observer, (start, *self.others), self.frame, _SETTINGS))
-        # A fit reaches only as far as its prior and the edges around its start.
-        again = self.fit(PosedBody(start.model, fitted.pose))
-        return again if again.cost_px < fitted.cost_px else fitted
+        found = search_around(self.observer, (start.body, *self.others), self.frame, _SETTINGS)
+        return self.fit(start.at(found.values))
 
-    def track(self, start: PosedBody, fitted: FittedStart) -> FittedStart:
-        """Track from a fitted start in all directions, and return it with the cost of all these frames.
-
-        Args:
-            start: the body in the fitted pose.
-            fitted: the fit.
-        """
+    def track(self, start: Hypothesis) -> StartTrack:
+        """Track from a start in all directions."""
         tracked, returning = list[PoseEstimate](), list[Iterator[PoseEstimate]]()
-        for frames in self.later:
-            way = self._estimates(start, [self.frame, *frames, *frames[-2::-1], self.frame])
-            _, *found = islice(way, 1 + len(frames))
-            tracked += found
+        for frames in self.later or ([],):
+            way = self._estimates(start, [self.frame, *frames, *frames[-2::-1], self.frame][: 1 + 2 * len(frames)])
+            tracked += islice(way, 1 + len(frames))
             returning.append(way)
-        cost = float(np.mean([fitted.cost_px, *map(_cost_px, tracked)]))
-        is_lost = any(_is_lost(e) for e in tracked)
-        return FittedStart(fitted.pose, fitted.status, cost if np.isfinite(cost) else np.inf, is_lost, tuple(returning))
+        by_frame = {e.frame: e for e in tracked}
+        own, cost_px = by_frame[self.frame], float(np.mean([e.cost_px for e in by_frame.values()]))
+        is_lost = any(e.statuses[0] == "lost" for k, e in by_frame.items() if k != self.frame)
+        poses = {k: e.poses[0] for k, e in by_frame.items()}
+        return StartTrack(start.at(own.poses[0]), own.statuses[0], cost_px, poses, is_lost, tuple(returning))
 
-    def _estimates(self, start: PosedBody, frames: Sequence[int]) -> Iterator[PoseEstimate]:
-        people = (start, *self.others)
+    def scored(self, starts: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return hypotheses with their costs on the frame, all on common evidence, the best first."""
+        costs = self._costs(self.frame, [s.body for s in starts])
+        return sorted((replace(s, cost=c) for s, c in zip(starts, costs, strict=True)), key=lambda s: s.cost)
+
+    def compared(self, tracks: Sequence[StartTrack]) -> list[StartTrack]:
+        """Return tracks with the sums of their costs over all frames, on common evidence, the best first."""
+        costs = np.sum(
+            [
+                self._costs(frame, [PosedBody(t.start.model, t.poses[frame]) for t in tracks])
+                for frame in tracks[0].poses
+            ],
+            axis=0,
+        )
+        scored = [t._replace(start=replace(t.start, cost=c)) for t, c in zip(tracks, costs, strict=True)]
+        return sorted(scored, key=lambda t: t.start.cost)
+
+    def _costs(self, frame: int, bodies: Sequence[PosedBody]) -> Array:
+        """Return the costs of one person in several poses, of bodies of any sizes, on common evidence, (n,), nats."""
+        guesses = [(body, *self.others) for body in bodies]
+        views = common_evidence(self.observer, frame, guesses, _SETTINGS)
+        scorers = [scorer_without_prediction(views, guess, 0, _SETTINGS) for guess in guesses]
+        return np.array([s.costs_with_priors(b.model, b.values[None])[0] for s, b in zip(scorers, bodies, strict=True)])
+
+    def _estimates(self, start: Hypothesis, frames: Sequence[int]) -> Iterator[PoseEstimate]:
+        people = (start.body, *self.others)
         subjects = Subjects.of([b.model for b in people], [0])
         # A pose and the same one before it are a prediction: the tracker does not search around it a second time.
         run = TrackingRun(self.observer, subjects, [[b.values, b.values] for b in people], frames)
@@ -117,27 +125,17 @@ def short_tracks(frame: int, n_frames: int) -> list[list[int]]:
     return [own for frames in both if (own := [k for k in frames if 0 <= k < n_frames])]
 
 
-def track_back(start: PosedBody, fitted: FittedStart) -> Returned:
+def track_back(track: StartTrack) -> tuple[list[Hypothesis], bool]:
     """Track back to the frame of a start.
 
-    Args:
-        start: the body in the fitted pose.
-        fitted: the fit, whose short tracks have not come back yet.
+    Returns:
+        The poses that it comes back to and that are not the start; whether the person is lost there or back.
     """
-    poses, is_lost = list[Array](), fitted.is_lost
-    for way in fitted.returning:
-        *_, last = found = list(way)
-        is_lost = is_lost or any(_is_lost(e) for e in found)
-        if limbs_elsewhere(start.model, start.points_world, start.model.points_world(last.poses[0]), _RETURNED_M):
-            poses.append(last.poses[0])
-    return Returned(poses, is_lost)
-
-
-def _is_lost(estimate: PoseEstimate) -> bool:
-    return estimate.statuses[0] == "lost"
-
-
-def _cost_px(estimate: PoseEstimate) -> float:
-    """Return the cost of a frame of the first person with what its status adds, px."""
-    extra = {"lost": _LOST_PX, "doubtful": _DOUBTFUL_PX}.get(estimate.statuses[0], 0.0)
-    return estimate.cost_px + extra
+    found, is_lost = list[Hypothesis](), track.is_lost
+    for way in track.returning:
+        *_, last = estimates = list(way)
+        is_lost = is_lost or any(e.statuses[0] == "lost" for e in estimates)
+        end = track.start.at(last.poses[0])
+        if distance_m(track.start.body, end.body) > SAME_POSE_M:
+            found.append(end)
+    return found, is_lost

@@ -8,16 +8,15 @@ from collections.abc import Sequence
 
 from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
-from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior, moved_m
+from tracker.fitting.hypothesis import SAME_POSE_M, distance_m
+from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior
 from tracker.tracking.estimation.settings import EstimationSettings
-from tracker.tracking.estimation.start_pose import roughly_known, search_start
+from tracker.tracking.estimation.start_pose import MAX_ROUNDS, roughly_known, search_start
 from tracker.tracking.person_memory import PersonMemory
 from tracker.tracking.view_regions import read_views
 
-_MAX_ROUNDS, _N_DRAWS = 2, 3
-"""Largest number of rounds, each with the evidence around the pose of the one before, and draws of samples in each."""
-_SETTLED_M = 0.01
-"""The search ends where nothing moves farther in a round, metres."""
+_N_DRAWS = 3
+"""Draws of samples in each round."""
 
 
 def search_around(
@@ -33,12 +32,12 @@ def search_around(
     """
     body, *others = bodies
     alone, wide = not others, roughly_known(settings)
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         everybody = (body, *others)
         priors = [PersonPrior(b.model, b.values) for b in everybody]
         problem = FrameProblem(read_views(observer, frame, everybody), priors, wide)
         memory = PersonMemory(body.model, body.values, alone=alone)
         before, body = body, search_start(problem, 0, everybody, memory, _N_DRAWS)
-        if moved_m(before, body) < _SETTLED_M:
+        if distance_m(before, body) < SAME_POSE_M:
             break
     return body

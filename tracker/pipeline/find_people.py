@@ -133,7 +133,7 @@ def find_people(
     go_on()
     first = find_first_poses_anywhere(session, observer, people, tried, say=say, show=count, step=go_on)
     bodies = {i: p.model for i, p in first.poses.items()}
-    poses = {i: p.fitted.pose for i, p in first.poses.items()}
+    poses = {i: p.start.pose for i, p in first.poses.items()}
     acquired: dict[int, Acquisition] = {}
     whole = range(frames[0], frames[-1] + 1)
     for number, person in enumerate(people if settings.acquire else ()):
@@ -160,7 +160,7 @@ def _acquired(
     sized = replace(session, people=tuple(replace(p, model=m) for p, m in zip(session.people, models, strict=True)))
     known = PosedFrames({found.frame: on_frame}, {}, {})
     how = settings.acquisition
-    if person in found.first.poses and found.first.poses[person].candidate.is_measured:
+    if person in found.first.poses and found.first.poses[person].start.is_measured:
         how = replace(how, priors=replace(how.priors, height=min(HEIGHT_SIGMA, how.priors.height)))
     return acquire_body(sized, observer, person, frames, how, report, known)
 
@@ -175,9 +175,9 @@ def first_record(found: FoundPeople, person: int, revision: int) -> PoseRecord:
     """
     first: FirstPose = found.first.poses[person]
     pose = found.poses[person]
-    settings: dict[str, Any] = {"method": first.candidate.generator}
+    settings: dict[str, Any] = {"method": first.start.source}
     return PoseRecord(
-        pose, ("searched",) * len(pose), revision, status=first.fitted.status, settings=settings,
+        pose, ("searched",) * len(pose), revision, status=first.status, settings=settings,
         remark="; ".join(first.notes),
     )  # fmt: skip
 
@@ -223,9 +223,9 @@ def sentences(session: Session, found: FoundPeople) -> list[str]:
     for person, first in found.first.poses.items():
         name = session.people[person].name
         out.append(
-            f"{name}: started on frame {found.frame} by {first.candidate.generator}, "
-            f"{first.model.height_m:.2f} m tall, {first.fitted.status}, "
-            f"cost {first.fitted.cost_px:.2f} px over a short track"
+            f"{name}: started on frame {found.frame} by {first.start.source}, "
+            f"{first.model.height_m:.2f} m tall, {first.status}, "
+            f"cost {first.cost_px:.2f} px over a short track"
         )
         out += [f"{name}: {note}" for note in first.notes]
         if person in found.acquired:

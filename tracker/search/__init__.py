@@ -1,5 +1,5 @@
 """The robust chamfer cost and best-first search over a decomposed pose space of GD96.
 
 The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use
-`chamfer_cost.ChamferCost`, and `search` and `SearchSettings` of `best_first`.
+`chamfer_cost.ChamferCost`, `search` and `SearchSettings` of `best_first`, and `even_points`.
 """

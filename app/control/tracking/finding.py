@@ -13,7 +13,6 @@ from app.control.tracking import track_settings
 from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
 from app.state.progress import FindState, Line
-from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
@@ -155,7 +154,7 @@ class FindingPeople:
             state = session_state.state
             candidates = dict(state.finding.candidates)
             if found is not None:
-                candidates[frame] = {i: PosedBody(p.model, p.fitted.pose) for i, p in found.poses.items()}
+                candidates[frame] = {i: p.start.body for i, p in found.poses.items()}
             finding = replace(state.finding, tried=frame, candidates=candidates)
             is_news = found is not None or not candidates
             if is_news and self._is_watched() and state.frame != frame:

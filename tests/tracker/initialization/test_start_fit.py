@@ -1,4 +1,4 @@
-"""Starts are fitted again while that pays, tracked there and back, and a fit that costs more is not taken."""
+"""Starts are searched, tracked there and back, and scored in nats on common evidence."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from tracker.body.model import PosedBody
+from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import load_model
 from tracker.initialization import start_fit
-from tracker.initialization.start_fit import FittedStart, StartFitter, short_tracks, track_back
+from tracker.initialization.start_fit import StartFitter, StartTrack, short_tracks, track_back
 
 MODEL = load_model("gavrila34")
-START = PosedBody(MODEL, MODEL.neutral())
+START = Hypothesis(PosedBody(MODEL, MODEL.neutral()), "test")
 
 
 def moved(pose, by_m):
@@ -51,13 +52,13 @@ def fitter(*later):
     return StartFitter(None, 5, later, ())
 
 
-def test_a_start_is_searched_and_fitted_again(fits):
+def test_a_start_is_searched_and_fitted(fits):
     costs, runs, _ = fits
-    costs[:] = [4.0, 3.0, 1.0]
+    costs[:] = [4.0]
     found = fitter().search(START)
-    assert runs == [[5], [5]]
-    assert found.pose[0] == 12
-    assert found.cost_px == 3.0
+    assert runs == [[5]]
+    assert found.pose[0] == 11
+    assert (found.source, found.cost) == ("test", np.inf)
 
 
 def test_a_stop_is_heard_after_each_frame_and_before_a_search(fits):
@@ -79,47 +80,60 @@ def test_a_stop_is_heard_after_each_frame_and_before_a_search(fits):
     heard.clear()
     one_way = replace(fitter([7, 9, 11]), step=stop_at(3))
     with pytest.raises(InterruptedError):
-        one_way.track(START, FittedStart(START.values, "good", 4.0))
+        one_way.track(START)
     assert runs == [[5, 7, 9]]
 
 
-def test_a_fit_that_costs_more_is_not_taken(fits):
-    costs, _, _ = fits
-    costs[:] = [3.0, 3.5]
-    assert fitter().search(START).pose[0] == 11
-
-
-def test_a_track_costs_the_mean_of_its_frames(fits):
+def test_a_track_has_the_poses_of_its_frames_and_their_mean_cost(fits):
     costs, runs, _ = fits
     costs[:] = [3.0]
-    own = fitter([6, 7], [4])
-    found = own.track(START, own.fit(START))
+    found = fitter([6, 7], [4]).track(START)
     assert found.cost_px == pytest.approx((3.0 + 3 * 2.0) / 4)
-    assert found.pose[0] == 1  # that of the fit
-    assert runs == [[5], [5, 6, 7], [5, 4]]
+    assert {k: v[0] for k, v in found.poses.items()} == {5: 1, 6: 2, 7: 3, 4: 2}
+    assert found.start.pose[0] == 1
+    assert runs == [[5, 6, 7], [5, 4]]
     assert not found.is_lost
+
+
+def test_the_only_frame_of_a_recording_is_a_track(fits):
+    costs, runs, _ = fits
+    costs[:] = [3.0]
+    assert fitter().track(START).poses.keys() == {5}
+    assert runs == [[5]]
 
 
 def test_the_way_back_is_tracked_only_when_it_is_asked_for(fits):
     costs, runs, _ = fits
     costs[:] = [3.0]
-    own = fitter([6, 7], [4])
-    back = track_back(START, own.track(START, own.fit(START)))
-    assert runs == [[5], [5, 6, 7, 6, 5], [5, 4, 5]]
-    assert [p[0] for p in back.poses] == [5, 3]
-    assert not back.is_lost
+    found, is_lost = track_back(fitter([6, 7], [4]).track(START))
+    assert runs == [[5, 6, 7, 6, 5], [5, 4, 5]]
+    assert [h.pose[0] for h in found] == [5, 3]
+    assert not is_lost
 
 
 @pytest.mark.parametrize("lost", [6, 4])
 def test_a_person_who_is_lost_on_a_track(fits, lost):
     costs, _, statuses = fits
     costs[:], statuses[lost] = [3.0], "lost"
-    own = fitter([6, 7], [4])
-    found = own.track(START, own.fit(START))
+    found = fitter([6, 7], [4]).track(START)
     assert found.is_lost
     assert found.status == "good"
-    assert found.cost_px == pytest.approx((3.0 + 3 * 2.0 + 2.0) / 4)
-    assert track_back(START, found).is_lost
+    assert track_back(found)[1]
+
+
+def test_costs_are_summed_over_the_frames(monkeypatch):
+    """All starts of a frame are scored on the same evidence, around all of them."""
+    away, seen = Hypothesis(PosedBody(MODEL, moved(MODEL.neutral(), 1.0))), []
+    monkeypatch.setattr(start_fit, "common_evidence", lambda _, frame, guesses, __: seen.append(len(guesses)) or frame)
+    monkeypatch.setattr(
+        start_fit, "scorer_without_prediction",
+        lambda frame, *_: SimpleNamespace(costs_with_priors=lambda model, poses: 10.0 * frame + poses[:, 0]),
+    )  # fmt: skip
+    own = fitter()
+    assert [h.cost for h in own.scored([away, START])] == [50.0, 51.0]
+    tracks = [StartTrack(h, "good", 1.0, {5: h.pose, 7: moved(h.pose, 3.0)}) for h in (away, START)]
+    assert [t.start.cost for t in own.compared(tracks)] == [50 + 73, 51 + 74]
+    assert seen == [2, 2, 2]
 
 
 def test_short_tracks_stay_within_the_recording():

@@ -38,7 +38,7 @@ def test_a_trunk_that_turned_the_wrong_way_is_found_again(monkeypatch, seed):
     assert off_m(found, truth) < 0.02
 
 
-@pytest.mark.parametrize(("steps_m", "n_rounds"), [((0.3, 0.005), 2), ((0.005,), 1), ((0.3, 0.3, 0.3), 2)])
+@pytest.mark.parametrize(("steps_m", "n_rounds"), [((0.3, 0.05), 2), ((0.05,), 1), ((0.3, 0.3, 0.3), 2)])
 def test_the_search_ends_where_nothing_moves(monkeypatch, steps_m, n_rounds):
     steps, draws = iter(steps_m), []
 

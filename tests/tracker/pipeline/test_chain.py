@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from fake_tracker import Walker
 
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
+from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model
 from tracker.initialization.first_pose import FirstPose, FirstPoses
-from tracker.initialization.generators.start_generators import StartCandidate
-from tracker.initialization.start_fit import FittedStart
 from tracker.pipeline import chain
 from tracker.pipeline.chain import StoredSession, run_chain, start_frame
 from tracker.pipeline.find_people import FindSettings, FoundPeople
@@ -59,8 +59,8 @@ def found(monkeypatch):
     def find(session, observer, people, frames, settings, report, show):
         calls.append(people)
         model = session.people[0].model
-        candidate = StartCandidate("voxels", model, model.neutral(), np.array([1.0, 0.0, 0.0]), 2.0)
-        first = FirstPose(FRAME, candidate, FittedStart(model.neutral(), "good", 1.5), True, ("left arm unresolved",))
+        start = Hypothesis(PosedBody(model, model.neutral()), "voxels")
+        first = FirstPose(FRAME, start, "good", 1.5, True, ("left arm unresolved",))
         show(FRAME, None)
         return FoundPeople(FirstPoses(FRAME, {0: first}), {0: model}, {0: model.neutral()}, {})
 

@@ -10,13 +10,15 @@ import pytest
 from figures import cameras_about_a_figure, figure, hide_legs, silhouettes_of_figure
 from solids import ellipsoid, silhouettes_of
 
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import fit_to_points
+from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model
 from tracker.initialization import first_pose, own_figure
 from tracker.initialization.first_pose import FirstPose, FirstPoses, find_first_poses, find_first_poses_anywhere
-from tracker.initialization.generators.start_generators import GENERATORS, StartCandidate, from_voxels
-from tracker.initialization.start_fit import FittedStart
+from tracker.initialization.generators.start_generators import GENERATORS, from_voxels
+from tracker.initialization.start_fit import StartTrack
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_sizes_changed
 from tracker.pipeline.find_people import (
     AXES,
@@ -55,21 +57,26 @@ def silhouettes(monkeypatch):
 @pytest.fixture
 def fits(monkeypatch):
     """Every start fits as it is; the second way of facing costs more."""
-    costs = iter(np.arange(1.0, 100.0))
-    monkeypatch.setattr(first_pose, "StartFitter", fitter(track=lambda start: (start.values, next(costs))))
+    costs = iter(np.arange(10.0, 1000.0, 10.0))
+    monkeypatch.setattr(first_pose, "StartFitter", fitter(track=lambda start: (start.pose, next(costs))))
 
 
-def fitter(track, status=lambda start: "good"):
-    """Stands for the class that fits starts: they fit as they are, and tracks give a pose and a cost."""
+def fitter(track, status=lambda start: "good", step=lambda: None):
+    """Stands for the class that fits starts: they fit as they are, and tracks give a pose and a cost, nats."""
 
     def fitted(start):
-        return FittedStart(start.values, status(start), 1.0)
+        step()
+        return start
 
-    def tracked(start, fit):
-        pose, cost_px = track(start)
-        return FittedStart(pose, status(start), float(cost_px))
+    def tracked(start):
+        pose, cost = track(start)
+        return StartTrack(replace(start.at(pose), cost=cost), status(start), 1.0, {3: pose})
 
-    return lambda *_: SimpleNamespace(fit=fitted, search=fitted, track=tracked)
+    return lambda *_: SimpleNamespace(
+        fit=fitted, search=fitted, track=tracked,
+        scored=lambda starts: [replace(s, cost=0.0) for s in starts],
+        compared=lambda tracks: sorted(tracks, key=lambda t: t.start.cost),
+    )  # fmt: skip
 
 
 OBSERVER = SimpleNamespace(recording=None)
@@ -100,15 +107,14 @@ def test_a_stop_is_heard_between_two_fits_of_a_frame(session, silhouettes, monke
     is_stopping = False
     fitted = []
 
-    def starts(observer, frame, later, others, step=lambda: None):
-        def fit(start):
+    def starts(observer, frame, later, others, step):
+        def fit():
             nonlocal is_stopping
-            fitted.append(start)
+            fitted.append(frame)
             is_stopping = True
             step()
-            return FittedStart(start.values, "good", 1.0)
 
-        return SimpleNamespace(fit=fit, search=fit, track=lambda start, found: found)
+        return fitter(lambda start: (start.pose, 0.0), step=fit)()
 
     def report(stage, share, text):
         if is_stopping:
@@ -127,7 +133,7 @@ def test_a_generator_is_added_by_an_entry_and_tried_where_the_others_propose_not
     silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
 
     def proposed(scene, model, is_known):
-        return [c._replace(generator="mine") for c in from_voxels(scene, model, is_known)]
+        return [replace(h, source="mine") for h in from_voxels(scene, model, is_known)]
 
     def nothing(scene, model, is_known):
         raise TrackerError("expected a head, found none")
@@ -137,7 +143,7 @@ def test_a_generator_is_added_by_an_entry_and_tried_where_the_others_propose_not
     monkeypatch.setitem(GENERATORS, "mine", proposed)
     said = []
     found = find_first_poses_anywhere(session, OBSERVER, [0], [3], 0.05, said.append)
-    assert found.poses[0].candidate.generator == "mine"
+    assert found.poses[0].start.source == "mine"
     assert [text.split(":")[0] for text in said] == [f"frame 3, {name}" for name in GENERATORS]
 
 
@@ -205,7 +211,7 @@ def off_by(places, monkeypatch):
     places = iter(places)
 
     def track(start):
-        moved = start.values.copy()
+        moved = start.pose.copy()
         moved[0] += next(places)
         return moved, 1.0
 
@@ -225,7 +231,7 @@ def test_another_start_takes_its_place(session, silhouettes, monkeypatch):
     silhouettes += silhouettes_of_figure(figure(noise=0.1)[0], CAMERAS)
     off_by([0.6] + [0.0] * 9, monkeypatch)
     found = find(session).poses[0]
-    assert found.fitted.status == "good"
+    assert found.status == "good"
     assert not any("share little" in note for note in found.notes)
 
 
@@ -239,11 +245,11 @@ def test_legs_that_look_like_shadows_are_found(session, silhouettes, monkeypatch
         return [np.linalg.norm(points[n] - joints[n]) for n in legs]
 
     def is_near(start):
-        return max(errors(start.model, start.values)) < 0.3
+        return max(errors(start.model, start.pose)) < 0.3
 
     def track(start):
         if not is_near(start):
-            return start.values, 2.0
+            return start.pose, 2.0
         known = {n: p for n, p in joints.items() if n in start.model.point_names}
         return fit_to_points(start.model, known).pose, 1.0
 
@@ -252,7 +258,7 @@ def test_legs_that_look_like_shadows_are_found(session, silhouettes, monkeypatch
     whole = silhouettes_of_figure(voxels, CAMERAS)
     silhouettes += hide_legs(whole, {0, 2}, [np.zeros_like(s.mask) for s in whole])
     found = find(session).poses[0]
-    assert max(errors(found.model, found.fitted.pose)) < 0.3
+    assert max(errors(found.model, found.start.pose)) < 0.3
     # Shadows are asked only where a start is not good without them.
     monkeypatch.setattr(first_pose, "recover_from_shadows", None)
     silhouettes[:] = whole
@@ -273,24 +279,23 @@ def test_a_start_that_one_view_contradicts_is_doubtful(session, silhouettes, fit
 
     monkeypatch.setattr(first_pose, "figure_masks", with_upper_half)
     found = find(session).poses[0]
-    assert found.fitted.status == "doubtful"
+    assert found.status == "doubtful"
     assert "share little of their area in view FRONT" in " ".join(found.notes)
 
 
 def test_both_ways_of_facing_are_compared(session, silhouettes, fits):
     silhouettes += silhouettes_of_figure(figure(turn_deg=40)[0], CAMERAS)
     first = find(session).poses[0]
-    assert first.is_facing_sure  # the feet say so
-    assert first.candidate.cues > 1
+    assert first.is_facing_sure  # the second track costs 10 nats more
     assert set(first.lines_px) <= set(NAMES)
 
 
 def found_people(session, scale):
     model = session.people[0].model
     body = model.with_height(scale * model.height_m)
-    candidate = StartCandidate("axis", body, body.neutral(), np.array([1.0, 0.0, 0.0]), 2.0)
+    start = Hypothesis(PosedBody(body, body.neutral()), "axis")
     lines = {"FRONT": np.array([[[1.0, 2.0], [3.0, 4.0]]])}
-    first = FirstPose(7, candidate, FittedStart(body.neutral(), "good", 1.0), True, ("a note",), lines)
+    first = FirstPose(7, start, "good", 1.0, True, ("a note",), lines)
     return FoundPeople(FirstPoses(7, {0: first}), {0: body}, {0: body.neutral()}, {})
 
 

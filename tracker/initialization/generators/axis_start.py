@@ -1,19 +1,20 @@
 """Search the twist and the limbs of a body on its axis, coarse to fine, by the silhouettes (GD96 Sect. 4.1).
 
-At each of some twists the limbs are searched among poses spread over their joint limits, then again among the better
-ones given the others. The best twists are refined, trunk and limbs in turn, at ever smaller spreads.
+At each of some twists the limbs are searched among poses spread over their joint limits, one after the other. The best
+twists are refined, trunk and limbs in turn, at ever smaller spreads.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.gauss_newton import fit_to_points, value_mask
+from tracker.fitting.hypothesis import Hypothesis, distinct
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.initialization.generators.body_axis import SHOULDERS, BodyAxis
@@ -27,95 +28,43 @@ from tracker.initialization.generators.silhouette_overlap import SilhouetteOverl
 
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
 _N_TWISTS = 12
-_N_AGAIN, _SWEEPS = 256, 2
-"""Poses of a limb that are tried again after the other limbs are known, and how often."""
+"""Twists about the axis that are tried, 30 degrees apart."""
 _FINER_RAD = tuple(np.radians([40.0, 30.0, 20.0, 15.0, 10.0, 8.0, 6.0, 4.0, 3.0]).tolist())
 """Spreads of the poses that are tried around the best one, rad, round by round."""
 _N_FINER = 64
 """Poses that are tried around the best one of trunk and of each limb in each round, a power of two."""
 _TRUNK_SHARE, _TRUNK_M = 0.5, 0.10
 """Spread of the trunk's directions as a share of that of the limbs, and of its place, metres per rad."""
-_N_SEARCHED, _N_KEPT = 12, 5
-"""Twists that are searched on, and starts that are returned of those that face any way."""
-_LIMB_JOINTS = (("knee", "ankle"), ("elbow", "wrist"))
-_N_EXCHANGED = 3
-"""Starts whose legs and whose arms are exchanged too: a leg before the other is easily taken for it."""
-_DOWNWARDS = 1.1
-"""Factor on the cost of a body with the head at the lower end of its axis."""
-_APART_RAD = np.radians(80)
-"""Angle between two ways of facing, rad: a body looks nearly the same from behind."""
-_DISTINCT_M = 0.08
-"""Smallest mean distance of the joints of two starts, metres."""
+_N_SEARCHED = 6
+"""Twists of those that face each way that are searched on: a body looks nearly the same from behind."""
 
 
-class AxisStart(NamedTuple):
-    """A start pose on the axis of a body."""
-
-    axis: BodyAxis
-    pose: Array
-    """(n_values,)."""
-    forward: Array
-    """Unit direction in which the trunk faces, (3,)."""
-    cost: float
-    """Cost against the silhouettes, see `SilhouetteOverlap`."""
-
-
-def search_on_axes(
-    model: BodyModel, overlap: SilhouetteOverlap, axes: Sequence[BodyAxis], up: Array
-) -> list[AxisStart]:
-    """Return start poses of a body on one of some axes, the cheapest first, one that faces the other way among them.
+def search_on_axes(model: BodyModel, overlap: SilhouetteOverlap, axes: Sequence[BodyAxis]) -> list[Hypothesis]:
+    """Return distinct starts of a body on one of some axes, the best first; costs are those of `SilhouetteOverlap`.
 
     Args:
         model: the body.
         overlap: with the silhouettes of the person.
         axes: places of the head that are tried; at least one.
-        up: vertical axis of the world, (3,). A body upside down must fit better than one that is upright.
     """
-    limb_search = _Search(model, overlap)
-
-    def weighed(start: AxisStart) -> float:
-        return start.cost * (_DOWNWARDS if start.axis.up @ up < 0 else 1.0)
-
-    coarse = sorted((start for axis in axes for start in _coarse(limb_search, axis)), key=weighed)
-    # A body looks nearly the same from behind: the best twists that face the other way are searched on too.
-    chosen = coarse[:_N_SEARCHED]
-    chosen += [s for s in coarse[_N_SEARCHED:] if _faces_elsewhere(s, coarse[0])][:2]
-    found = sorted((AxisStart(s.axis, *limb_search.refined(s.pose)) for s in chosen), key=weighed)
-    for start in found[:_N_EXCHANGED]:
-        exchanged = [_exchanged(model, start.pose, joints) for joints in _LIMB_JOINTS]
-        found += [AxisStart(start.axis, *limb_search.refined(pose)) for pose in exchanged]
-    kept: list[AxisStart] = []
-    for start in sorted(found, key=weighed):
-        if all(_is_distinct(model, start, other) for other in kept):
-            kept.append(start)
-    others = [s for s in kept[_N_KEPT:] if _faces_elsewhere(s, kept[0])][:1]
-    return kept[:_N_KEPT] + (others if not any(_faces_elsewhere(s, kept[0]) for s in kept[:_N_KEPT]) else [])
+    search = _Search(model, overlap)
+    coarse = sorted((h for axis in axes for h in _coarse(search, axis)), key=lambda h: h.cost)
+    ways = [[h for h in coarse if h.faces_away_from(coarse[0]) is away][:_N_SEARCHED] for away in (False, True)]
+    found = []
+    for start in (h for way in ways for h in way):
+        pose, cost = search.refined(start.pose)
+        found.append(replace(start.at(pose), cost=cost))
+    return distinct(found)
 
 
-def _exchanged(model: BodyModel, pose: Array, joints: Sequence[str]) -> Array:
-    """Return the pose in which the left and the right limb take each other's place, as far as joints allow."""
-    points = model.named_points_world(pose)
-    pairs = [(f"left_{j}", f"right_{j}") for j in joints if f"left_{j}" in points]
-    for left, right in pairs:
-        points[left], points[right] = points[right], points[left]
-    return fit_to_points(model, points, pose).pose
-
-
-def _faces_elsewhere(start: AxisStart, other: AxisStart) -> bool:
-    return bool(start.forward @ other.forward < np.cos(_APART_RAD))
-
-
-def _is_distinct(model: BodyModel, start: AxisStart, other: AxisStart) -> bool:
-    off = model.points_world(start.pose) - model.points_world(other.pose)
-    return bool(np.linalg.norm(off, axis=1).mean() > _DISTINCT_M)
-
-
-def _coarse(limb_search: "_Search", axis: BodyAxis) -> list[AxisStart]:
+def _coarse(search: "_Search", axis: BodyAxis) -> list[Hypothesis]:
     """Return for each twist on an axis the best pose among a few."""
+    notes = (f"the axis contradicts the others in view {', '.join(axis.left_out)}",) if axis.left_out else ()
     found, near = [], None
     for i in range(_N_TWISTS):
-        near = _trunk(limb_search.model, axis, _frame(axis.up, 2 * np.pi * i / _N_TWISTS), near)
-        found.append(AxisStart(axis, *limb_search.limbs_placed(near)))
+        near = _trunk(search.model, axis, _frame(axis.up, 2 * np.pi * i / _N_TWISTS), near)
+        pose, cost = search.limbs_placed(near)
+        found.append(Hypothesis(PosedBody(search.model, pose), cost=cost, notes=notes))
     return found
 
 
@@ -127,26 +76,21 @@ class _Search:
         self._limbs, self._parts = moving_limbs(model), np.arange(len(model.parts))
         self._root = np.flatnonzero(model.dof_joint == 0)
 
-    def limbs_placed(self, pose: Array) -> tuple[Array, Array, float]:
-        """Search the limbs all over their joint limits; return the pose, the direction it faces and its cost."""
+    def limbs_placed(self, pose: Array) -> tuple[Array, float]:
+        """Search the limbs all over their joint limits; return the pose and its cost."""
         model, trunk = self.model, trunk_parts(self.model)
         covered = self._overlap.nothing()
         Ts = model.kinematics(pose).Ts_world_part
         costs = 1 + self._overlap.cover(Ts[trunk], trunk, covered)
-        tried = []
         for limb, changes in zip(self._limbs, changes_within_limits(model), strict=True):
             poses = self._with_limb(pose, limb, model.clip(model.retract(model.neutral(), changes)))
             totals, view_costs = self._costs(pose, limb, poses, covered, costs)
-            order = np.argsort(totals)
-            pose, costs = poses[order[0]], view_costs[order[0]]
+            best = int(np.argmin(totals))
+            pose, costs = poses[best], view_costs[best]
             self._overlap.cover(model.kinematics(pose).Ts_world_part[limb.parts], limb.parts, covered)
-            tried.append(poses[order[:_N_AGAIN]])
-        for _ in range(_SWEEPS):
-            for limb, poses in zip(self._limbs, tried, strict=True):
-                pose, _ = self._best_of_limb(pose, limb, self._with_limb(pose, limb, poses))
-        return self._found(pose)
+        return pose, float(self._total(pose[None])[0])
 
-    def refined(self, pose: Array) -> tuple[Array, Array, float]:
+    def refined(self, pose: Array) -> tuple[Array, float]:
         """Search around a pose, trunk and limbs in turn; see `limbs_placed`."""
         model, best = self.model, self._total(pose[None])[0]
         for spread in _FINER_RAD:
@@ -160,11 +104,7 @@ class _Search:
                 near, cost = self._best_of_limb(pose, limb, model.clip(model.retract(pose, steps)))
                 if cost < best:
                     pose, best = near, cost
-        return self._found(pose)
-
-    def _found(self, pose: Array) -> tuple[Array, Array, float]:
-        forward = self.model.kinematics(pose).Ts_world_part[0, :3, 0]
-        return pose, forward, float(self._total(pose[None])[0])
+        return pose, float(best)
 
     def _with_limb(self, pose: Array, limb: Limb, poses: Array) -> Array:
         """Return the pose with one limb as in each of some poses, (n, n_values)."""

@@ -16,12 +16,11 @@ _MIN_APART = 0.2
 _CENTER_WEIGHT = 0.1
 """Weight of the rays through the silhouettes' centres against the planes. They only give the place along the axis."""
 _BIN_M = 0.02
+"""Width of the bins along the axis in which the silhouettes' widths are measured, metres."""
 _LATERAL_M = 0.40
 """Points of a silhouette farther aside of the axis are not counted, metres."""
 _HEAD = ((0.0, 0.02, 0.065), (0.02, 0.105, 0.100), (0.105, 0.135, 0.080))
 """Crown, head and neck: begin and end below the top and the width of their silhouettes, as fractions of the height."""
-_HEAD_LENGTH = 0.13
-"""Length of a head, as a fraction of the height."""
 _SHOULDERS = (0.18, 0.32, 0.16)
 """The same for the trunk below, which may be wider."""
 _ABOVE = 0.08
@@ -31,8 +30,6 @@ SHOULDERS = 0.185
 Biomech. 29:1223)."""
 _MAX_MISFIT = 0.035
 """Largest mean difference of the widths from those of a head, as a fraction of the height."""
-_DOWNWARDS = 0.010
-"""Advantage that a head at the lower end needs in its fit, as a fraction of the height."""
 
 
 class BodyAxis(NamedTuple):
@@ -55,7 +52,7 @@ def find_body_axes(axes: Sequence[MajorAxis], up: Array, height_m: float) -> lis
 
     Args:
         axes: of the silhouettes of one person.
-        up: vertical axis of the world, (3,). A head at the lower end must fit better than one at the upper end.
+        up: vertical axis of the world, (3,); of two heads that fit alike, the upper one is first.
         height_m: of the person, as far as it is known.
 
     Raises:
@@ -67,18 +64,18 @@ def find_body_axes(axes: Sequence[MajorAxis], up: Array, height_m: float) -> lis
     direction = direction if direction @ up >= 0 else -direction
     center = _center(used, direction)
     found = []
-    for sign, extra in ((1.0, 0.0), (-1.0, _DOWNWARDS)):
+    for sign in (1.0, -1.0):
         along, widths = _profile(used, center, sign * direction, height_m)
         for top_m, misfit in _heads(along, widths, height_m):
             if misfit <= _MAX_MISFIT:
                 top = center + sign * top_m * direction
-                found.append((misfit + extra, BodyAxis(sign * direction, top, misfit, used, left_out)))
+                found.append(BodyAxis(sign * direction, top, misfit, used, left_out))
     if not found:
         raise TrackerError(
             "expected a head along the silhouettes' axis, found none",
             Remedy("another_frame", condition="the person stands with the arms away from the head"),
         )
-    return [axis for _, axis in sorted(found, key=lambda f: f[0])]
+    return sorted(found, key=lambda axis: axis.misfit)
 
 
 def _direction(axes: Sequence[MajorAxis]) -> tuple[tuple[MajorAxis, ...], Array]:
@@ -172,6 +169,6 @@ def _heads(along: Array, widths: Array, height_m: float) -> list[tuple[float, fl
             misfits[i] = np.mean([t.mean() for t in terms])
     found: list[tuple[float, float]] = []
     for i in np.argsort(misfits, kind="stable"):
-        if np.isfinite(misfits[i]) and all(abs(along[i] - top) > _HEAD_LENGTH * height_m for top, _ in found):
+        if np.isfinite(misfits[i]) and all(abs(along[i] - top) > _HEAD[-1][1] * height_m for top, _ in found):
             found.append((float(along[i]), float(misfits[i])))
     return found

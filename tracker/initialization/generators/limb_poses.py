@@ -10,6 +10,7 @@ from tracker.body.limbs import Limb, limb_display_name, limbs
 from tracker.body.model import BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
+from tracker.search.even_points import even_points
 
 _N_POSES = {"leg": 1024, "arm": 2048}
 """Poses of a limb over its joint limits; powers of two, so that they fill the space evenly. Legs turn less."""
@@ -51,14 +52,14 @@ def changes_around(model: BodyModel, dofs: IntArray, n: int, spread: float, spre
         spread: standard deviation of angles, rad; that of joints of little spread is smaller.
         spread_m: standard deviation of lengths, metres.
     """
-    _, normal = _even(n, len(dofs))
+    _, normal = even_points(n, len(dofs))
     sigmas = np.where(np.isfinite(model.spreads[dofs]), _HELD * spread, spread)
     return _of_dofs(model, dofs, normal * np.where(model.dof_is_length[dofs], spread_m, sigmas))
 
 
 def _within_limits(model: BodyModel, limb: Limb) -> Array:
     dofs = np.flatnonzero(limb.dofs)
-    even, normal = _even(_N_POSES[_kind(limb)], len(dofs))
+    even, normal = even_points(_N_POSES[_kind(limb)], len(dofs))
     low, high = model.limits[dofs].T
     low, high = np.maximum(low, -np.pi), np.minimum(high, np.pi)
     steps = low + even * (high - low)
@@ -93,14 +94,3 @@ def _in_trunk(model: BodyModel, limb: Limb, poses: Array) -> NDArray[np.bool_]:
             local = rigid.apply(rigid.inverse(rest.Ts_world_part[part]), points) - model.centers_part[part]
             inside |= model.shapes[part].inside_outside(local) < _INSIDE
     return inside
-
-
-@lru_cache(maxsize=32)
-def _even(n: int, dims: int) -> tuple[Array, Array]:
-    """Return points that fill the unit cube evenly, (n, dims), and the same normally distributed (Sobol sequence)."""
-    # Imported lazily: these take 0.3 s to load.
-    from scipy.special import ndtri
-    from scipy.stats import qmc
-
-    even = np.asarray(qmc.Sobol(dims, seed=7).random(n))
-    return even, np.asarray(ndtri(0.002 + 0.996 * even))

@@ -24,15 +24,9 @@ _LEG_ROOT = -0.75
 """A limb that begins lower on the trunk, as a share of half its length from its middle, is a leg, raised or not."""
 _SLICE_M = 0.03
 """Half the thickness of the slice whose mean is a limb's centre, metres."""
-_SHARES = np.linspace(0.0, 1.0, 51)
-_SPLITS = np.arange(0.40, 0.601, 0.02)
-"""Places of the middle joint along a limb that are tried, as shares of its length."""
-_MIN_ANGLE = 0.35
-"""Smallest bend, rad, that shows the middle joint."""
-_MIN_BEND = 1.5
-"""Ratio of the errors of one and of two straight lines above which the place of the middle joint is known."""
-_USUAL_SPLIT = {"arm": 0.53, "leg": 0.52}
-"""Place of the middle joint of a straight limb, as a share of its length to the wrist or ankle."""
+_SPLIT = {"arm": 0.53, "leg": 0.52}
+"""Place of elbow and knee, as a share of the length through the limb to wrist or ankle, bent or not (P. de Leva 1996,
+J. Biomech. 29:1223)."""
 _END_M = {"arm": 0.10, "leg": 0.12}
 """Distance of the wrist and the ankle from the end of the limb, metres."""
 
@@ -48,16 +42,12 @@ class LimbRegion(NamedTuple):
     """Elbow or knee, (3,), metres."""
     distal: Array
     """Wrist or ankle, (3,), metres."""
-    tip: Array
-    """Its farthest voxels: fingers or toes, (3,), metres."""
-    is_bent: bool
-    """Whether its bend shows the place of the middle joint; else it follows from usual proportions."""
     indices: IntArray
     """Its voxels, indices into those of the figure, (n,)."""
 
     def scaled(self, factor: float) -> "LimbRegion":
         """Return it in a figure that is larger by a factor about the world's origin."""
-        places = {n: getattr(self, n) * factor for n in ("proximal", "middle", "distal", "tip")}
+        places = {n: getattr(self, n) * factor for n in ("proximal", "middle", "distal")}
         return self._replace(**places)
 
 
@@ -127,10 +117,8 @@ def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso) -> Lim
     side = np.sign(torso.local(first[None])[0, 1]) or 1.0
     across, along = (0.35, -0.75) if kind == "leg" else (1.0, 0.85)
     root = torso.center + torso.axes @ np.array([0.0, side * across * max(0.12, torso.half_axes[1]), along * half])
-    line = np.array([_at(region, from_torso, (root, branch.begins_m, first), s * length) for s in _SHARES])
-    split, is_bent = _split(line, kind)
-    middle = line[int(np.argmin(np.abs(_SHARES - split)))]
-    return LimbRegion(kind, root, middle, line[-1], tip, is_bent and own_root, branch.own)
+    middle, distal = (_at(region, from_torso, (root, branch.begins_m, first), s * length) for s in (_SPLIT[kind], 1.0))
+    return LimbRegion(kind, root, middle, distal, branch.own)
 
 
 def _at(region: Array, from_torso: Array, begin: tuple[Array, float, Array], distance: float) -> Array:
@@ -147,25 +135,3 @@ def _at(region: Array, from_torso: Array, begin: tuple[Array, float, Array], dis
         return np.asarray(root + (first - root) * max(0.0, distance) / begins_m)
     gaps = np.abs(from_torso - distance)
     return np.asarray(region[gaps <= max(_SLICE_M, float(gaps.min()))].mean(axis=0))
-
-
-def _split(line: Array, kind: str) -> tuple[float, bool]:
-    """Return the place of the middle joint along a limb, and whether a bend shows it."""
-    errors = [_line_error(line[s + 1e-9 >= _SHARES]) + _line_error(line[s - 1e-9 <= _SHARES]) for s in _SPLITS]
-    best = int(np.argmin(errors))
-    gain = _line_error(line) / max(errors[best], 1e-6 * len(line))
-    is_bent = gain > _MIN_BEND and _bend(line, float(_SPLITS[best])) > _MIN_ANGLE
-    return (float(_SPLITS[best]), True) if is_bent else (_USUAL_SPLIT[kind], False)
-
-
-def _bend(line: Array, at: float) -> float:
-    """Return the angle by which a line bends at a share of its length, rad."""
-    middle = line[int(np.argmin(np.abs(_SHARES - at)))]
-    a, b = middle - line[0], line[-1] - middle
-    return float(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b) + 1e-9), -1, 1)))
-
-
-def _line_error(points: Array) -> float:
-    """Return the sum of squared distances of points from their line, square metres."""
-    deviations = points - points.mean(axis=0)
-    return float(np.sum(np.linalg.svd(deviations, compute_uv=False)[1:] ** 2))

@@ -24,8 +24,6 @@ class PersonScene(NamedTuple):
     """Silhouettes of the person, of all views."""
     floor: GroundPlane
     """The floor."""
-    motion: Array | None
-    """The way of the person to later frames, (3,), metres; None if it is not known."""
 
     @property
     def up(self) -> Array:

@@ -14,10 +14,11 @@ _LATERAL = 2.0
 """Points farther aside of the axis are removed, in standard deviations of the points that are kept. A strip of even
 width keeps all its points: its border lies at sqrt(3)."""
 _MAX_ROUNDS = 12
-_SETTLED_RAD = 0.005
+"""Largest number of rounds. They end before where no other points are removed."""
 _MAX_POINTS = 5000
 """Largest number of points that are sampled from a silhouette."""
 _MIN_POINTS = 30
+"""Smallest number of pixels of a silhouette that has an axis."""
 
 
 class MajorAxis(NamedTuple):
@@ -58,7 +59,7 @@ def major_axis(mask: Mask, camera: Camera) -> MajorAxis | None:
         points = points[np.all((points >= -0.5) & (points <= np.array(camera.pinhole.size) - 0.5), axis=1)]
         if len(points) < _MIN_POINTS:
             return None
-    kept, lines, last, elongation = np.ones(len(points), bool), [], None, 0.0
+    kept, lines, elongation = np.ones(len(points), bool), [], 0.0
     for _ in range(_MAX_ROUNDS):
         center = points[kept].mean(axis=0)
         variances, axes = np.linalg.eigh(np.cov(points[kept].T))
@@ -66,8 +67,7 @@ def major_axis(mask: Mask, camera: Camera) -> MajorAxis | None:
         elongation = float(1 - np.sqrt(max(0.0, variances[0]) / variances[1]))
         ends = (points[kept] - center) @ along
         lines.append(center + np.outer([ends.min(), ends.max()], along))
-        if last is not None and abs(along @ last) > np.cos(_SETTLED_RAD):
+        before, kept = kept, np.abs((points - center) @ across) <= _LATERAL * np.sqrt(variances[0])
+        if np.array_equal(kept, before):
             break
-        last = along
-        kept = np.abs((points - center) @ across) <= _LATERAL * np.sqrt(variances[0])
     return MajorAxis(camera.pinhole, points, len(rows), np.array(lines), elongation)

@@ -4,49 +4,28 @@ A generator proposes; `tracker.initialization` fits, tracks and compares. Anothe
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
-from tracker.body.model import BodyModel
-from tracker.geometry.arrays import Array
-from tracker.initialization.generators.axis_start import AxisStart, search_on_axes
+from tracker.body.model import BodyModel, PosedBody
+from tracker.fitting.hypothesis import Hypothesis
+from tracker.initialization.generators.axis_start import search_on_axes
 from tracker.initialization.generators.body_axis import BodyAxis, find_body_axes
 from tracker.initialization.generators.person_scene import PersonScene, silhouette_axes
 from tracker.initialization.generators.silhouette_overlap import SilhouetteOverlap
-from tracker.initialization.generators.stature import UPRIGHT, height_of_parts, possible_parts, standing_height
-from tracker.initialization.generators.voxel_start import facing_cues, start_pose, turned_round
+from tracker.initialization.generators.stature import height_of_parts, possible_parts, standing_height
+from tracker.initialization.generators.voxel_start import start_pose, turned_round
 from tracker.voxels.part_size import principal_axes
 
 _AXES_TRIED = 3
+"""Places of the head along the axis that are tried, the best first."""
 _RAISED = (0.0, 0.10, 0.20)
 """Tops of the head that a search tries, below the end of the figure, as fractions of the height: hands may be above."""
 
 
-class StartCandidate(NamedTuple):
-    """A start pose before the fit to contours."""
-
-    generator: str
-    """Name of the generator that proposed it."""
-    model: BodyModel
-    """The body, with the height that was measured."""
-    pose: Array
-    """(n_values,)."""
-    forward: Array
-    """Unit direction in which the trunk faces, (3,)."""
-    cues: float
-    """Sum of the cues of feet, bends and motion for that direction; below 0 they favour the opposite one."""
-    unresolved: tuple[str, ...] = ()
-    """Limbs that the generator does not separate from the rest of the body."""
-    straight: tuple[str, ...] = ()
-    """Limbs whose middle joint follows from proportions."""
-    axis: BodyAxis | None = None
-    """The axis of the body, where the generator found one."""
-    is_measured: bool = True
-    """Whether the height of the body was measured, or was known."""
-
-
-def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
+def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Hypothesis]:
     """Return starts from the parts that voxels show (MTHC01 Sect. 3), one for each head and way of facing.
 
     Args:
@@ -57,21 +36,20 @@ def from_voxels(scene: PersonScene, model: BodyModel, is_known: bool) -> list[St
     Raises:
         TrackerError: no head with a trunk is found.
     """
-    starts: list[StartCandidate] = []
+    starts: list[Hypothesis] = []
     for parts in possible_parts(scene):
         height_m = None if is_known else height_of_parts(scene, parts)
         own = model if height_m is None else model.with_height(height_m)
-        starts += [
-            StartCandidate(
-                "voxels", own, start_pose(own, p), p.torso.axes[:, 0], sign * p.facing, p.unresolved, p.straight,
-                None, is_known or height_m is not None,
-            )
-            for sign, p in ((1.0, parts), (-1.0, turned_round(parts)))
-        ]  # fmt: skip
+        is_measured = is_known or height_m is not None
+        for facing in (parts, turned_round(parts)):
+            listed = ", ".join(n.replace("_", " ") for n in facing.unresolved)
+            notes = (f"not resolved by the voxels, which show them as one with the body: {listed}",) if listed else ()
+            body = PosedBody(own, start_pose(own, facing))
+            starts.append(Hypothesis(body, "voxels", is_measured=is_measured, notes=notes))
     return starts
 
 
-def from_axis(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
+def from_axis(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Hypothesis]:
     """Return starts on the axis of the silhouettes (GD96 Sect. 4.1), one for each way of facing.
 
     Views in which others cover the person are left out if two remain. See `from_voxels`.
@@ -86,14 +64,14 @@ def from_axis(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Star
     return _on_axes("axis", scene, own, axes, is_known or height_m is not None)
 
 
-def from_search(scene: PersonScene, model: BodyModel, is_known: bool) -> list[StartCandidate]:
+def from_search(scene: PersonScene, model: BodyModel, is_known: bool) -> list[Hypothesis]:
     """Return starts from a search along the figure's longest axis, with the head near either end.
 
     It needs no head that stands out. See `from_voxels`.
     """
     found = principal_axes(scene.figure.points_world, scene.figure.grid.size_m)
     up = found.axes[:, 2] * (1.0 if found.axes[:, 2] @ scene.up >= 0 else -1.0)
-    starts: list[StartCandidate] = []
+    starts: list[Hypothesis] = []
     for direction in (up, -up):
         top = found.center + float(((scene.figure.points_world - found.center) @ direction).max()) * direction
         axes = [BodyAxis(direction, top - s * model.height_m * direction, np.nan, (), ()) for s in _RAISED]
@@ -102,28 +80,16 @@ def from_search(scene: PersonScene, model: BodyModel, is_known: bool) -> list[St
     return starts
 
 
-StartGenerator: TypeAlias = Callable[[PersonScene, BodyModel, bool], list[StartCandidate]]
+StartGenerator: TypeAlias = Callable[[PersonScene, BodyModel, bool], list[Hypothesis]]
 """Proposes starts from the person on a frame, the body, and whether its height is known."""
 GENERATORS: dict[str, StartGenerator] = {"voxels": from_voxels, "axis": from_axis, "search": from_search}
 """Each generator by name, in the order of their cost, in which they are tried."""
 
 
-def _feet_up(scene: PersonScene, axis: BodyAxis) -> Array:
-    """Return the direction from the feet upwards, (3,): a standing person's soles are on the ground, bent or not."""
-    return scene.up if axis.up @ scene.up > UPRIGHT else axis.up
-
-
 def _on_axes(
     generator: str, scene: PersonScene, model: BodyModel, axes: Sequence[BodyAxis], is_measured: bool
-) -> list[StartCandidate]:
+) -> list[Hypothesis]:
     masks, cameras = zip(*scene.clear_views, strict=True)
     overlap = SilhouetteOverlap(model, masks, cameras, scene.figure.points_world.mean(axis=0))
-    starts: list[AxisStart] = search_on_axes(model, overlap, axes, scene.up)
-    return [
-        StartCandidate(
-            generator, model, start.pose, start.forward,
-            facing_cues(scene.figure, start.forward, _feet_up(scene, start.axis), scene.motion),
-            axis=start.axis, is_measured=is_measured,
-        )
-        for start in starts
-    ]  # fmt: skip
+    starts = search_on_axes(model, overlap, axes)
+    return [replace(start, source=generator, is_measured=is_measured) for start in starts]

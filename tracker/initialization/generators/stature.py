@@ -32,7 +32,7 @@ def possible_parts(scene: PersonScene) -> list[FigureParts]:
     found, errors, graph = list[FigureParts](), list[TrackerError](), neighbor_graph(scene.figure)
     for head in possible_heads(scene.figure, graph, scene.up):
         try:
-            found.append(locate_parts(scene.figure, graph, head, scene.motion))
+            found.append(locate_parts(scene.figure, graph, head))
         except TrackerError as error:
             errors.append(error)
     if not found:

@@ -21,7 +21,7 @@ _MIN_FILLED = 0.75
 _GIRDLE_M = (0.25, 0.28)
 """Length and radius of the shoulder girdle below the neck, metres. It is wide where arms hang at a trunk's sides."""
 _MAX_ITERATIONS = 30
-_SETTLED_RAD = 0.01
+"""Largest number of turns of the template. They end before where no other voxels are inside."""
 
 
 class Torso(NamedTuple):
@@ -87,16 +87,13 @@ def _axis(points: Array, neck: Array) -> Array:
     length, radius = _AVERAGE_M
     down = points.mean(axis=0) - neck
     down /= np.linalg.norm(down)
+    before = np.zeros(len(points), bool)
     for _ in range(_MAX_ITERATIONS):
         inside = _in_cylinder(points, neck, -down, length, radius)
-        if not inside.any():
+        if not inside.any() or np.array_equal(inside, before):
             break
-        new = points[inside].mean(axis=0) - neck
-        new /= np.linalg.norm(new)
-        turned = np.arccos(np.clip(new @ down, -1, 1))
-        down = new
-        if turned < _SETTLED_RAD:
-            break
+        down, before = points[inside].mean(axis=0) - neck, inside
+        down /= np.linalg.norm(down)
     return np.asarray(-down)
 
 

@@ -19,11 +19,6 @@ from tracker.voxels.voxel_grid import Voxels
 SIDES = ("left", "right")
 _JOINTS = {"arm": ("elbow", "wrist"), "leg": ("knee", "ankle")}
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
-_FOOT_M, _BEND_M, _MOTION_M = 0.06, 0.06, 0.12
-"""Units of the cues for where a person faces, metres. The cues are a foot before its ankle, a knee or elbow beside the
-line through its limb, and the way to the next frames."""
-SURE = 1.0
-"""Sum of these cues from which on left and right are known."""
 _SAME_HEAD_M = 0.11
 """Distance up to which two heads are the same, metres."""
 _ONE_LEG = 0.25
@@ -36,26 +31,14 @@ class FigureParts(NamedTuple):
     figure: Voxels
     head: Head
     torso: Torso
-    """Its narrow axis points forwards and its wide one to the left, as far as the cues show."""
+    """Its narrow axis points forwards and its wide one to the left, or it is turned round: voxels do not tell."""
     limbs: dict[str, LimbRegion]
     """Limbs that stand out, by name: `left_arm` and so on."""
-    facing: float
-    """Sum of the cues for the direction; below `SURE` left and right may be exchanged."""
-
-    @property
-    def is_facing_sure(self) -> bool:
-        """Whether left and right are known by the cues."""
-        return self.facing >= SURE
 
     @property
     def unresolved(self) -> tuple[str, ...]:
         """Names of the limbs that do not stand out, as `left_arm`; a leg or an arm whose side is open without it."""
         return tuple(f"{s}_{k}" for k in _JOINTS for s in SIDES if f"{s}_{k}" not in self.limbs)
-
-    @property
-    def straight(self) -> tuple[str, ...]:
-        """Names of the limbs whose middle joint follows from proportions, because no bend shows it."""
-        return tuple(name for name, limb in self.limbs.items() if not limb.is_bent)
 
 
 def possible_heads(figure: Voxels, graph: VoxelGraph, up: Array) -> list[Head]:
@@ -79,14 +62,13 @@ def possible_heads(figure: Voxels, graph: VoxelGraph, up: Array) -> list[Head]:
     return heads[:1] if is_same else heads
 
 
-def locate_parts(figure: Voxels, graph: VoxelGraph, head: Head, motion: Array | None = None) -> FigureParts:
+def locate_parts(figure: Voxels, graph: VoxelGraph, head: Head) -> FigureParts:
     """Locate neck, torso and limbs of a figure.
 
     Args:
         figure: voxels of one person.
         graph: their `neighbor_graph`.
         head: the head.
-        motion: the way of the figure to later frames, (3,), metres; None if it is not known.
 
     Raises:
         TrackerError: nothing is below the head.
@@ -95,12 +77,8 @@ def locate_parts(figure: Voxels, graph: VoxelGraph, head: Head, motion: Array | 
     grown = figure.scaled(1 / head.scale)
     torso = find_torso(grown, head.neck / head.scale, head.is_head)
     limbs = find_limbs(grown, graph, torso, head.is_head)
-    moved = None if motion is None else motion / head.scale
-    facing = facing_cues(grown, torso.axes[:, 0], torso.axes[:, 2], moved) + _bends(torso, limbs)
-    if facing < 0:
-        torso = torso.turned_round()
     own = {n: limb.scaled(head.scale) for n, limb in _by_side(torso, limbs, len(figure.indices)).items()}
-    return FigureParts(figure, head, torso.scaled(head.scale), own, abs(facing))
+    return FigureParts(figure, head, torso.scaled(head.scale), own)
 
 
 def turned_round(parts: FigureParts) -> FigureParts:
@@ -149,33 +127,3 @@ def _by_side(torso: Torso, limbs: Sequence[LimbRegion], n_voxels: int) -> dict[s
             found[f"{side}_{kind}"] = own[0]
         # A single thick region at the lower end holds both legs: neither is resolved.
     return found
-
-
-def _bends(torso: Torso, limbs: Sequence[LimbRegion]) -> float:
-    """Return the cue of the limbs' bends that a person faces along the torso's narrow axis."""
-    forward, total = torso.axes[:, 0], 0.0
-    for limb in limbs:
-        bend = float((limb.middle - (limb.proximal + limb.distal) / 2) @ forward)
-        sign = 1.0 if limb.kind == "leg" else -1.0
-        total += sign * 0.5 * float(np.clip(bend / _BEND_M, -1, 1)) if limb.is_bent else 0.0
-    return total
-
-
-def facing_cues(figure: Voxels, forward: Array, up: Array, motion: Array | None) -> float:
-    """Return the sum of the cues of feet and motion that a person faces in a direction; from `SURE` on it is known.
-
-    Args:
-        figure: voxels of the person.
-        forward: the direction, (3,).
-        up: from the legs to the head, (3,).
-        motion: the way of the figure to later frames, (3,), metres; None if it is not known.
-    """
-    points, total = figure.points_world, 0.0
-    along = points @ up
-    low = points[along < along.min() + 0.06]
-    above = points[(along > along.min() + 0.10) & (along < along.min() + 0.22)]
-    if len(low) and len(above):
-        total += float(np.clip((low.mean(axis=0) - above.mean(axis=0)) @ forward / _FOOT_M, -1.5, 1.5))
-    if motion is not None:
-        total += float(np.clip(motion @ forward / _MOTION_M, -2, 2))
-    return total

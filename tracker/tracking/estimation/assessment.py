@@ -6,16 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.limbs import limb_display_name, limbs
+from tracker.body.model import PosedBody
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import covariance
+from tracker.fitting.hypothesis import Hypothesis, limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.tracking import confidence
 from tracker.tracking.confidence import PoseQuality, Status, worst
 from tracker.tracking.estimate import NormalMatrix
 from tracker.tracking.estimation.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
-
-ELSEWHERE_RAD = 0.3
-"""A limb of which a joint turned farther is elsewhere, rad."""
 
 
 class PersonEstimate(NamedTuple):
@@ -68,7 +67,8 @@ def estimate_at(
     residuals = problem.residuals(person, bodies, everywhere=True)
     blocks = [residuals, *problem.priors(person, bodies)]
     fit = problem.solve(person, bodies[person].values, blocks, max_iterations=0)
-    found = PersonFit(residuals, bodies, fit, bodies[person], alternatives=tuple(alternatives))
+    others = tuple(Hypothesis(PosedBody(bodies[person].model, pose)) for pose in alternatives)
+    found = PersonFit(residuals, bodies, fit, bodies[person], alternatives=others)
     return finalize(problem, person, bodies, found)
 
 
@@ -93,12 +93,12 @@ def finalize(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFi
     )  # fmt: skip
     if not found.alternatives:
         return out
-    turned = np.abs([model.difference(other, found.fit.pose) for other in found.alternatives]).max(axis=0)
-    names = [limb_display_name(x.name) for x in limbs(model) if turned[x.dofs].max() > ELSEWHERE_RAD]
+    moved = {limb for other in found.alternatives for limb in limbs_elsewhere(found.body, other.body)}
+    names = [limb_display_name(x.name) for x in limbs(model) if x.name in moved]
     poses = tuple(b.values for b in bodies)
     return out.in_doubt(
         f"{' and '.join(names) or 'body'} may be elsewhere",
-        [(*poses[:person], other, *poses[person + 1 :]) for other in found.alternatives],
+        [(*poses[:person], other.pose, *poses[person + 1 :]) for other in found.alternatives],
     )
 
 

@@ -12,15 +12,10 @@ from functools import lru_cache
 from itertools import takewhile
 from typing import NamedTuple
 
-import numpy as np
-
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import PosedBody
-from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import with_locked_dofs
-from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
@@ -28,11 +23,12 @@ from tracker.tracking.estimation.assessment import estimate_at, estimate_fixed
 from tracker.tracking.estimation.forward_pass import make_estimate, track_forward
 from tracker.tracking.estimation.frame_estimator import FrameEstimator
 from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior
-from tracker.tracking.estimation.pose_paths import ROUNDS, Candidates, FrameCost, propagate_candidates, viterbi_path
-from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
+from tracker.tracking.estimation.pose_paths import ROUNDS, Candidates, propagate_candidates, viterbi_path
+from tracker.tracking.estimation.pose_score import PoseScorer, common_evidence, scorer_without_prediction
+from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost, trust
 from tracker.tracking.subjects import Keyframes
 from tracker.tracking.tracker import TrackingRun
-from tracker.tracking.view_regions import regions, visible_pieces_px
+from tracker.tracking.view_regions import regions
 
 _TRUSTED_FRAMES = 3
 """Number of good frames in a row that end an interval. A lost limb may look good by chance on fewer."""
@@ -170,19 +166,20 @@ class _PathSelection:
             self._candidates_of(f, TrackedFrame.of(b)) for f, b in zip(self._forward, backward, strict=True)
         ]
         self._views = lru_cache(_CACHED_FRAMES)(self._observe)
-        self._frame_cost = lru_cache(_CACHED_FRAMES)(self._make_frame_cost)
+        self._scorer = lru_cache(_CACHED_FRAMES)(self._make_scorer)
 
     def propagate(self) -> Iterator[int]:
         """Propagate the candidates through the interval. Yields the index of each frame that is visited."""
         locked = self._forward[0].poses[self._person]
         ends = [e[i].poses[self._person] if e else None for e, i in ((self._before, -1), (self._after, 0))]
         ends = [None if e is None else with_locked_dofs(self._model, e, locked, self._active_dofs) for e in ends]
-        yield from propagate_candidates(self._candidates, self._frame_cost, ends)
+        sigma = trust(self._model, self._settings)
+        yield from propagate_candidates(self._model, self._candidates, self._scorer, ends, sigma)
 
     def better(self) -> tuple[PoseEstimate, ...]:
         """Return the estimates of the selected path that replace those of forward tracking, in tracking order."""
         ends = [[self._model.points_world(e.poses[self._person]) for e in some] for some in (self._before, self._after)]
-        points, costs = [np.array(c.points) for c in self._candidates], [np.array(c.costs) for c in self._candidates]
+        points, costs = [c.points for c in self._candidates], [c.costs for c in self._candidates]
         out = []
         for i, chosen in enumerate(viterbi_path(points, costs, *ends)):
             if chosen == 1:
@@ -201,26 +198,16 @@ class _PathSelection:
         poses = [pose if p == self._person else v for p, v in enumerate(self._forward[i].poses)]
         return tuple(PosedBody(m, p) for m, p in zip(self._models, poses, strict=True))
 
-    def _make_frame_cost(self, i: int) -> FrameCost:
-        person, settings = self._person, self._settings
-        bodies, views = self._bodies(i, self._forward[i].poses[person]), self._views(i)
-        residuals = ContourResiduals(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
-        penetration = (
-            [BodyPenetration(bodies, person, settings.apart)] if len(bodies) > 1 and settings.apart > 0 else []
+    def _make_scorer(self, i: int) -> PoseScorer:
+        bodies = self._bodies(i, self._forward[i].poses[self._person])
+        return scorer_without_prediction(
+            self._views(i), bodies, self._person, self._settings, self._part_colors, self._active_dofs
         )
-        colors = Colors(views, bodies, person)
-        return FrameCost(self._model, residuals, colors, self._part_colors, penetration, settings, self._active_dofs)
 
     def _observe(self, i: int) -> tuple[ViewEvidence, ...]:
         """Return the evidence of a frame around the poses of both passes; all candidates are compared on it."""
-        cameras = self._observer.working_cameras
         guesses = [self._bodies(i, e.poses[self._person]) for e in (self._forward[i], self._backward[i])]
-        visible = [
-            np.concatenate([visible_pieces_px(occluding_contours.trace(g, c)) for g in guesses]) for c in cameras
-        ]
-        where = regions(cameras, [body for g in guesses for body in g])
-        accepting = visible if self._settings.segments else None
-        return self._observer.evidence(self._forward[i].frame, where, accepting, edges=self._settings.edges)
+        return common_evidence(self._observer, self._forward[i].frame, guesses, self._settings)
 
     def _estimate(self, i: int, chosen: int) -> PoseEstimate:
         """Return the estimate of a frame with a candidate that was propagated there."""

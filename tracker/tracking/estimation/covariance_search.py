@@ -13,51 +13,51 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.fitting.contour_residuals import MIN_DECREASE
-from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
+from tracker.fitting.gauss_newton import PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solver_of
+from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.geometry.arrays import Array
-from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN, PoseScorer, ScoredFit
+from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE
 
 _N_SAMPLES = 16
+"""Poses that are drawn and refined in a search."""
 _SCALE = 2.0
 """Factor of the standard deviations. Refinement leads smaller steps back to where they began."""
-_FREE = 3.0
-"""Factor of the standard deviations of a refinement, with which its start hardly counts in the covariance."""
-_MAX_STEP = 1.2
-"""Largest change of a degree of freedom, rad or metres. It limits degrees of freedom that no contour determines."""
 
 
-def search_along_covariance(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array, draw: int = 0) -> Fit:
-    """Refine poses sampled around a fit, and return the fit of the cheapest.
+def search_along_covariance(
+    model: BodyModel, found: Hypothesis, scorer: PoseScorer, sigma: Array, draw: int = 0
+) -> Hypothesis:
+    """Refine poses sampled around a pose, and return the cheapest.
 
     Poses are compared without the prediction, since what it says has led to a doubtful pose.
 
     Args:
         model: the body.
-        fit: the refined pose.
+        found: the refined pose.
         scorer: compares poses; the first of its priors is the prediction.
         sigma: standard deviations of a prediction, (n_dofs,), rad or metres.
         draw: number of the samples; another number gives others.
 
     Returns:
-        The given pose refined again, unless another is cheaper by `MIN_COST_GAIN`. Its normal matrix is that of all
+        The given pose refined again, unless another is cheaper by `CLEAR_NATS`. Its normal matrix is that of all
         blocks of the scorer.
     """
 
     own = OWN_TRUST * sigma
 
-    def refined(scorer: PoseScorer, pose: Array) -> ScoredFit:
+    def refined(scorer: PoseScorer, pose: Array) -> Hypothesis:
         held = PosePrior(pose, 1 / own)
-        found = solver_of(model)(
+        fit = solver_of(model)(
             model, pose, _blocks(scorer, held), scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE
         )
-        return ScoredFit(found, scorer.cost(found) - held.cost(model, found.pose))
+        return Hypothesis.refined(model, fit, scorer.cost(fit) - held.cost(model, fit.pose))
 
-    here, *others = scorer.each(refined, [fit.pose, *_samples(model, fit, scorer, own, draw)])
+    here, *others = scorer.each(refined, [found.pose, *_samples(model, found.pose, scorer, own, draw)])
     cheapest = min(others, key=lambda x: x.cost)
-    best = cheapest if cheapest.cost < here.cost - MIN_COST_GAIN else here
-    return solver_of(model)(model, best.fit.pose, scorer.blocks, scorer.active_dofs, 0)
+    best = cheapest if cheapest.cost < here.cost - CLEAR_NATS else here
+    return scorer.scored(model, solver_of(model)(model, best.pose, scorer.blocks, scorer.active_dofs, 0))
 
 
 def _blocks(scorer: PoseScorer, held: PosePrior) -> list[ResidualBlock]:
@@ -65,17 +65,16 @@ def _blocks(scorer: PoseScorer, held: PosePrior) -> list[ResidualBlock]:
     return [scorer.residuals, held, *scorer.priors[1:]]
 
 
-def _samples(model: BodyModel, fit: Fit, scorer: PoseScorer, sigma: Array, draw: int = 0) -> Sequence[Array]:
-    """Return poses drawn around a fit, (n_values,) each."""
+def _samples(model: BodyModel, pose: Array, scorer: PoseScorer, sigma: Array, draw: int = 0) -> Sequence[Array]:
+    """Return poses drawn around a pose, (n_values,) each."""
     free = np.flatnonzero(np.ones(model.n_dofs, dtype=bool) if scorer.active_dofs is None else scorer.active_dofs)
-    blocks = _blocks(scorer, PosePrior(fit.pose, 1 / (_FREE * sigma)))
-    around = solver_of(model)(model, fit.pose, blocks, scorer.active_dofs, 0)
+    blocks = _blocks(scorer, PosePrior(pose, 1 / sigma))
+    around = solver_of(model)(model, pose, blocks, scorer.active_dofs, 0)
     # Steps with the inverse Hessian as covariance. Its eigenvalues would take a hundred times as long.
     factor = np.linalg.cholesky(around.hessian[np.ix_(free, free)])
     steps = np.zeros((_N_SAMPLES, model.n_dofs))
-    drawn = _SCALE * np.linalg.solve(factor.T, _normal(_N_SAMPLES, len(free), draw).T).T
-    steps[:, free] = np.clip(drawn, -_MAX_STEP, _MAX_STEP)
-    return [model.clip(model.retract(fit.pose, step)) for step in steps]
+    steps[:, free] = _SCALE * np.linalg.solve(factor.T, _normal(_N_SAMPLES, len(free), draw).T).T
+    return [model.clip(model.retract(pose, step)) for step in steps]
 
 
 @lru_cache(maxsize=8)

@@ -8,8 +8,6 @@ cheapest refined pose wins.
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import Limb, limb_display_name
 from tracker.body.model import PosedBody
@@ -18,28 +16,25 @@ from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton import Fit, with_locked_dofs
+from tracker.fitting.hypothesis import SAME_POSE_M, SETTLED_M, distance_m, limbs_elsewhere
 from tracker.geometry.arrays import Array
-from tracker.tracking.estimation.assessment import ELSEWHERE_RAD, PersonEstimate, assess, estimate_fixed, finalize
+from tracker.tracking.estimation.assessment import PersonEstimate, assess, estimate_fixed, finalize
 from tracker.tracking.estimation.covariance_search import search_along_covariance
 from tracker.tracking.estimation.frame_problem import (
     Bodies,
     FrameProblem,
     PersonFit,
     PersonPrior,
-    moved_m,
     with_body,
 )
 from tracker.tracking.estimation.identity_swaps import identity_swaps
-from tracker.tracking.estimation.limb_recovery import PoseScorer, for_several, search_limbs
+from tracker.tracking.estimation.limb_recovery import search_limbs
+from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
 
 _MAX_LIMBS = 2
 """Number of limbs of a person that are searched in a frame, the most likely lost first."""
-_MOVED_RAD = 0.05
-"""A search succeeded where a joint turned farther, rad."""
-_OTHERS_MOVED_M, _SELF_MOVED_M = 0.002, 0.01
-"""A person is refined again where another, or they themselves, moved farther since, metres."""
 
 
 class FrameEstimator:
@@ -111,9 +106,8 @@ class FrameEstimator:
         for _ in range(self.settings.rounds if len(self.bodies) > 1 else 0):
             done = True
             for person, before in fits.items():
-                limits = np.where(np.arange(len(self.bodies)) == person, _SELF_MOVED_M, _OTHERS_MOVED_M)
-                pairs = zip(before.bodies, self.bodies, limits, strict=True)
-                if not all(moved_m(then, now) < limit for then, now, limit in pairs):
+                pairs = zip(before.bodies, self.bodies, strict=True)
+                if not all(distance_m(then, now) < SETTLED_M for then, now in pairs):
                     fits[person] = self.move(person, self.problem.refine(person, self.bodies, before))
                     done = False
             if done:
@@ -176,7 +170,7 @@ class FrameEstimator:
             return found
         scorer = PoseScorer.of(
             residuals, priors, Colors(own, *problem.around(person, bodies)), memory.part_colors,
-            recover if len(bodies) == 1 else for_several(recover), memory.active_dofs,
+            recover, memory.active_dofs,
         )  # fmt: skip
         notes, evaluations = list[str](), 0
         searched = self._search_body(person, fit, scorer) if quality.is_body_lost else None
@@ -184,20 +178,21 @@ class FrameEstimator:
             evaluations, fit = searched
             notes.append("body searched")
         others = (memory.history[-1], problem.people[person].predicted)
-        best, alternatives = search_limbs(model, limbs, fit, others, scorer)
-        turned = np.abs(model.difference(best.pose, fit.pose))
+        start = scorer.scored(model, fit)
+        best, *alternatives = search_limbs(model, limbs, start, others, scorer)
+        moved, relocated = (limbs_elsewhere(start.body, best.body, m) for m in (SETTLED_M, SAME_POSE_M))
         for limb in limbs:
-            memory.record_search(limb, quality, turned[limb.dofs].max() > _MOVED_RAD)
-            if turned[limb.dofs].max() > ELSEWHERE_RAD:
+            memory.record_search(limb, quality, limb.name in moved)
+            if limb.name in relocated:
                 notes.append(f"{limb_display_name(limb.name)} relocated")
         if samples:
             sampled = search_along_covariance(model, best, scorer, problem.sigma(person))
-            memory.record_sampling(np.abs(model.difference(sampled.pose, best.pose)).max() > _MOVED_RAD)
+            memory.record_sampling(distance_m(sampled.body, best.body) > SETTLED_M)
             best = sampled
+        assert best.fit is not None
         return found._replace(
-            fit=best, body=PosedBody(model, best.pose), evaluations=evaluations, notes=tuple(notes),
-            alternatives=tuple(a.pose for a in alternatives),
-        )  # fmt: skip
+            fit=best.fit, body=best.body, evaluations=evaluations, notes=tuple(notes), alternatives=tuple(alternatives)
+        )
 
     def search_body(self, person: int, start: Array) -> tuple[int, Array] | None:
         """Search a lost person from a pose, (n_values,); methods that search whole bodies override it.

@@ -17,14 +17,19 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals, PartCosts
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solver_of
+from tracker.fitting.hypothesis import SETTLED_M, Hypothesis, distance_m
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import PoseQuality
-from tracker.tracking.estimation.settings import MAX_ITERATIONS, OWN_TRUST, TOLERANCE, EstimationSettings, prior_blocks
+from tracker.tracking.estimation.settings import (
+    MAX_ITERATIONS,
+    OWN_TRUST,
+    TOLERANCE,
+    EstimationSettings,
+    prior_blocks,
+    trust,
+)
 from tracker.tracking.evidence_assignment import EvidenceAssignment, EvidencePool
-
-_SAME_ASSIGNMENT_M = 0.01
-"""Evidence is assigned again where a person has moved farther, metres."""
 
 _ROUNDING_PX2 = 1 / 12
 """Variance of rounding to whole pixels, px^2."""
@@ -70,8 +75,8 @@ class PersonFit(NamedTuple):
     """Number of poses that the best-first search scored."""
     notes: tuple[str, ...] = ()
     """Notes for people to read on how the person was found."""
-    alternatives: tuple[Array, ...] = ()
-    """Poses that are about as good, (n_values,) each, best first."""
+    alternatives: tuple[Hypothesis, ...] = ()
+    """Poses that are about as good, best first."""
     is_predicted: bool = True
     """Whether the prediction is a term of the fit."""
 
@@ -166,8 +171,7 @@ class FrameProblem:
 
     def sigma(self, person: int) -> Array:
         """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""
-        is_length = self.people[person].model.dof_is_length
-        return np.where(is_length, self.settings.trust_m, self.settings.trust_rad)
+        return trust(self.people[person].model, self.settings)
 
     def priors(self, person: int, bodies: Bodies, untrusted: Sequence[Limb] = ()) -> list[ResidualBlock]:
         """Build the prior terms: prediction (first, weak for untrusted limbs), joint spread, penetration."""
@@ -175,10 +179,7 @@ class FrameProblem:
         for limb in untrusted:
             assert settings.recover is not None
             sigma[limb.dofs] = settings.recover.trust_rad
-        blocks = prior_blocks(model, self.people[person].predicted, sigma)
-        if len(self.people) > 1 and settings.apart > 0:
-            blocks.append(BodyPenetration(bodies, person, settings.apart))
-        return blocks
+        return [*prior_blocks(model, self.people[person].predicted, sigma), *penetration(bodies, person, settings)]
 
     def residuals(self, person: int, bodies: Bodies, everywhere: bool = False) -> ContourResiduals:
         """Build the residuals of a person's contours against the evidence assigned to them.
@@ -251,11 +252,9 @@ def with_body(bodies: Bodies, person: int, body: PosedBody) -> Bodies:
 
 def _are_near(before: Sequence[PosedBody], now: Sequence[PosedBody]) -> bool:
     """Return whether evidence assigned to people in some poses may be used for others."""
-    return all(moved_m(a, b) < _SAME_ASSIGNMENT_M for a, b in zip(before, now, strict=True))
+    return all(distance_m(a, b) < SETTLED_M for a, b in zip(before, now, strict=True))
 
 
-def moved_m(before: PosedBody, now: PosedBody) -> float:
-    """Return the largest distance between the points of a person in two poses, metres."""
-    if before is now:
-        return 0.0
-    return float(np.linalg.norm(now.points_world - before.points_world, axis=1).max())
+def penetration(bodies: Bodies, person: int, settings: EstimationSettings) -> list[ResidualBlock]:
+    """Return the term against the penetration of other bodies, if there are any and it is wanted."""
+    return [BodyPenetration(bodies, person, settings.apart)] if len(bodies) > 1 and settings.apart > 0 else []

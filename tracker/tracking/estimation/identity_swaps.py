@@ -4,12 +4,9 @@ from collections.abc import Mapping
 from itertools import combinations
 
 from tracker.body.model import PosedBody
+from tracker.fitting.hypothesis import BEAM_NATS, CLEAR_NATS
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonFit, with_body
-from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN
-
-_MAX_PRIOR_INCREASE = 60.0
-"""Largest increase in prior cost (nats) at which swapping two people is still tried."""
 
 
 def identity_swaps(
@@ -37,7 +34,7 @@ def identity_swaps(
             refined = problem.refine(i, swapped, fits[i])
             swapped = with_body(swapped, i, refined.body)
             there += refined.fit.cost - color_weight * problem.color_nats(i, swapped)
-        if there < here + MIN_COST_GAIN:
+        if there < here + CLEAR_NATS:
             swaps[p, q] = tuple(b.values for b in swapped)
     return swaps
 
@@ -51,4 +48,4 @@ def _is_plausible(problem: FrameProblem, bodies: Bodies, p: int, q: int) -> bool
             prediction.linearize(model, bodies[k].values, model.kinematics(bodies[k].values)).cost for k in (other, i)
         )
         increase += swapped - own
-    return increase < _MAX_PRIOR_INCREASE
+    return increase < BEAM_NATS

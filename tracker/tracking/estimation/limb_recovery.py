@@ -7,130 +7,30 @@ beam search.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import NamedTuple, TypeVar
+from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
 from tracker.compute.jit import njit
-from tracker.compute.threads import N_HELPERS, kernel_pool, map_chunked
-from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
-from tracker.fitting.gauss_newton import Fit, ResidualBlock
+from tracker.compute.threads import N_HELPERS, kernel_pool
+from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton_compiled import solver_of
+from tracker.fitting.hypothesis import BEAM_NATS, CLEAR_NATS, SAME_POSE_M, Hypothesis, apart, distinct
 from tracker.geometry.arrays import Array, IntArray
+from tracker.search.even_points import even_points
+from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, RecoverSettings
 
 T = TypeVar("T")
 
-DISTINCT_POSE_M = 0.12
-"""Poses are distinct if some point differs by more, metres."""
-_SAME_M = 0.06
-"""Poses nearer to each other lead to the same refined pose, metres."""
-MIN_COST_GAIN = 3.0
-"""Smallest decrease of the cost (nats) for a pose to replace another: it is then about 20 times more likely. Poses with
-a smaller difference are about equally good."""
-
-
-@dataclass(frozen=True, eq=False)
-class PoseScorer:
-    """Scores poses of one person on one frame by contours, colours and priors together.
-
-    It shares its thread clones with the scorers made from it; use one of them at a time.
-    """
-
-    residuals: ContourResiduals
-    priors: Sequence[ResidualBlock]
-    colors: Colors
-    part_colors: PartColors | None
-    """Colours of the parts; None where they are unknown."""
-    settings: RecoverSettings
-    active_dofs: NDArray[np.bool_] | None
-    """The degrees of freedom that may move, (n_dofs,); None: all. Limbs are given without the others."""
-    clones: tuple[ContourResiduals, ...]
-    """The residuals once for each helper thread, each with scratch of its own."""
-
-    @classmethod
-    def of(
-        cls, residuals: ContourResiduals, priors: Sequence[ResidualBlock], colors: Colors,
-        part_colors: PartColors | None, settings: RecoverSettings, active_dofs: NDArray[np.bool_] | None = None,
-    ) -> "PoseScorer":  # fmt: skip
-        """Return a scorer with a clone for each helper thread."""
-        clones = tuple(residuals.clone_for_thread() for _ in range(N_HELPERS))
-        return cls(residuals, priors, colors, part_colors, settings, active_dofs, clones)
-
-    @property
-    def blocks(self) -> list[ResidualBlock]:
-        """The residual blocks to minimize."""
-        return [self.residuals, *self.priors]
-
-    def restricted_to(self, limb: Limb) -> "PoseScorer":
-        """Return a faster scorer for poses that differ in a limb alone. It works in the room of this one's clones."""
-        return replace(self, clones=tuple(c.restricted_to(limb.parts, c.workspace) for c in self.clones))
-
-    def each(self, work: Callable[["PoseScorer", Array], T], poses: Sequence[Array] | Array) -> list[T]:
-        """Apply work to each of several poses, (n_values,) each, in parallel; each thread has a scorer of its own."""
-        return map_chunked(work, [replace(self, residuals=c) for c in self.clones], list(poses))
-
-    def cost(self, fit: Fit) -> float:
-        """Return the cost of a refined pose with its colours."""
-        return fit.cost + float(self._color_costs(fit.pose[None])[0])
-
-    def costs(self, candidates: Array) -> Array:
-        """Return the costs of poses, (n, n_values), without refinement and without priors, (n,)."""
-        costs, n = np.empty(len(candidates)), len(self.clones)
-
-        def score(i: int, residuals: ContourResiduals) -> None:
-            own = candidates[i::n]
-            costs[i::n] = residuals.costs(own) + self._color_costs(own)
-
-        list(kernel_pool().map(score, range(n), self.clones))
-        return costs
-
-    def _color_costs(self, poses: Array) -> Array:
-        """Return what the colours add to the costs of poses, (n, n_values), (n,)."""
-        if self.part_colors is None or not len(poses):
-            return np.zeros(len(poses))
-        return -self.settings.colors * self.colors.nats(poses, self.part_colors)
-
-
-class ScoredFit(NamedTuple):
-    """A refined pose."""
-
-    fit: Fit
-    cost: float
-    """Cost with the colours, nats."""
-
-
-class LimbSearch(NamedTuple):
-    """The result of a search of limbs."""
-
-    best: Fit
-    """The cheapest fit; the initial one unless another is cheaper by `MIN_COST_GAIN`."""
-    alternatives: tuple[Fit, ...] = ()
-    """Fits that are about as good, with a limb elsewhere, cheapest first."""
-
-
-def for_several(settings: RecoverSettings) -> RecoverSettings:
-    """Return the settings for one of several people, with about half the work in each search.
-
-    Limbs of people who occlude each other are searched several times as often, and a person who is found is refined
-    again with the others.
-    """
-    return replace(
-        settings, scored=min(32, settings.scored), restart_per_candidate=False, min_decrease=MIN_DECREASE,
-        refine_margin=10.0,
-    )  # fmt: skip
-
 
 def search_limbs(
-    model: BodyModel, limbs: Sequence[Limb], initial: Fit, others: Sequence[Array], scorer: PoseScorer
-) -> LimbSearch:
+    model: BodyModel, limbs: Sequence[Limb], initial: Hypothesis, others: Sequence[Array], scorer: PoseScorer
+) -> list[Hypothesis]:
     """Search limbs that seem lost, one after the other, by beam search.
 
     A limb may be where another belongs, and each alone fits best as it is. Therefore the best poses of each limb, worse
@@ -139,60 +39,58 @@ def search_limbs(
     Args:
         model: the body.
         limbs: the limbs to search.
-        initial: the refined pose.
+        initial: the refined pose, scored.
         others: poses whose limbs are tried as they are, such as that of the frame before, (n_values,) each.
         scorer: compares poses.
+
+    Returns:
+        The best pose, which is the initial one unless another is clearly better. Then those that are about as good,
+        with a limb elsewhere, cheapest first.
     """
-    settings, start = scorer.settings, ScoredFit(initial, scorer.cost(initial))
+    settings, start = scorer.settings, initial
     beam = [start]
     for limb in limbs:
-        beam = [x for x in beam if x.cost < beam[0].cost + settings.margin]
-        last = limb is limbs[-1]
-        max_cost = beam[0].cost + (settings.refine_margin if last else max(settings.refine_margin, settings.margin))
+        beam = [x for x in beam if x.cost < beam[0].cost + BEAM_NATS]
         away = [p for x in limbs if x is not limb for p in x.parts]
-        poses = [x.fit.pose for x in beam]
-        groups = [[pose] for pose in poses] if settings.restart_per_candidate else [poses]
-        found = [x for group in groups for x in _search_limb(model, limb, away, group, others, scorer, max_cost)]
-        beam = _distinct(model, [*beam, *found], settings.beam_width, _SAME_M)
-    best = beam[0] if beam[0].cost < start.cost - MIN_COST_GAIN else start
-    rest = [x for x in (*beam, start) if x is not best and x.cost < best.cost + MIN_COST_GAIN]
-    places = _distinct(model, [best._replace(cost=-np.inf), *rest], settings.beam_width, DISTINCT_POSE_M)
-    return LimbSearch(best.fit, tuple(x.fit for x in places[1:]))
+        found = _search_limb(model, limb, away, beam, others, scorer)
+        beam = distinct([*beam, *found], settings.beam_width)
+    best = beam[0] if beam[0].cost < start.cost - CLEAR_NATS else start
+    rest = [x for x in (*beam, start) if x is not best and x.cost < best.cost + CLEAR_NATS]
+    return [best, *distinct([replace(best, cost=-np.inf), *rest], settings.beam_width)[1:]]
 
 
 def _search_limb(
-    model: BodyModel, limb: Limb, away: list[int], beam: Sequence[Array], others: Sequence[Array], scorer: PoseScorer,
-    max_cost: float,
-) -> list[ScoredFit]:  # fmt: skip
+    model: BodyModel, limb: Limb, away: list[int], beam: Sequence[Hypothesis], others: Sequence[Array],
+    scorer: PoseScorer,
+) -> list[Hypothesis]:  # fmt: skip
     """Return the best poses of one limb, refined with the whole body.
 
     Args:
         model: the body.
         limb: the limb to search.
         away: indices of parts that occlude nothing while poses are ranked: those of other lost limbs.
-        beam: poses of the body, (n_values,) each. They differ in parts that are away. Places of the limb are ranked
-            around the first, and then scored with each.
+        beam: poses of the body, which differ in parts that are away. Places of the limb are ranked around the first,
+            and then scored with each.
         others: poses whose limb is tried as it is.
         scorer: compares poses.
-        max_cost: a pose whose limb, refined alone, costs as much is discarded.
     """
 
-    def limb_only(scorer: PoseScorer, pose: Array) -> ScoredFit:
-        fit = solver_of(model)(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE)
-        return ScoredFit(fit, scorer.cost(fit))
+    def limb_only(scorer: PoseScorer, pose: Array) -> Hypothesis:
+        return scorer.scored(model, solver_of(model)(model, pose, scorer.blocks, limb.dofs, 4, 1e-2, MIN_DECREASE))
 
-    def whole_body(scorer: PoseScorer, pose: Array) -> ScoredFit:
-        min_decrease = scorer.settings.min_decrease
-        fit = solver_of(model)(model, pose, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, min_decrease)
-        return ScoredFit(fit, scorer.cost(fit))
+    def whole_body(scorer: PoseScorer, pose: Array) -> Hypothesis:
+        dofs = scorer.active_dofs
+        return scorer.scored(
+            model, solver_of(model)(model, pose, scorer.blocks, dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+        )
 
     of_limb = scorer.restricted_to(limb)
-    poses = _candidates(model, limb, away, beam[0], others, of_limb)
+    poses = _candidates(model, limb, away, beam[0].pose, others, of_limb)
     if len(beam) > 1:
-        poses = np.array([*poses, *(_with_limb(model, k, pose, limb) for k in beam[1:] for pose in poses)])
+        poses = np.array([*poses, *(_with_limb(model, k.pose, pose, limb) for k in beam[1:] for pose in poses)])
         poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: scorer.settings.n_limb_refined]]
-    tried = [x for x in of_limb.each(limb_only, poses) if x.cost < max_cost]
-    return scorer.each(whole_body, [x.fit.pose for x in _distinct(model, tried, scorer.settings.n_refined, _SAME_M)])
+    tried = [x for x in of_limb.each(limb_only, poses) if x.cost < beam[0].cost + BEAM_NATS]
+    return scorer.each(whole_body, [x.pose for x in distinct(tried, scorer.settings.beam_width)])
 
 
 def _candidates(
@@ -203,25 +101,20 @@ def _candidates(
     score = scorer.colors.limb_scorer(here, limb.parts, scorer.part_colors, away)
     proposals = _proposals(model, limb, here, settings)
     scores = np.concatenate(_map_split(score, proposals))
-    best = _best_apart(model, limb, proposals, scores, settings.n_local_search, DISTINCT_POSE_M)
-    dofs, n_rounds = np.flatnonzero(limb.dofs), len(settings.perturbations_rad)
+    best = _best_apart(model, limb, proposals, scores, settings.n_local_search)
+    dofs = np.flatnonzero(limb.dofs)
     # Each pose improves by itself, so that threads do not wait for one another between rounds.
-    for rounds in (range(n_rounds // 2), range(n_rounds // 2, n_rounds)):
-        steps = [
-            np.random.default_rng(i).normal(
-                0.0, settings.perturbations_rad[i], (len(best), settings.perturbations, len(dofs))
-            )
-            for i in rounds
-        ]
-        improved = _map_split(lambda *share: _perturbed(model, dofs, score, *share), best, *steps)
-        best, scores = (np.concatenate(x) for x in zip(*improved, strict=True))
-        best = best[np.sort(np.argsort(-scores, kind="stable")[: settings.scored])]
+    rounds = [
+        np.random.default_rng(i).normal(0.0, spread, (len(best), settings.perturbations, len(dofs)))
+        for i, spread in enumerate(settings.perturbations_rad)
+    ]
+    best = np.concatenate(_map_split(lambda *share: _perturbed(model, dofs, score, *share), best, *rounds))
     best = np.array([*best, *(_with_limb(model, here, other, limb) for other in others)])
-    return _best_apart(model, limb, best, -scorer.costs(best), settings.n_limb_refined, _SAME_M)
+    return _best_apart(model, limb, best, -scorer.costs(best), settings.n_limb_refined)
 
 
-def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: int, apart_m: float) -> Array:
-    """Return the best of many poses of a limb, no two near each other, so that one good place leaves room for others.
+def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: int) -> Array:
+    """Return the best of many poses of a limb, no two of them the same, so that one good place leaves room for others.
 
     Args:
         model: the body.
@@ -229,45 +122,12 @@ def _best_apart(model: BodyModel, limb: Limb, poses: Array, scores: Array, n: in
         poses: (m, n_values); only the limb is compared.
         scores: of each, (m,); higher is better.
         n: largest number of poses to return.
-        apart_m: some point differs by more in each two of them, metres.
     """
     points = np.flatnonzero(np.isin(model.point_parts, limb.parts))
     Ts = chain_poses(model.tree, model.kinematics(poses[0]), limb.parts, poses)
     places = np.empty((len(poses), len(points), 3))
     _put(Ts, np.searchsorted(limb.parts, model.point_parts[points]), model.points_part[points], places)
-    return poses[_apart(places, np.argsort(-scores), n, apart_m)]
-
-
-def _distinct(model: BodyModel, found: Sequence[ScoredFit], n: int, apart_m: float) -> list[ScoredFit]:
-    """Return the n cheapest fits, cheapest first, some point of each two of them more than a distance apart, metres."""
-    if not found:
-        return []
-    places = np.array([model.points_world(x.fit.pose) for x in found])
-    order = np.argsort([x.cost for x in found], kind="stable")
-    return [found[i] for i in _apart(places, order, n, apart_m)]
-
-
-@njit(nogil=True, cache=True)
-def _apart(places: Array, order: IntArray, n: int, apart_m: float) -> IntArray:
-    """Return the first n indices, in an order, of places (m, k, 3) of which each two differ by more than `apart_m`."""
-    kept = np.empty(min(n, len(order)), np.int64)
-    n_kept = 0
-    for i in order:
-        if n_kept == len(kept):
-            break
-        alone = True
-        for j in kept[:n_kept]:
-            farthest = 0.0
-            for k in range(places.shape[1]):
-                x, y, z = places[i, k] - places[j, k]
-                farthest = max(farthest, x * x + y * y + z * z)
-            if farthest <= apart_m * apart_m:
-                alone = False
-                break
-        if alone:
-            kept[n_kept] = i
-            n_kept += 1
-    return kept[:n_kept]
+    return poses[apart(places, np.argsort(-scores), n, SAME_POSE_M)]
 
 
 @njit(nogil=True, cache=True)
@@ -289,7 +149,7 @@ def _with_limb(model: BodyModel, values: Array, other: Array, limb: Limb) -> Arr
 def _proposals(model: BodyModel, limb: Limb, values: Array, settings: RecoverSettings) -> Array:
     """Return poses with the limb elsewhere, (n, n_values): every other one nearby, the rest within the joint limits."""
     dofs = np.flatnonzero(limb.dofs)
-    even, normal = _even(settings.proposals, len(dofs))
+    even, normal = even_points(settings.proposals, len(dofs))
     low, high = model.limits[dofs].T
     low, high = np.maximum(low, -np.pi), np.minimum(high, np.pi)
     now = model.difference(values, model.neutral())[dofs]
@@ -309,8 +169,8 @@ def _map_split(work: Callable[..., T], *arrays: Array) -> list[T]:
 
 def _perturbed(
     model: BodyModel, dofs: IntArray, score: Callable[[Array], Array], poses: Array, *rounds: Array
-) -> tuple[Array, Array]:
-    """Improve poses by random perturbation: in each round each pose takes its best step, or none.
+) -> Array:
+    """Improve poses, (n, n_values), by random perturbation: in each round each takes its best step, or none.
 
     Args:
         model: the body.
@@ -318,19 +178,14 @@ def _perturbed(
         score: returns the scores of poses, (n,).
         poses: (n, n_values).
         rounds: steps of each round, (n, n_steps, len(dofs)).
-
-    Returns:
-        The poses, (n, n_values), and their scores, (n,).
     """
-    scores = np.empty(0) if rounds else score(poses)
     for steps in rounds:
         (n, n_steps), n_values = steps.shape[:2], poses.shape[1]
         moved = _moved(model, np.repeat(poses, n_steps, axis=0), dofs, steps.reshape(n * n_steps, len(dofs)))
         around = np.concatenate([poses[:, None], moved.reshape(n, n_steps, n_values)], axis=1)
-        of_each = score(around.reshape(n * (1 + n_steps), n_values)).reshape(n, 1 + n_steps)
-        at = np.arange(n), of_each.argmax(axis=1)
-        poses, scores = around[at], of_each[at]
-    return poses, scores
+        scores = score(around.reshape(n * (1 + n_steps), n_values)).reshape(n, 1 + n_steps)
+        poses = around[np.arange(n), scores.argmax(axis=1)]
+    return poses
 
 
 def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Array:
@@ -342,14 +197,3 @@ def _moved(model: BodyModel, poses: Array, dofs: IntArray, steps: Array) -> Arra
     changes = np.zeros((len(poses), model.n_dofs))
     changes[:, dofs] = steps
     return np.array([model.clip(model.retract(pose, change)) for pose, change in zip(poses, changes, strict=True)])
-
-
-@lru_cache(maxsize=16)
-def _even(n: int, dims: int) -> tuple[Array, Array]:
-    """Return points that fill the unit cube evenly, (n, dims), and the same normally distributed (Sobol sequence)."""
-    # Imported lazily: these take 0.3 s to load.
-    from scipy.special import ndtri
-    from scipy.stats import qmc
-
-    even = np.asarray(qmc.Sobol(dims, seed=7).random(n))
-    return even, np.asarray(ndtri(0.002 + 0.996 * even))

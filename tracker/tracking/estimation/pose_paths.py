@@ -7,82 +7,24 @@ Inf. Theory 13:260). Motion resolves what single frames leave ambiguous.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tracker.appearance.part_colors import Colors, PartColors
-from tracker.body.model import BodyModel
-from tracker.compute.threads import N_HELPERS, map_chunked
-from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
-from tracker.fitting.gauss_newton import ResidualBlock
-from tracker.fitting.gauss_newton_compiled import solver_of
+from tracker.body.model import BodyModel, PosedBody
+from tracker.fitting.hypothesis import CLEAR_NATS, SETTLED_M, Hypothesis, distance_m, distinct
 from tracker.geometry.arrays import Array
-from tracker.tracking.estimation.limb_recovery import DISTINCT_POSE_M, MIN_COST_GAIN
-from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings, prior_blocks
+from tracker.tracking.estimation.pose_score import PoseScorer
 
 ROUNDS = 2
 """How often candidates are propagated forward through all frames and back."""
 _MAX_CANDIDATES = 12
 """Candidates that are kept on a frame."""
-_SAME_M = 0.01
-"""Poses of which no point differs by more are the same, metres."""
-_SIMILAR_M = 0.05
-"""Of propagated poses this near to each other the cheaper is kept, metres."""
 _ACCELERATION_SIGMA_M = 0.05
 """Standard deviation of a point from its straight continuation over two frames, metres. Half of it is pose error."""
 _MAX_ACCELERATION_COST = 20.0
 """Upper bound on the acceleration cost of one point, nats. It admits real impacts, such as a foot strike."""
-
-
-class FrameCost:
-    """The cost of one person's poses on one frame, and their refinement: the unary term of the path."""
-
-    def __init__(
-        self, model: BodyModel, residuals: ContourResiduals, colors: Colors, part_colors: PartColors | None,
-        penetration: Sequence[ResidualBlock], settings: EstimationSettings, active_dofs: NDArray[np.bool_] | None,
-    ) -> None:  # fmt: skip
-        """Prepare a clone of the residuals for each thread.
-
-        Args:
-            model: the body.
-            residuals: of the frame.
-            colors: of the frame.
-            part_colors: colours of the parts; None where they are unknown.
-            penetration: the term against penetration of other bodies, if any.
-            settings: of the tracker.
-            active_dofs: the degrees of freedom that may move, (n_dofs,); None: all.
-        """
-        self._model, self._settings, self._active_dofs = model, settings, active_dofs
-        self._penetration = list(penetration)
-        self._clones = [residuals, *(residuals.clone_for_thread() for _ in range(N_HELPERS - 1))]
-        self._colors, self._part_colors = colors, part_colors
-
-    def costs(self, poses: Array) -> Array:
-        """Return the costs of poses, (n, n_values), (n,), nats."""
-        costs = self._clones[0].costs(poses)
-        if self._settings.recover is not None and self._part_colors is not None:
-            costs = costs - self._settings.recover.colors * self._colors.nats(poses, self._part_colors)
-        return costs + np.array([self._prior_cost(v) for v in poses])
-
-    def refined(self, poses: Sequence[Array]) -> Array:
-        """Return each of several poses, (n_values,), refined as if it were the prediction of the frame."""
-        model, settings = self._model, self._settings
-        sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
-
-        def refine(residuals: ContourResiduals, pose: Array) -> Array:
-            blocks = [residuals, *prior_blocks(model, pose, sigma), *self._penetration]
-            fit = solver_of(model)(model, pose, blocks, self._active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
-            return fit.pose
-
-        return np.array(map_chunked(refine, self._clones, poses))
-
-    def _prior_cost(self, pose: Array) -> float:
-        """Return the cost of the prior terms at a pose, but for that of the prediction."""
-        model, kinematics = self._model, self._model.kinematics(pose)
-        blocks = [*prior_blocks(model, pose, np.ones(model.n_dofs)), *self._penetration]
-        return sum(b.linearize(model, pose, kinematics).cost for b in blocks)
 
 
 class Candidates:
@@ -97,60 +39,59 @@ class Candidates:
             alternatives: poses that the passes found about as good.
         """
         self._model, self._n_found, self._alternatives = model, len(found), list(alternatives)
-        self.poses = list(found)
-        """The poses, (n_values,) each."""
-        self.points = [model.points_world(v) for v in found]
-        """Their points in the world, (n_points, 3) each, metres."""
-        self.costs: list[float] = []
-        """Their costs, nats; empty before `score`."""
+        self.hypotheses = [Hypothesis(PosedBody(model, pose), "pass") for pose in found]
+        """The candidates, those that were found first; their costs are infinite before `score`."""
 
-    def score(self, frame_cost: FrameCost) -> None:
+    @property
+    def poses(self) -> list[Array]:
+        """Their poses, (n_values,) each."""
+        return [h.pose for h in self.hypotheses]
+
+    @property
+    def points(self) -> Array:
+        """Their points in the world, (n, n_points, 3), metres."""
+        return np.array([h.body.points_world for h in self.hypotheses])
+
+    @property
+    def costs(self) -> Array:
+        """Their costs, (n,), nats."""
+        return np.array([h.cost for h in self.hypotheses])
+
+    def score(self, scorer: PoseScorer) -> None:
         """Compute the costs of the poses that were found, and add the alternatives."""
-        self.costs = frame_cost.costs(np.array(self.poses)).tolist()
+        self.hypotheses = self._scored(np.array(self.poses), scorer)
         if self._alternatives:
-            self.add(np.array(self._alternatives), frame_cost)
+            self.add(np.array(self._alternatives), scorer)
 
-    def add(self, poses: Array, frame_cost: FrameCost) -> None:
+    def add(self, poses: Array, scorer: PoseScorer) -> None:
         """Add poses, (n, n_values), that differ from those that were found, and discard the most expensive ones."""
-        for values, cost in zip(poses, frame_cost.costs(poses).tolist(), strict=True):
-            points = self._model.points_world(values)
-            far = [float(np.linalg.norm(points - p, axis=1).max()) for p in self.points]
-            if min(far[: self._n_found]) < _SAME_M:
-                continue
-            similar = [i for i in range(self._n_found, len(far)) if far[i] < _SIMILAR_M]
-            if any(self.costs[i] <= cost for i in similar):
-                continue
-            self._keep([i for i in range(len(far)) if i not in similar])
-            self.poses.append(values)
-            self.points.append(points)
-            self.costs.append(cost)
-        order = np.argsort(self.costs[self._n_found :], kind="stable")[: max(0, _MAX_CANDIDATES - self._n_found)]
-        self._keep([*range(self._n_found), *(self._n_found + order).tolist()])
+        found, others = self.hypotheses[: self._n_found], self.hypotheses[self._n_found :]
+        new = [h for h in self._scored(poses, scorer) if min(distance_m(h.body, f.body) for f in found) > SETTLED_M]
+        self.hypotheses = [*found, *distinct([*others, *new], _MAX_CANDIDATES - self._n_found)]
 
     def alternatives(self, chosen: int) -> list[Array]:
         """Return the poses about as good as the one of an index and elsewhere, (n_values,) each, cheapest first."""
-        out = [chosen]
-        for i in np.argsort(self.costs, kind="stable").tolist():
-            distance = min(np.linalg.norm(self.points[i] - self.points[k], axis=1).max() for k in out)
-            if self.costs[i] < self.costs[chosen] + MIN_COST_GAIN and distance > DISTINCT_POSE_M:
-                out.append(i)
-        return [self.poses[i] for i in out[1:]]
+        best = self.hypotheses[chosen]
+        close = [h for h in self.hypotheses if h is not best and h.cost < best.cost + CLEAR_NATS]
+        return [h.pose for h in distinct([replace(best, cost=-np.inf), *close])[1:]]
 
-    def _keep(self, which: Sequence[int]) -> None:
-        self.poses = [self.poses[i] for i in which]
-        self.points = [self.points[i] for i in which]
-        self.costs = [self.costs[i] for i in which]
+    def _scored(self, poses: Array, scorer: PoseScorer) -> list[Hypothesis]:
+        costs = scorer.costs_with_priors(self._model, poses).tolist()
+        return [Hypothesis(PosedBody(self._model, p), "neighbour", c) for p, c in zip(poses, costs, strict=True)]
 
 
 def propagate_candidates(
-    frames: Sequence[Candidates], frame_cost: Callable[[int], FrameCost], ends: Sequence[Array | None]
-) -> Iterator[int]:
+    model: BodyModel, frames: Sequence[Candidates], scorer_of: Callable[[int], PoseScorer],
+    ends: Sequence[Array | None], sigma: Array,
+) -> Iterator[int]:  # fmt: skip
     """Propagate poses from frame to frame, forward and backward, and refine them there.
 
     Args:
+        model: the body.
         frames: the candidates of each frame; new ones are added to them.
-        frame_cost: returns the cost of the frame of an index.
+        scorer_of: returns the scorer of the frame of an index.
         ends: the poses before the first frame and after the last, (n_values,) each; None where there is none.
+        sigma: standard deviations of a prediction, (n_dofs,), rad or metres.
 
     Yields:
         The index of each frame that is visited: all of them 2 * `ROUNDS` times.
@@ -159,12 +100,12 @@ def propagate_candidates(
     for order, end in [(range(n), ends[0]), (range(n - 1, -1, -1), ends[1])] * ROUNDS:
         before = [] if end is None else [end]
         for i in order:
-            here = frame_cost(i)
-            if not frames[i].costs:
+            here = scorer_of(i)
+            if not np.isfinite(frames[i].costs).all():
                 frames[i].score(here)
             if before:
-                frames[i].add(here.refined(before), here)
-            before = list(frames[i].poses)
+                frames[i].add(here.refined(model, before, sigma), here)
+            before = frames[i].poses
             yield i
 
 
@@ -180,7 +121,7 @@ def viterbi_path(
         after: the same on the frames after the last.
 
     Returns:
-        The index of the pose of each frame; 0 throughout unless another path is cheaper by `MIN_COST_GAIN`.
+        The index of the pose of each frame; 0 throughout unless another path is cheaper by `CLEAR_NATS`.
     """
     fixed = [[p[None] for p in some] for some in (before, after)]
     points = [*fixed[0], *points, *fixed[1]]
@@ -189,7 +130,7 @@ def viterbi_path(
     if len(points) < 3:  # too few for an acceleration
         cheapest = [int(np.argmin(c)) for c in costs]
         gain = sum(float(c[0] - c.min()) for c in costs)
-        return (cheapest if gain >= MIN_COST_GAIN else [0] * len(costs))[own]
+        return (cheapest if gain >= CLEAR_NATS else [0] * len(costs))[own]
     # total[i, k] is the least cost of a path that ends with poses i and k of two frames.
     total, backpointers = costs[0][:, None] + costs[1], []
     stay = float(total[0, 0])
@@ -199,7 +140,7 @@ def viterbi_path(
         paths = total[:, :, None] + acceleration
         backpointers.append(paths.argmin(axis=0))
         total = paths.min(axis=0) + cost
-    if stay - total.min() < MIN_COST_GAIN:
+    if stay - total.min() < CLEAR_NATS:
         return [0] * len(points[own])
     path = [int(i) for i in np.unravel_index(int(total.argmin()), total.shape)][::-1]
     for step in reversed(backpointers):

@@ -35,32 +35,19 @@ class RecoverSettings:
     reach_rad: float = float(np.radians(35))
     """Spread of the proposals around the pose, rad; the other half fill the joint limits."""
     n_local_search: int = 48
-    """Proposals that are improved by random perturbation."""
-    scored: int = 48
-    """Proposals that go through all rounds, and whose contours are scored."""
+    """Proposals that are improved by random perturbation, and whose contours are scored."""
     perturbations: int = 16
     """Steps tried around each proposal in a round."""
     perturbations_rad: tuple[float, ...] = tuple(np.radians([16.0, 11.0, 7.0, 4.0]).tolist())
     """Their standard deviation, rad, round by round."""
     n_limb_refined: int = 10
     """Proposals whose limb is refined alone."""
-    n_refined: int = 3
-    """Proposals that are refined with the whole body."""
     beam_width: int = 3
-    """Poses that are kept while the next limb is searched."""
-    restart_per_candidate: bool = True
-    """Whether the next limb is searched from each of them; else once, and its places are scored with each."""
-    min_decrease: float = 0.0
-    """Smallest decrease of the cost for another iteration with the whole body."""
-    margin: float = 40.0
-    """Largest excess cost (nats) of a pose that is kept for the next limb: more than a limb can make up for."""
+    """Proposals that are refined with the whole body, and poses that are kept while the next limb is searched."""
     colors: float = 0.2
     """Weight of the colours against edges. Neighbouring pixels are correlated, so it is well below 1."""
     trust_rad: float = 1.0
     """Standard deviation of the prediction of a limb that seems lost, rad: nearly none."""
-    refine_margin: float = np.inf
-    """Largest excess cost (nats) of a proposal whose limb is refined alone, to be refined with the whole body; at least
-    the margin where another limb follows."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +105,11 @@ def at_stride(settings: EstimationSettings, stride: int) -> EstimationSettings:
         settings, trust_rad=stride * settings.trust_rad, trust_m=stride * settings.trust_m,
         predict=replace(motion, bound_rad=stride * motion.bound_rad, bound_m=stride * motion.bound_m),
     )  # fmt: skip
+
+
+def trust(model: BodyModel, settings: EstimationSettings) -> Array:
+    """Return the standard deviations of a prediction, (n_dofs,), rad or metres."""
+    return np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
 
 
 def chamfer_cost(

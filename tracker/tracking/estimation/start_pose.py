@@ -10,31 +10,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
-
 from tracker.appearance.part_colors import Colors
-from tracker.body.dimensions import mirror_part
-from tracker.body.limbs import Limb
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import PosedBody
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, solve
-from tracker.geometry.arrays import Array
+from tracker.fitting.gauss_newton import ResidualBlock
+from tracker.fitting.hypothesis import SAME_POSE_M, distance_m
+from tracker.fitting.limb_exchange import exchanged, paired_limbs
 from tracker.tracking.estimation.assessment import PersonEstimate, estimate_at
 from tracker.tracking.estimation.covariance_search import search_along_covariance
-from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior, moved_m, with_body
+from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior, with_body
 from tracker.tracking.estimation.incremental_fit import fit_by_chains
-from tracker.tracking.estimation.limb_recovery import PoseScorer, search_limbs
+from tracker.tracking.estimation.limb_recovery import search_limbs
+from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
 
 _START_RAD, _START_M = 0.35, 0.15
 """Standard deviation of a start placed by hand, rad and metres: about twice the error that people leave."""
-_MAX_ROUNDS = 4
-_SETTLED_M = 0.01
-"""The search ends where nobody moves farther in a round, metres."""
-_EXCHANGE_M, _EXCHANGE_RAD = 0.01, 1.5
-"""Standard deviations of joints and angles where two limbs are exchanged, metres and rad."""
+MAX_ROUNDS = 2
+"""Largest number of rounds of a search, each with the evidence around the poses of the one before."""
 
 
 class StartFrame(NamedTuple):
@@ -79,11 +74,11 @@ def settle_starts(
     if not doubted or not any(len(v.points_px) for v in first.views):
         return {}
     wide, bodies = roughly_known(settings), start
-    for _ in range(_MAX_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         problem, last = FrameProblem(observe(bodies), known, wide), bodies
         for person in doubted:
             bodies = with_body(bodies, person, search_start(problem, person, bodies, memories[person]))
-        if all(moved_m(a, b) < _SETTLED_M for a, b in zip(last, bodies, strict=True)):
+        if all(distance_m(a, b) < SAME_POSE_M for a, b in zip(last, bodies, strict=True)):
             break
     found = FrameProblem(observe(bodies), known, wide)
     return {p: bodies[p] for p in doubted if _contradiction(estimate_at(found, p, bodies)) <= _contradiction(before[p])}
@@ -127,30 +122,11 @@ def search_start(
         fit = min(fit, last.fit, key=lambda f: f.cost)
     colors = Colors(own, *problem.around(person, bodies))
     scorer = PoseScorer.of(residuals, priors, colors, None, recover, memory.active_dofs)
-    for pair in _pairs(memory.limbs):
-        fit = search_limbs(model, pair, fit, (start,), scorer).best
-        exchanged = problem.solve(person, _exchanged(model, fit.pose, pair), scorer.blocks, MAX_ITERATIONS)
-        fit = min(fit, exchanged, key=scorer.cost)
+    best = scorer.scored(model, fit)
+    for pair in paired_limbs(memory.limbs):
+        best, *_ = search_limbs(model, pair, best, (start,), scorer)
+        swapped = problem.solve(person, exchanged(best.body, pair), scorer.blocks, MAX_ITERATIONS)
+        best = min(best, scorer.scored(model, swapped), key=lambda h: h.cost)
     for draw in range(n_draws):
-        fit = search_along_covariance(model, fit, scorer, problem.sigma(person), draw)
-    return PosedBody(model, fit.pose)
-
-
-def _pairs(limbs: Sequence[Limb]) -> list[tuple[Limb, Limb]]:
-    """Return the limbs of one side with those of the other."""
-    by_name = {limb.name: limb for limb in limbs}
-    found = [(limb, by_name.get(mirror_part(limb.name) or "")) for limb in limbs]
-    return [(one, other) for one, other in found if other is not None and one.parts[0] < other.parts[0]]
-
-
-def _exchanged(model: BodyModel, pose: Array, pair: tuple[Limb, Limb]) -> Array:
-    """Return a pose, (n_values,), in which two limbs lie where the other was, as far as the joints allow."""
-    names, points_world = list(model.point_names), model.points_world(pose)
-    of_pair = np.isin(model.point_parts, np.concatenate([limb.parts for limb in pair]))
-    targets = {i: names.index(other) for i in np.flatnonzero(of_pair) if (other := mirror_part(names[i])) in names}
-    points = np.array([*targets], dtype=np.int64)
-    blocks: list[ResidualBlock] = [
-        PointTargets(points, points_world[[*targets.values()]], np.full(len(points), 1 / _EXCHANGE_M)),
-        PosePrior(model.neutral(), np.full(model.n_dofs, 1 / _EXCHANGE_RAD)),
-    ]
-    return solve(model, pose, blocks, pair[0].dofs | pair[1].dofs, max_iterations=40, tolerance=1e-4).pose
+        best = search_along_covariance(model, best, scorer, problem.sigma(person), draw)
+    return best.body

@@ -9,10 +9,10 @@ from gestures import drag, wait_for
 from app.drawing import overlays
 from app.page import inspector_feed
 from app.state.page_view import View
+from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
+from tracker.fitting.hypothesis import Hypothesis
 from tracker.initialization.first_pose import FirstPose, FirstPoses
-from tracker.initialization.generators.start_generators import StartCandidate
-from tracker.initialization.start_fit import FittedStart
 from tracker.pipeline import chain
 from tracker.pipeline.find_people import FoundPeople
 
@@ -32,9 +32,9 @@ def found(monkeypatch):
         model = session.people[0].model
         body = model.with_height(1.05 * model.height_m)
         pose = body.neutral()
-        candidate = StartCandidate("axis", body, pose, np.array([1.0, 0.0, 0.0]), 2.0)
+        start = Hypothesis(PosedBody(body, pose), "axis")
         lines = {"FRONT": np.array([[[10.0, 20.0], [30.0, 40.0]], [[11.0, 20.0], [29.0, 40.0]]])}
-        first = FirstPose(FRAME, candidate, FittedStart(pose, "good", 1.0), True, (), lines)
+        first = FirstPose(FRAME, start, "good", 1.0, True, (), lines)
         return FoundPeople(FirstPoses(FRAME, dict.fromkeys(people, first)), {0: body}, {0: pose}, {})
 
     monkeypatch.setattr(chain, "find_people", find)
@@ -136,8 +136,8 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
 
     def find(session, observer, people, frames, settings, report, show):
         model = session.people[0].model.with_height(1.9)
-        candidate = StartCandidate("axis", model, model.neutral(), np.array([1.0, 0.0, 0.0]), 2.0)
-        poses = {0: FirstPose(2, candidate, FittedStart(model.neutral(), "good", 1.0), True, ())}
+        start = Hypothesis(PosedBody(model, model.neutral()), "axis")
+        poses = {0: FirstPose(2, start, "good", 1.0, True, ())}
         for frame, event in zip((2, 3, 5), go, strict=True):
             show(frame, None)
             assert frame == 2 or controller.state.frame != frame  # what was found stays in sight meanwhile

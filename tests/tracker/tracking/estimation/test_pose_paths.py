@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from staging import posed
 
-from tracker.tracking.estimation.limb_recovery import MIN_COST_GAIN
+from tracker.body.model import PosedBody
+from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.tracking.estimation.pose_paths import (
     _ACCELERATION_SIGMA_M,
     _MAX_ACCELERATION_COST,
@@ -40,22 +41,26 @@ def test_the_cheapest_way_is_that_of_all_ways_tried(seed, known):
     ways = list(product(*(range(len(p)) for p in points)))
     best = min(ways, key=lambda way: cost_of(points, costs, before, after, way))
     stay = cost_of(points, costs, before, after, (0,) * 6)
-    assert stay - cost_of(points, costs, before, after, best) > MIN_COST_GAIN
+    assert stay - cost_of(points, costs, before, after, best) > CLEAR_NATS
     assert tuple(viterbi_path(points, costs, before, after)) == best
 
 
 def test_what_is_hardly_cheaper_changes_nothing():
     points = [np.zeros((2, 4, 3))] * 4
-    little, much = [np.array([0.0, -MIN_COST_GAIN / 5])] * 4, [np.array([0.0, -MIN_COST_GAIN / 3])] * 4
+    little, much = [np.array([0.0, -CLEAR_NATS / 5])] * 4, [np.array([0.0, -CLEAR_NATS / 3])] * 4
     assert viterbi_path(points, little, [], []) == [0] * 4
     assert viterbi_path(points, much, [], []) == [1] * 4
 
 
 @pytest.mark.parametrize("n", [1, 2])
 def test_of_few_frames_the_cheapest_poses_are_taken(n):
-    points, costs = [np.zeros((2, 4, 3))] * n, [np.array([2 * MIN_COST_GAIN, 0.0])] * n
+    points, costs = [np.zeros((2, 4, 3))] * n, [np.array([2 * CLEAR_NATS, 0.0])] * n
     assert viterbi_path(points, costs, [], []) == [1] * n
     assert viterbi_path(points, [-c for c in costs], [], []) == [0] * n
+
+
+SIGMA = None
+"""The stand-in below refines without it."""
 
 
 class Valley:
@@ -64,10 +69,10 @@ class Valley:
     def __init__(self, best):
         self.best = best
 
-    def costs(self, poses):
+    def costs_with_priors(self, model, poses):
         return np.array([100 * np.sum((v - self.best) ** 2) for v in poses])
 
-    def refined(self, poses):
+    def refined(self, model, poses, sigma):
         return np.array([v + 0.5 * (self.best - v) for v in poses])
 
 
@@ -76,11 +81,11 @@ def test_what_one_frame_knows_all_come_to_know(gavrila):
     step[gavrila.dof_names.index("left_shoulder.abduction")] = 0.5
     right, wrong = base, gavrila.retract(base, step)
     frames = [Candidates(gavrila, [right if i == 2 else wrong]) for i in range(5)]
-    visited = list(propagate_candidates(frames, lambda i: Valley(right), (None, None)))
+    visited = list(propagate_candidates(gavrila, frames, lambda i: Valley(right), (None, None), SIGMA))
     assert visited == [0, 1, 2, 3, 4, 4, 3, 2, 1, 0] * ROUNDS
     for frame in frames:
         assert np.abs(frame.poses[int(np.argmin(frame.costs))] - right).max() < 1e-9
-        np.testing.assert_array_equal(frame.costs, Valley(right).costs(frame.poses))
+        np.testing.assert_array_equal(frame.costs, Valley(right).costs_with_priors(gavrila, frame.poses))
 
 
 def test_poses_before_and_after_are_carried_in(gavrila):
@@ -88,7 +93,7 @@ def test_poses_before_and_after_are_carried_in(gavrila):
     step[gavrila.dof_names.index("left_shoulder.abduction")] = 0.5
     for ends in ((base, None), (None, base)):
         frames = [Candidates(gavrila, [gavrila.retract(base, step)]) for _ in range(3)]
-        list(propagate_candidates(frames, lambda i: Valley(base), ends))
+        list(propagate_candidates(gavrila, frames, lambda i: Valley(base), ends, SIGMA))
         assert all(min(f.costs) < 1e-9 for f in frames)
 
 
@@ -109,7 +114,9 @@ def test_of_poses_that_are_alike_the_cheaper_is_kept_and_those_found_stay(gavril
     frame.add(np.array(many), sight)
     assert len(frame.poses) == len(frame.points) == len(frame.costs) == _MAX_CANDIDATES
     np.testing.assert_array_equal(frame.poses[:2], [turned(1.0), turned(0.9)])
-    expected = np.sort([*sight.costs([turned(0.48)]), *sight.costs(many)])[: _MAX_CANDIDATES - 2]
+    expected = np.sort([*sight.costs_with_priors(gavrila, [turned(0.48)]), *sight.costs_with_priors(gavrila, many)])[
+        : _MAX_CANDIDATES - 2
+    ]
     np.testing.assert_allclose(frame.costs[2:], expected)
 
 
@@ -120,7 +127,7 @@ def test_other_poses_are_taken_in_at_first_sight(gavrila):
     frame = Candidates(gavrila, [wrong], [base, wrong])
     frame.score(sight)
     np.testing.assert_array_equal(frame.poses, [wrong, base])
-    np.testing.assert_array_equal(frame.costs, sight.costs([wrong, base]))
+    np.testing.assert_array_equal(frame.costs, sight.costs_with_priors(gavrila, [wrong, base]))
 
 
 def test_rivals_cost_hardly_more_and_are_elsewhere(gavrila):
@@ -129,6 +136,7 @@ def test_rivals_cost_hardly_more_and_are_elsewhere(gavrila):
     for pose, turn in zip(poses, (0.0, 0.05, 0.8, 0.85, -0.8), strict=True):
         pose[dof] += turn
     frame = Candidates(gavrila, poses)
-    frame.costs = [0.0, -1.0, MIN_COST_GAIN / 2, -2.0, 2 * MIN_COST_GAIN]
+    costs = [0.0, -1.0, CLEAR_NATS / 2, -2.0, 2 * CLEAR_NATS]
+    frame.hypotheses = [Hypothesis(PosedBody(gavrila, p), "", c) for p, c in zip(poses, costs, strict=True)]
     np.testing.assert_array_equal(frame.alternatives(0), [poses[3]])
     np.testing.assert_array_equal(frame.alternatives(4), [poses[3], poses[1]])

@@ -13,13 +13,14 @@ from tracker.evaluation.metrics import evaluate_joints, joints_of_poses
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import fit_to_points
+from tracker.fitting.limb_exchange import exchanged
 from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.assemble import NewSession, assemble
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.estimation import start_pose
-from tracker.tracking.estimation.start_pose import StartFrame, _exchanged, settle_starts
+from tracker.tracking.estimation.start_pose import StartFrame, settle_starts
 from tracker.tracking.person_memory import PersonMemory
 
 N_SEEDS, N_FRAMES = 20, 11
@@ -78,7 +79,7 @@ def test_limbs_are_exchanged_in_space(gavrila):
     pose, names = gavrila.neutral(), list(gavrila.point_names)
     pose[gavrila.dof_value[gavrila.dof_names.index("left_hip.elevation")]] = 0.6
     legs = tuple(limb for limb in limbs(gavrila) if limb.name.endswith("calf"))
-    before, after = gavrila.points_world(pose), gavrila.points_world(_exchanged(gavrila, pose, legs))
+    before, after = gavrila.points_world(pose), gavrila.points_world(exchanged(PosedBody(gavrila, pose), legs))
     for name in ("knee", "ankle"):
         left, right = names.index(f"left_{name}"), names.index(f"right_{name}")
         apart = np.linalg.norm(before[left] - before[right])
