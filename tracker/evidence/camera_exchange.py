@@ -17,8 +17,7 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording, read_background, read_mask
 from tracker.geometry.arrays import Array, Image, Mask
 from tracker.geometry.cameras import BEYOND_PX, NEAR_PLANE_M, Camera, viewed_point
-from tracker.images.background_subtraction import change_threshold
-from tracker.images.silhouette_contour import MAX_FILL
+from tracker.images.change import MAX_FILL, change_threshold
 
 _SIDE_PX = 128
 """Longer side of the pictures."""

@@ -13,6 +13,7 @@ from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Region
 from tracker.images import background_subtraction
 from tracker.images.background_subtraction import Changes
+from tracker.images.change import change_threshold
 from tracker.images.image_statistics import ImageStatistics, SampleGrid
 from tracker.images.working_view import WorkingView
 
@@ -88,7 +89,7 @@ class Foreground:
             statistics.colors[empty.usable], empty.statistics.colors[empty.usable]
         )
         differences = np.abs(statistics.colors - gain * empty.statistics.colors).max(axis=-1)
-        return Prepared(frame, mask, statistics.strengths, background_subtraction.change_threshold(differences), gain)
+        return Prepared(frame, mask, statistics.strengths, change_threshold(differences), gain)
 
     def smooth_region(self, prepared: Prepared, box: Region) -> Image:
         """Return a region of the frame, smoothed, in working pixels, (H, W, 3)."""

@@ -24,12 +24,12 @@ from tracker.images.background_subtraction import (
     Mask,
     Shading,
     apply_gain,
-    change_threshold,
     exposure_gain,
     has_usable_exposure,
     smooth_image,
     subtract_background,
 )
+from tracker.images.change import change_threshold
 from tracker.images.image_statistics import SPACING_PX
 from tracker.images.silhouette_cleaning import clean_silhouette
 from tracker.images.working_view import WorkingView

@@ -9,19 +9,16 @@ from numpy.typing import NDArray
 from tracker.compute.jit import njit
 from tracker.compute.quantiles import median
 from tracker.geometry.arrays import FloatArray, Image, Mask
+from tracker.images.change import NOISE_SIGMAS
 
 SMOOTHING_PX = 1.0
 """Standard deviation of the Gaussian that smooths images before they are compared or differentiated, px."""
-MIN_DIFFERENCE = 12.0
-"""Smallest difference in any colour channel (of 255) that counts as a change. It lies above video noise."""
 MIN_SHADE = 0.5
 """Brightness of the darkest shadow, as a share of the unshaded background."""
 MAX_HUE_SHIFT = 7.0
 """Largest deviation of a channel from the darkened background within a shadow, gray levels."""
 MAX_HIGHLIGHT = 1.3
 """Brightness of the brightest highlight, as a share of the unlit background."""
-NOISE_SIGMAS = 5.0
-"""Smallest difference that counts as a change, in standard deviations of the background at that pixel."""
 _DARK, _BRIGHT = 20.0, 235.0
 """Gray levels between which a ratio of colours is reliable."""
 _MIN_SAMPLES = 50
@@ -33,19 +30,6 @@ _SAME, _SHADOW, _NEW = 0, 1, 2
 def smooth_image(image: Image) -> Image:
     """Smooth an image, (H, W, 3), against the noise of single pixels."""
     return np.asarray(cv2.GaussianBlur(image, (0, 0), SMOOTHING_PX), dtype=np.uint8)
-
-
-def change_threshold(differences: NDArray[np.float32]) -> float:
-    """Return the difference above which a pixel has changed, gray levels.
-
-    The threshold follows the noise of the view. Most pixels show the background, so the median difference measures the
-    noise of an unchanged pixel.
-
-    Args:
-        differences: largest difference over the channels between smoothed frame and smoothed background, at samples
-            spread over the whole image, (n,).
-    """
-    return max(MIN_DIFFERENCE, NOISE_SIGMAS * float(median(differences)))
 
 
 def has_usable_exposure(empty_colors: NDArray[np.float32]) -> Mask:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
 from tracker.geometry.arrays import FloatArray, Mask
+from tracker.images.change import MAX_FILL
 from tracker.images.edge_segments import MAX_ANGLE_RAD
 from tracker.images.edges import Edges
 
@@ -19,8 +20,6 @@ SAME_PX = 2
 """Largest distance of a contour point from the image edge that it lies on, px."""
 _NO_TRUST, _FULL_TRUST = 0.5, 0.9
 """Shares of the contour with an image edge along it, for no trust and for full trust."""
-MAX_FILL = 0.75
-"""Share of the region that a silhouette fills from which it is not plausible: changed light fills all of it."""
 MIN_TRUST = 0.5
 """Trust below which a silhouette is left out where it alone decides."""
 _ALONG = np.float32(np.cos(MAX_ANGLE_RAD))

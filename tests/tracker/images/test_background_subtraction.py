@@ -2,15 +2,14 @@ import numpy as np
 import pytest
 
 from tracker.images.background_subtraction import (
-    MIN_DIFFERENCE,
     apply_gain,
-    change_threshold,
     dilate,
     exposure_gain,
     has_usable_exposure,
     smooth_image,
     subtract_background,
 )
+from tracker.images.change import MIN_DIFFERENCE, change_threshold
 
 
 def room(seed=0, noise=0.0):
