@@ -16,25 +16,31 @@ from numpy.typing import NDArray
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording, read_background, read_mask
 from tracker.geometry.arrays import Array, Image, Mask
-from tracker.geometry.cameras import BEYOND_PX, NEAR_PLANE_M, Camera, viewed_point
-from tracker.images.change import MAX_FILL, change_threshold
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
 
 _SIDE_PX = 128
 """Longer side of the pictures."""
-_FRAMES = 6
-"""Number of frames that are compared: their median is an empty scene where nobody stays half of the time."""
+_FRAMES, _FRAMES_WITHOUT_BACKGROUND = 4, 6
+"""Numbers of frames that are compared. Without backgrounds, their median is an empty scene where nobody stays half of
+the time."""
+_MIN_DIFFERENCE = 20.0
+"""Smallest difference from the background that counts as a change, gray levels."""
 _MIN_MASK_PX = 20
 """Smallest foreground that counts, px of a small picture: less is noise."""
-_POINTS = 24
-"""Points of the grids along each axis: of the whole room, and around what that one finds."""
+_MAX_FOREGROUND = 0.6
+"""Share of a picture above which its background is that of another place, and says nothing."""
+_COARSE, _FINE = 20, 30
+"""Points of the grids along each axis: of the whole room, and around what the coarse one finds."""
 _ROOM = 0.7
 """Half the side of the room, as a share of the cameras' mean distance from the point at which they look."""
 _MIN_GAIN, _MIN_COVERAGE = 0.1, 0.45
 """An exchange is reported if it raises the coverage by this much, to this much. On seven recordings, with four cameras
 and with three of them, no right assignment is reported. Of 38 exchanges of two of four cameras with backgrounds, 36 are
 named; of the two others, in a square, the pair across is named."""
-_PRESENT = 0.5
-"""Share of a body's points on the foreground above which it is there."""
+_ABSENT, _PRESENT = 0.4, 0.6
+"""Share of a body's points on the foreground below which it is not there, and above which it is."""
+_FAR_PX = 1e4
+"""Distance in a small picture at which nothing is."""
 _MAX_CAMERAS = 8
 """Among more cameras only those with the least coverage are exchanged."""
 
@@ -70,7 +76,8 @@ def find_exchange(cameras: Sequence[CameraSource], recording: Recording) -> Came
     if len(cameras) < 2:
         return None
     views = [_SmallView(c.camera) for c in cameras]
-    footage = _read(cameras, views, recording, recording.quick_frames(_FRAMES))
+    n = _FRAMES if all(c.background or c.masks for c in cameras) else _FRAMES_WITHOUT_BACKGROUND
+    footage = _read(cameras, views, recording, recording.quick_frames(n))
     order = list(range(len(cameras)))
     room, foregrounds = _Room(views), [f.foregrounds for f in footage]
     coverage = _coverage(room, foregrounds)
@@ -109,7 +116,7 @@ def find_body_exchange(
     footage = _read(cameras, views, recording, [frame])
 
     def share(camera: int, mask: Mask | None) -> float:
-        if mask is None or mask.mean() > MAX_FILL:
+        if mask is None or mask.mean() > _MAX_FOREGROUND:
             return 0.0
         pixels, inside = views[camera].pixels(points_world)
         return float((inside & mask.ravel()[pixels]).mean())
@@ -121,7 +128,7 @@ def find_body_exchange(
         now = max(share(k, footage[k].foregrounds[0]) for k in (i, j))
         for of_i, of_j in _exchanged((views[i], footage[i]), (views[j], footage[j])):
             there = min(share(i, of_i[0]), share(j, of_j[0]))
-            if now < _PRESENT and there > _PRESENT:
+            if now < _ABSENT and there > _PRESENT:
                 return cameras[i].camera.name, cameras[j].camera.name
     return None
 
@@ -230,9 +237,7 @@ def _through(view: _SmallView, filmed: _SmallView, footage: _Footage) -> _Footag
     original_px = np.stack(view.source.distortion_map(view.camera), axis=-1).astype(np.float64)
     share = np.array(filmed.camera.size) / filmed.source.pinhole.size
     at = (filmed.source.undistort_points(original_px) + 0.5) * share - 0.5
-    columns, rows = np.moveaxis(
-        np.nan_to_num(np.clip(at, BEYOND_PX, -BEYOND_PX), nan=BEYOND_PX).astype(np.float32), -1, 0
-    )
+    columns, rows = np.moveaxis(np.nan_to_num(np.clip(at, -_FAR_PX, _FAR_PX), nan=-_FAR_PX).astype(np.float32), -1, 0)
 
     def image(found: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.asarray(cv2.remap(found, columns, rows, cv2.INTER_LINEAR), np.float32)
@@ -253,7 +258,7 @@ def _changed(image: NDArray[np.float32], empty: NDArray[np.float32]) -> Mask:
     gain = np.median(image[::2, ::2] / (empty[::2, ::2] + 1), axis=(0, 1))
     red, green, blue = np.moveaxis(np.abs(image - gain * empty), -1, 0)
     difference = np.maximum(np.maximum(red, green), blue)  # ten times as fast as along the last axis
-    changed = (difference > change_threshold(difference[::2, ::2].ravel())).astype(np.uint8)
+    changed = (difference > max(_MIN_DIFFERENCE, 6 * float(np.median(difference[::2, ::2])))).astype(np.uint8)
     changed = np.asarray(cv2.morphologyEx(changed, cv2.MORPH_OPEN, np.ones((2, 2), np.uint8)), np.uint8)
     return np.asarray(cv2.morphologyEx(changed, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))) > 0
 
@@ -267,8 +272,8 @@ class _Room:
         self.distance = float(np.mean([np.linalg.norm(v.camera.center_world - middle) for v in views]))
         """Mean distance of the cameras from the middle, metres."""
         half = _ROOM * self.distance
-        self.spacing = 2 * half / _POINTS
-        self.points = _grid(middle - half, middle + half, _POINTS)
+        self.spacing = 2 * half / _COARSE
+        self.points = _grid(middle - half, middle + half, _COARSE)
         self.pixels = [v.pixels(self.points) for v in views]
 
 
@@ -304,10 +309,10 @@ def _covered_shares(room: _Room, masks: Sequence[Mask | None]) -> list[float]:
     if not hull.any():
         return shares
     found = room.points[hull]
-    fine = _grid(found.min(axis=0) - room.spacing, found.max(axis=0) + room.spacing, _POINTS)
+    fine = _grid(found.min(axis=0) - room.spacing, found.max(axis=0) + room.spacing, _FINE)
     pixels = [v.pixels(fine) for v in room.views]
     hull = _carve(room.views, masks, pixels, 0.0)
-    step = float(np.ptp(fine, axis=0).max()) / _POINTS
+    step = float(np.ptp(fine, axis=0).max()) / _FINE
     for i, (view, mask) in enumerate(zip(room.views, masks, strict=True)):
         if mask is None or np.isnan(shares[i]):
             continue

@@ -20,7 +20,9 @@ _MIN_SHARE = 0.25
 _MATTERS = 0.15
 """Share of silhouettes by which a figure or a view must matter: somewhat more than an arm. A figure explains so much of
 one that no other does, because lines of sight to two people also meet where there is no person. A view is left out as
-broken if without it, and without no other one, so much more of the others is explained."""
+broken if without it so much more of the others is explained."""
+_MIN_LEAD = 0.05
+"""Lead of that gain over the gain without any other view."""
 _MIN_COVERAGE = 0.6
 """Share of its silhouette that the hull explains in a view that agrees with the others."""
 _NEARLY_ALL = 0.95
@@ -114,7 +116,7 @@ def _carve_consistent(silhouettes: Sequence[ViewSilhouette], size_m: float) -> t
         gains = [float(np.delete(w[1] - before, i).mean()) if w else 0.0 for i, w in enumerate(without)]
         best, second = (int(i) for i in np.argsort(gains)[:-3:-1])
         chosen = without[best]
-        if chosen and gains[best] > _MATTERS >= gains[second]:
+        if chosen and gains[best] > _MATTERS and gains[best] - gains[second] > _MIN_LEAD:
             return *chosen, best
     if whole is None:
         raise contradiction or AssertionError

@@ -258,8 +258,8 @@ def test_a_live_pin_costs_a_few_steps_of_the_solver_a_move(opened, monkeypatch):
     controller, iterations = opened(), []
     drag(controller, "torso", (4.0, 0.0))
 
-    def counted(*arguments):
-        fit = gauss_newton.solve(*arguments)
+    def counted(*arguments, **options):
+        fit = gauss_newton.solve(*arguments, **options)
         iterations[-1].append(fit.iterations)
         return fit
 
