@@ -236,9 +236,7 @@ def test_another_start_takes_its_place(session, silhouettes, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True, reason="since starts are compared in nats, a leg stays 54 cm off; 30 are asked"
-)
+@pytest.mark.xfail(strict=True, reason="since starts are compared in nats, a leg stays 54 cm off; 30 are asked")
 def test_legs_that_look_like_shadows_are_found(session, silhouettes, monkeypatch):
     voxels, joints = figure(noise=0.1)
     legs = ("left_knee", "right_knee", "left_ankle", "right_ankle")
