@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording, read_background, read_mask
 from tracker.geometry.arrays import Array, Image, Mask
-from tracker.geometry.cameras import NEAR_PLANE_M, Camera, viewed_point
+from tracker.geometry.cameras import BEYOND_PX, NEAR_PLANE_M, Camera, viewed_point
 
 _SIDE_PX = 128
 """Longer side of the pictures."""
@@ -39,8 +39,6 @@ and with three of them, no right assignment is reported. Of 38 exchanges of two 
 named; of the two others, in a square, the pair across is named."""
 _ABSENT, _PRESENT = 0.4, 0.6
 """Share of a body's points on the foreground below which it is not there, and above which it is."""
-_FAR_PX = 1e4
-"""Distance in a small picture at which nothing is."""
 _MAX_CAMERAS = 8
 """Among more cameras only those with the least coverage are exchanged."""
 
@@ -237,7 +235,9 @@ def _through(view: _SmallView, filmed: _SmallView, footage: _Footage) -> _Footag
     original_px = np.stack(view.source.distortion_map(view.camera), axis=-1).astype(np.float64)
     share = np.array(filmed.camera.size) / filmed.source.pinhole.size
     at = (filmed.source.undistort_points(original_px) + 0.5) * share - 0.5
-    columns, rows = np.moveaxis(np.nan_to_num(np.clip(at, -_FAR_PX, _FAR_PX), nan=-_FAR_PX).astype(np.float32), -1, 0)
+    columns, rows = np.moveaxis(
+        np.nan_to_num(np.clip(at, BEYOND_PX, -BEYOND_PX), nan=BEYOND_PX).astype(np.float32), -1, 0
+    )
 
     def image(found: NDArray[np.float32]) -> NDArray[np.float32]:
         return np.asarray(cv2.remap(found, columns, rows, cv2.INTER_LINEAR), np.float32)

@@ -35,7 +35,7 @@ class StartTrack(NamedTuple):
     start: Hypothesis
     """On the frame of the start; its cost is that of all frames once tracks are compared."""
     status: Status
-    """On that frame, as the tracker gives it."""
+    """The tracker's status of the fit on the frame of the start."""
     cost_px: float
     """Mean chamfer cost of the frames, px of the footage. It is shown, and compares different frames."""
     poses: Mapping[int, Array]
