@@ -60,7 +60,7 @@ class FirstPose(NamedTuple):
     start: Hypothesis
     """The pose and the body, whose height may have been measured."""
     status: Status
-    """The tracker's status of the fit on that frame, at best doubtful if silhouettes, rivals or a short track object."""
+    """The tracker's status of the fit on that frame, at best doubtful if silhouettes, rivals or a track object."""
     cost_px: float
     """Mean cost of the short track, px of the footage."""
     is_facing_sure: bool
