@@ -241,25 +241,34 @@ class _Task(NamedTuple):
     step: Callable[[], None]
 
 
+class _Tried(NamedTuple):
+    """A first pose by one way to find silhouettes."""
+
+    pose: FirstPose
+    track: StartTrack
+    fitter: StartFitter
+
+
 def _best_on_frame(
     task: _Task, frame: int, generators: Sequence[str], found: Mapping[int, FirstPose]
 ) -> FirstPose:  # fmt: skip
-    """Return the pose on a frame; where it is not good, that with what looks like shadows if it is better."""
-    poses, errors, before = list[FirstPose](), list[TrackerError](), None
+    """Return the pose on a frame; where it is not good, the more likely one of that and of silhouettes with shadows."""
+    tried, errors, before = list[_Tried](), list[TrackerError](), None
     for source in task.sources:
         silhouettes = source.silhouettes(frame, task.person)
         if before is not None and not _are_larger(silhouettes, before):
             break
         before = silhouettes
         try:
-            poses.append(_on_frame(task, frame, source, silhouettes, generators, found))
+            tried.append(_on_frame(task, frame, source, silhouettes, generators, found))
         except TrackerError as error:
             errors.append(error)
-        if poses and poses[-1].status == "good":
+        if tried and tried[-1].pose.status == "good":
             break
-    if not poses:
+    if not tried:
         raise errors[0]
-    return min(poses, key=lambda p: (p.status != "good", p.cost_px))
+    best, *_ = tried[0].fitter.compared([t.track for t in tried])
+    return next(t.pose for t in tried if t.track.poses is best.poses)
 
 
 def _are_larger(silhouettes: Sequence[ViewSilhouette], before: Sequence[ViewSilhouette]) -> bool:
@@ -270,7 +279,7 @@ def _are_larger(silhouettes: Sequence[ViewSilhouette], before: Sequence[ViewSilh
 def _on_frame(
     task: _Task, frame: int, source: _Source, silhouettes: Sequence[ViewSilhouette],
     generators: Sequence[str], found: Mapping[int, FirstPose],
-) -> FirstPose:  # fmt: skip
+) -> _Tried:  # fmt: skip
     session, observer, _, person, size_m, step = task
     hull = carve_people(silhouettes, size_m)
     known = {i: pose.start.body for i, pose in found.items()}
@@ -293,7 +302,8 @@ def _on_frame(
     status = worst([best.status, "doubtful"]) if any(doubts) else best.status
     notes = (*notes, *filter(None, doubts))
     lines = _lines_px(session, scene)
-    return FirstPose(frame, best.start, status, best.cost_px, compared.is_facing_sure, notes, lines)
+    pose = FirstPose(frame, best.start, status, best.cost_px, compared.is_facing_sure, notes, lines)
+    return _Tried(pose, best, fitter)
 
 
 def _filling(
