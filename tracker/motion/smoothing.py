@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
-from tracker.motion.prediction import unwrapped
+from tracker.motion.prediction import MAX_ORDER, unwrapped
 
 _RADIUS_M = 0.05
 """Radius of gyration of a part about its own axis, metres: turning an outstretched limb moves none of its joints."""
@@ -36,8 +36,6 @@ _FIRST_DENSITY = 1.0
 """Spectral density at the first iteration, m^2/s^3: points change their speed by 1 m/s within a second."""
 _ITERATIONS = 10
 """Number of iterations of expectation maximization."""
-_LEAST_FRAMES = 3
-"""Fewer frames show no acceleration."""
 _BLOCK_FRAMES, _OVERLAP_FRAMES = 500, 60
 """Frames are smoothed in blocks, which bounds the memory; the overlap is longer than the smoother looks. The process
 noise is estimated from the first block."""
@@ -72,7 +70,7 @@ def smooth_poses(track: PoseTrack) -> Array:
     """
     known = np.flatnonzero(track.trusted.any(axis=1) | track.fixed)
     out = np.array(track.poses)
-    if len(known) < _LEAST_FRAMES:
+    if len(known) <= MAX_ORDER:  # these show no acceleration
         return out
     first, end = int(known[0]), int(known[-1]) + 1
     q = _Smoother(track, slice(first, min(end, first + _BLOCK_FRAMES))).estimate_noise()

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.gauss_newton import (
     CLOSE_ENOUGH,
-    LOOSE,
     OTHER_BODY_M,
+    UNKNOWN,
     PointTargets,
     PosePrior,
     ResidualBlock,
@@ -103,7 +103,7 @@ def pose_of(
     blocks: list[ResidualBlock] = [
         PointTargets(np.array([names[n] for n in points.names]), targets, 1 / np.sqrt(variances + OTHER_BODY_M**2)),
         PosePrior.of_spreads(model),
-        PosePrior(near, np.full(model.n_dofs, 1 / LOOSE)),
+        PosePrior(near, np.full(model.n_dofs, 1 / UNKNOWN)),
     ]
     fit = solve(model, near if start is None else start, blocks, active_dofs, tolerance=CLOSE_ENOUGH)
     return BodyPose(fit.pose, covariance(model, fit))
