@@ -24,6 +24,9 @@ _LEG_ROOT = -0.75
 """A limb that begins lower on the trunk, as a share of half its length from its middle, is a leg, raised or not."""
 _SLICE_M = 0.03
 """Half the thickness of the slice whose mean is a limb's centre, metres."""
+_SPLIT = {"arm": 0.51, "leg": 0.49}
+"""Place of elbow and knee, as a share of the length through the limb to wrist or ankle, bent or not: that of the
+built-in bodies, from shoulder and hip (P. de Leva 1996, J. Biomech. 29:1223)."""
 _END_M = {"arm": 0.10, "leg": 0.12}
 """Distance of the wrist and the ankle from the end of the limb, metres."""
 
@@ -102,10 +105,7 @@ def _connected(figure: Voxels, own: IntArray) -> list[IntArray]:
 
 
 def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso) -> LimbRegion:
-    """Return the limb of a branch. Its hidden first stretch is assumed straight.
-
-    Elbow and knee halve it: they lie at 0.51 and 0.49 of its length (P. de Leva 1996, J. Biomech. 29:1223).
-    """
+    """Return the limb of a branch. Its hidden first stretch is assumed straight."""
     region, from_torso, half = points[branch.own], distances[branch.own], torso.half_axes[2]
     # Voxels of a child who is enlarged to an adult are wide: there may be none this near.
     first = region[from_torso <= max(branch.begins_m + 0.05, from_torso.min())].mean(axis=0)
@@ -117,7 +117,7 @@ def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso) -> Lim
     side = np.sign(torso.local(first[None])[0, 1]) or 1.0
     across, along = (0.35, -0.75) if kind == "leg" else (1.0, 0.85)
     root = torso.center + torso.axes @ np.array([0.0, side * across * max(0.12, torso.half_axes[1]), along * half])
-    middle, distal = (_at(region, from_torso, (root, branch.begins_m, first), at) for at in (length / 2, length))
+    middle, distal = (_at(region, from_torso, (root, branch.begins_m, first), s * length) for s in (_SPLIT[kind], 1.0))
     return LimbRegion(kind, root, middle, distal, branch.own)
 
 
