@@ -34,9 +34,9 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-DOCUMENT_BYTES = 4_000_000
-"""Size above which a document that people write is refused: a calibrated camera takes 1 to 2 kB, and the largest rig
-known has 521 (CMU Panoptic); a body of 20 parts takes 10 kB."""
+DOCUMENT_BYTES = 500_000
+"""Size above which a document that people write is refused: a body of 20 parts takes 10 kB, a camera of a session 100
+bytes."""
 TABLE_BYTES = 1_000_000_000
 """Size above which a table of numbers is refused: an hour of 50 joints at 120 Hz, in digits."""
 _MAX_LINE = 1_000_000

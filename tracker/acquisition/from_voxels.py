@@ -36,8 +36,6 @@ _KINDS = ("height", "build", "length", "girth", "free_end")
 """Kinds of sizes that voxels show; the places of joints in the flesh are left to the contours."""
 _TIP_SHARE = 0.99
 """Quantile of a part's voxels along its axis that counts as its tip."""
-_ROWS = 9
-"""Measurements of a part: its centre, its turn, and two half sizes with the tip or three of them."""
 
 
 @dataclass(frozen=True)
@@ -202,8 +200,10 @@ class _Frame:
             return NormalEquations(0.0, np.zeros(n), np.zeros((n, n)))
         points = points_by_sizes(body.model, body.kinematics, by_sizes)
         J = parts_by_unknowns(body, state, by_figure, points)[used]
-        residuals = rows.residual.reshape(-1, _ROWS).copy()
-        R = np.array([rows.noise[k : k + _ROWS, k : k + _ROWS] for k in range(0, len(rows.noise), _ROWS)])
+        # Of each part: its centre, its turn, and two half sizes with the tip or three of them.
+        residuals = rows.residual.reshape(len(J), -1).copy()
+        at = np.arange(rows.residual.size).reshape(len(J), -1)
+        R = rows.noise[at[:, :, None], at[:, None, :]]
         for row, i in enumerate(np.flatnonzero(used)):
             if TIPS[i]:
                 residuals[row, 8] = seen.tips[i] - own.tips[i]

@@ -10,6 +10,7 @@ al. 1999 for the hip). Shapes: GD96 Sect. 3 lists no ranges; ours are those of t
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -19,16 +20,18 @@ from tracker.body.dimensions import main_axis, mirror_part
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 
-_LENGTH, _GIRTHS, _CENTER, _HALF, _TAPER, _EXPONENTS, _JOINT = (
-    0, slice(1, 3), slice(3, 6), slice(6, 9), slice(9, 11), slice(11, 13), slice(13, 16)
-)  # fmt: skip
-"""Columns of the changes of a part. The logarithm of its length stretches flesh and joints along its main axis, and
+_COUNTS = {"length": 1, "girths": 2, "center": 3, "half": 3, "taper": 2, "exponents": 2, "joint": 3}
+"""Numbers of the changes of a part. The logarithm of its length stretches flesh and joints along its main axis, and
 those of its girths stretch it across. Shifts of the flesh's centre, of its half-axes and of its own joint on the parent
 are fractions of the height."""
-_N_COLUMNS = _JOINT.stop
+_N_COLUMNS = sum(_COUNTS.values())
+_LENGTH, _GIRTHS, _CENTER, _HALF, _TAPER, _EXPONENTS, _JOINT = (
+    slice(end - count, end) for count, end in zip(_COUNTS.values(), accumulate(_COUNTS.values()), strict=True)
+)
+"""Their columns."""
 DIFFERENCE = 1e-4
 """Step of parameters or unit coordinates by which derivatives are taken as differences: far above rounding and far
-below the spread of people."""
+below the spread of people. Halved and doubled: those of `gavrila34` change by 2e-5 at most."""
 _EXPONENT_LIMITS, _TAPER_LIMIT = (0.15, 1.0), 0.8
 """Limits of shapes: convex, with finite derivatives."""
 _LIMB_JOINTS, _LIMB_PARTS = ("shoulder", "elbow", "hip", "knee"), ("upper_arm", "forearm", "thigh", "calf")
@@ -180,7 +183,7 @@ class SizeParameters:
             out, out_by = scaled(values, stretch, stretch_by)
             return out + height * shift, out_by + height * (shift_by + shift[..., None] * by_height)
 
-        length, length_by = along * raw[:, :1], along[..., None] * C[:, :1]
+        length, length_by = along * raw[:, _LENGTH], along[..., None] * C[:, _LENGTH]
         girth = np.take_along_axis(raw[:, _GIRTHS], across, axis=1) + sizes[1]
         girth_by = np.take_along_axis(C[:, _GIRTHS], across[..., None], axis=1) + by_build
         stretch = np.where(along, length, girth), np.where(along[..., None], length_by, girth_by)
@@ -242,7 +245,7 @@ class SizeParameters:
         outward = -1.0 if part.center[main] < 0 else 1.0  # from the joint to the far end
         is_leaf = i not in self.base.parents
         far = "free_end" if is_leaf else "end_far"
-        out = [("length", _LENGTH, 1.0), ("girth_a", _GIRTHS.start, 1.0), ("girth_b", _GIRTHS.start + 1, 1.0)]
+        out = [("length", _LENGTH.start, 1.0), ("girth_a", _GIRTHS.start, 1.0), ("girth_b", _GIRTHS.start + 1, 1.0)]
         for name, half in ((far, 0.5), ("end_near", -0.5)):
             out += [(name, _CENTER.start + main, 0.5 * outward), (name, _HALF.start + main, half)]
         out += [(f"side_{a}", _CENTER.start + k, 1.0) for k, a in enumerate("xyz") if k != main]

@@ -18,7 +18,7 @@ from tracker.geometry.arrays import Array
 
 HEIGHT_LIMITS_M = (0.3, 3.0)
 """Least and largest height of a body, metres."""
-_MIN_M, _MAX_SHARE = 0.005, 0.7
+MIN_PART_M, _MAX_SHARE = 0.005, 0.7
 """Shortest dimension of a part, metres; longest, as a share of the body's height."""
 _SIDES = ("left_", "right_")
 _WIDTHS = ("shoulder", "hip")
@@ -159,7 +159,7 @@ def scaled(sizes: BodyDimensions, height_m: float) -> BodyDimensions:
 
 def size_limits_m(height_m: float) -> tuple[float, float]:
     """Return the least and the largest dimension of a part of a body of a height, metres."""
-    return _MIN_M, _MAX_SHARE * height_m
+    return MIN_PART_M, _MAX_SHARE * height_m
 
 
 def mirror_part(name: str) -> str | None:

@@ -1,5 +1,6 @@
 """Forward kinematics of a joint tree: the compiled kernels of `BodyModel.kinematics`."""
 
+from enum import IntEnum, auto
 from typing import NamedTuple
 
 import numpy as np
@@ -9,8 +10,13 @@ from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array, IntArray
 
-TRANSLATE, REVOLVE, BALL = 0, 1, 2
-"""Kinds of operations of a joint."""
+
+class Operation(IntEnum):
+    """Kinds of operations of a joint."""
+
+    TRANSLATE = auto()
+    REVOLVE = auto()
+    BALL = auto()
 
 
 class Tree(NamedTuple):
@@ -21,7 +27,7 @@ class Tree(NamedTuple):
     offsets: Array
     """Position of each part's joint in its parent's frame, (n_parts, 3), metres."""
     ops: IntArray
-    """Operations of the joints in order: kind (translate, revolve, ball) and index of the joint, (n_ops, 2)."""
+    """Operations of the joints in order: `Operation` and index of the joint, (n_ops, 2)."""
     axes: Array
     """Unit axis of each operation of kind revolve, (n_ops, 3)."""
 
@@ -91,8 +97,8 @@ def _starts(tree: Tree) -> IntArray:
         out[part] = op, dof, value
         while op < tree.ops.shape[0] and tree.ops[op, 1] == part:
             kind = tree.ops[op, 0]
-            dof += 1 if kind == REVOLVE else 3
-            value += 1 if kind == REVOLVE else 3 if kind == TRANSLATE else 4
+            dof += 1 if kind == Operation.REVOLVE else 3
+            value += 1 if kind == Operation.REVOLVE else 3 if kind == Operation.TRANSLATE else 4
             op += 1
     return out
 
@@ -132,7 +138,7 @@ def _place_part(  # noqa: C901
     first_dof = dof
     while op < ops.shape[0] and ops[op, 1] == part:
         kind = ops[op, 0]
-        if kind == TRANSLATE:
+        if kind == Operation.TRANSLATE:
             for k in range(3):
                 T[k, 3] += values[value + k]
                 for i in range(3):
@@ -140,7 +146,7 @@ def _place_part(  # noqa: C901
             dof += 3
             value += 3
         else:
-            if kind == REVOLVE:
+            if kind == Operation.REVOLVE:
                 ax, ay, az = op_axes[op, 0], op_axes[op, 1], op_axes[op, 2]
                 for i in range(3):
                     axes[dof, i] = T[i, 0] * ax + T[i, 1] * ay + T[i, 2] * az
@@ -155,7 +161,7 @@ def _place_part(  # noqa: C901
                 qw, qx, qy, qz = qw / norm, qx / norm, qy / norm, qz / norm
                 value += 4
             _turn(T, qw, qx, qy, qz)
-            if kind == BALL:  # the three dofs of a ball turn about the axes of its child
+            if kind == Operation.BALL:  # the three dofs of a ball turn about the axes of its child
                 for k in range(3):
                     for i in range(3):
                         axes[dof + k, i] = T[i, k]

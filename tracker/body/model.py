@@ -196,18 +196,18 @@ class BodyModel:
     @cached_property
     def tree(self) -> "Tree":
         """The joint tree as arrays, for `forward_kinematics`."""
-        from tracker.body.kinematics import BALL, REVOLVE, TRANSLATE, Tree
+        from tracker.body.kinematics import Operation, Tree
 
         ops, axes = [], []
         for i, j in enumerate(self.joints):
             if j.free:
-                ops.append((TRANSLATE, i))
+                ops.append((Operation.TRANSLATE, i))
                 axes.append((0.0, 0.0, 0.0))
             if j.kind == "ball":
-                ops.append((BALL, i))
+                ops.append((Operation.BALL, i))
                 axes.append((0.0, 0.0, 0.0))
             for a in j.axes:
-                ops.append((REVOLVE, i))
+                ops.append((Operation.REVOLVE, i))
                 axes.append(a.direction)
         return Tree(
             np.array(self.parents, dtype=np.int64),

@@ -80,7 +80,8 @@ _FORMS = {3: "rodrigues", 4: "quaternion"}
 Rot, which are equal."""
 _MIN_FOCAL = 0.25
 """Smallest focal length as a share of the principal point, which lies near the middle: half of a view of 152 degrees.
-Wider lenses are fisheyes, whose focal lengths are longer at the same view."""
+Wider lenses are fisheyes, whose focal lengths are longer at the same view. Halved: no change in
+tests/tracker/calibrations; doubled, pictures that are cut at a side are refused (test_camera_forms.py)."""
 _SHORTER = {14: 12, 12: 8, 8: 5}
 """Counts of OpenCV's coefficients, and to how many they are cut where the others are 0."""
 _UNIT = re.compile(r"^(length|translation|world|distance)?units?$|^units?(of)?(length|translation)s?$")

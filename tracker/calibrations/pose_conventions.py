@@ -34,17 +34,17 @@ OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 # Degrees; measured on simulated rigs of 2 to 8 cameras in rings, arcs, corners and rows, aimed up to 12 degrees beside
 # one point, level or turned by 90 degrees: tests/tracker/calibrations/test_pose_conventions.py.
-_FITS = 30.0
-"""Cost up to which a convention fits, degrees. Checked, as all here, on rigs of test_pose_conventions.py."""
+FITS_DEG = 30.0
+"""Cost up to which a convention fits, and angle up to which a camera looks at a point, degrees: half a usual lens.
+Checked, as all here, on rigs of test_pose_conventions.py."""
 _RATIO, _MARGIN = 1.3, 5.0
 """A convention is doubted if it costs more than this many times another, and this many degrees more."""
 _PAIR_RATIO, _PAIR_MARGIN = 2.0, 20.0
 """The same for two cameras, whose axes meet by chance more often."""
-_PARALLEL = 45.0
-"""Cost of axes that are all parallel, degrees: the cameras may look at one place, but nothing shows it."""
 _MAX_ANGLE = 60.0
-"""Largest cost of an axis, degrees: what points elsewhere counts alike."""
-_LOOK_DOWN = 0.3
+"""Largest cost of an axis, degrees: what points elsewhere counts alike. Also the cost of axes that are all parallel:
+the cameras may look at one place, but nothing shows it."""
+LOOK_DOWN = 0.3
 """Part of the vertical in the picture below which a camera that looks down has no level (17 degrees)."""
 _UNKNOWN_ROLL = 22.5
 """Cost of a roll that is not known, degrees: the mean of all."""
@@ -88,7 +88,7 @@ def _chosen(n: int) -> list[int]:
 
 def _cost(Ts_world_camera: Sequence[Array]) -> float:
     point = axes_point(Ts_world_camera)
-    look = _PARALLEL
+    look = _MAX_ANGLE
     if point.is_determined:
         look = float(np.sqrt(np.mean(np.minimum(np.degrees(point.angles_rad), _MAX_ANGLE) ** 2)))
     return look + _roll(np.asarray(Ts_world_camera))
@@ -105,7 +105,7 @@ def _roll(Ts_world_camera: Array) -> float:
     verticals = np.concatenate([normals[lengths > 0.1] / lengths[lengths > 0.1, None], sides])
     across, along = verticals @ x.T, verticals @ y.T
     rolls = np.abs((np.degrees(np.arctan2(across, along)) + 45.0) % 90.0 - 45.0)
-    rolls = np.where(np.hypot(across, along) < _LOOK_DOWN, _UNKNOWN_ROLL, rolls)
+    rolls = np.where(np.hypot(across, along) < LOOK_DOWN, _UNKNOWN_ROLL, rolls)
     return float(np.sqrt(np.mean(rolls**2, axis=1)).min())
 
 
@@ -132,7 +132,7 @@ def check_convention(
     cost = costs(Ts_stated)
     stated = cost.pop(STATED)
     best = min(cost.values())
-    others = _distinct([c for c in cost if cost[c] <= min(_FITS, max(_RATIO * best, best + _MARGIN))], Ts_stated)
+    others = _distinct([c for c in cost if cost[c] <= min(FITS_DEG, max(_RATIO * best, best + _MARGIN))], Ts_stated)
     if is_clearly_worse(stated, best, len(Ts_stated)):
         rewrite = _rewrite(others[0])
         condition = f"if R and t, as read, are changed ({rewrite})" if is_turned else f"if {in_words(others[0])}"
@@ -147,7 +147,7 @@ def check_convention(
             Remedy("choose_poses"),
         )
     others = [c for c in others if cost[c] <= _RATIO * stated + _MARGIN]
-    if is_fixed or not others or stated >= _PARALLEL:
+    if is_fixed or not others or stated >= _MAX_ANGLE:
         return None
     return (
         f"The file is read with {expected}; {' or '.join(others)} would fit these cameras as well. Check with "
@@ -173,7 +173,7 @@ def odd_camera(Ts_stated: Sequence[Array]) -> int | None:
 def is_clearly_worse(cost: float, best: float, n_cameras: int) -> bool:
     """Return whether the best of several readings fits some cameras, and another, of a given cost, does not."""
     ratio, margin = (_PAIR_RATIO, _PAIR_MARGIN) if n_cameras == 2 else (_RATIO, _MARGIN)
-    return best < _FITS and cost > ratio * best + margin
+    return best < FITS_DEG and cost > ratio * best + margin
 
 
 def best_cost(Ts_stated: Sequence[Array], convention: PoseConvention | None = None) -> tuple[float, PoseConvention]:

@@ -22,7 +22,8 @@ from tracker.validation import ROUNDING, quoted
 _ORDERS = {"w, x, y, z": (0, 1, 2, 3), "x, y, z, w": (3, 0, 1, 2)}
 """Places of w, x, y and z among the four numbers."""
 _ALONG = 0.02
-"""Share of the length of a row by which rectified cameras stand beside it: their rows are exact but for rounding."""
+"""Share of the length of a row by which rectified cameras stand beside it: their rows are exact but for rounding.
+Halved and doubled: no change in tests/tracker/calibrations."""
 
 
 def with_quaternions(sections: Mapping[str, Section], where: str, poses: PoseConvention | None) -> dict[str, Section]:

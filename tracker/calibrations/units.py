@@ -14,8 +14,6 @@ MAX_STUDIO_M = 100.0
 1.7 m are 15 px high there in a picture of 1,000 px and 60 degrees."""
 MIN_STUDIO_M = 0.5
 """Distance nearer than which cameras show no person: at it, a lens of 60 degrees sees 58 cm."""
-_LIKELY_M = (1.0, 30.0)
-"""Distances of usual studios: a unit that gives one is offered first."""
 _WORDS = {"m": "metres", "cm": "centimetres", "mm": "millimetres"}
 
 
@@ -72,9 +70,9 @@ def _distance(entries: Sequence[CameraEntry]) -> tuple[float, str, bool]:
 
 
 def _remedy(distance: float, units: Units) -> Remedy:
-    """Name the units by which the distance is that of a studio."""
+    """Name the units by which the distance is that of a studio, first the one nearest to the middle of these."""
     fitting = [u for u in METRES if u != units and MIN_STUDIO_M <= distance * METRES[u] <= MAX_STUDIO_M]
-    fitting.sort(key=lambda u: not _LIKELY_M[0] <= distance * METRES[u] <= _LIKELY_M[1])
+    fitting.sort(key=lambda u: abs(np.log((distance * METRES[u]) ** 2 / (MIN_STUDIO_M * MAX_STUDIO_M))))
     if not fitting:
         return Remedy("scale_calibration", units=", ".join(METRES))
     return Remedy("give_unit", units=" or ".join(f"{u} ({distance * METRES[u]:.2g} m)" for u in fitting))

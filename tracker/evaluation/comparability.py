@@ -6,7 +6,7 @@ from itertools import permutations, product
 import numpy as np
 
 from tracker.errors import Remedy
-from tracker.evaluation.metrics import axes_matrix, best_rigid, gather_joints
+from tracker.evaluation.metrics import LOST_M, axes_matrix, best_rigid, gather_joints
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
@@ -14,10 +14,6 @@ from tracker.geometry.arrays import Array
 
 APART_M = 1.0
 """Median distance above which two motions are not estimates of one."""
-_NEAR_M = 0.1
-"""Median distance below which other axes, units or another origin explain the difference."""
-_MAX_FRAMES = 200
-"""Number of frames that are compared, spread over all."""
 
 
 def length_note(n_session: int, n_reference: int | None) -> str | None:
@@ -42,8 +38,7 @@ def distance_note(
         axes: the axes as which the reference was read (`axes_matrix`).
     """
     joints = [j for j in LIMB_JOINTS if j in estimated.names and j in reference.names]
-    some = frames[:: max(1, len(frames) // _MAX_FRAMES)]
-    estimate, truth = (gather_joints(t, joints, some).reshape(-1, 3) for t in (estimated, reference))
+    estimate, truth = (gather_joints(t, joints, frames).reshape(-1, 3) for t in (estimated, reference))
     both = np.isfinite(estimate + truth).all(axis=-1)
     estimate, truth = estimate[both], truth[both]
     if not len(truth) or (apart := _median_m(estimate, truth)) <= APART_M:
@@ -53,16 +48,16 @@ def distance_note(
 
 
 def _explanation(estimate: Array, truth: Array, axes: str) -> tuple[str, Remedy]:
-    """Say which change of the reference, (n, 3), brings it near the estimate, (n, 3)."""
+    """Say which change of the reference, (n, 3), brings it within `LOST_M` of the estimate, (n, 3)."""
     file_axes = truth @ axes_matrix(axes)  # the inverse of a rotation is its transpose
     found, words = min((_median_m(estimate, file_axes @ axes_matrix(w).T), w) for w in _axes())
-    if found < _NEAR_M:
+    if found < LOST_M:
         return "", Remedy("reference_axes", axes=words, distance_m=found)
     ratio = _spread_m(truth) / max(_spread_m(estimate), 1e-9)
     for factor, name in ((1000.0, "1000 times as large"), (0.001, "1000 times smaller")):
         if 0.5 < ratio / factor < 2:
             return f": it is {name}", Remedy("reference_units")
-    if len(truth) >= 3 and _median_m(rigid.apply(best_rigid(truth, estimate), truth), estimate) < _NEAR_M:
+    if len(truth) >= 3 and _median_m(rigid.apply(best_rigid(truth, estimate), truth), estimate) < LOST_M:
         return ": it is of the same motion in a world with another origin or direction", Remedy("align_reference")
     return "", Remedy("check_reference")
 

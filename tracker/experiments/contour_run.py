@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
+from tracker.contours.pieces import PIECE_PX
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.experiments.staged_views import Actor, StagedObserver
-from tracker.fitting.observability import EXACT_1PX, observe_pose
+from tracker.fitting.observability import ContourNoise, observe_pose
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.pipeline.methods import make_tracker
@@ -20,6 +21,8 @@ from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
 OBSERVABLE_DEG = 2.0
 """Standard deviation at the true pose, with 1 px of noise, below which an angle counts as observable, degrees."""
+EXACT_1PX = ContourNoise(1.0, PIECE_PX, 0.0)
+"""Noise of 1 px, independent from piece to piece, on the contours of the very body that is fitted."""
 LOST_DEG = 3.0
 """Mean error of the angles of a frame above which it counts as lost, degrees."""
 

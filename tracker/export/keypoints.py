@@ -1,6 +1,7 @@
 """Keypoints of the people in a view, in the pixels of the footage, with occlusion by all bodies."""
 
 from collections.abc import Sequence
+from enum import IntEnum
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -13,10 +14,16 @@ from tracker.contours.part_edges import points_occluded
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 
-ABSENT, OCCLUDED, VISIBLE = 0, 1, 2
-"""COCO's visibility flags."""
 _SILHOUETTE_PX = 400
 """Longer side of the mask in which the area of a silhouette is counted, px."""
+
+
+class KeypointFlag(IntEnum):
+    """COCO's visibility flags."""
+
+    ABSENT = 0
+    OCCLUDED = 1
+    VISIBLE = 2
 
 
 class Keypoints(NamedTuple):
@@ -25,7 +32,7 @@ class Keypoints(NamedTuple):
     points_px: Array
     """Its joint centres in the order of `BodyModel.point_names`, (n, 2), original px; NaN where the lens shows none."""
     visibility: NDArray[np.int64]
-    """ABSENT, OCCLUDED or VISIBLE, (n,). A point outside the image is absent."""
+    """A `KeypointFlag` for each, (n,). A point outside the image is absent."""
     box_px: tuple[float, float, float, float] | None
     """x, y, width, height of the body within the image; None if it is outside."""
     area_px: float
@@ -58,8 +65,8 @@ def project_through_lens(camera: Camera, points_world: Array) -> Array:
 
 
 def _keypoints(body: PosedBody, camera: Camera, points_px: Array, occluded: NDArray[np.bool_]) -> Keypoints:
-    visibility = np.where(occluded, OCCLUDED, VISIBLE)
-    visibility[~_within(points_px, camera)] = ABSENT
+    visibility = np.where(occluded, KeypointFlag.OCCLUDED, KeypointFlag.VISIBLE)
+    visibility[~_within(points_px, camera)] = KeypointFlag.ABSENT
     surface, ends = _surface_world(body)
     surface_px = project_through_lens(camera, surface)
     known = np.isfinite(surface_px).all(axis=-1)

@@ -1,5 +1,6 @@
 """Arrays of the contour residuals: the evidence of all views, scratch buffers, and the sums that the kernels fill."""
 
+from enum import IntEnum, auto
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +11,13 @@ from tracker.contours.static_cache import StaticContours
 from tracker.contours.surfaces import Surfaces
 from tracker.geometry.arrays import Array, FloatArray
 
-ACROSS, RIGID, SLIDING = 0, 1, 2
-"""Values of `ContourTerm.motion`."""
+
+class ContourMotion(IntEnum):
+    """How contour points move; see `contour_residuals.MatchSettings`."""
+
+    ACROSS = auto()
+    RIGID = auto()
+    SLIDING = auto()
 
 
 class ViewArrays(NamedTuple):
@@ -113,7 +119,7 @@ class ContourTerm(NamedTuple):
     turn: float
     """See `contour_residuals.MatchSettings`."""
     motion: int
-    """How contour points move: `ACROSS`, `RIGID` or `SLIDING`; see `contour_residuals.MatchSettings`."""
+    """A `ContourMotion`."""
     static: StaticContours
     scratch: Scratch
     sums: Sums

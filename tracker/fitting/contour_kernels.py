@@ -9,7 +9,7 @@ from tracker.contours import occluding_contours
 from tracker.contours.pieces import PIECE_PX, place_parts
 from tracker.contours.static_cache import StaticContours, copy_poses, is_static_unchanged, trace_moving_parts
 from tracker.evidence.view_evidence import SCENE_SPACING_PX
-from tracker.fitting.contour_arrays import ACROSS, SLIDING, ContourTerm, Scratch, Sums, ViewArrays
+from tracker.fitting.contour_arrays import ContourMotion, ContourTerm, Scratch, Sums, ViewArrays
 from tracker.fitting.segment_matching import match_points, pack_visible, store_static
 from tracker.fitting.twists import add_twists
 from tracker.images.distance_transform import bilinear
@@ -47,7 +47,7 @@ def _model_to_image(
             if pulled and d < theta:
                 across = q[3, k] * along_u + q[4, k] * along_v
                 w = weight * length * (f * f)
-                if motion == ACROSS:
+                if motion == ContourMotion.ACROSS:
                     pulls[0, k] += w * across * across
                     pulls[1, k] += w * across * d
                     continue
@@ -167,7 +167,7 @@ def accumulate_normal_equations(term: ContourTerm, with_jacobian: bool) -> float
                     if not static.moves[part]:
                         continue
                     span, W = scratch.firsts[part : part + 2], scratch.traced.Ts_world_unit[part]
-                    slides = motion == SLIDING and surfaces.profile_sizes[part] > 0
+                    slides = motion == ContourMotion.SLIDING and surfaces.profile_sizes[part] > 0
                     add_twists(span, scratch.pieces, scratch.pulls, P, W, eye, slides, sums.M[part], sums.b[part])
         pixel += views.sizes[view, 0] * views.sizes[view, 1]
     if stale:

@@ -21,15 +21,14 @@ import numpy as np
 
 from tracker.body.kinematics import Kinematics, Tree, forward_kinematics
 from tracker.body.model import BodyModel, PosedBody, parts_of
+from tracker.compute.float32 import FAR
 from tracker.compute.jit import njit
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import StaticContours, static_contours_buffer
 from tracker.contours.surfaces import Surfaces, resized_surfaces, surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_arrays import (
-    ACROSS,
-    RIGID,
-    SLIDING,
+    ContourMotion,
     ContourTerm,
     Scratch,
     Sums,
@@ -45,7 +44,8 @@ from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.segment_distance import sort_points, stack_rows
 
 CAPTURE = 2.0
-"""Edge points farther than this many outlier distances from the predicted contours are left out for good."""
+"""Edge points farther than this many outlier distances from the predicted contours are left out for good. Halved and
+doubled: no change on `walk` and `fast_arms` from joints (acquisition.py)."""
 
 MIN_DECREASE = 0.1
 """Smallest decrease of the cost for another Gauss-Newton iteration where poses are only compared. Near its minimum the
@@ -76,16 +76,14 @@ class MatchSettings:
     motion of the contour on the surface (B of Eq. 31)."""
 
 
-UNBOUNDED = 1e6
-"""A scale at which residuals of any size count in full."""
-
-
 def paper_match(motion: Literal["rigid", "sliding"] = "sliding") -> MatchSettings:
-    """Return the weights of KRH08 Eq. 60: model to image, a sum of squares in px^2 with every pixel of contour."""
-    return MatchSettings(scale=UNBOUNDED, model_to_image=1.0, image_to_model=0.0, information_per_px=1.0, motion=motion)
+    """Return the weights of KRH08 Eq. 60: model to image, a sum of squares in px^2 with every pixel of contour.
 
-
-_MOTIONS = {"across": ACROSS, "rigid": RIGID, "sliding": SLIDING}
+    Residuals of any size count in full: the scale is beyond any.
+    """
+    return MatchSettings(
+        scale=float(FAR), model_to_image=1.0, image_to_model=0.0, information_per_px=1.0, motion=motion
+    )
 
 
 class PartCosts(NamedTuple):
@@ -201,7 +199,7 @@ class ContourResiduals:
         )
         self._term = ContourTerm(
             Ts, own.start, own.stop, surfaces, arrays, settings.scale, settings.turn,
-            _MOTIONS[settings.motion],
+            ContourMotion[settings.motion.upper()],
             self._static_buffer(np.arange(own.start, own.stop), len(Ts), arrays),
             scratch_buffer(surfaces, self._max_pieces, arrays.points.shape[1]), sums_buffer(len(Ts), len(views)),
         )  # fmt: skip

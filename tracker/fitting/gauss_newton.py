@@ -26,16 +26,13 @@ MIN_RETRY_DAMPING = 1e-2
 AT_LIMIT = 1e-9
 """Distance from a limit that counts as at the limit, rad or metres."""
 UNKNOWN = 1.0
-"""Standard deviation of a degree of freedom that nothing shows, rad or m."""
+"""Standard deviation of a degree of freedom that nothing shows, such as the twist of a straight arm, rad or m."""
 JOINT_M = 0.005
 """Standard deviation of a known joint of the same body, metres: markers and rigs repeat a joint to some
 millimetres."""
 OTHER_BODY_M = 0.015
 """Standard deviation of a known joint of a body of other sizes, metres: joints of people and those of the built-in body
 differ by 1 to 4 cm (docs/accuracy.md, Joint centres)."""
-LOOSE = 0.5
-"""Standard deviation of what known joints do not determine, such as the twist of a straight arm, rad or m: so much
-larger than theirs that it yields to any."""
 CLOSE_ENOUGH = 1e-3
 """Step below which a pose that is shown or filtered is final, rad or m: no joint moves by more than a millimetre."""
 

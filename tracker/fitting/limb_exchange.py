@@ -7,11 +7,8 @@ import numpy as np
 from tracker.body.dimensions import mirror_part
 from tracker.body.limbs import Limb
 from tracker.body.model import PosedBody
-from tracker.fitting.gauss_newton import PointTargets, PosePrior, ResidualBlock, solve
+from tracker.fitting.gauss_newton import JOINT_M, UNKNOWN, PointTargets, PosePrior, ResidualBlock, solve
 from tracker.geometry.arrays import Array
-
-_EXCHANGE_M, _EXCHANGE_RAD = 0.01, 1.5
-"""Standard deviations of joints and angles where two limbs are exchanged, metres and rad."""
 
 
 def paired_limbs(limbs: Sequence[Limb]) -> list[tuple[Limb, Limb]]:
@@ -29,7 +26,7 @@ def exchanged(body: PosedBody, pair: tuple[Limb, Limb]) -> Array:
     targets = {i: names.index(other) for i in np.flatnonzero(of_pair) if (other := mirror_part(names[i])) in names}
     points = np.array([*targets], dtype=np.int64)
     blocks: list[ResidualBlock] = [
-        PointTargets(points, points_world[[*targets.values()]], np.full(len(points), 1 / _EXCHANGE_M)),
-        PosePrior(model.neutral(), np.full(model.n_dofs, 1 / _EXCHANGE_RAD)),
+        PointTargets(points, points_world[[*targets.values()]], np.full(len(points), 1 / JOINT_M)),
+        PosePrior(model.neutral(), np.full(model.n_dofs, 1 / UNKNOWN)),
     ]
     return solve(model, pose, blocks, pair[0].dofs | pair[1].dofs, max_iterations=40, tolerance=1e-4).pose

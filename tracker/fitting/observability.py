@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
-from tracker.contours.pieces import PIECE_PX
 from tracker.fitting.gauss_newton import UNKNOWN
 from tracker.fitting.twists import twists_to_dofs
 from tracker.geometry.arrays import Array, IntArray
@@ -45,10 +44,6 @@ class ContourNoise:
     def information_per_px(self) -> float:
         """Information of a pixel of contour, 1/px^3."""
         return 1.0 / (self.sigma_px**2 * self.length_px)
-
-
-EXACT_1PX = ContourNoise(1.0, PIECE_PX, 0.0)
-"""Noise of 1 px, independent from piece to piece, on the contours of the very body that is fitted."""
 
 
 class ViewInformation(NamedTuple):

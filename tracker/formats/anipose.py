@@ -17,10 +17,11 @@ from tracker.files import write_text_atomic
 from tracker.formats.camera_section import check_names, read_entry
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
-from tracker.text_files import DOCUMENT_BYTES, TextKind, parse_toml, read_text
+from tracker.text_files import TextKind, parse_toml, read_text
 from tracker.validation import quoted
 
-KIND = TextKind("calibration", DOCUMENT_BYTES, CalibrationError)
+KIND = TextKind("calibration", 4_000_000, CalibrationError)
+"""A calibrated camera takes 1 to 2 kB, and the largest rig known has 521 (CMU Panoptic)."""
 
 
 def read_calibration(path: str | Path) -> tuple[Camera, ...]:

@@ -5,13 +5,14 @@ Other layouts are rewritten to this one (`tracker.calibrations`), so that all ar
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 import msgspec
 import numpy as np
 from msgspec import Meta
 
 from tracker.errors import CalibrationError
+from tracker.formats.trc import METRES_BY_WORD
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
@@ -19,7 +20,7 @@ from tracker.geometry.lenses import coefficient_counts, count_words
 from tracker.validation import MAX_SIDE_PX, FileStem, Number, Vector, check, quoted
 
 Units = Literal["m", "cm", "mm"]
-METRES: dict[str, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+METRES = {unit: METRES_BY_WORD[unit] for unit in get_args(Units)}
 """Metres per unit."""
 
 FOUR_DIGITS = 1e-3

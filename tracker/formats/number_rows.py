@@ -15,6 +15,8 @@ from tracker.validation import MAX_FRAMES, quoted
 
 MAX_VALUES = 40_000_000
 """Largest number of values of a table, 320 MB: an hour of 30 points at 120 Hz."""
+MAX_NAMES = 2000
+"""Largest number of points or columns that the head of a table names: some twenty bodies of 100 values."""
 _MISSING = {
     "", "nan", "-nan", "+nan", "n/a", "#n/a", "na", "null", "none", "-", "--", "1.#qnan", "-1.#qnan", "1.#ind",
     "-1.#ind", "1.#snan", "-nan(ind)", "nan(ind)", "nan(snan)",

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
-from tracker.formats.number_rows import NumberRows
+from tracker.formats.number_rows import MAX_NAMES, NumberRows
 from tracker.geometry.arrays import Array
 from tracker.text_files import TABLE_BYTES, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_NUMBER, Name, check_version, quoted
@@ -36,8 +36,6 @@ _TITLE = "# quadrille poses, version "
 _DIGITS = 9
 """Decimals of a value, so that a pose is read back to 1e-9 rad or m."""
 _KIND = TextKind("pose table", TABLE_BYTES, FormatError, "export it again")
-_MAX_COLUMNS = 2000
-"""Largest number of columns of values."""
 _FACTORS = {"_deg": float(np.radians(1.0)), "_m": 1.0, ".qw": 1.0, ".qx": 1.0, ".qy": 1.0, ".qz": 1.0}
 """Suffixes of the columns, and what their values are multiplied by."""
 
@@ -165,9 +163,8 @@ def _read_columns(columns: Sequence[str], where: str) -> tuple[tuple[str, ...], 
             )
         names.append(column.removesuffix(unit) if unit.startswith("_") else column)
         factors.append(_FACTORS[unit])
-    if not 1 <= len(names) <= _MAX_COLUMNS or len(set(names)) < len(names):
+    if not 1 <= len(names) <= MAX_NAMES or len(set(names)) < len(names):
         raise FormatError(
-            f"{where}: expected 1 to {_MAX_COLUMNS} columns of values, each once, found {quoted(names)}; "
-            "export it again"
+            f"{where}: expected 1 to {MAX_NAMES} columns of values, each once, found {quoted(names)}; export it again"
         )
     return tuple(names), factors

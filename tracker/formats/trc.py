@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
-from tracker.formats.number_rows import NumberRows, not_a_number
+from tracker.formats.number_rows import MAX_NAMES, NumberRows, not_a_number
 from tracker.geometry.arrays import Array
 from tracker.text_files import LOST, TABLE_BYTES, TextKind, read_lines, refuse_lost
 from tracker.validation import MAX_FRAMES, MAX_NUMBER, FrameRate, check, quoted
@@ -37,8 +37,6 @@ METRES_BY_WORD = {
 _KIND = TextKind("TRC file", TABLE_BYTES, FormatError, "export it again")
 _Line: TypeAlias = tuple[int, str]
 """Number of a line in its file, from 1, and its text with its end."""
-_MAX_POINTS = 1000
-"""Largest number of points of a file."""
 _MAX_TIME = 1e13
 """Largest time of a file, s: Unix time in milliseconds, which is named as a contradiction to DataRate, is some 2e12."""
 
@@ -170,9 +168,9 @@ def _names(line: str, where: str) -> tuple[str, ...]:
     names = tuple(n.strip() for n in line.split("\t")[2:] if n.strip())
     if LOST in line:  # in the first line there is a path, which nobody needs
         refuse_lost(list(names), where, _KIND)
-    if not 1 <= len(names) <= _MAX_POINTS or len(set(names)) != len(names):
+    if not 1 <= len(names) <= MAX_NAMES or len(set(names)) != len(names):
         raise FormatError(
-            f"{where}: expected 1 to {_MAX_POINTS} point names, each once, found {quoted(list(names))}; rename them"
+            f"{where}: expected 1 to {MAX_NAMES} point names, each once, found {quoted(list(names))}; rename them"
         )
     return names
 

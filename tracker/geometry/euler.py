@@ -9,15 +9,13 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 
 Order = Literal["XYZ", "ZXY"]
-_AXES = dict(zip("XYZ", np.eye(3), strict=True))
-"""Unit vectors by the names of the axes."""
 _LOCK_RAD = 1e-5
 """Distance of the middle angle from a quarter turn at which the first and the third axis coincide."""
 
 
 def euler_matrix(angles: Array, order: Order) -> Array:
     """Return the rotations of intrinsic Euler angles, `(..., 3)` rad in the given order, as `(..., 3, 3)`."""
-    first, second, third = (rigid.so3_exp(angles[..., i, None] * _AXES[axis]) for i, axis in enumerate(order))
+    first, second, third = (rigid.so3_exp(angles[..., i, None] * _axis(axis)) for i, axis in enumerate(order))
     return first @ second @ third
 
 
@@ -52,8 +50,13 @@ def continuous_euler_angles(R: Array, order: Order) -> Array:
     return found
 
 
+def _axis(name: str) -> Array:
+    """Return the unit vector of an axis, (3,)."""
+    return np.eye(3)["XYZ".index(name)]
+
+
 def _unlocked(R: Array, second: float, third: float, order: Order) -> Array:
     """Return the angles of a rotation whose first and third axis coincide, for a given third angle."""
     rest = euler_matrix(np.array([0.0, second, third]), order)
-    first = rigid.so3_log(R @ rest.T) @ _AXES[order[0]]
+    first = rigid.so3_log(R @ rest.T) @ _axis(order[0])
     return np.array([first, second, third])

@@ -11,8 +11,8 @@ from tracker.store.stored_poses import read_stored_poses
 from tracker.voxels.visual_hull import VisualHull
 from tracker.voxels.voxel_grid import Voxels
 
-_OWN_M = 0.4
-"""A figure that is closer to the trunk of another person with a pose is that person, metres."""
+OWN_M = 0.4
+"""A figure that is closer to the trunk of a person, or to where it was some frames before, is that person, metres."""
 _MAX_HULL_M3 = 0.25
 """Largest volume of the visual hull of one person, cubic metres: three times that of a large man."""
 
@@ -73,4 +73,4 @@ def own_figure(session: Session, person: int, hull: VisualHull, others: Sequence
 
 def _is_in(figure: Voxels, body: PosedBody) -> bool:
     trunk = body.points_world.mean(axis=0)
-    return bool(np.linalg.norm(figure.points_world.mean(axis=0) - trunk) < _OWN_M)
+    return bool(np.linalg.norm(figure.points_world.mean(axis=0) - trunk) < OWN_M)

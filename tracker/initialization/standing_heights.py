@@ -11,13 +11,12 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.initialization.generators.person_scene import PersonScene
 from tracker.initialization.generators.stature import upright_height
+from tracker.initialization.own_figure import OWN_M
 
 _STEP = 6
 """Distance of the frames on which heights are measured."""
 _N_HEIGHTS, _MAX_FRAMES = 3, 8
 """Number of heights of which the median is taken, and of frames on which they are looked for."""
-_STEP_M = 0.5
-"""Largest way of a figure from one of these frames to the next, metres."""
 
 
 class _Measured(NamedTuple):
@@ -63,7 +62,7 @@ class StandingHeights:
         for frame in frames:
             found = self._on_frame(frame, person)
             away = [float(np.linalg.norm(m.center - center)) for m in found]
-            if len(found) < self._n_people or min(away) > _STEP_M:
+            if len(found) < self._n_people or min(away) > OWN_M:
                 return
             center, height_m = found[int(np.argmin(away))]
             yield height_m

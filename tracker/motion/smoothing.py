@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
-from tracker.motion.prediction import unwrapped
+from tracker.motion.prediction import MAX_ORDER, unwrapped
 
 _RADIUS_M = 0.05
 """Radius of gyration of a part about its own axis, metres: turning an outstretched limb moves none of its joints."""
@@ -30,14 +30,13 @@ _LINEAR = 0.05
 pose; a rotation that the images do not show would otherwise take the pose out of the range where they hold."""
 _UNTRUSTED = 100.0
 """Factor of the standard deviation of a degree of freedom that is not measured, as of all before the first frame."""
-_START_VELOCITY = 5.0
-"""Standard deviation of the velocity before the first frame, rad/s or m/s."""
+START_VELOCITY = 5.0
+"""Standard deviation of a velocity before the first frame, rad/s or m/s. With 2 rad/s and 0.5 m/s,
+the voxel tracker is off by 43.9 mm on `walk`, with this by 43.6."""
 _FIRST_DENSITY = 1.0
 """Spectral density at the first iteration, m^2/s^3: points change their speed by 1 m/s within a second."""
 _ITERATIONS = 10
 """Number of iterations of expectation maximization."""
-_LEAST_FRAMES = 3
-"""Fewer frames show no acceleration."""
 _BLOCK_FRAMES, _OVERLAP_FRAMES = 500, 60
 """Frames are smoothed in blocks, which bounds the memory; the overlap is longer than the smoother looks. The process
 noise is estimated from the first block."""
@@ -72,7 +71,7 @@ def smooth_poses(track: PoseTrack) -> Array:
     """
     known = np.flatnonzero(track.trusted.any(axis=1) | track.fixed)
     out = np.array(track.poses)
-    if len(known) < _LEAST_FRAMES:
+    if len(known) <= MAX_ORDER:  # these show no acceleration
         return out
     first, end = int(known[0]), int(known[-1]) + 1
     q = _Smoother(track, slice(first, min(end, first + _BLOCK_FRAMES))).estimate_noise()
@@ -152,7 +151,7 @@ class _Smoother:
         predicted: list[_Gaussian] = []
         filtered: list[_Gaussian] = []
         x, P = np.concatenate([self.measured[0], np.zeros(n)]), np.zeros((2 * n, 2 * n))
-        P[:n, :n], P[n:, n:] = _UNTRUSTED**2 * self._R[0], _START_VELOCITY**2 * np.eye(n)
+        P[:n, :n], P[n:, n:] = _UNTRUSTED**2 * self._R[0], START_VELOCITY**2 * np.eye(n)
         for t in range(n_frames):
             if t:
                 dt = float(self._steps_s[t - 1])

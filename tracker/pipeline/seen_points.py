@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 
 from tracker.body.model import BodyModel
+from tracker.fitting.hypothesis import SETTLED_M
 from tracker.footage.camera_source import CameraSource
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.store.records import SEEN, Pin, PoseRecord
 
-_MOVED_M = 0.01
-"""An edit other than a drag that moves a point by more withdraws its place in the images, metres."""
 _Seen = dict[str, dict[str, Any]]
 """Position in each camera, original px, by point."""
 
@@ -50,12 +49,12 @@ def with_drag_ends(cameras: Sequence[CameraSource], seen: _Seen, ends: Sequence[
 
 
 def without_moved(model: BodyModel, seen: _Seen, before: Array, after: Array) -> _Seen:
-    """Return stored points without those that an edit of the pose, (n_values,) each, moves.
+    """Return stored points without those that an edit of the pose, (n_values,) each, moves by more than `SETTLED_M`.
 
     Nothing stays where the body has other values.
     """
     if not seen or len(before) != len(after):
         return {}
     off_m = np.linalg.norm(model.points_world(after) - model.points_world(before), axis=1)
-    stays = {name for name, off in zip(model.point_names, off_m, strict=True) if off <= _MOVED_M}
+    stays = {name for name, off in zip(model.point_names, off_m, strict=True) if off <= SETTLED_M}
     return {name: views for name, views in seen.items() if name in stays}

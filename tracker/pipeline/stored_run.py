@@ -22,13 +22,12 @@ from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import TrackedFrame
+from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
 _SAVE_FRAMES = 10
 """Frames after which a run is saved."""
-_MOTION_FRAMES = 8
-"""Frames before the first one from which its motion, and that of the frame before, is predicted."""
 _RENAMED = {"second_pass": "backward_pass"}
 """Settings whose names have changed since sessions store them."""
 _UNFINISHED = "unfinished track"
@@ -239,7 +238,7 @@ def _poses_before(store: AnnotationStore, person: Person, frames: Sequence[int],
         return _pose_on(store, person, frame) if frame in rows else None
 
     past: list[Array] = []
-    for frame in range(first - _MOTION_FRAMES * step, first, step):
+    for frame in range(first - HISTORY_FRAMES * step, first, step):
         found = pose(frame)
         past = [] if found is None else [*past, found]
     if past:

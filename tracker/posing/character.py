@@ -7,7 +7,7 @@ character stands at the person's place, and its lowest point is as high above th
 import numpy as np
 
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import JOINT_M, LOOSE, PointTargets, PosePrior, ResidualBlock, solve
+from tracker.fitting.gauss_newton import JOINT_M, UNKNOWN, PointTargets, PosePrior, ResidualBlock, solve
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import GroundPlane
 
@@ -36,7 +36,7 @@ def drive_character(pose: Array, source: BodyModel, character: BodyModel, floor:
     start = _named_alike(pose, source, character)
     blocks: list[ResidualBlock] = [
         PointTargets(points, targets, np.full(len(points), 1 / JOINT_M)),
-        PosePrior(start, np.full(character.n_dofs, 1 / LOOSE)),
+        PosePrior(start, np.full(character.n_dofs, 1 / UNKNOWN)),
     ]
     found = solve(character, start, blocks).pose
     return _on_floor(found, character, places, character.height_m / source.height_m, floor)

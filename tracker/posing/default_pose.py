@@ -5,12 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker.body.model import BodyModel
+from tracker.calibrations.pose_conventions import LOOK_DOWN
 from tracker.fitting.gauss_newton import fit_to_points
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera, viewed_point
-
-_STRAIGHT_DOWN = 0.1
-"""Level component of a camera's axis below which the camera looks straight down or up."""
 
 
 def default_pose(
@@ -39,6 +37,6 @@ def _rightward(camera: Camera, up: Array) -> Array:
     """Return the level direction, (3,), that a camera sees as rightward, whatever its roll; any if it looks straight
     down."""
     right = np.cross(camera.T_world_camera[:3, 2], up)
-    if np.linalg.norm(right) < _STRAIGHT_DOWN:
+    if np.linalg.norm(right) < LOOK_DOWN:
         right = np.cross(camera.T_world_camera[:3, 1], up)
     return np.asarray(right / np.linalg.norm(right))

@@ -7,12 +7,9 @@ import numpy as np
 
 from tracker.body.limbs import Limb, limbs
 from tracker.body.model import BodyModel
+from tracker.fitting.hypothesis import SAME_POSE_M
 from tracker.geometry.arrays import Array
 from tracker.posing.edits import copy_dofs, limb_of
-
-_MOVED_M = 0.1
-"""Distance from which a limb counts as moved, metres. An adult's forearm and calf are about as thick: the limb then
-covers other pixels than before."""
 
 
 class LimbMove(NamedTuple):
@@ -25,6 +22,8 @@ class LimbMove(NamedTuple):
 
 def untouched_moves(model: BodyModel, before: Array, after: Array, touched: Collection[str]) -> list[LimbMove]:
     """Return the limbs that moved by their own joints and that nobody had touched, farthest first.
+
+    A limb has moved if one of its points is farther away than `SAME_POSE_M`.
 
     A limb that was still in the neutral pose is left out: nothing had placed it yet.
 
@@ -42,6 +41,6 @@ def untouched_moves(model: BodyModel, before: Array, after: Array, touched: Coll
         if is_posed and limb.name not in own:
             back = model.points_world(copy_dofs(model, after, before, limb.dofs))
             distance_m = float(np.linalg.norm(back - points_world, axis=1).max())
-            if distance_m > _MOVED_M:
+            if distance_m > SAME_POSE_M:
                 found.append(LimbMove(limb, distance_m))
     return sorted(found, key=lambda move: -move.distance_m)

@@ -23,12 +23,10 @@ from tracker.geometry.triangulation import PointObservation
 from tracker.posing.grab import Constraints, holds_at
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.settings import prior_blocks
+from tracker.tracking.estimation.start_pose import PLACED_M, PLACED_RAD
 
 _REACHES = (2.0, 1.0)
 """Outlier distances of the rounds, in those of the settings."""
-_TRUST_RAD, _TRUST_M = 0.3, 0.1
-"""Standard deviations of the initial pose of a round: a user places a limb less precisely than a tracker predicts
-it."""
 _TRUNK_RAD = 0.05
 """Standard deviation of the body's rotation for pins alone, rad: less than that of a limb, since one pin moves a
 limb, and only several move the body."""
@@ -80,7 +78,7 @@ def fit_frame(
     for person in people:
         block, model = blocks[person], models[person]
         if block is not None or held[person]:
-            sigma = np.where(model.dof_is_length, OTHER_BODY_M, np.where(model.dof_joint == 0, _TRUNK_RAD, _TRUST_RAD))
+            sigma = np.where(model.dof_is_length, OTHER_BODY_M, np.where(model.dof_joint == 0, _TRUNK_RAD, PLACED_RAD))
             now[person], pinned[person] = _fit_one(model, now[person], block, held[person], sigma, active[person])
     for reach in _REACHES if views is not None else ():
         for person in people:
@@ -90,7 +88,7 @@ def fit_frame(
             if reach != 1.0:
                 theta_px = reach * (theta_px or float(np.median([v.theta_px / v.scale for v in views])))
             match = ContourResiduals(views, posed, person, settings.match, theta_px, everywhere=True)
-            sigma = np.where(model.dof_is_length, _TRUST_M, _TRUST_RAD)
+            sigma = np.where(model.dof_is_length, PLACED_M, PLACED_RAD)
             now[person], pinned[person] = _fit_one(
                 model, now[person], blocks[person], [match, *held[person]], sigma, active[person]
             )  # fmt: skip

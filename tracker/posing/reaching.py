@@ -21,6 +21,7 @@ from tracker.fitting.gauss_newton import (
     solve,
     value_mask,
 )
+from tracker.fitting.hypothesis import SAME_POSE_M
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import NEAR_PLANE_M
@@ -44,8 +45,6 @@ point back by some 0.1 mm."""
 _STIFF_WEIGHT = 0.015
 """The same for joints that bend little, such as the waist: a drag of the trunk turns the body before it bends it."""
 
-_AGREE_M = 0.1
-"""Distance between lines of sight of a point in two views at which the earlier one counts by half, metres."""
 
 _MIDDLE_WEIGHT, _BOW = 0.35, 0.35
 """Weight of keeping an elbow or knee that was not placed from moving farther than the wrist or ankle is dragged; and
@@ -234,7 +233,8 @@ def as_other_views_placed(grabbed: Grab, target_world: Array) -> tuple[Array, fl
     """Return the target at the depth at which other views see the grabbed point where they placed it.
 
     That is the point of the pointer's line of sight nearest to those of the other views. The farther these pass, the
-    less they count: the point then moves away from where they saw it.
+    less they count: by half where the lines of sight are `SAME_POSE_M` apart. The point then moves away from where they
+    saw it.
 
     Args:
         grabbed: the grab.
@@ -251,7 +251,7 @@ def as_other_views_placed(grabbed: Grab, target_world: Array) -> tuple[Array, fl
     across, off = own.weights[0] @ sight, own.weights[0] @ (target_world - own.targets_world[0])
     information = float(across @ across)
     step = -float(across @ off) / (information + _DEPTH_WEIGHT**2)
-    trust = 1 / (1 + (float(np.linalg.norm(off + step * across)) / _AGREE_M) ** 2)
+    trust = 1 / (1 + (float(np.linalg.norm(off + step * across)) / SAME_POSE_M) ** 2)
     return target_world + trust * step * sight, HOLD_WEIGHT * trust * information**0.5
 
 

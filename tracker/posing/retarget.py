@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
-from tracker.fitting.gauss_newton import JOINT_M, LOOSE, PointTargets, PosePrior, ResidualBlock, solve
+from tracker.fitting.gauss_newton import JOINT_M, UNKNOWN, PointTargets, PosePrior, ResidualBlock, solve
 from tracker.fitting.pins import pin_block
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
@@ -40,7 +40,7 @@ def retarget_pose(
     places = source.points_world(pose)[[source.point_names.index(target.point_names[i]) for i in points]]
     blocks: list[ResidualBlock] = [
         PointTargets(points, places, np.full(len(points), 1 / JOINT_M)),
-        PosePrior(pose, np.full(target.n_dofs, 1 / LOOSE)),
+        PosePrior(pose, np.full(target.n_dofs, 1 / UNKNOWN)),
     ]
     if pins:
         blocks.append(pin_block(target, cameras, pins))

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from tracker.calibrations.pose_conventions import FITS_DEG
 from tracker.calibrations.units import MIN_STUDIO_M
 from tracker.formats.camera_section import MAX_OFFSET
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
@@ -14,8 +15,6 @@ from tracker.geometry.camera_rig import MIN_APART_M, axes_point
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import UP_ROTATIONS
 
-_MAX_AIM_RAD = np.radians(30.0)
-"""Angle between an axis and the common point above which the cameras do not look at one point: half a usual lens."""
 _MIN_PERSON_SHARE = 0.04
 """Share of the picture's longer side that a person fills, below which no limb can be seen: 40 of 1000 pixels."""
 _UNDER_FLOOR_M = 0.1
@@ -61,7 +60,7 @@ def summarize_rig(cameras: Sequence[Camera], up: str = "z") -> RigSummary:
     centers, axes = Ts[:, :3, 3], Ts[:, :3, 2]
     heights = centers @ UP_ROTATIONS[up][:, 2]
     point = axes_point([c.T_world_camera for c in cameras])
-    meet = len(cameras) > 1 and point.is_determined and point.angles_rad.max() < _MAX_AIM_RAD
+    meet = len(cameras) > 1 and point.is_determined and point.angles_rad.max() < np.radians(FITS_DEG)
     distances = point.distances if meet else None
     if distances is None:
         sentence = "The cameras look at no common point"

@@ -39,10 +39,21 @@ _UNCERTAIN = " uncertain"
 """Last word of the reason against a pose of which a limb may be off."""
 _LIMIT_RAD = 0.05
 """An angle is at its limit where it is nearer, rad."""
-_WEIGHTS = np.array([2.893, 4.401, -2.282, -2.963, 3.508, 0.282, 13.031, -1.814])
-"""Weights of `features`, in their order."""
-_OFF_CONSTANT, _LOST_CONSTANT = 1.042, -0.973
-"""Constants of the log odds that a joint of a limb is off by more than 100 mm, and by more than 150 mm."""
+
+
+class StatusModel(NamedTuple):
+    """Log odds that a joint of a limb is wrong, linear in features of the limb."""
+
+    weights: Array
+    """Weights of the features, in their order."""
+    off: float
+    """Constant of the log odds that a joint is off by more than 100 mm."""
+    lost: float
+    """Constant of the log odds that a joint is off by more than 150 mm."""
+
+
+STATUS_MODEL = StatusModel(np.array([2.893, 4.401, -2.282, -2.963, 3.508, 0.282, 13.031, -1.814]), 1.042, -0.973)
+"""Log odds by `features`, fitted by `tests/benchmarks/calibrate_status.py`."""
 
 
 def _odds(probability: float) -> float:
@@ -165,6 +176,12 @@ class PoseQuality(NamedTuple):
         return tuple(x.name for x, odds in zip(self.limbs, self.search_odds, strict=True) if odds > least)
 
 
+FEATURES = (
+    "free_spread", "second_forward", "end_color", "end_explained", "at_limits", "innovation", "trunk_forward", "views"
+)  # fmt: skip
+"""Names of `features`, in their order."""
+
+
 def features(pose: PoseQuality, limb: LimbFeatures) -> Array:
     """Return the features of a limb from which its status follows, (8,)."""
     return np.array([
@@ -204,7 +221,7 @@ def search_features(pose: PoseQuality, limb: LimbFeatures) -> Array:
 
 @lru_cache(maxsize=8)  # used several times for each frame
 def _log_odds(found: PoseQuality) -> Array:
-    odds = np.array([_WEIGHTS @ features(found, x) + _LOST_CONSTANT for x in found.limbs])
+    odds = np.array([STATUS_MODEL.weights @ features(found, x) + STATUS_MODEL.lost for x in found.limbs])
     odds.flags.writeable = False
     return odds
 
@@ -334,7 +351,7 @@ def _second_largest(shares: Array) -> float:
 
 def classify(found: PoseQuality) -> Status:
     """Return the status of a pose."""
-    odds = found.log_odds[:, None] + (_OFF_CONSTANT - _LOST_CONSTANT, 0.0)
+    odds = found.log_odds[:, None] + (STATUS_MODEL.off - STATUS_MODEL.lost, 0.0)
     return "lost" if found.is_unseen else classify_limbs(odds)
 
 

@@ -10,23 +10,20 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
-from tracker.tracking.confidence import LOST_ODDS, NEXT_TO_NOTHING, OFF_ODDS, probabilities
+from tracker.tracking.confidence import FEATURES, LOST_ODDS, NEXT_TO_NOTHING, OFF_ODDS, StatusModel, probabilities
 
-_WEIGHTS = np.array([1.623, 2.136, -1.529, -1.445, 4.644, -1.302, 1.014, 0.628])
-"""Weights of `run_features`, in their order."""
-N_FEATURES = len(_WEIGHTS)
-_OFF_CONSTANT, _LOST_CONSTANT = 5.433, 3.683
-"""Constants of the log odds that a joint of a limb is off by more than 100 mm, and by more than 150 mm."""
-_OF_FRAME = [0, 1, 2, 3, 4, 7]
+RUN_MODEL = StatusModel(np.array([1.623, 2.136, -1.529, -1.445, 4.644, -1.302, 1.014, 0.628]), 5.433, 3.683)
+"""Log odds by `run_features`, fitted by `tests/benchmarks/calibrate_status.py`."""
+N_FEATURES = len(RUN_MODEL.weights)
+_TRUNK = FEATURES.index("trunk_forward")
+_OF_FRAME = [i for i, name in enumerate(FEATURES) if name not in ("innovation", "trunk_forward")]
 """Features of `confidence` that are features of a run too."""
-_TRUNK = 6
-"""Index of the trunk's distance to the edges among the features of `confidence`."""
 _AROUND = 2
 """Number of frames before and after a frame whose steps by smoothing count for it."""
 _MAX_STEP = 0.5
 """Larger steps count as this one, body heights."""
 
-DOUBTFUL_FROM, LOST_FROM = probabilities(np.array([OFF_ODDS + _LOST_CONSTANT - _OFF_CONSTANT, LOST_ODDS])).tolist()
+DOUBTFUL_FROM, LOST_FROM = probabilities(np.array([OFF_ODDS + RUN_MODEL.lost - RUN_MODEL.off, LOST_ODDS])).tolist()
 """Probabilities of a lost limb above which it is doubtful, and lost."""
 
 
@@ -59,4 +56,4 @@ def run_features(frame_features: Array, steps: Array) -> Array:
 
 def log_odds(found: Array) -> Array:
     """Return the log odds of off and lost, (..., 2), of features, (..., 8)."""
-    return np.asarray((found @ _WEIGHTS)[..., None] + (_OFF_CONSTANT, _LOST_CONSTANT))
+    return np.asarray((found @ RUN_MODEL.weights)[..., None] + (RUN_MODEL.off, RUN_MODEL.lost))

@@ -137,7 +137,7 @@ joints = [{ name = "root", child = "trunk", free = true }, { name = "hinge", par
         (["--fps", "0"], ["a frame rate above 0"]),
         (["--fps", "nan"], ["a frame rate above 0"]),
         (["--model", "ROOM/latin.toml"], ["body model", "latin.toml", "expected UTF-8 text"]),
-        (["--model", "ROOM/large.toml"], ["large.toml", "at most 4 MB"]),
+        (["--model", "ROOM/large.toml"], ["large.toml", "at most 0.5 MB"]),
         (["--people", "a", "a"], ["a name of its own for each person, found more than one 'a'"]),
         (["--background", "nowhere"], ["'front'", "nowhere"]),
         (["--model", "gavrila23"], ["gavrila23", "gavrila22"]),

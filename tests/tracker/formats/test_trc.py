@@ -181,11 +181,11 @@ def test_malformed(write, rows, units, expected):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("Heel", "Knee", "line 4: expected 1 to 1000 point names, each once"),
+        ("Heel", "Knee", "line 4: expected 1 to 2000 point names, each once"),
         ("50\t50\t2", "fast\t50\t2", "line 3, DataRate: expected a frame rate above 0.*found 'fast'"),
         ("50\t50\t2", "1e-300\t50\t2", "line 3, DataRate"),
         ("50\t50\t2", "inf\t50\t2", "line 3, DataRate"),
-        ("Knee", "\t\t\t".join(f"p{i}" for i in range(1001)), "line 4: expected 1 to 1000 point names"),
+        ("Knee", "\t\t\t".join(f"p{i}" for i in range(2001)), "line 4: expected 1 to 2000 point names"),
         ("PathFileType", "Path", "not a TRC file"),
         ("Frame#\tTime\tKnee\t\t\tHeel\t\t", "Frame# Time Knee Heel", "line 4: expected columns separated by tabs"),
     ],

@@ -14,8 +14,7 @@ from tracker.fitting.contour_residuals import ContourResiduals, PartCosts
 from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.formats.model_toml import PRESETS, load_model, parse_model
 from tracker.tracking.confidence import (
-    _LOST_CONSTANT,
-    _OFF_CONSTANT,
+    STATUS_MODEL,
     LimbFeatures,
     PoseQuality,
     _Contours,
@@ -118,7 +117,7 @@ def test_a_limb_is_doubtful_where_it_may_be_off_and_lost_where_it_may_be_lost():
     seen = set()
     for spread_px in np.geomspace(1.0, 80.0, 40):
         found = PoseQuality(0.05, 3, 0.0, 0.05, (CLEAR, CLEAR._replace(free_spread_px=spread_px)))
-        off, lost = (probabilities(found.log_odds + c - _LOST_CONSTANT).max() for c in (_OFF_CONSTANT, _LOST_CONSTANT))
+        off, lost = (probabilities(found.log_odds + c - STATUS_MODEL.lost).max() for c in STATUS_MODEL[1:])
         assert classify(found) == ("lost" if lost > 0.25 else "doubtful" if off > 0.05 else "good")
         seen.add(classify(found))
     assert seen == {"good", "doubtful", "lost"}

@@ -19,12 +19,11 @@ _BIN_M = 0.02
 """Width of the bins along the axis in which the silhouettes' widths are measured, metres."""
 _LATERAL_M = 0.40
 """Points of a silhouette farther aside of the axis are not counted, metres."""
-_HEAD = ((0.0, 0.02, 0.065), (0.02, 0.105, 0.100), (0.105, 0.135, 0.080))
-"""Crown, head and neck: begin and end below the top and the width of their silhouettes, as fractions of the height."""
+_HEAD = ((-0.08, 0.0, 0.0), (0.0, 0.02, 0.065), (0.02, 0.105, 0.100), (0.105, 0.135, 0.080))
+"""Nothing, crown, head and neck: begin and end below the top and the width of their silhouettes, as fractions of the
+height."""
 _SHOULDERS = (0.18, 0.32, 0.16)
 """The same for the trunk below, which may be wider."""
-_ABOVE = 0.08
-"""Length above the head in which nothing is, as a fraction of the height."""
 SHOULDERS = 0.185
 """Distance of the shoulders' joint centres below the top of the head, as a fraction of the height (P. de Leva 1996, J.
 Biomech. 29:1223)."""
@@ -164,7 +163,6 @@ def _heads(along: Array, widths: Array, height_m: float) -> list[tuple[float, fl
         below = (top - along) / height_m
         terms = [np.abs(relative[(below > a) & (below <= b)] - width) for a, b, width in _HEAD]
         terms.append(np.maximum(0.0, least - relative[(below > a) & (below <= b)]))
-        terms.append(relative[(below > -_ABOVE) & (below <= 0)])
         if all(len(t) for t in terms):
             misfits[i] = np.mean([t.mean() for t in terms])
     found: list[tuple[float, float]] = []

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.arrays import Array
 from tracker.voxels.paths import VoxelGraph, path_lengths
 from tracker.voxels.voxel_grid import Voxels
@@ -40,8 +41,8 @@ _TRIED = 5
 """Number of places that are tried, from the highest score down."""
 _UPPER_M, _MIN_UPPER_SCORE = 0.35, 0.4
 """Depth of the upper end of a figure below its highest voxel, metres, and the smallest score of a head there."""
-_ADULT_M, _ADULT_M3 = 1.75, 0.10
-"""Stature of a typical adult, metres, and the volume of the visual hull, cubic metres."""
+_ADULT_M3 = 0.10
+"""Volume of the visual hull of a typical adult, cubic metres."""
 _HEAD_M, _HEAD_GROWTH_M = 0.0945, 0.0405
 """Distance from the centre within which voxels belong to the head, metres. It is a constant plus a slope by the size of
 the person as a share of an adult's, because heads grow less than bodies."""
@@ -139,7 +140,7 @@ def _head(figure: Voxels, graph: VoxelGraph, place: _Place) -> Head | None:
     lengths = path_lengths(graph, place.distances <= place.radius_m, figure.grid.size_m)
     path_m = place.radius_m + float(lengths[np.isfinite(lengths)].max())
     # A person cut off by an image has short paths, yet the volume of more than a child.
-    scale = min(1.0, max(path_m / _ADULT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
+    scale = min(1.0, max(path_m / DEFAULT_HEIGHT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
     is_head = place.distances <= _HEAD_M + _HEAD_GROWTH_M * scale
     neck = _neck(figure, is_head)
     if neck is None:

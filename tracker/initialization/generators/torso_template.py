@@ -20,8 +20,6 @@ _MIN_FILLED = 0.75
 """Smallest share of occupied voxels in a layer that is added; a lower one meets empty voxels."""
 _GIRDLE_M = (0.25, 0.28)
 """Length and radius of the shoulder girdle below the neck, metres. It is wide where arms hang at a trunk's sides."""
-_MAX_ITERATIONS = 30
-"""Largest number of turns of the template. They end before where no other voxels are inside."""
 
 
 class Torso(NamedTuple):
@@ -83,17 +81,20 @@ def find_torso(figure: Voxels, neck: Array, is_head: NDArray[np.bool_]) -> Torso
 
 
 def _axis(points: Array, neck: Array) -> Array:
-    """Return the direction from the torso to the neck, (3,): the template turns to the centroid of its voxels."""
+    """Return the direction from the torso to the neck, (3,): the template turns to the centroid of its voxels.
+
+    It turns until it holds the same voxels as before.
+    """
     length, radius = _AVERAGE_M
     down = points.mean(axis=0) - neck
     down /= np.linalg.norm(down)
-    before = np.zeros(len(points), bool)
-    for _ in range(_MAX_ITERATIONS):
-        inside = _in_cylinder(points, neck, -down, length, radius)
-        if not inside.any() or np.array_equal(inside, before):
-            break
-        down, before = points[inside].mean(axis=0) - neck, inside
+    before = set[bytes]()
+    inside = _in_cylinder(points, neck, -down, length, radius)
+    while inside.any() and inside.tobytes() not in before:
+        before.add(inside.tobytes())
+        down = points[inside].mean(axis=0) - neck
         down /= np.linalg.norm(down)
+        inside = _in_cylinder(points, neck, -down, length, radius)
     return np.asarray(-down)
 
 

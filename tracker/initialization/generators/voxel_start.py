@@ -8,6 +8,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import Remedy, TrackerError
 from tracker.fitting.gauss_newton import fit_to_points
+from tracker.fitting.hypothesis import SAME_POSE_M
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.initialization.generators.head_template import Head, find_head, find_upper_head
@@ -19,8 +20,6 @@ from tracker.voxels.voxel_grid import Voxels
 SIDES = ("left", "right")
 _JOINTS = {"arm": ("elbow", "wrist"), "leg": ("knee", "ankle")}
 _TRUNK = ("neck", "left_shoulder", "right_shoulder", "left_hip", "right_hip")
-_SAME_HEAD_M = 0.11
-"""Distance up to which two heads are the same, metres."""
 _ONE_LEG = 0.25
 """Largest share of a figure's voxels in a single leg."""
 
@@ -58,7 +57,7 @@ def possible_heads(figure: Voxels, graph: VoxelGraph, up: Array) -> list[Head]:
             "expected a head that stands out of the silhouettes, found none",
             Remedy("another_frame", condition="no arm or other person is beside the head"),
         )
-    is_same = np.linalg.norm(heads[0].center - heads[-1].center) < _SAME_HEAD_M
+    is_same = np.linalg.norm(heads[0].center - heads[-1].center) < SAME_POSE_M
     return heads[:1] if is_same else heads
 
 

@@ -17,10 +17,8 @@ from tracker.motion.prediction import PredictSettings
 from tracker.search.best_first import SearchSettings
 from tracker.tracking.chamfer.constants import PAPER_BODY
 from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.person_memory import HISTORY_FRAMES
 
-_POSES = 8
-"""T of GD96 Sect. 4.2, which it does not state. A parabola through fewer poses amplifies the noise of a lattice of 5
-degrees: the variance of the prediction is 2 times that of a pose with 8 poses, and 19 times with 3."""
 _EXPANSIONS = 60
 """Expansions of a stage. The paper states no end of the search; this one ends for no other reason."""
 
@@ -33,7 +31,7 @@ def paper_settings() -> TrackSettings:
     """
     return TrackSettings(
         estimate="search",
-        predict=PredictSettings(order=2, window=_POSES, full_window=True),
+        predict=PredictSettings(order=2, window=HISTORY_FRAMES, full_window=True),
         search=SearchSettings(passes=(1.0,), patience=_EXPANSIONS, max_expansions=_EXPANSIONS),
         recover=None,
         outliers="paper",

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.float32 import FAR
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import UNBOUNDED, ContourResiduals, paper_match
+from tracker.fitting.contour_residuals import ContourResiduals, paper_match
 from tracker.fitting.gauss_newton import iterate
 from tracker.geometry.arrays import Array
 from tracker.tracking.contour.image_contours import with_unlimited_distances
@@ -50,7 +51,7 @@ def paper_residuals(
         settings: whether the sliding term is part of the Jacobian.
     """
     motion: Literal["rigid", "sliding"] = "sliding" if settings.sliding else "rigid"
-    return ContourResiduals(unlimited, bodies, person, paper_match(motion), UNBOUNDED, everywhere=True)
+    return ContourResiduals(unlimited, bodies, person, paper_match(motion), float(FAR), everywhere=True)
 
 
 def fit_by_iterations(

@@ -31,11 +31,8 @@ from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.view_regions import regions
 
 _TRUSTED_FRAMES = 3
-"""Number of good frames in a row that end an interval. A lost limb may look good by chance on fewer."""
-_MOTION_FRAMES = 3
-"""Number of poses after the interval from which its motion is predicted."""
-_VISITS = 1 + 2 * ROUNDS
-"""Number of visits to each frame."""
+"""Number of good frames in a row that end an interval, and from which its motion is predicted. A lost limb may look
+good by chance on fewer."""
 _CACHED_FRAMES = 32
 """Number of frames whose evidence is cached while candidates are propagated, some megabytes each."""
 
@@ -86,9 +83,10 @@ def track_lost_backward(
     known, subjects = list(tracked), run.subjects
     work = [s for person in subjects.tracked for s in _intervals_of(known, person, subjects.keyframes)]
     work.sort(key=lambda s: s.frames.stop)
-    total, done = _VISITS * sum(len(s.frames) for s in work), 0
+    n_visits = 1 + 2 * ROUNDS  # of each frame
+    total, done = n_visits * sum(len(s.frames) for s in work), 0
     for interval in work:
-        person, backward, last = interval.person, list[PoseEstimate](), done + _VISITS * len(interval.frames)
+        person, backward, last = interval.person, list[PoseEstimate](), done + n_visits * len(interval.frames)
         for estimate in _track_interval(run, known, interval, settings, make_estimator):
             backward.append(estimate)
             done += 1
@@ -125,7 +123,7 @@ def _track_interval(
 ) -> Iterator[PoseEstimate]:  # fmt: skip
     """Track one person from the last frame of an interval to its first; the others keep their poses."""
     subjects, person, (first, end) = run.subjects, interval.person, (interval.frames.start, interval.frames.stop)
-    after = takewhile(lambda f: f.statuses[person] == "good", tracked[end + 1 : end + 1 + _MOTION_FRAMES])
+    after = takewhile(lambda f: f.statuses[person] == "good", tracked[end + 1 : end + 1 + _TRUSTED_FRAMES])
     ahead = [*reversed(list(after)), tracked[end]]
     start = [[f.poses[p] for f in ahead] for p in range(len(subjects.models))]
     fixed = {f.frame: {p: v for p, v in enumerate(f.poses) if p != person} for f in tracked[first : end + 1]}

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from tracker.tracking.method import Option
+from tracker.tracking.person_memory import HISTORY_FRAMES
 
 
 def _with_recovery(settings: Any, on: bool) -> Any:
@@ -28,7 +29,7 @@ ORDER = Option(
 WINDOW = Option(
     "window", "Past poses", "number of poses from which the motion is predicted", "3 by default, 8 in the paper's mode",
     "whole", lambda s: s.predict.window,
-    lambda s, value: replace(s, predict=replace(s.predict, window=int(value))), limits=(1, 8),
+    lambda s, value: replace(s, predict=replace(s.predict, window=int(value))), limits=(1, HISTORY_FRAMES),
 )  # fmt: skip
 """More than 8 poses, a quarter of a second, fit no polynomial of a person's motion."""
 RECOVER = Option(

@@ -10,7 +10,7 @@ import numpy as np
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
 from tracker.fitting.contour_residuals import MatchSettings
-from tracker.fitting.gauss_newton import PosePrior, ResidualBlock
+from tracker.fitting.gauss_newton import CLOSE_ENOUGH, PosePrior, ResidualBlock
 from tracker.fitting.interpenetration import SelfPenetration
 from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings
@@ -18,7 +18,7 @@ from tracker.search.chamfer_cost import ChamferCost, Outliers
 
 MAX_ITERATIONS = 15
 """Gauss-Newton iterations of a whole body."""
-TOLERANCE = 1e-3
+TOLERANCE = CLOSE_ENOUGH
 """Step at which they end, rad or metres: a tenth of a pixel on a limb."""
 
 OWN_TRUST = 3.0

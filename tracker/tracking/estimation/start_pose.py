@@ -26,8 +26,8 @@ from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
 
-_START_RAD, _START_M = 0.35, 0.15
-"""Standard deviation of a start placed by hand, rad and metres: about twice the error that people leave."""
+PLACED_RAD, PLACED_M = 0.35, 0.15
+"""Standard deviation of a pose placed by hand, rad and metres: about twice the error that people leave."""
 MAX_ROUNDS = 2
 """Largest number of rounds of a search, each with the evidence around the poses of the one before."""
 
@@ -95,7 +95,7 @@ def _contradiction(estimate: PersonEstimate) -> int:
 
 def roughly_known(settings: EstimationSettings) -> EstimationSettings:
     """Return the settings with which a start is searched: its prior is wide."""
-    return replace(settings, trust_rad=_START_RAD, trust_m=_START_M)
+    return replace(settings, trust_rad=PLACED_RAD, trust_m=PLACED_M)
 
 
 def search_start(

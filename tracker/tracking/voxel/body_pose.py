@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.gauss_newton import (
     CLOSE_ENOUGH,
-    LOOSE,
     OTHER_BODY_M,
+    UNKNOWN,
     PointTargets,
     PosePrior,
     ResidualBlock,
@@ -19,13 +19,11 @@ from tracker.fitting.gauss_newton import (
 )
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.motion.smoothing import START_VELOCITY
 from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
 from tracker.tracking.voxel.kalman import product
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState, Layout, point_jacobians
-
-_START_RATE, _START_SPEED = 2.0, 0.5
-"""Standard deviations of unknown angular velocities, rad/s, and of the torso's velocity, m/s."""
 
 
 class BodyPose(NamedTuple):
@@ -67,8 +65,8 @@ def state_of(
     variances[layout.turns_at] = (scale * settings.start_turn) ** 2
     variances[layout.center_at] = (scale * settings.start_m) ** 2
     variances[layout.sizes_at] = settings.start_size_m**2
-    variances[layout.velocity_at] = _START_SPEED**2
-    variances[layout.turn_rates_at] = _START_RATE**2
+    variances[layout.velocity_at] = START_VELOCITY**2
+    variances[layout.turn_rates_at] = START_VELOCITY**2
     return FilterState(
         of.figure, layout, rigid.quaternion_from_matrix(rotations), of.sizes.copy(), center, velocity, rates,
         np.diag(variances),
@@ -103,7 +101,7 @@ def pose_of(
     blocks: list[ResidualBlock] = [
         PointTargets(np.array([names[n] for n in points.names]), targets, 1 / np.sqrt(variances + OTHER_BODY_M**2)),
         PosePrior.of_spreads(model),
-        PosePrior(near, np.full(model.n_dofs, 1 / LOOSE)),
+        PosePrior(near, np.full(model.n_dofs, 1 / UNKNOWN)),
     ]
     fit = solve(model, near if start is None else start, blocks, active_dofs, tolerance=CLOSE_ENOUGH)
     return BodyPose(fit.pose, covariance(model, fit))

@@ -10,12 +10,11 @@ from functools import cached_property
 
 import numpy as np
 
+from tracker.body.dimensions import MIN_PART_M
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.voxel.figure import N_PARTS, PARENTS, TORSO, FigureJoints, chain_centers
 
-MIN_SIZE_M = 0.01
-"""Smallest half size of a part, metres."""
 _COLUMNS = 3 * np.arange(N_PARTS)[:, None] + np.arange(3)
 """Columns of the error state that belong to each part, from the first of their kind, (10, 3)."""
 _ON_CHAIN = np.diag([float(part != TORSO) for part in range(N_PARTS)])
@@ -123,7 +122,7 @@ class FilterState:
         quaternions = rigid.quaternion_multiply(self.quaternions, turns)
         sizes, velocity, turn_rates = self.sizes, self.velocity, self.turn_rates
         if at.sizes:
-            sizes = np.maximum(sizes + step[at.sizes_at].reshape(-1, 3), MIN_SIZE_M)
+            sizes = np.maximum(sizes + step[at.sizes_at].reshape(-1, 3), MIN_PART_M)
         if at.velocity:
             velocity = velocity + step[at.velocity_at]
         if at.turn_rates:
