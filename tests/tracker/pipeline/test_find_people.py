@@ -23,7 +23,6 @@ from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_s
 from tracker.pipeline.find_people import (
     AXES,
     FindSettings,
-    FoundPeople,
     expected_steps,
     find_people,
     frames_to_try,
@@ -296,7 +295,7 @@ def found_people(session, scale):
     start = Hypothesis(PosedBody(body, body.neutral()), "axis")
     lines = {"FRONT": np.array([[[1.0, 2.0], [3.0, 4.0]]])}
     first = FirstPose(7, start, "good", 1.0, True, ("a note",), lines)
-    return FoundPeople(FirstPoses(7, {0: first}), {0: body}, {0: body.neutral()}, {})
+    return FirstPoses(7, {0: first})
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.05])
@@ -311,7 +310,7 @@ def test_poses_and_bodies_are_one_entry_of_the_history(session, scale):
         assert store.setting(AXES) == {"frame": 7, "lines": {"FRONT": [[[[1.0, 2.0], [3.0, 4.0]]]]}}
         sizes = sizes_changed(store.setting(SIZES_EDITS, {}), entry.edit)
         assert [name for name, _, _ in sizes] == (["person"] if scale != 1.0 else [])
-    assert changed.people[0].model.height_m == pytest.approx(found.bodies[0].height_m)
+    assert changed.people[0].model.height_m == pytest.approx(found.poses[0].model.height_m)
     assert format_model(load_session(session.folder).people[0].model) == format_model(changed.people[0].model)
 
 
@@ -320,6 +319,8 @@ def test_an_entry_of_one_person_is_read_as_before():
     changed = [("ann", 1, 2), ("bob", 3, 4)]
     edits = with_sizes_changed(with_sizes_changed({}, 4, changed[:1]), 5, changed)
     assert [sizes_changed(edits, edit) for edit in (4, 5)] == [changed[:1], changed]
+    again = with_sizes_changed(edits, 5, [("bob", 4, 7)])  # the same entry: undone in one step
+    assert sizes_changed(again, 5) == [("ann", 1, 2), ("bob", 3, 7)]
     assert sizes_changed({"5": ["ann", 1, 2]}, 6) == []
 
 
