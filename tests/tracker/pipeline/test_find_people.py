@@ -1,6 +1,8 @@
 """People found with nobody's help: which frames are tried, what is said where nobody can be found, what is stored."""
 
 import shutil
+import threading
+import time
 from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
@@ -161,6 +163,47 @@ def test_two_frames_that_agree_end_the_trial(session, silhouettes, fits, monkeyp
         session, OBSERVER, [0], frames, 0.05, show=lambda frame, found: found is None and tried.append(frame)
     )
     assert tried == frames
+
+
+def test_the_first_two_frames_are_tried_at_the_same_time(session, silhouettes, monkeypatch):
+    silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
+    at_once = threading.Barrier(2, timeout=20)
+    shown = []
+
+    def starts(observer, frame, later, others, step):
+        at_once.wait()
+        costs = iter(np.arange(10.0, 1000.0, 10.0))
+        return fitter(lambda start: (start.pose, next(costs)))()
+
+    monkeypatch.setattr(first_pose, "StartFitter", starts)
+    found = find_first_poses_anywhere(
+        session, OBSERVER, [0], [20, 10, 30], 0.05, show=lambda frame, found: shown.append((frame, found is None))
+    )
+    assert shown == [(20, True), (20, False), (10, True), (10, False)]  # as if one after the other
+    assert found.frame == 20
+
+
+def test_a_stop_ends_both_frames(session, silhouettes, monkeypatch):
+    silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
+    at_once, ended = threading.Barrier(2, timeout=20), []
+
+    def starts(observer, frame, later, others, step):
+        at_once.wait()
+        if frame == 20:
+            raise InterruptedError
+        end = time.monotonic() + 20
+        try:
+            while time.monotonic() < end:
+                step()
+        except Exception:
+            ended.append(frame)
+            raise
+        return fitter(lambda start: (start.pose, 1.0))()
+
+    monkeypatch.setattr(first_pose, "StartFitter", starts)
+    with pytest.raises(InterruptedError):
+        find_first_poses_anywhere(session, OBSERVER, [0], [20, 10, 30], 0.05)
+    assert ended == [10]
 
 
 @pytest.mark.slow
