@@ -30,9 +30,6 @@ _FOLLOWED = ("tracked", "interpolated")
 _FINDING = 0.5
 """Share of the work before tracking that ends with the first poses, where sizes are acquired after them."""
 
-_ACQUISITION = AcquisitionSettings(rounds=2)
-"""A second round tracks with acquired sizes, where too few frames were good with those of the preset."""
-
 
 @dataclass(frozen=True)
 class ChainPlan:
@@ -129,11 +126,12 @@ def _acquire(people: Sequence[int], track: TrackPlan, opened: OpenSession, repor
     """Acquire the sizes of those people who have none of their own, one after the other, and store each."""
     assert track.start is not None
     people = [i for i in people if has_preset_proportions(opened.session.people[i].model)]
+    settings = AcquisitionSettings(rounds=2)  # again with acquired sizes where few frames were good with the preset's
     whole = range(track.frames[0], track.frames[-1] + 1)
     for number, person in enumerate(people):
         session, part = opened.session, part_of(report, number / len(people), (number + 1) / len(people))
         known = posed_frames(session, person, whole, track.start)
-        acquired = acquire_body(session, opened.observer, person, whole, _ACQUISITION, part, known)
+        acquired = acquire_body(session, opened.observer, person, whole, settings, part, known)
         if acquired.is_better:
             opened.store_body(person, acquired, track.start)
         part("", 1.0, f"{session.people[person].name}: {acquisition_sentence(acquired)}")
