@@ -122,8 +122,12 @@ PHRASES = {
     "place_body": Phrases(
         "place the body in the page, or use quadrille init", "place the body by hand, or press Find people"
     ),
+    "find_or_place": Phrases(
+        "add --init auto to find people, or place the body in the page", "press Find people, or place the body by hand"
+    ),
     "common_start": Phrases(
-        "clear those of one person, or track without --init", "clear those of one person, or track from here (T)"
+        "clear those of one person, or track without --init and --acquire",
+        "clear those of one person, or track from here (T)",
     ),
     # bodies and joints
     "paper_body": Phrases(

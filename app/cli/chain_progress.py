@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class ChainProgress:
-    """The sink of a chain: one bar for finding people, one for each pass of the run, and a line for each sentence."""
+    """The sink of a chain: one bar for people and sizes, one for each pass of the run, and a line for each sentence."""
 
     def __init__(self, progress: Reporter) -> None:
         """Show nothing yet.
@@ -41,7 +41,7 @@ class ChainProgress:
             if not compiled_mark().exists():
                 self._progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
             if share < 1:
-                self._advance = self._bar.enter_context(self._progress.share("finding people"))
+                self._advance = self._bar.enter_context(self._progress.share("before tracking"))
         if stage != self._stage and share < 1:
             self._progress.say(stage)
         self._stage = stage

@@ -16,7 +16,6 @@ from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.acquisition.from_contours import Acquisition
     from tracker.pipeline.given_pose import GivenPose
     from tracker.session.session import Session
 
@@ -92,6 +91,7 @@ def _init_from_table(at: Target, arguments: InitArguments, path: Path) -> None:
 
 def _init_from_joints(at: Target, arguments: InitArguments, path: Path) -> None:
     from tracker.evaluation.references import placement, read_joints
+    from tracker.pipeline.body_acquisition import acquisition_sentence
     from tracker.pipeline.given_pose import set_pose_at_joints
 
     session, (index,) = at
@@ -100,7 +100,7 @@ def _init_from_joints(at: Target, arguments: InitArguments, path: Path) -> None:
     given = set_pose_at_joints(session, index, arguments.frame, joints, arguments.fit_sizes)
     residuals_mm = dict(given.residuals_mm)
     mean_mm, height_m = fmean(residuals_mm.values()), given.person.model.height_m
-    sizes = None if given.acquired is None else _sizes(given.acquired)
+    sizes = None if given.acquired is None else acquisition_sentence(given.acquired)
     found = _record(session, arguments.frame, given) | {
         "height_m": height_m, "residual_mm": residuals_mm, "mean_mm": mean_mm, "sizes": sizes, "notes": joints.notes
     }  # fmt: skip
@@ -114,14 +114,6 @@ def _init_from_joints(at: Target, arguments: InitArguments, path: Path) -> None:
             "joints, or say --fit-sizes"
         )
     _print(arguments, given, found, [*lines, *(f"note: {note}" for note in joints.notes)])
-
-
-def _sizes(acquired: "Acquisition") -> str:
-    """Say from which frames sizes were acquired, and the outcome."""
-    costs = f"cost {acquired.cost_before_px:.2f} px before, {acquired.cost_after_px:.2f} px after"
-    if acquired.cost_after_px >= acquired.cost_before_px:
-        return f"sizes not applied: the body would fit the contours worse ({costs})"
-    return f"sizes from frames {', '.join(map(str, acquired.frames))}: {costs}"
 
 
 def _record(session: "Session", frame: int, given: "GivenPose") -> dict[str, Any]:

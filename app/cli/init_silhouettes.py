@@ -31,9 +31,12 @@ def init_from_silhouettes(
     Raises:
         TrackerError: everybody has a pose, or no frame shows the people well enough; nothing is stored then.
     """
-    from tracker.initialization.first_pose import find_first_poses, find_first_poses_anywhere
     from tracker.pipeline.chain import open_stored_session, unplaced
-    from tracker.pipeline.find_people import FoundPeople, frames_to_try
+    from tracker.pipeline.find_people import FindSettings, find_people
+
+    def report(stage: str, share: float, text: str = "", /) -> None:
+        if text:
+            progress.say(text)
 
     session = at.session
     with open_stored_session(session) as opened:
@@ -42,15 +45,9 @@ def init_from_silhouettes(
             raise TrackerError(
                 "expected a person without a pose, found none; name one with --person to find the person again"
             )
-        observer = opened.observer
-        if method == "auto":
-            tried = frames_to_try(range(session.n_frames), frame)
-            first = find_first_poses_anywhere(session, observer, people, tried, voxel_m, progress.say)
-        else:
-            first = find_first_poses(session, observer, people, [frame], (method,), voxel_m)
-        bodies = {i: p.model for i, p in first.poses.items()}
-        poses = {i: p.start.pose for i, p in first.poses.items()}
-        opened.store_found(FoundPeople(first, bodies, poses, {}), f"init from {method}")
+        settings = FindSettings(frame, None if method == "auto" else method, voxel_m)
+        first = find_people(session, opened.observer, people, range(session.n_frames), settings, report)
+        opened.store_found(first, f"init from {method}")
     return first_poses_record(session, first)
 
 

@@ -16,8 +16,7 @@ from tracker.pipeline.methods import METHODS, all_options
 from tracker.tracking.method import OptionValue, PaperMode
 
 if TYPE_CHECKING:
-    from tracker.pipeline.find_people import FindSettings
-    from tracker.pipeline.stored_run import TrackPlan
+    from tracker.pipeline.chain import ChainPlan
     from tracker.session.session import Session
     from tracker.tracking.tracker import TrackerSettings
 
@@ -34,7 +33,8 @@ class TrackWords:
     """auto finds people who have no pose first, on the frame where they track best, and tracks from there in both
     directions."""
     acquire: bool = False
-    """with --init auto: acquire the sizes of those people from the contours before tracking."""
+    """acquire sizes from the contours before tracking, of people whose body has the sizes of its preset; then track
+    from the frame where people are placed in both directions."""
     frames: OptionalRange = None
     """A:B, half open; all by default."""
     stride: int = 1
@@ -89,6 +89,8 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
 
     Ctrl+C stops it and keeps the poses found so far; run it again to resume.
     """
+    from tracker.pipeline.chain import ChainPlan
+    from tracker.pipeline.find_people import FindSettings
     from tracker.pipeline.stored_run import TrackPlan
     from tracker.session.matching import check_names
 
@@ -100,28 +102,21 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     if arguments.paper and paper is not None:
         paper.require_body({p.name: p.model for p in (at.session.people[i] for i in at.people)})
     used = check_names(arguments.cameras, [c.camera.name for c in at.session.cameras], "camera", "--cameras")
-    plan = TrackPlan(frames, at.people, settings, tuple(used))
-    found = track(at.session, plan, Reporter(silent=arguments.json), _found_by(arguments))
+    find = None if arguments.init is None else FindSettings()
+    plan = ChainPlan(TrackPlan(frames, at.people, settings, tuple(used)), find, at.people if arguments.acquire else ())
+    found = track(at.session, plan, Reporter(silent=arguments.json))
     print(format_json(found) if arguments.json else format_summary(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
 
 
-def _found_by(arguments: TrackArguments) -> "FindSettings | None":
-    """Return how people without a pose are found; None where nobody is looked for."""
-    from tracker.pipeline.find_people import FindSettings
-
-    return None if arguments.init is None else FindSettings(acquire=arguments.acquire)
-
-
 def _check_chain(arguments: TrackArguments) -> None:
-    """Raise a `TrackerError` where options contradict `--init`."""
-    if arguments.init is not None and arguments.backward:
-        raise TrackerError("expected --init without --backward, found both; it tracks in both directions by itself")
-    if arguments.acquire and arguments.init is None:
-        raise TrackerError(
-            "expected --acquire with --init auto, found it alone; add --init auto, or run quadrille acquire first"
-        )
+    """Raise a `TrackerError` where `--backward` contradicts a run in both directions."""
+    for option, is_used in (("--init", arguments.init is not None), ("--acquire", arguments.acquire)):
+        if is_used and arguments.backward:
+            raise TrackerError(
+                f"expected {option} without --backward, found both; it tracks in both directions by itself"
+            )
 
 
 def settings_of(arguments: TrackWords) -> "TrackerSettings":
@@ -150,9 +145,7 @@ def _flag(name: str, value: OptionValue) -> str:
     return f"--{'no-' if value is False else ''}{name.replace('_', '-')}"
 
 
-def track(
-    session: "Session", plan: "TrackPlan", progress: Reporter, find: "FindSettings | None" = None
-) -> dict[str, Any]:
+def track(session: "Session", plan: "ChainPlan", progress: Reporter) -> dict[str, Any]:
     """Track people and store their poses as one entry of the history.
 
     Keyframes and locked degrees of freedom keep their values. An interrupted run keeps its poses; run it again
@@ -160,10 +153,8 @@ def track(
 
     Args:
         session: the session.
-        plan: what to track.
+        plan: what to do. If it neither finds people nor acquires sizes, the run goes from its first frame to its last.
         progress: shows how far it is.
-        find: how people without a pose are found, from whom the run goes out in both directions; None: a run from the
-            first frame of the plan to its last.
 
     Returns:
         See `track_report.summarize`.
@@ -179,10 +170,14 @@ def track(
         if opened.backup_error is not None:
             progress.say(opened.backup_error)
         try:
-            plan = opened.track(plan, sink) if find is None else run_chain(plan, find, opened, sink)
+            if plan.find is None and not plan.acquire:
+                opened.track(plan.track, sink)
+            else:
+                run_chain(plan, opened, sink)
         except KeyboardInterrupt:
             is_stopped = True
     if opened.run is None or opened.plan is None:
-        print("stopped before anybody was found; nothing was stored", file=sys.stderr)
+        kept = "what was found is kept; run it again to go on" if opened.is_changed else "nothing was stored"
+        print(f"stopped before tracking; {kept}", file=sys.stderr)
         sys.exit(130)
     return summarize(opened.session, opened.plan, opened.run, is_stopped)

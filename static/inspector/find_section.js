@@ -15,7 +15,7 @@ export function findSection({ store, send }) {
     find("start"),
   );
   start.className = "is-primary";
-  const stop = textButton("Stop", "Stop; what was tracked stays", () => find("stop"));
+  const stop = textButton("Stop", "Stop; what was found and tracked stays", () => find("stop"));
   const progress = document.createElement("progress");
   const work = document.createElement("div");
   work.className = "acquisition-work";

@@ -17,8 +17,7 @@ from app.page.inspector_feed import methods
 from app.state.run_choices import RunChoices
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
-from tracker.pipeline.chain import StoredSession, run_chain
-from tracker.pipeline.find_people import FindSettings
+from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain
 from tracker.pipeline.methods import METHODS, all_options
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import load_session
@@ -64,7 +63,7 @@ def test_the_chain_drives_it(sonar, tmp_path):
         record = PoseRecord(values, ("manual",) * len(values), revision)
         store.commit("put", [PoseChange("person", 2, record)])
         plan = TrackPlan(range(5), (0,), SonarSettings())
-        run_chain(plan, FindSettings(), StoredSession(session, store, observer), sink)
+        run_chain(ChainPlan(plan), StoredSession(session, store, observer), sink)
         assert [row.frame for row in store.frames("person")] == [0, 1, 2, 3, 4]
         record = store.pose("person", 4)
         assert record.settings["method"] == "sonar"

@@ -79,6 +79,11 @@ class Acquisition(NamedTuple):
     voxels: VoxelSizes | None = None
     """The fit to voxels before, if there was one."""
 
+    @property
+    def is_better(self) -> bool:
+        """Whether the acquired body fits the contours better than the one before."""
+        return self.cost_after_px < self.cost_before_px
+
 
 def acquire_from_contours(
     observer: Observer,

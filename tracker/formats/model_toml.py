@@ -339,3 +339,8 @@ def _search_groups(model: BodyModel, groups: Sequence[_GroupRow], where: str) ->
 def has_preset_sizes(model: BodyModel) -> bool:
     """Return whether a body still has all sizes of its preset, so that the height of the person is not known."""
     return model.name in PRESETS and format_model(model) == format_model(load_model(model.name))
+
+
+def has_preset_proportions(model: BodyModel) -> bool:
+    """Return whether a body has the sizes of its preset but for its height, so that they are nobody's own."""
+    return model.name in PRESETS and has_preset_sizes(model.with_height(load_model(model.name).height_m))

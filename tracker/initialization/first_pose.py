@@ -5,7 +5,9 @@ facing. Each is fitted to the contours. The best are searched around and tracked
 The most likely track is kept. It is doubtful where another start is as likely, or where it loses the person.
 """
 
+import threading
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import combinations, product
 from types import MappingProxyType
 from typing import NamedTuple, TypeAlias
@@ -117,7 +119,7 @@ def find_first_poses(
     """
     with _Trial(session, observer, people, size_m, say) as trial:
         for frame in frames:
-            trial.add(frame, generators)
+            trial.add([frame], generators)
         return trial.best()
 
 
@@ -127,23 +129,29 @@ def find_first_poses_anywhere(
 ) -> FirstPoses:  # fmt: skip
     """Find first poses by whatever generator and on whatever of some frames tracks best; see `find_first_poses`.
 
-    The cheapest generator is tried until the starts of two frames are good and agree on the heights. The others are
-    tried where no start is good, one after the other, on the frames that cost least. `show` receives each frame and
-    what was found on it. `step` is called between fits and for each silhouette, every second or so and from several
-    threads; an exception that it raises ends the search.
+    The cheapest generator is tried until the starts of two frames are good and agree on the heights. Frames that are
+    tried in any case are tried at the same time. The other generators are tried where no start is good, one after the
+    other, on the frames that cost least. `show` receives each frame and what was found on it. `step` is called between
+    fits and for each silhouette, every second or so and from several threads; an exception that it raises ends the
+    search.
     """
     cheapest, *others = GENERATORS
     with _Trial(session, observer, people, size_m, say, show, step) as trial:
-        for frame in frames:
-            if trial.is_settled:
-                break
-            trial.add(frame, (cheapest,))
+        left = list(frames)
+        while left and not trial.is_settled:
+            n_sure = max(1, ENOUGH_FRAMES - sum(f.is_good for f in trial.found))
+            trial.add(left[:n_sure], (cheapest,))
+            del left[:n_sure]
         by_cost = [f.frame for f in sorted(trial.found, key=lambda f: f.cost_px)] or list(frames)
         for name, frame in product(others, by_cost[:_OTHER_FRAMES]):
             if any(f.is_good for f in trial.found):
                 break
-            trial.add(frame, (name,))
+            trial.add([frame], (name,))
         return trial.best()
+
+
+class _EndedError(Exception):
+    """The trial of another frame has ended the search."""
 
 
 class _Trial:
@@ -158,9 +166,16 @@ class _Trial:
                 f"expected two cameras or more to find people, found '{session.cameras[0].camera.name}' alone, which "
                 "shows no depth; place the body by hand, or set it from known joints"
             )
-        self._show, self._step = show, step
+        self._show, self._ended = show, threading.Event()
+
+        def go_on() -> None:
+            if self._ended.is_set():
+                raise _EndedError
+            step()
+
+        self._step = go_on
         self._session, self._observer, self._people, self._size_m, self._say = session, observer, people, size_m, say
-        self._finder = SilhouetteFinder(session.cameras, observer.recording, step=step)
+        self._finder = SilhouetteFinder(session.cameras, observer.recording, step=go_on)
         floor = floor_plane(session.up, session.floor)
 
         def recovered(frame: int, person: int) -> Sequence[ViewSilhouette]:
@@ -183,22 +198,37 @@ class _Trial:
 
         return _Source(silhouettes, StandingHeights(scenes, self._session.n_frames, len(self._session.people)))
 
-    def add(self, frame: int, generators: Sequence[str]) -> None:
-        """Try a frame."""
+    def add(self, frames: Sequence[int], generators: Sequence[str]) -> None:
+        """Try frames, each in a thread of its own. They are shown and said in their order; an exception ends all."""
+        with ThreadPoolExecutor(len(frames), "trial") as pool:
+            tried = [pool.submit(self._poses_on, frame, generators) for frame in frames]
+            try:
+                for frame, trial in zip(frames, tried, strict=True):
+                    self._show(frame, None)
+                    self._take(frame, generators, trial)
+            except BaseException:
+                self._ended.set()
+                raise
+
+    def _poses_on(self, frame: int, generators: Sequence[str]) -> FirstPoses:
         own: dict[int, FirstPose] = {}
-        self._show(frame, None)
+        for person in self._people:
+            task = _Task(self._session, self._observer, self._sources, person, self._size_m, self._step)
+            own[person] = _best_on_frame(task, frame, generators, own)
+        return FirstPoses(frame, own)
+
+    def _take(self, frame: int, generators: Sequence[str], trial: Future[FirstPoses]) -> None:
+        """Wait for the poses of a frame and keep them."""
         try:
-            for person in self._people:
-                task = _Task(self._session, self._observer, self._sources, person, self._size_m, self._step)
-                own[person] = _best_on_frame(task, frame, generators, own)
+            found = trial.result()
         except TrackerError as error:
             self._errors.append(error)
             self._say(f"frame {frame}, {' and '.join(generators)}: {error}")
             return
-        self.found.append(FirstPoses(frame, own))
-        self._show(frame, self.found[-1])
-        statuses = ", ".join(p.status for p in own.values())
-        cost = f"cost {self.found[-1].cost_px:.2f} px over a short track"
+        self.found.append(found)
+        self._show(frame, found)
+        statuses = ", ".join(p.status for p in found.poses.values())
+        cost = f"cost {found.cost_px:.2f} px over a short track"
         self._say(f"frame {frame}, {' and '.join(generators)}: {statuses}, {cost}")
 
     @property

@@ -19,6 +19,7 @@ from tracker.fitting.pins import PinBlock, pin_block
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.initialization.first_pose import HEIGHT_SIGMA
 from tracker.pipeline.seen_points import seen_points
 from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session, save_model
@@ -42,6 +43,8 @@ _ENOUGH = 0.5
 """Share of these frames with good poses above which another round would show little more."""
 _TRACKING = 0.4
 """Share of the work up to the end of that tracking."""
+MEASURED = "is_measured"
+"""Key of a pose's settings: the height of its body was measured in the silhouettes."""
 
 
 class PosedFrames(NamedTuple):
@@ -55,6 +58,8 @@ class PosedFrames(NamedTuple):
     """By frame, points of the person that a user has marked in the images: pins, and the ends of drags."""
     has_known_joints: bool = False
     """Whether some joints come from a file, which may define them otherwise than anatomy does."""
+    has_measured_height: bool = False
+    """Whether the height of the present body was measured in the silhouettes."""
 
 
 def acquire_body(
@@ -93,7 +98,7 @@ def acquire_body(
         found = _acquire(observer, tracked, settings, part_of(report, between, end))
         body = found.body
         is_enough = len(tracked.bodies) > _ENOUGH * min(len(frames), _MOST_TRACKED)
-        if is_enough or found.cost_after_px >= found.cost_before_px:
+        if is_enough or not found.is_better:
             break
     return found
 
@@ -103,15 +108,23 @@ def _acquire(
 ) -> Acquisition:
     if isinstance(settings, TwoViewSettings):
         return acquire_from_two_views(observer, known.bodies, 0, settings, report)
-    if not known.has_known_joints:
-        settings = replace(settings, priors=settings.priors.anatomical())
+    priors = settings.priors if known.has_known_joints else settings.priors.anatomical()
+    if known.has_measured_height:
+        priors = replace(priors, height=min(HEIGHT_SIGMA, priors.height))
+    settings = replace(settings, priors=priors)
     return acquire_from_contours(observer, known.bodies, 0, known.placed, settings, report, known.seen)
 
 
-def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedFrames:
+def posed_frames(session: Session, person: int, frames: Sequence[int], start: int | None = None) -> PosedFrames:
     """Return the frames on which a person has a credible pose, with the placed joints.
 
     Keyframes and good frames are used. If there are none, doubtful ones are.
+
+    Args:
+        session: the session.
+        person: index of the person.
+        frames: that may be used, ascending.
+        start: frame that a run goes out from. Its pose is used whatever its status.
 
     Raises:
         TrackerError: the person has no pose on these frames.
@@ -120,7 +133,7 @@ def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedF
     stored = [read_stored_poses(session.annotations_path, p.name, p.model, within) for p in session.people]
     own, model = {k: s for k, s in stored[person].items() if k in frames}, session.people[person].model
     own = {k: s for k, s in own.items() if len(s.record.values) == len(model.value_names)}
-    usable = {k: s for k, s in own.items() if s.record.keyframe or s.record.status in ("", "good")}
+    usable = {k: s for k, s in own.items() if s.record.keyframe or s.record.status in ("", "good") or k == start}
     usable = usable or {k: s for k, s in own.items() if s.record.status != "lost"}
     if not usable:
         raise TrackerError(
@@ -143,15 +156,17 @@ def posed_frames(session: Session, person: int, frames: Sequence[int]) -> PosedF
     seen = {k: pin_block(model, cameras, o).widened(_HAND) for k, o in observed.items() if o}
     placed = {k: t for k, s in keyframes.items() if (t := _placed(s, observed[k])) is not None and len(t.points)}
     has_known_joints = any(s.record.settings.get("joints") for s in keyframes.values())
-    return PosedFrames(bodies, placed, seen, has_known_joints)
+    is_measured = any(s.record.settings.get(MEASURED) for s in usable.values())
+    return PosedFrames(bodies, placed, seen, has_known_joints, is_measured)
 
 
 def store_body(
-    session: Session, store: AnnotationStore, person: int, body: BodyModel, poses: Mapping[int, Array], label: str
-) -> Session:
+    session: Session, store: AnnotationStore, person: int, body: BodyModel, poses: Mapping[int, Array], label: str,
+    start: int | None = None,
+) -> Session:  # fmt: skip
     """Make a body the present one of a person: a new model revision, and keyframes fitted to it, as one undoable edit.
 
-    Other stored poses keep the body that they were made with until they are tracked again.
+    Other stored poses keep the body that they were made with until they are tracked again, but for that of the start.
 
     Args:
         session: the session, which this process has locked.
@@ -160,31 +175,38 @@ def store_body(
         body: the new body.
         poses: by frame, poses of the new body; they replace those of keyframes. Other keyframes are retargeted.
         label: of the entry of the history.
+        start: frame that a run goes out from.
     """
     name, model = session.people[person].name, session.people[person].model
     before = store.add_model_revision(name, format_model(model))
     changed = save_model(session, person, body)
     revision = store.add_model_revision(name, format_model(body))
     stored = read_stored_poses(session.annotations_path, name, model)
+    fitting = {k: s for k, s in stored.items() if len(s.record.values) == len(body.value_names)}
     changes: list[Change] = [
         PoseChange(name, k, refitted_record(s.record, _pose_in(body, s, poses.get(k)), revision))
-        for k, s in stored.items()
-        if s.record.keyframe and len(s.record.values) == len(body.value_names)
+        for k, s in fitting.items()
+        if s.record.keyframe
     ]
+    if start in fitting and not fitting[start].record.keyframe:
+        changes.append(PoseChange(name, start, resized_start(fitting[start], body, revision)))
     edit = store.commit(label, changes).edit
     store.set_setting(SIZES_EDITS, with_sizes_changed(store.setting(SIZES_EDITS, {}), edit, [(name, before, revision)]))
     return changed
 
 
 def with_sizes_changed(edits: Mapping[str, Any], edit: int, changed: Sequence[tuple[str, int, int]]) -> dict[str, Any]:
-    """Return the setting `SIZES_EDITS` with another entry of the history; `sizes_changed` reads it.
+    """Return the setting `SIZES_EDITS` with changes by an entry of the history; `sizes_changed` reads it.
 
     Args:
-        edits: the setting before.
+        edits: the setting before. It may have earlier changes by the same entry.
         edit: number of the entry.
         changed: name of each person whose sizes it changed, with the revisions before and after it.
     """
-    return {**edits, str(edit): [list(row) for row in changed]}
+    rows = {name: (before, after) for name, before, after in sizes_changed(edits, edit)}
+    for name, before, after in changed:
+        rows[name] = rows.get(name, (before, after))[0], after
+    return {**edits, str(edit): [[name, *revisions] for name, revisions in rows.items()]}
 
 
 def sizes_changed(edits: Mapping[str, Any], edit: int) -> list[tuple[str, int, int]]:
@@ -213,6 +235,27 @@ def refitted_record(record: PoseRecord, pose: Array, revision: int) -> PoseRecor
         settings={"method": "refit", "model_revision": record.model_revision, **kept}, view_costs_px=(),
         part_costs_px=(), limbs_lost=(), remark="refitted to other sizes",
     )  # fmt: skip
+
+
+def resized_start(start: StoredPose, body: BodyModel, revision: int) -> PoseRecord:
+    """Return the record of the pose that a run goes out from, retargeted to acquired sizes; its status stays.
+
+    Args:
+        start: the pose, which is no keyframe.
+        body: in the acquired sizes.
+        revision: of that body.
+    """
+    pose = retarget_pose(start.body.values, start.body.model, body)
+    return replace(start.record, values=pose, model_revision=revision, cost_px=None, view_costs_px=(), part_costs_px=())
+
+
+def acquisition_sentence(acquired: Acquisition) -> str:
+    """Say from which frames sizes were acquired, and whether they are applied: only where the cost falls."""
+    costs = f"cost {acquired.cost_before_px:.2f} px before, {acquired.cost_after_px:.2f} px after"
+    if not acquired.is_better:
+        return f"sizes not applied: the body would fit the contours worse ({costs})"
+    frames = ", ".join(map(str, acquired.frames))
+    return f"sizes from frames {frames}: {acquired.body.height_m:.2f} m tall, {costs}"
 
 
 def _pose_in(body: BodyModel, stored: StoredPose, known: Array | None) -> Array:

@@ -6,15 +6,19 @@ shows them. Each stage is stored when it is done. The same plan goes on where it
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings
+from tracker.compute.progress import Report, part_of
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
+from tracker.formats.model_toml import has_preset_proportions
 from tracker.initialization.first_pose import FirstPoses
-from tracker.pipeline.find_people import FindSettings, FoundPeople, find_people, sentences, store_found
-from tracker.pipeline.stored_run import TrackPlan, stored_run
+from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
+from tracker.pipeline.find_people import FindSettings, find_people, sentences, store_found
+from tracker.pipeline.stored_run import TrackPlan, is_interrupted, stored_run
 from tracker.pipeline.track_session import Step, TrackSession
 from tracker.session.lock import SessionLock
 from tracker.session.relink import require_files
@@ -23,6 +27,20 @@ from tracker.store.annotation_store import AnnotationStore
 
 _FOLLOWED = ("tracked", "interpolated")
 """Sources of poses that follow from those of other frames, so that no run starts from them."""
+_FINDING = 0.5
+"""Share of the work before tracking that ends with the first poses, where sizes are acquired after them."""
+
+
+@dataclass(frozen=True)
+class ChainPlan:
+    """What a chain does. The same plan goes on where it was stopped."""
+
+    track: TrackPlan
+    """Whom to track on which frames, without a start; frames ascending."""
+    find: FindSettings | None = field(default_factory=FindSettings)
+    """How people who have no pose are found; None if nobody is looked for."""
+    acquire: tuple[int, ...] = ()
+    """People whose sizes are acquired from the contours, unless they have sizes of their own by then."""
 
 
 class Sink(Protocol):
@@ -52,41 +70,71 @@ class OpenSession(Protocol):
     def sources(self, person: int) -> Mapping[int, str]:
         """Return the source of the pose of a person on each frame that has one."""
 
-    def store_found(self, found: FoundPeople) -> None:
+    def store_found(self, found: FirstPoses) -> None:
         """Store people who were found."""
+
+    def store_body(self, person: int, acquired: Acquisition, start: int) -> None:
+        """Make an acquired body the present one of a person, and retarget the pose of the start to it."""
+
+    def is_interrupted(self, plan: TrackPlan) -> bool:
+        """Return whether this run was interrupted, so that it goes on there."""
 
     def track(self, plan: TrackPlan, sink: Sink) -> TrackPlan:
         """Track and store the poses; return the plan."""
 
 
-def run_chain(plan: TrackPlan, find: FindSettings, opened: OpenSession, sink: Sink) -> TrackPlan:
-    """Find the people who have no pose, and track out from there in both directions everybody who has a pose there.
+def run_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
+    """Find the people who have no pose, acquire sizes, and track out from there everybody who has a pose there.
 
     Args:
-        plan: what to track, without a start; frames ascending.
-        find: how people are found.
+        plan: what to do.
         opened: the session.
         sink: receives progress and results.
 
     Returns:
-        The plan with the frame that the run went out from.
+        The plan of tracking with the frame that the run went out from.
 
     Raises:
-        TrackerError: no frame shows the people well enough, or people are placed on different frames alone.
+        TrackerError: no frame shows the people well enough, people are placed on different frames alone, or somebody
+            has no pose and nobody is looked for.
     """
-    session = opened.session
-    missing = unplaced(opened, plan.people)
-    if missing:
-        found = find_people(session, opened.observer, missing, plan.frames, find, sink.report, sink.show)
+    track, end = plan.track, _FINDING if plan.acquire else 1.0
+    missing = unplaced(opened, track.people)
+    if missing and plan.find is None:
+        names = ", ".join(f"'{opened.session.people[i].name}'" for i in missing)
+        raise TrackerError(f"expected a pose of {names}, found none", Remedy("find_or_place"))
+    if missing and plan.find is not None:
+        of_finding = part_of(sink.report, 0.0, end)
+        found = find_people(opened.session, opened.observer, missing, track.frames, plan.find, of_finding, sink.show)
+        of_finding("finding first poses", 1.0)  # the last chance to stop before anything is stored
         opened.store_found(found)
         for sentence in sentences(opened.session, found):
-            sink.report("found", 1.0, sentence)
+            of_finding("finding first poses", 1.0, sentence)
         start = found.frame
     else:
-        start = start_frame([opened.sources(i) for i in plan.people], plan.frames)
-    sink.report("tracking", 1.0, f"tracking from frame {start} to {plan.frames[0]}, and to {plan.frames[-1]}")
-    people = tuple(i for i in plan.people if start in opened.sources(i))
-    return opened.track(replace(plan, people=people, start=start), sink)
+        start = start_frame([opened.sources(i) for i in track.people], track.frames)
+    people = tuple(i for i in track.people if start in opened.sources(i))
+    track = replace(track, people=people, start=start)
+    if not opened.is_interrupted(track):  # a run goes on in the bodies in which it was begun
+        of_sizes = part_of(sink.report, end if missing else 0.0, 1.0, "acquiring sizes")
+        _acquire([i for i in plan.acquire if i in people], track, opened, of_sizes)
+    sink.report("tracking", 1.0, f"tracking from frame {start} to {track.frames[0]}, and to {track.frames[-1]}")
+    return opened.track(track, sink)
+
+
+def _acquire(people: Sequence[int], track: TrackPlan, opened: OpenSession, report: Report) -> None:
+    """Acquire the sizes of those people who have none of their own, one after the other, and store each."""
+    assert track.start is not None
+    people = [i for i in people if has_preset_proportions(opened.session.people[i].model)]
+    settings = AcquisitionSettings(rounds=2)  # again with acquired sizes where few frames were good with the preset's
+    whole = range(track.frames[0], track.frames[-1] + 1)
+    for number, person in enumerate(people):
+        session, part = opened.session, part_of(report, number / len(people), (number + 1) / len(people))
+        known = posed_frames(session, person, whole, track.start)
+        acquired = acquire_body(session, opened.observer, person, whole, settings, part, known)
+        if acquired.is_better:
+            opened.store_body(person, acquired, track.start)
+        part("", 1.0, f"{session.people[person].name}: {acquisition_sentence(acquired)}")
 
 
 def unplaced(opened: OpenSession, people: Sequence[int]) -> tuple[int, ...]:
@@ -118,6 +166,8 @@ class StoredSession:
         self.session, self.observer, self._store = session, observer, store
         self.plan: TrackPlan | None = None
         """The last plan that was tracked."""
+        self.is_changed = False
+        """Whether people or sizes were stored."""
         self.run: TrackSession | None = None
         """The results of that."""
 
@@ -130,9 +180,21 @@ class StoredSession:
         """See `OpenSession.sources`."""
         return {row.frame: row.source for row in self._store.frames(self.session.people[person].name)}
 
-    def store_found(self, found: FoundPeople, label: str = "find people") -> None:
+    def store_found(self, found: FirstPoses, label: str = "find people") -> None:
         """See `OpenSession.store_found`; the label is that of the entry of the history."""
         self.session = store_found(self.session, self._store, found, label)
+        self.is_changed = True
+
+    def store_body(self, person: int, acquired: Acquisition, start: int) -> None:
+        """See `OpenSession.store_body`."""
+        label = f"acquire sizes of {self.session.people[person].name}"
+        poses = dict(zip(acquired.frames, acquired.poses, strict=True))
+        self.session = store_body(self.session, self._store, person, acquired.body, poses, label, start)
+        self.is_changed = True
+
+    def is_interrupted(self, plan: TrackPlan) -> bool:
+        """See `OpenSession.is_interrupted`."""
+        return is_interrupted(self._store, plan)
 
     def track(self, plan: TrackPlan, sink: Sink) -> TrackPlan:
         """See `OpenSession.track`."""

@@ -74,7 +74,7 @@ def set_pose_at_joints(session: Session, index: int, frame: int, joints: MarkerT
         person = replace(person, model=person.model.with_height(_checked(height_from_joints(person.model, joints))))
     with SessionLock(session.folder):
         acquired = _acquire(session, person, joints) if fit_sizes else None
-        if acquired is not None and acquired.cost_after_px < acquired.cost_before_px:
+        if acquired is not None and acquired.is_better:
             person = replace(person, model=acquired.body)
         pose = fit_to_points(person.model, limbs, centers=True).pose
         views = _views(session, person, pose)

@@ -93,7 +93,8 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, pla
     for whole, rest in zip(plan.legs, left, strict=True):
         before = whole[: len(whole) - len(rest)]
         is_begun = len(before) > 0
-        start = _start_poses(session, store, rest if rest else whole, plan, is_begun)
+        step = whole[1] - whole[0] if len(whole) > 1 else 1
+        start = _start_poses(session, store, (rest or whole)[0], step, plan, is_begun)
         known = before if is_begun or plan.start is None else [plan.start]
         legs.append(
             Leg(
@@ -133,10 +134,10 @@ def _frames_left(store: AnnotationStore, plan: TrackPlan) -> list[Sequence[int]]
 
     A leg that has stored no frame yet begins with the start.
     """
-    unfinished, legs = store.setting(_UNFINISHED), plan.legs
-    if unfinished is None or not _same_task(unfinished["task"], plan.record()):
+    legs = plan.legs
+    if not is_interrupted(store, plan):
         return legs
-    following = unfinished["next"]
+    following = store.setting(_UNFINISHED)["next"]
     if following is None:
         return [leg[len(leg) :] for leg in legs]
     for number, leg in enumerate(legs):
@@ -145,6 +146,12 @@ def _frames_left(store: AnnotationStore, plan: TrackPlan) -> list[Sequence[int]]
             rest = leg if at == 1 and plan.start is not None else leg[at:]
             return [*(done[len(done) :] for done in legs[:number]), rest, *legs[number + 1 :]]
     return legs
+
+
+def is_interrupted(store: AnnotationStore, plan: TrackPlan) -> bool:
+    """Return whether a run of this plan was interrupted, so that it goes on there."""
+    unfinished = store.setting(_UNFINISHED)
+    return unfinished is not None and _same_task(unfinished["task"], plan.record())
 
 
 def _same_task(stored: list[Any], task: list[Any]) -> bool:
@@ -200,14 +207,14 @@ def _status(record: PoseRecord | None) -> Status:
 
 
 def _start_poses(
-    session: Session, store: AnnotationStore, frames: Sequence[int], plan: TrackPlan, is_begun: bool
+    session: Session, store: AnnotationStore, first: int, step: int, plan: TrackPlan, is_begun: bool
 ) -> list[list[Array]]:
-    """Return the poses from which each person is tracked: those before the frames, or that of the start alone."""
+    """Return the poses from which each person is tracked: those before the first frame, or that of the start alone."""
     start = None if is_begun else plan.start
     out = []
     for i, person in enumerate(session.people):
         known = None if start is None else _pose_on(store, person, start)
-        out.append(_poses_before(store, person, frames, i in plan.people) if known is None else [known])
+        out.append(_poses_before(store, person, first, step, i in plan.people) if known is None else [known])
     return out
 
 
@@ -217,7 +224,7 @@ def _pose_on(store: AnnotationStore, person: Person, frame: int) -> Array | None
     return None if record is None or len(record.values) != len(person.model.value_names) else record.values
 
 
-def _poses_before(store: AnnotationStore, person: Person, frames: Sequence[int], needed: bool) -> list[Array]:
+def _poses_before(store: AnnotationStore, person: Person, first: int, step: int, needed: bool) -> list[Array]:
     """Return the poses to begin from, the last one last: those just before the first frame, else the nearest one.
 
     Without any just before, a pose on the first frame itself is nearest. Tracking backward, "before" is after.
@@ -225,13 +232,13 @@ def _poses_before(store: AnnotationStore, person: Person, frames: Sequence[int],
     Args:
         store: annotations of the session.
         person: whose poses.
-        frames: to track, in order.
+        first: frame to track first.
+        step: from each frame to the next one; negative for tracking backward.
         needed: whether the person is tracked; others may have the neutral pose.
 
     Raises:
         SessionError: a pose is needed and there is none.
     """
-    first, step = frames[0], 1 if len(frames) < 2 else frames[1] - frames[0]
     rows = {row.frame for row in store.frames(person.name)}
 
     def pose(frame: int) -> Array | None:

@@ -2,8 +2,9 @@
 
 import logging
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from app.control.search.search_runs import SearchRuns
@@ -13,17 +14,20 @@ from app.control.tracking import track_settings
 from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
 from app.state.progress import FindState, Line
+from tracker.acquisition.from_contours import Acquisition
+from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.formats.model_toml import format_model
 from tracker.initialization.first_pose import FirstPoses
-from tracker.pipeline.body_acquisition import SIZES_EDITS, with_sizes_changed
-from tracker.pipeline.chain import Sink, run_chain
-from tracker.pipeline.find_people import AXES, FindSettings, FoundPeople, axes_record, first_record
+from tracker.pipeline.body_acquisition import SIZES_EDITS, resized_start, with_sizes_changed
+from tracker.pipeline.chain import ChainPlan, Sink, run_chain, unplaced
+from tracker.pipeline.find_people import AXES, axes_record, first_record
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.pipeline.track_session import Step, TrackSession
 from tracker.session.session import Session, save_model
-from tracker.store.records import PoseChange
+from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.stored_poses import StoredPose
 
 _LOG = logging.getLogger(__name__)
 _STEPS = 100
@@ -76,7 +80,7 @@ class FindingPeople:
                 raise TrackerError(
                     "expected no other search for people at work, found one; stop it or wait for its end"
                 )
-            people = self._unplaced()
+            people = unplaced(self, range(len(session_state.present)))
             if not people:
                 raise TrackerError(
                     "expected a person without a pose, found that all are placed; track from here (T), or clear a "
@@ -89,7 +93,8 @@ class FindingPeople:
             session_state.set(finding=finding)
             self._shown, self._first_tried, self._edit = session_state.state.frame, None, None
         self._stopping.clear()
-        self._thread = threading.Thread(target=self._work, args=(acquire,), name="find people", daemon=True)
+        sized = people if acquire else ()
+        self._thread = threading.Thread(target=self._work, args=(sized,), name="find people", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -100,19 +105,15 @@ class FindingPeople:
         if self._thread is not None:
             self._thread.join(30)
 
-    def _unplaced(self) -> tuple[int, ...]:
-        session_state = self._session_state
-        return tuple(i for i in range(len(session_state.present)) if not session_state.saver.index.frames(i))
-
-    def _work(self, acquire: bool) -> None:
+    def _work(self, acquire: tuple[int, ...]) -> None:
         session, state = self._session_state.session, self._session_state.state
         settings = track_settings.of_run(state.settings, state.run_choices)
         plan = TrackPlan(range(session.n_frames), tuple(range(len(session.people))), settings)
         try:
-            run_chain(plan, FindSettings(acquire=acquire), self, self)
+            run_chain(ChainPlan(plan, acquire=acquire), self, self)
             self._set(running=False, message="Done.")
         except _StoppedError:
-            message = "Stopped; nothing was changed." if self._edit is None else "Stopped; what was tracked stays."
+            message = "Stopped; nothing was changed." if self._edit is None else "Stopped; what was found stays."
             self._set(**_ENDED, message=message, tried=None)
         except Exception as error:
             if not isinstance(error, TrackerError):
@@ -187,40 +188,80 @@ class FindingPeople:
         with self._session_state.lock:
             self._session_state.set(finding=replace(self._session_state.state.finding, **changes))
 
-    def store_found(self, found: FoundPeople) -> None:
+    def store_found(self, found: FirstPoses) -> None:
         """See `OpenSession.store_found`: store people and bodies as one entry of the history, and show them.
 
         Raises:
             TrackerError: somebody was placed meanwhile, or a body cannot be written.
         """
         with self._activities.editing():
-            session_state, saver = self._session_state, self._session_state.saver
-            if self._unplaced() != tuple(found.poses):
+            if unplaced(self, range(len(self._session_state.present))) != tuple(found.poses):
                 raise TrackerError(
                     "expected nobody to be placed meanwhile, found a new pose; what was found is discarded"
                 )
-            sizes, changes = [], []
-            for person, body in found.bodies.items():
-                who, before = session_state.session.people[person], saver.revisions.current(person)
-                if format_model(body) != format_model(who.model):
-                    session_state.set_body_models(save_model(session_state.session, person, body))
-                revision = saver.revisions.current(person)
-                changes.append(PoseChange(who.name, found.frame, first_record(found, person, revision)))
-                if revision != before:
-                    sizes.append((who.name, before, revision))
-            edit = saver.write("find people", changes, None, by_program=False)
+            records = {i: partial(first_record, first) for i, first in found.poses.items()}
+            self._store(found.frame, {i: first.model for i, first in found.poses.items()}, records)
             axes = axes_record(found)
-            saver.store_setting(AXES, axes)
-            if edit is not None and sizes:
-                saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, sizes))
-                self._runs.clear()
+            self._session_state.saver.store_setting(AXES, axes)
             frame, lines = _axes(axes)
-            finding = replace(
-                session_state.state.finding, frame=frame, axes=lines, tried=None, candidates={}, sought=frozenset()
-            )
-            session_state.show_frame(found.frame, finding=finding)
-            session_state.refresh_saving()
-            self._edit = edit
+            before = self._session_state.state.finding
+            finding = replace(before, frame=frame, axes=lines, tried=None, candidates={}, sought=frozenset())
+            self._session_state.show_frame(found.frame, finding=finding)
+
+    def store_body(self, person: int, acquired: Acquisition, start: int) -> None:
+        """See `OpenSession.store_body`: it belongs to the same entry of the history, unless there is a later one.
+
+        Raises:
+            TrackerError: the pose or the sizes were changed meanwhile, or the body cannot be written.
+        """
+        with self._activities.editing():
+            saver, name = self._session_state.saver, self._session_state.session.people[person].name
+            record, revision = saver.record(person, start), saver.revisions.current(person)
+            if record is None or record.keyframe or record.model_revision != revision:
+                raise TrackerError(
+                    f"expected {name} as found on frame {start}, found another pose or other sizes; the acquired sizes "
+                    "are discarded; track from here (T)"
+                )
+            stored = StoredPose(PosedBody(self._session_state.present[person], record.values), record)
+            resized = partial(resized_start, stored, acquired.body)
+            self._store(start, {person: acquired.body}, {person: resized})
+            if self._session_state.state.frame == start:
+                self._session_state.show_frame(start)
+
+    def _store(
+        self, frame: int, bodies: Mapping[int, BodyModel], records: Mapping[int, Callable[[int], PoseRecord]]
+    ) -> None:
+        """Store bodies, and poses on a frame, in the entry of the history of this search; the caller is editing.
+
+        Args:
+            frame: number of the frame.
+            bodies: by person.
+            records: by person, returns the pose for the revision of the body.
+        """
+        session_state, saver = self._session_state, self._session_state.saver
+        sizes, changes = [], []
+        for person, body in bodies.items():
+            who, before = session_state.session.people[person], saver.revisions.current(person)
+            if format_model(body) != format_model(who.model):
+                session_state.set_body_models(save_model(session_state.session, person, body))
+            revision = saver.revisions.current(person)
+            changes.append(PoseChange(who.name, frame, records[person](revision)))
+            if revision != before:
+                sizes.append((who.name, before, revision))
+        edit = self._edit = saver.write("find people", changes, self._entry(), by_program=False)
+        if edit is not None and sizes:
+            saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, sizes))
+            self._runs.clear()
+        session_state.refresh_saving()
+
+    def _entry(self) -> int | None:
+        """Return the entry of the history of this search if further changes can be added to it: if it is the latest."""
+        latest = next((e.edit for e in self._session_state.saver.history(1) if not e.undone), None)
+        return self._edit if self._edit == latest else None
+
+    def is_interrupted(self, plan: TrackPlan) -> bool:
+        """See `OpenSession.is_interrupted`; in the page a run that was stopped is over."""
+        return False
 
     def track(self, plan: TrackPlan, sink: Sink) -> TrackPlan:
         """See `OpenSession.track`. The run can be paused; it is shown like any other, so that the sink gets no step."""
@@ -231,7 +272,7 @@ class FindingPeople:
             outcome.append(is_done)
             ended.set()
 
-        self._tracking.start_outward(plan.start, plan.people, self._edit, on_end)
+        self._tracking.start_outward(plan.start, plan.people, self._entry(), on_end)
         ended.wait()
         if not outcome[0]:
             raise _StoppedError

@@ -277,6 +277,8 @@ def test_a_reader_that_has_read_enough():
 
 
 def test_options_that_contradict_the_search_for_people_are_refused(run, session):
-    assert_refused(run("track", session, "--acquire"), ["expected --acquire with --init auto", "quadrille acquire"])
+    assert_refused(run("track", session, "--acquire"), ["expected a pose of 'person', found none", "--init auto"])
+    result = run("track", session, "--acquire", "--backward")
+    assert_refused(result, ["expected --acquire without --backward", "both directions"])
     result = run("track", session, "--init", "auto", "--backward")
     assert_refused(result, ["expected --init without --backward", "both directions"])

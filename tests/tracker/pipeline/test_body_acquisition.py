@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tracker.acquisition.from_contours import AcquisitionSettings
+from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
@@ -16,8 +16,10 @@ from tracker.footage.recording import Recording
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import format_model, has_preset_sizes, load_model
 from tracker.geometry.triangulation import sigma_px
+from tracker.initialization.first_pose import HEIGHT_SIGMA
 from tracker.pipeline import body_acquisition
 from tracker.pipeline.body_acquisition import (
+    MEASURED,
     PLACED_M,
     SIZES_EDITS,
     acquire_body,
@@ -171,7 +173,7 @@ def test_each_round_tracks_with_the_body_of_the_one_before(session, store, monke
     def acquire(observer, bodies, person, placed, settings, report, seen):
         fitted_from.append(bodies[3][0].model)
         body = present.with_height(present.height_m + 0.1 * len(fitted_from))
-        return SimpleNamespace(body=body, cost_before_px=3.0, cost_after_px=costs[len(fitted_from) - 1])
+        return Acquisition(body, (3,), (body.neutral(),), 3.0, costs[len(fitted_from) - 1], None, None)
 
     monkeypatch.setattr(body_acquisition, "_with_tracked", track)
     monkeypatch.setattr(body_acquisition, "acquire_from_contours", acquire)
@@ -189,6 +191,21 @@ def test_joints_are_those_of_anatomy_unless_known_ones_were_placed(known, sessio
     monkeypatch.setattr(body_acquisition, "acquire_from_contours", lambda *a: used.append(a[4].priors))
     acquire_body(session, None, 0, range(1), AcquisitionSettings())
     assert used == [SizePriors() if known else SizePriors().anatomical()]
+
+
+@pytest.mark.parametrize("is_measured", [True, False])
+def test_a_height_that_was_measured_is_trusted_also_after_a_restart(is_measured, session, store, monkeypatch):
+    put(session, store, f0=record(session, store, status="good", settings={MEASURED: is_measured}))
+    used = []
+    monkeypatch.setattr(body_acquisition, "acquire_from_contours", lambda *a: used.append(a[4].priors.height))
+    acquire_body(session, None, 0, range(1), AcquisitionSettings())
+    assert used == [HEIGHT_SIGMA if is_measured else SizePriors().height]
+
+
+def test_a_run_goes_out_from_a_lost_pose_too(session, store):
+    put(session, store, f0=record(session, store, status="good"), f2=record(session, store, status="lost"))
+    assert sorted(posed_frames(session, 0, range(10)).bodies) == [0]
+    assert sorted(posed_frames(session, 0, range(10), start=2).bodies) == [0, 2]
 
 
 def test_a_round_in_which_most_frames_are_good_is_the_last(session, store, monkeypatch):

@@ -10,17 +10,20 @@ import numpy as np
 import pytest
 from fake_tracker import Walker
 
+from tracker.acquisition.from_contours import Acquisition
+from tracker.body.dimensions import dimensions_of, with_dimensions
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.hypothesis import Hypothesis
-from tracker.formats.model_toml import format_model
+from tracker.formats.model_toml import format_model, load_model
 from tracker.initialization.first_pose import FirstPose, FirstPoses
 from tracker.pipeline import chain
-from tracker.pipeline.chain import StoredSession, run_chain, start_frame
-from tracker.pipeline.find_people import FindSettings, FoundPeople
+from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, start_frame
+from tracker.pipeline.find_people import FindSettings
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.stored_run import TrackPlan
-from tracker.session.session import load_session
+from tracker.posing.retarget import retarget_pose
+from tracker.session.session import load_session, save_model
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.chamfer.method import CHAMFER
@@ -59,10 +62,10 @@ def found(monkeypatch):
     def find(session, observer, people, frames, settings, report, show):
         calls.append(people)
         model = session.people[0].model
-        start = Hypothesis(PosedBody(model, model.neutral()), "voxels")
+        start = Hypothesis(PosedBody(model, model.neutral()), "voxels", is_measured=True)
         first = FirstPose(FRAME, start, "good", 1.5, True, ("left arm unresolved",))
         show(FRAME, None)
-        return FoundPeople(FirstPoses(FRAME, {0: first}), {0: model}, {0: model.neutral()}, {})
+        return FirstPoses(FRAME, {0: first})
 
     monkeypatch.setattr(chain, "find_people", find)
     return calls
@@ -90,9 +93,41 @@ def opened(tmp_path, sample_folder):
         yield StoredSession(session, store, observer)
 
 
-def run(opened, sink=None, frames=range(6), smooth=False):
+def run(opened, sink=None, frames=range(6), smooth=False, acquire=(), is_finding=True):
     plan = TrackPlan(frames, (0,), TrackSettings(smooth=smooth))
-    return run_chain(plan, FindSettings(), opened, sink or Notes())
+    return run_chain(ChainPlan(plan, FindSettings() if is_finding else None, acquire), opened, sink or Notes())
+
+
+@pytest.fixture
+def acquiring(opened, monkeypatch):
+    """Stands for the acquisition, which finds a thinner forearm; keeps the poses that it was given. The person's body
+    has the sizes of its preset and the height of the sample."""
+    asked = SimpleNamespace(calls=[], cost_px=1.0)
+    height_m = opened.session.people[0].model.height_m
+    opened.session = save_model(opened.session, 0, load_model("gavrila22").with_height(height_m))
+
+    def acquire(session, observer, person, frames, settings, report, known):
+        asked.calls.append(known)
+        report("fitting", 0.5)
+        before = session.people[person].model
+        sizes = dimensions_of(before)
+        arm = sizes.parts["left_forearm"]
+        thin = {**sizes.parts, "left_forearm": arm._replace(girths_m=(0.5 * arm.girths_m[0], arm.girths_m[1]))}
+        body = with_dimensions(before, sizes._replace(height_m=1.1 * before.height_m, parts=thin))
+        return Acquisition(body, (FRAME,), (body.neutral() + 0.01,), 2.0, asked.cost_px, None, None)
+
+    monkeypatch.setattr(chain, "acquire_body", acquire)
+    return asked
+
+
+def put(opened, frame, keyframe=False):
+    """Place the person by hand."""
+    (person,) = opened.session.people
+    values = person.model.neutral()
+    with closing(AnnotationStore(opened.session.annotations_path)) as store:
+        revision = store.add_model_revision(person.name, format_model(person.model))
+        record = PoseRecord(values, ("manual",) * len(values), revision, keyframe)
+        store.commit("put", [PoseChange("person", frame, record)])
 
 
 def rows(opened):
@@ -125,9 +160,9 @@ def test_smoothing_joins_both_directions_and_keeps_the_start(opened, found, walk
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n", [1, 3, 4])
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
 def test_a_stopped_chain_goes_on_where_it_was(opened, found, walkers, n):
-    """In the first leg, between the legs, and in the second."""
+    """In the first leg, before its last frame, between the legs, and in the second."""
     with pytest.raises(StoppedError):
         run(opened, Notes(stop_at=n))
     before, sink = rows(opened), Notes()
@@ -163,12 +198,79 @@ def test_it_starts_where_people_were_put_rather_than_where_they_were_tracked():
 
 
 def test_people_placed_on_different_frames_alone_are_refused(opened, found):
-    person = opened.session.people[0]
-    values = person.model.neutral()
-    with closing(AnnotationStore(opened.session.annotations_path)) as store:
-        revision = store.add_model_revision(person.name, format_model(person.model))
-        record = PoseRecord(values, ("manual",) * len(values), revision)
-        store.commit("put", [PoseChange("person", 9, record)])
+    put(opened, 9)
     with pytest.raises(TrackerError, match="a frame on which all people have a pose"):
         run(opened)
     assert found == []
+
+
+def test_sizes_are_acquired_and_stored_before_tracking(opened, found, walkers, acquiring):
+    before = opened.session.people[0].model
+    run(opened, sink := Notes(), acquire=(0,))
+    (known,) = acquiring.calls
+    assert list(known.bodies) == [FRAME]
+    assert known.has_measured_height
+    body = opened.session.people[0].model
+    assert body.height_m == pytest.approx(1.1 * before.height_m)
+    assert format_model(load_session(opened.session.folder).people[0].model) == format_model(body)
+    assert "sizes from frames 3: 1.96 m tall, cost 2.00 px before, 1.00 px after" in " ".join(sink.said)
+    poses = rows(opened)
+    assert len({poses[k].model_revision for k in range(6)}) == 1
+    start = poses[FRAME]
+    assert (start.sources[0], start.status, start.settings["method"]) == ("searched", "good", "voxels")
+    np.testing.assert_allclose(start.values, retarget_pose(before.neutral(), before, body), atol=1e-6)
+    with closing(AnnotationStore(opened.session.annotations_path, read_only=True)) as store:
+        assert [e.label for e in store.history()] == [
+            "track frames 0:6", "acquire sizes of person", "find people, frame 3"
+        ]  # fmt: skip
+
+
+@pytest.mark.parametrize("cost_px", [1.0, 2.0])
+def test_a_chain_stopped_while_tracking_goes_on_in_the_same_body(opened, found, walkers, acquiring, cost_px):
+    """Also in that of the preset, where the acquired one was no better."""
+    acquiring.cost_px = cost_px
+    with pytest.raises(StoppedError):
+        run(opened, Notes(stop_at=2), acquire=(0,))
+    body = opened.session.people[0].model
+    run(opened, sink := Notes(), acquire=(0,))
+    assert len(acquiring.calls) == len(found) == 1
+    assert len(sink.steps) == 3
+    assert opened.session.people[0].model is body
+
+
+def test_a_chain_stopped_while_sizes_are_acquired_goes_on_there(opened, found, walkers, acquiring):
+    class Impatient(Notes):
+        def report(self, stage, share, text=""):
+            if stage == "acquiring sizes":
+                raise StoppedError
+
+    before = opened.session.people[0].model
+    with pytest.raises(StoppedError):
+        run(opened, Impatient(), acquire=(0,))
+    assert list(rows(opened)) == [FRAME]
+    assert opened.session.people[0].model.height_m == before.height_m
+    run(opened, acquire=(0,))
+    assert (len(found), len(acquiring.calls)) == (1, 2)
+    assert sorted(rows(opened)) == list(range(6))
+
+
+def test_sizes_are_acquired_of_placed_people_unless_they_have_their_own(opened, found, walkers, acquiring):
+    put(opened, 4, keyframe=True)
+    assert run(opened, acquire=(0,), is_finding=False).start == 4
+    assert found == []
+    poses = rows(opened)
+    body = opened.session.people[0].model
+    preset = load_model("gavrila22")
+    put_m = preset.with_height(1.78).points_world(preset.neutral())
+    np.testing.assert_allclose(body.points_world(poses[4].values), put_m, atol=0.15)
+    assert poses[4].settings["method"] == "refit"
+    assert sorted(poses) == list(range(6))
+    run(opened, acquire=(0,), is_finding=False)
+    assert len(acquiring.calls) == 1
+
+
+def test_people_without_a_pose_are_named_where_nobody_is_looked_for(opened, found, acquiring):
+    with pytest.raises(TrackerError, match="expected a pose of 'person', found none") as error:
+        run(opened, acquire=(0,), is_finding=False)
+    assert error.value.remedy.code == "find_or_place"
+    assert found == acquiring.calls == []

@@ -1,6 +1,8 @@
 """People found with nobody's help: which frames are tried, what is said where nobody can be found, what is stored."""
 
 import shutil
+import threading
+import time
 from contextlib import closing
 from dataclasses import replace
 from types import SimpleNamespace
@@ -23,7 +25,6 @@ from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed, with_s
 from tracker.pipeline.find_people import (
     AXES,
     FindSettings,
-    FoundPeople,
     expected_steps,
     find_people,
     frames_to_try,
@@ -164,6 +165,47 @@ def test_two_frames_that_agree_end_the_trial(session, silhouettes, fits, monkeyp
     assert tried == frames
 
 
+def test_the_first_two_frames_are_tried_at_the_same_time(session, silhouettes, monkeypatch):
+    silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
+    at_once = threading.Barrier(2, timeout=20)
+    shown = []
+
+    def starts(observer, frame, later, others, step):
+        at_once.wait()
+        costs = iter(np.arange(10.0, 1000.0, 10.0))
+        return fitter(lambda start: (start.pose, next(costs)))()
+
+    monkeypatch.setattr(first_pose, "StartFitter", starts)
+    found = find_first_poses_anywhere(
+        session, OBSERVER, [0], [20, 10, 30], 0.05, show=lambda frame, found: shown.append((frame, found is None))
+    )
+    assert shown == [(20, True), (20, False), (10, True), (10, False)]  # as if one after the other
+    assert found.frame == 20
+
+
+def test_a_stop_ends_both_frames(session, silhouettes, monkeypatch):
+    silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
+    at_once, ended = threading.Barrier(2, timeout=20), []
+
+    def starts(observer, frame, later, others, step):
+        at_once.wait()
+        if frame == 20:
+            raise InterruptedError
+        end = time.monotonic() + 20
+        try:
+            while time.monotonic() < end:
+                step()
+        except Exception:
+            ended.append(frame)
+            raise
+        return fitter(lambda start: (start.pose, 1.0))()
+
+    monkeypatch.setattr(first_pose, "StartFitter", starts)
+    with pytest.raises(InterruptedError):
+        find_first_poses_anywhere(session, OBSERVER, [0], [20, 10, 30], 0.05)
+    assert ended == [10]
+
+
 @pytest.mark.slow
 def test_nobody_in_the_silhouettes(session, silhouettes):
     silhouettes += [s._replace(mask=np.zeros_like(s.mask)) for s in silhouettes_of_figure(figure()[0], CAMERAS)]
@@ -296,7 +338,7 @@ def found_people(session, scale):
     start = Hypothesis(PosedBody(body, body.neutral()), "axis")
     lines = {"FRONT": np.array([[[1.0, 2.0], [3.0, 4.0]]])}
     first = FirstPose(7, start, "good", 1.0, True, ("a note",), lines)
-    return FoundPeople(FirstPoses(7, {0: first}), {0: body}, {0: body.neutral()}, {})
+    return FirstPoses(7, {0: first})
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.05])
@@ -311,7 +353,7 @@ def test_poses_and_bodies_are_one_entry_of_the_history(session, scale):
         assert store.setting(AXES) == {"frame": 7, "lines": {"FRONT": [[[[1.0, 2.0], [3.0, 4.0]]]]}}
         sizes = sizes_changed(store.setting(SIZES_EDITS, {}), entry.edit)
         assert [name for name, _, _ in sizes] == (["person"] if scale != 1.0 else [])
-    assert changed.people[0].model.height_m == pytest.approx(found.bodies[0].height_m)
+    assert changed.people[0].model.height_m == pytest.approx(found.poses[0].model.height_m)
     assert format_model(load_session(session.folder).people[0].model) == format_model(changed.people[0].model)
 
 
@@ -320,6 +362,8 @@ def test_an_entry_of_one_person_is_read_as_before():
     changed = [("ann", 1, 2), ("bob", 3, 4)]
     edits = with_sizes_changed(with_sizes_changed({}, 4, changed[:1]), 5, changed)
     assert [sizes_changed(edits, edit) for edit in (4, 5)] == [changed[:1], changed]
+    again = with_sizes_changed(edits, 5, [("bob", 4, 7)])  # the same entry: undone in one step
+    assert sizes_changed(again, 5) == [("ann", 1, 2), ("bob", 3, 7)]
     assert sizes_changed({"5": ["ann", 1, 2]}, 6) == []
 
 

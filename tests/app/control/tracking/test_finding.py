@@ -9,12 +9,12 @@ from gestures import drag, wait_for
 from app.drawing import overlays
 from app.page import inspector_feed
 from app.state.page_view import View
+from tracker.acquisition.from_contours import Acquisition
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.initialization.first_pose import FirstPose, FirstPoses
 from tracker.pipeline import chain
-from tracker.pipeline.find_people import FoundPeople
 
 FRAME = 1
 
@@ -28,14 +28,13 @@ def found(monkeypatch):
         show(FRAME, None)
         report("finding first poses", 0.25, "frame 1, voxels: good")
         assert go.wait(10)
-        report("acquiring sizes", 0.5, "")
         model = session.people[0].model
         body = model.with_height(1.05 * model.height_m)
         pose = body.neutral()
         start = Hypothesis(PosedBody(body, pose), "axis")
         lines = {"FRONT": np.array([[[10.0, 20.0], [30.0, 40.0]], [[11.0, 20.0], [29.0, 40.0]]])}
         first = FirstPose(FRAME, start, "good", 1.0, True, (), lines)
-        return FoundPeople(FirstPoses(FRAME, dict.fromkeys(people, first)), {0: body}, {0: pose}, {})
+        return FirstPoses(FRAME, dict.fromkeys(people, first))
 
     monkeypatch.setattr(chain, "find_people", find)
     return go
@@ -77,6 +76,59 @@ def test_one_entry_holds_poses_sizes_and_tracks(opened, found, tracked):
     assert controller.state.undo is None
     controller.history.redo()
     assert controller.session.people[0].model.height_m == pytest.approx(1.05 * before)
+
+
+@pytest.fixture
+def acquired(monkeypatch):
+    """Stands for the acquisition of sizes: finds a body 10% taller once it is let go."""
+    go = threading.Event()
+
+    def acquire(session, observer, person, frames, settings, report, known):
+        report("fitting", 0.5)
+        assert go.wait(10)
+        body = session.people[person].model.with_height(1.1 * session.people[person].model.height_m)
+        return Acquisition(body, (FRAME,), (body.neutral(),), 2.0, 1.0, None, None)
+
+    monkeypatch.setattr(chain, "acquire_body", acquire)
+    monkeypatch.setattr(chain, "has_preset_proportions", lambda model: True)
+    return go
+
+
+def test_acquired_sizes_belong_to_the_same_entry(opened, found, acquired, tracked):
+    controller = opened()
+    before = controller.models[0].height_m
+    found.set()
+    acquired.set()
+    controller.finding.start()
+    wait_for(lambda: not controller.state.finding.running)
+    ((_, _, edit),) = tracked
+    assert edit is not None
+    assert controller.session.people[0].model.height_m == pytest.approx(1.05 * 1.1 * before)
+    assert controller.state.frame == FRAME
+    assert controller.state.people[0].source == "searched"
+    assert controller.state.revisions[0] == controller.state.people[0].revision
+    controller.history.undo()
+    assert controller.session.people[0].model.height_m == pytest.approx(before)
+    assert controller.state.undo is None
+    controller.history.redo()
+    assert controller.session.people[0].model.height_m == pytest.approx(1.05 * 1.1 * before)
+
+
+def test_a_pose_that_was_changed_while_sizes_are_acquired_wins(opened, found, acquired, tracked):
+    controller = opened()
+    before = controller.models[0].height_m
+    found.set()
+    controller.finding.start()
+    wait_for(lambda: controller.state.finding.stage == "acquiring sizes")
+    drag(controller, "left_wrist", (6.0, -9.0))
+    pose = controller.state.people[0].values
+    acquired.set()
+    wait_for(lambda: not controller.state.finding.running)
+    assert controller.state.finding.failed
+    assert "the acquired sizes are discarded" in controller.state.finding.message
+    assert controller.session.people[0].model.height_m == pytest.approx(1.05 * before)
+    np.testing.assert_array_equal(controller.state.people[0].values, pose)
+    assert tracked == []
 
 
 @pytest.mark.slow
