@@ -175,9 +175,9 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
         hidden, occluders = by_body.any(axis=0), _other_occluders(by_body, people)
         for person, body in enumerate(bodies):
             px, held = camera.project(points[person]), state.held_points(person)
-            for i, name in enumerate(body.model.point_names):
-                if person not in undrawn and np.all(np.isfinite(px[i])):
-                    u, v = float(px[i, 0]), float(px[i, 1])
+            is_in_front = np.all(np.isfinite(px), axis=1)
+            for i, (name, (u, v)) in enumerate(zip(body.model.point_names, px.tolist(), strict=True)):
+                if person not in undrawn and is_in_front[i]:
                     is_visible, by, is_held = not hidden[first + i], occluders[first + i], name in held
                     out.append(Handle(index, person, name, u, v, is_visible, by, is_held, side_of(name)))
             first += len(px)

@@ -183,8 +183,8 @@ def iterate(
         before it comes once more, with that iteration counted.
     """
     is_active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
-    start = pose  # inactive degrees of freedom stay there, even outside the limits
-    pose = with_locked_dofs(model, model.clip(start), start, active_dofs)
+    start, is_locked = pose, value_mask(model, ~is_active)  # locked values stay, even outside the limits
+    pose = np.where(is_locked, start, model.clip(start))
     here = _sum(model, pose, blocks)
     damping, iterations = INITIAL_DAMPING, 0
     yield Fit(pose, here.cost, iterations, here.hessian)
@@ -202,7 +202,7 @@ def iterate(
             worth = -(g + 0.5 * H @ step) @ step > gain
             change = np.zeros(model.n_dofs)
             change[active] = step
-            trial = with_locked_dofs(model, model.clip(model.retract(pose, change)), start, active_dofs)
+            trial = np.where(is_locked, start, model.clip(model.retract(pose, change)))
             moved = float(np.abs(model.difference(trial, pose)).max())
             there = _sum(model, trial, blocks) if worth else here
             if there.cost < here.cost or not worth or moved < tolerance or damping > MAX_DAMPING:
@@ -333,8 +333,11 @@ def _by_other_angles(model: BodyModel, pose: Array, joint: int) -> Array:
 
 def _sum(model: BodyModel, pose: Array, blocks: Sequence[ResidualBlock]) -> NormalEquations:
     kinematics = model.kinematics(pose)
-    parts = [b.linearize(model, pose, kinematics) for b in blocks]
-    return NormalEquations(sum(p.cost for p in parts), sum(p.gradient for p in parts), sum(p.hessian for p in parts))  # type: ignore[arg-type]
+    first, *others = (b.linearize(model, pose, kinematics) for b in blocks)
+    cost, gradient, hessian = first
+    for p in others:
+        cost, gradient, hessian = cost + p.cost, gradient + p.gradient, hessian + p.hessian
+    return NormalEquations(cost, gradient, hessian)
 
 
 def _pressed_against_limit(model: BodyModel, pose: Array, gradient: Array) -> NDArray[np.bool_]:
