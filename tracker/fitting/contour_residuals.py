@@ -199,7 +199,7 @@ class ContourResiduals:
         )
         self._term = ContourTerm(
             Ts, own.start, own.stop, surfaces, arrays, settings.scale, settings.turn,
-            ContourMotion[settings.motion.upper()],
+            int(ContourMotion[settings.motion.upper()]),  # numba is slow to take members of an enumeration
             self._static_buffer(np.arange(own.start, own.stop), len(Ts), arrays),
             scratch_buffer(surfaces, self._max_pieces, arrays.points.shape[1]), sums_buffer(len(Ts), len(views)),
         )  # fmt: skip
