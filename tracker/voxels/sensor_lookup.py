@@ -12,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.geometry.arrays import Array
-from tracker.geometry.cameras import BEYOND_PX, BORDER_SAMPLES, Camera
+from tracker.geometry.cameras import BEYOND_PX, Camera
 from tracker.geometry.lens_tables import Lens, lens_of
 
 _STEPS_PER_PX = 2
 """Entries of the table per raw pixel along each axis."""
 _MAX_ENTRIES = 4096
 """Largest number of entries along each axis. Wide lenses have long borders."""
+_BORDER_SAMPLES = 64
+"""Points along each side of the image whose rays bound the table; a border bends little between two of them."""
 _ROWS_AT_ONCE = 64
 """Rows of the table that are filled at a time: all rows of a wide lens would take gigabytes."""
 
@@ -70,7 +72,7 @@ def _border(camera: Camera) -> tuple[Array, Array]:
     """Return the lowest and highest sensor coordinates of the image, (2,) each; of a fisheye's, as undistorted."""
     seen = camera.pinhole if camera.fisheye else camera
     width, height = seen.size
-    u, v = np.linspace(-1, width, BORDER_SAMPLES), np.linspace(-1, height, BORDER_SAMPLES)
+    u, v = np.linspace(-1, width, _BORDER_SAMPLES), np.linspace(-1, height, _BORDER_SAMPLES)
     sides = [np.stack(np.broadcast_arrays(a, b), axis=-1) for a, b in ((u, -1), (u, height), (-1, v), (width, v))]
     rays = seen.rays(np.concatenate(sides))
     xy = rays[:, :2] / rays[:, 2:]
