@@ -32,6 +32,8 @@ _SMOOTHING = 1.0
 _PRIOR_SAMPLES = 30.0
 """Weight of all views in the colours of a part, and of the whole body in its histograms of r, samples: those of a
 forearm in some five frames."""
+_CLEAR = 1.0
+"""Evidence of a sample that is clear, nats. A part whose usual evidence is less counts almost fully on all frames."""
 _ROUNDS = 2
 """Rounds of learning. In the second, parts count by how far they agree with the first."""
 
@@ -152,14 +154,14 @@ def _with_prior(counts: Array, of_body: IntArray) -> Array:
 
 
 def _agreement(models: Sequence[BodyModel], tables: ViewTables, shown: Sequence[_Shown], n_frames: int) -> Array:
-    """Return the weight of each part on each frame, (T, P): the square of its share of the usual evidence."""
+    """Return the weight of each part on each frame, (T, P), which falls with the distance from the usual evidence."""
     nats, samples = np.zeros((2, n_frames, tables.trust.shape[1]))
     for s in shown:
         own = tables.of_view(s.view)
         add_score(s.cells.colors, s.canvas, s.share, s.background, own, nats[s.frame], samples[s.frame])
     rates = nats / np.maximum(samples, 1e-9)
     best = usual(rates, models)
-    return np.where(best > 0, np.clip(rates / np.where(best > 0, best, 1.0), 0, 1) ** 2, 1.0)
+    return np.asarray(np.clip(1 - (best - rates) / np.maximum(best, _CLEAR), 0, 1) ** 2)
 
 
 def _bodies_of(models: Sequence[BodyModel]) -> IntArray:
