@@ -44,10 +44,15 @@ class LimbImages(NamedTuple):
     """Evidence of each cell for the other parts, (h, w), nats."""
     trust: FloatArray
     """T of each part of the limb in each cell, (n, h, w), nats."""
+
+
+class LimbCanvas(NamedTuple):
+    """Scratch for the limb in one view."""
+
     nearness: FloatArray
-    """Scratch, (h, w), 1/m."""
+    """1 / depth of the limb, (h, w), 1/m."""
     nats: FloatArray
-    """Scratch, (h, w), nats."""
+    """Evidence of the cell for the limb, (h, w), nats."""
     drawn: NDArray[np.int32]
     """1 + the last pose of the limb that covers each cell, (h, w); 0 at first."""
 
@@ -196,7 +201,7 @@ def fill_limb_images(
 @njit(**NO_REFCOUNT)
 def add_limb_scores(
     points: FloatArray, faces: NDArray[np.int32], to_px: FloatArray, share: float, images: LimbImages,
-    corners: FloatArray, nats: Array,
+    canvas: LimbCanvas, corners: FloatArray, nats: Array,
 ) -> None:  # fmt: skip
     """Add what each pose of a limb adds to the evidence of the static parts, (C,), nats.
 
@@ -206,11 +211,13 @@ def add_limb_scores(
         to_px: from the coordinates of each part to homogeneous cells, (C, n, 3, 4).
         share: see above.
         images: the view.
+        canvas: scratch.
         corners: scratch, (k, 3).
         nats: added to.
     """
-    height, width = images.nearness.shape
-    hidden, drawn, nearness, own = images.static.nearness, images.drawn, images.nearness, images.nats
+    nearness, own, drawn = canvas
+    height, width = nearness.shape
+    hidden = images.static.nearness
     for c in range(to_px.shape[0]):
         total = 0.0
         for part in range(points.shape[0]):

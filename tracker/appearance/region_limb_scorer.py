@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.appearance.part_drawing import Canvas, draw, meshes_of
-from tracker.appearance.region_kernels import LimbImages, add_limb_scores, fill_limb_images
+from tracker.appearance.region_kernels import LimbCanvas, LimbImages, add_limb_scores, fill_limb_images
 from tracker.appearance.region_model import RegionFrame, RegionModel, sample_share
 from tracker.body.kinematics import chain_poses
 from tracker.body.model import PosedBody, parts_of
@@ -26,7 +26,7 @@ class _View(NamedTuple):
 
 
 class RegionLimbScorer:
-    """Scores one limb of an otherwise static body. Use one scorer in each thread."""
+    """Scores one limb of an otherwise static body. Thread-safe."""
 
     def __init__(
         self, known: RegionModel, frame: RegionFrame, bodies: Sequence[PosedBody], person: int, limb: IntArray
@@ -55,17 +55,13 @@ class RegionLimbScorer:
             shape, P = view.colors.shape[:2], view.camera.projection
             canvas = draw(meshes._replace(points=meshes.points[static]), P, Ts[static], *shape)
             labels = np.append(0, static + 1).astype(np.uint8)[canvas.labels]
-            images = LimbImages(
-                Canvas(canvas.nearness, labels), np.empty(shape, np.float32), np.empty((len(limb), *shape), np.float32),
-                np.empty(shape, np.float32), np.empty(shape, np.float32), np.zeros(shape, np.int32),
-            )  # fmt: skip
+            nats, trust = np.empty(shape, np.float32), np.empty((len(limb), *shape), np.float32)
+            images = LimbImages(Canvas(canvas.nearness, labels), nats, trust)
             share = sample_share(view.camera)
             fill_limb_images(view.colors, share, frame.background[i], known.tables.of_view(i), parts, images)
             self._views.append(_View(P, share, images))
-
-    def static_nats(self) -> float:
-        """Return the evidence of all bodies without the limb, nats."""
-        return float(sum(v.images.static_nats.sum() for v in self._views))
+        self.static_nats = float(sum(v.images.static_nats.sum() for v in self._views))
+        """Evidence for all bodies without the limb, nats."""
 
     def __call__(self, poses: Array) -> Array:
         """Return what the limb adds to the evidence in many poses, (C, n_values), that differ in the limb only, (C,),
@@ -76,6 +72,7 @@ class RegionLimbScorer:
         Ts = chain_poses(self._model.tree, self._rest, self._limb, poses)
         nats, corners = np.zeros(len(poses)), np.empty((self._points.shape[2], 3), np.float32)
         for P, share, images in self._views:
-            images.drawn[:] = 0
-            add_limb_scores(self._points, self._faces, (P @ Ts).astype(np.float32), share, images, corners, nats)
+            shape, to_px = images.static_nats.shape, (P @ Ts).astype(np.float32)
+            canvas = LimbCanvas(np.empty(shape, np.float32), np.empty(shape, np.float32), np.zeros(shape, np.int32))
+            add_limb_scores(self._points, self._faces, to_px, share, images, canvas, corners, nats)
         return nats

@@ -76,26 +76,41 @@ class RegionModel:
         ]
         return RegionFrame(cells, tuple(background))
 
+    def nats(self, frame: RegionFrame, bodies: Sequence[PosedBody]) -> float:
+        """Return the sum of `score(...).nats`, in less time."""
+        return float(self._parts(frame, self._draw(frame, bodies))[0].sum())
+
     def score(self, frame: RegionFrame, bodies: Sequence[PosedBody]) -> RegionScore:
-        """Return the evidence for posed bodies, of the models that were learnt."""
-        (n_views, n_parts), n_limbs = self.tables.trust.shape[:2], sum(len(limbs(m)) for m in self.models)
-        out = RegionScore(*(np.zeros((n_views, n)) for n in (n_parts, n_parts, n_limbs)))
+        """Return the evidence of each part in each view, for bodies of the models that were learnt."""
+        drawn = self._draw(frame, bodies)
+        unexplained = np.zeros((len(frame.views), sum(len(limbs(m)) for m in self.models)))
         ends, parts, of_limb = _limb_axes(bodies)
-        for i, view in enumerate(frame.views):
-            if view is None:
+        for i, (view, canvas) in enumerate(zip(frame.views, drawn, strict=True)):
+            if view is None or canvas is None:
                 continue
-            canvas, tables, share = draw_bodies(bodies, view), self.tables.of_view(i), sample_share(view.camera)
-            add_score(view.colors, canvas, share, frame.background[i], tables, out.nats[i], out.samples[i])
-            depths = view.camera.depths(ends)
+            depths, share = view.camera.depths(ends), sample_share(view.camera)
             shown = depths.min(axis=1) > NEAR_PLANE_M
             depth, px = depths[shown].mean(axis=1), view.camera.project(ends[shown]).reshape(-1, 4)
             reach, weight = REACH_M * view.camera.K[0, 0] / depth, share * depth**2
             axes = np.concatenate([px, reach[:, None], weight[:, None]], axis=1)
             add_unexplained(
-                view.colors, canvas.labels, frame.background[i], tables, axes, parts[shown], of_limb[shown],
-                out.unexplained[i],
+                view.colors, canvas.labels, frame.background[i], self.tables.of_view(i), axes, parts[shown],
+                of_limb[shown], unexplained[i],
             )  # fmt: skip
-        return out
+        return RegionScore(*self._parts(frame, drawn), unexplained)
+
+    @staticmethod
+    def _draw(frame: RegionFrame, bodies: Sequence[PosedBody]) -> list[Canvas | None]:
+        return [None if view is None else draw_bodies(bodies, view) for view in frame.views]
+
+    def _parts(self, frame: RegionFrame, drawn: Sequence[Canvas | None]) -> tuple[Array, Array]:
+        """Return the first two fields of a score."""
+        nats, samples = np.zeros((2, len(frame.views), self.tables.trust.shape[1]))
+        for i, (view, canvas) in enumerate(zip(frame.views, drawn, strict=True)):
+            if view is not None and canvas is not None:
+                at = view.colors, canvas, sample_share(view.camera), frame.background[i]
+                add_score(*at, self.tables.of_view(i), nats[i], samples[i])
+        return nats, samples
 
 
 def background_of(known: BackgroundDensity, view: CellView, canvas: Canvas) -> FloatArray:

@@ -1,0 +1,121 @@
+"""Repair the pose of a person on one frame: refine it without the prediction, and search every limb.
+
+A tracker searches the limbs that seem lost. Most wrong limbs do not: they lie on edges, and the search would have found
+the right place. Therefore all are searched, and poses are compared by contours and region evidence together.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.appearance.part_colors import PartColors
+from tracker.appearance.region_limb_scorer import RegionLimbScorer
+from tracker.appearance.region_model import RegionFrame, RegionModel
+from tracker.body.limbs import Limb
+from tracker.body.model import PosedBody
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.contour_residuals import MIN_DECREASE
+from tracker.fitting.gauss_newton_compiled import solver_of
+from tracker.fitting.hypothesis import Hypothesis
+from tracker.geometry.arrays import Array
+from tracker.tracking.estimation.frame_problem import Bodies, with_body
+from tracker.tracking.estimation.limb_recovery import search_limbs
+from tracker.tracking.estimation.pose_score import PoseScorer, scorer_without_prediction
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings
+
+MIN_GAIN_NATS = 6.0
+"""Smallest gain for which a tracked pose is replaced, nats: the other is then 400 times more likely."""
+
+
+class RegionEvidence(NamedTuple):
+    """Region evidence of a frame."""
+
+    known: RegionModel
+    frame: RegionFrame
+
+
+class Repair(NamedTuple):
+    """The best pose of a person on a frame."""
+
+    pose: Array
+    """Pose, (n_values,): the tracked one unless another is better by `MIN_GAIN_NATS`."""
+    gain: float
+    """How much less the best pose costs than the tracked one, nats, at least 0."""
+    alternatives: tuple[Hypothesis, ...]
+    """Poses about as good as the best, with a limb elsewhere, cheapest first."""
+
+
+@dataclass(frozen=True, eq=False)
+class RegionScorer(PoseScorer):
+    """Scores poses by contours, priors and region evidence. Colours of parts only rank proposals."""
+
+    region: RegionEvidence
+    bodies: Bodies
+    """All people; the scored person may be in any pose."""
+    person: int
+    """Index of the scored person."""
+    limb: Limb | None = None
+    """The limb in which poses differ; None if they may differ everywhere."""
+    limb_scorers: dict[bytes, RegionLimbScorer] = field(default_factory=dict)
+    """Scorer of the limb by the rest of the pose."""
+
+    def restricted_to(self, limb: Limb) -> "RegionScorer":
+        """See `PoseScorer.restricted_to`."""
+        return _with_region(super().restricted_to(limb), self.region, self.bodies, self.person, limb)
+
+    def _color_costs(self, poses: Array) -> Array:
+        if self.limb is None:
+            return -np.array([self.region.known.nats(self.region.frame, self._bodies(pose)) for pose in poses])
+        moves = np.isin(np.arange(poses.shape[1]), self.bodies[self.person].model.dof_value[self.limb.dofs])
+        rests, nats = [pose[~moves].tobytes() for pose in poses], np.zeros(len(poses))
+        for rest in set(rests):
+            own = np.array([r == rest for r in rests])
+            nats[own] = self._limb_nats(rest, poses[own])
+        return -nats
+
+    def _limb_nats(self, rest: bytes, poses: Array) -> Array:
+        """Return the evidence for poses, (n, n_values), of one rest, (n,), nats."""
+        assert self.limb is not None
+        scorer = self.limb_scorers.get(rest)
+        if scorer is None:
+            scorer = RegionLimbScorer(*self.region, self._bodies(poses[0]), self.person, self.limb.parts)
+            self.limb_scorers[rest] = scorer
+        return scorer(poses) + scorer.static_nats
+
+    def _bodies(self, pose: Array) -> Bodies:
+        return with_body(self.bodies, self.person, PosedBody(self.bodies[self.person].model, pose))
+
+
+def better_limbs(
+    views: Sequence[ViewEvidence], bodies: Bodies, person: int, region: RegionEvidence, settings: EstimationSettings,
+    searched: Sequence[Limb], others: Sequence[Array] = (), part_colors: PartColors | None = None,
+) -> Repair:  # fmt: skip
+    """Refine the pose of a person without the prediction, and search limbs.
+
+    Args:
+        views: evidence of the frame around all people, with all edges that may be theirs; see `common_evidence`.
+        bodies: all people as tracked; the others stay.
+        person: index of the person.
+        region: region evidence of the frame.
+        settings: of the tracker.
+        searched: the limbs to search, likeliest lost first; see `region_deficit.limb_deficits`.
+        others: poses whose limbs are tried as they are, such as those of the frames around, (n_values,) each.
+        part_colors: colours that rank proposals; None where they are unknown.
+    """
+    model, tracked = bodies[person].model, bodies[person].values
+    plain = scorer_without_prediction(views, bodies, person, settings, part_colors)
+    scorer = _with_region(plain, region, bodies, person)
+    fit = solver_of(model)(model, tracked, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+    before = float(scorer.costs_with_priors(model, tracked[None])[0])
+    best, *rest = search_limbs(model, searched, scorer.scored(model, fit), others, scorer)
+    gain = max(0.0, before - best.cost)
+    return Repair(best.pose if gain > MIN_GAIN_NATS else tracked, gain, tuple(rest))
+
+
+def _with_region(
+    plain: PoseScorer, region: RegionEvidence, bodies: Bodies, person: int, limb: Limb | None = None
+) -> RegionScorer:
+    own = {f.name: getattr(plain, f.name) for f in fields(PoseScorer)}
+    return RegionScorer(**own, region=region, bodies=bodies, person=person, limb=limb)
