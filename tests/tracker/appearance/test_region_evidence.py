@@ -2,79 +2,24 @@
 
 import numpy as np
 import pytest
-from staging import SUIT, cameras_around, painted, posed
+from region_scenes import WALL, Walk, limb_of
+from staging import SUIT
 
 from tracker.appearance.part_drawing import draw_bodies
 from tracker.appearance.region_cells import CELL_PX, cells_of
 from tracker.appearance.region_deficit import limb_deficits
-from tracker.appearance.region_learning import LearningFrame, isotonic, learn_regions
+from tracker.appearance.region_learning import isotonic
 from tracker.appearance.region_limb_scorer import RegionLimbScorer
 from tracker.appearance.region_model import SAMPLE_M
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.contours.label_image import part_labels
-from tracker.evidence.view_evidence import ViewEvidence
 from tracker.images.color_histogram import BINS
-
-CAMERAS = cameras_around(2, size=(320, 240))
-CAMERAS = [c.cropped((0, 0, 319, 239)) for c in CAMERAS]
-N_FRAMES = 12
-WALL = (40, 90, 60)
-
-
-def filmed(bodies, suit, rng, wall=WALL):
-    """Views of bodies with noise; the second is a region with odd borders."""
-    views = []
-    for i, camera in enumerate(CAMERAS):
-        image = painted(bodies, camera, suit, wall).astype(int)
-        image = np.clip(image + rng.normal(0, 2, image.shape), 0, 255).astype(np.uint8)
-        box = (0, 0, 319, 239) if i == 0 else (33, 5, 290, 236)
-        u0, v0, u1, v1 = box
-        empty = np.empty((0, 2), np.float32)
-        distance = np.zeros((v1 - v0, u1 - u0), np.float32)
-        colors = np.ascontiguousarray(image[v0:v1, u0:u1])
-        views.append(ViewEvidence(camera.cropped(box), 1.0, empty, distance, (u0, v0), colors=colors))
-    return tuple(views)
-
-
-def moment(model, k):
-    """A figure that walks past."""
-    values = posed(model, k)
-    values[0] += 0.9 * (k / (N_FRAMES - 1) - 0.5)
-    values[1] += 1.2 * (k / (N_FRAMES - 1) - 0.5)
-    return values
-
-
-def with_limb(model, values, name, turn):
-    """The same figure with a limb elsewhere."""
-    limb = next(x for x in limbs(model) if x.name == name)
-    return model.clip(model.retract(values, turn * limb.dofs))
-
-
-class Run:
-    """A recording in which the right leg is wrong on every fourth frame."""
-
-    def __init__(self, model, suit, wall=WALL):
-        rng = np.random.default_rng(0)
-        self.model = model
-        self.true = [[PosedBody(model, moment(model, k))] for k in range(N_FRAMES)]
-        self.wrong = np.arange(N_FRAMES) % 4 == 1
-        self.tracked = [
-            [PosedBody(model, with_limb(model, b[0].values, "right_calf", -0.6))] if wrong else b
-            for b, wrong in zip(self.true, self.wrong, strict=True)
-        ]
-        self.views = [filmed(b, suit, rng, wall) for b in self.true]
-        self.known = learn_regions(
-            [LearningFrame(v, b) for v, b in zip(self.views, self.tracked, strict=True)], CAMERAS
-        )
-
-    def score(self, k, bodies):
-        return self.known.score(self.known.frame(self.views[k], bodies), bodies)
 
 
 @pytest.fixture(scope="module")
 def run(gavrila):
-    return Run(gavrila, SUIT)
+    return Walk(gavrila, SUIT)
 
 
 def plain_score(known, frame, bodies):
@@ -123,7 +68,7 @@ def test_a_limb_scorer_is_a_score_of_all_parts(run):
     model, pose = run.model, run.true[5][0].values
     frame, rng = run.known.frame(run.views[5], run.true[5]), np.random.default_rng(1)
     for name in ("left_forearm", "right_calf"):
-        limb = next(x for x in limbs(model) if x.name == name)
+        limb = limb_of(model, name)
         poses = np.array(
             [model.clip(model.retract(pose, rng.normal(0, 0.6, model.n_dofs) * limb.dofs)) for _ in range(9)]
         )
@@ -147,7 +92,7 @@ def test_the_deficit_shows_the_limbs_that_are_wrong(run):
 
 def test_clothes_like_the_wall_are_not_trusted(gavrila, run):
     """Legs in the colour of the wall have no evidence, without any rule; the rest keeps its own."""
-    dull = Run(gavrila, SUIT | dict.fromkeys(("thigh", "calf"), WALL))
+    dull = Walk(gavrila, SUIT | dict.fromkeys(("thigh", "calf"), WALL))
     calf, torso = (gavrila.part_index[n] for n in ("left_calf", "torso"))
     rates = []
     for each in (dull, run):

@@ -1,0 +1,46 @@
+"""Repair of a leg that lies elsewhere, by contours and region evidence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from region_scenes import Walk, limb_of
+from staging import SUIT
+
+from tracker.fitting.hypothesis import SAME_POSE_M
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimation.limb_repair import MIN_GAIN_NATS, RegionEvidence, better_limbs
+from tracker.tracking.estimation.settings import RecoverSettings
+
+SETTINGS = replace(TrackSettings(), recover=RecoverSettings(proposals=256, n_local_search=12, n_limb_refined=4))
+
+
+@pytest.fixture(scope="module")
+def walk(gavrila):
+    return Walk(gavrila, SUIT)
+
+
+def repaired(walk, k):
+    bodies = tuple(walk.tracked[k])
+    region = RegionEvidence(walk.known, walk.known.frame(walk.views[k], bodies))
+    return better_limbs(walk.views[k], bodies, 0, region, SETTINGS, [limb_of(walk.model, "right_calf")])
+
+
+def off_m(walk, k, pose):
+    """Largest distance of a point of the leg from the truth, metres."""
+    points = np.isin(walk.model.point_parts, limb_of(walk.model, "right_calf").parts)
+    true = walk.true[k][0].points_world
+    return np.linalg.norm(walk.model.points_world(pose) - true, axis=1)[points].max()
+
+
+def test_a_wrong_leg_is_found(walk):
+    assert off_m(walk, 5, walk.tracked[5][0].values) > 2 * SAME_POSE_M
+    found = repaired(walk, 5)
+    assert found.gain > 5 * MIN_GAIN_NATS
+    assert off_m(walk, 5, found.pose) < SAME_POSE_M
+
+
+def test_a_right_pose_stays(walk):
+    found = repaired(walk, 3)
+    assert found.gain < MIN_GAIN_NATS
+    assert np.array_equal(found.pose, walk.tracked[3][0].values)
