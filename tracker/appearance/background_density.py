@@ -10,33 +10,25 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.appearance.color_shares import VOLUME, smoothed_shares
+from tracker.appearance.color_shares import log_density
 from tracker.appearance.region_cells import CellView
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import FloatArray, Image, Mask
+from tracker.images.background_model import MAD_TO_SIGMA
+from tracker.images.background_subtraction import MAX_HUE_SHIFT, MIN_SHADE, exposure_gain, has_usable_exposure
+from tracker.images.change import NOISE_SIGMAS
 from tracker.images.color_histogram import BINS, bin_of
 
 _MIN_SEEN = 8
 """Fewest frames in which a cell was open, for a colour of its own."""
 _MIN_NOISE = 2.0
-"""Smallest standard deviation of a channel, gray levels: rounding, and what a compressed video leaves out."""
-_MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal distribution by its median absolute deviation."""
-_DARKEST = 0.4
-"""Brightness of the darkest shadow, as a share of the background."""
-_HUE_NOISE = 3.0
-"""Standard deviation of a channel about the darkened background within a shadow, gray levels."""
-_OUTLIER_SIGMAS = 4.0
-"""Distance from the usual colour beyond which a colour is an outlier, in standard deviations of a channel."""
+"""Smallest standard deviation of a channel, gray levels: rounding, and the losses of a compressed video."""
 _BLOCK = 8
-"""Side of the blocks that share the rates of outliers and shadows, cells."""
-_PRIOR_CELLS = 100.0
-"""Weight of the rates of the whole view in those of a block, cells."""
-_GAIN_STEP, _MIN_GAIN_CELLS = 3, 50
-"""Every third cell of each direction measures the gain, and the fewest of them whose median gives one."""
-_DARK, _BRIGHT = 20.0, 235.0
-"""Gray levels between which a ratio of colours is reliable, as for `background_subtraction.exposure_gain`."""
+"""Side of the blocks that share the rates of outliers and shadows, cells. The rates of the whole view count as much as
+one frame of a block; every fourth cell of a row or column measures the exposure."""
+_HUE_NOISE = MAX_HUE_SHIFT / 2
+"""Standard deviation of a channel about the darkened background within a shadow, gray levels."""
 
 
 class BackgroundDensity(NamedTuple):
@@ -56,14 +48,11 @@ class BackgroundDensity(NamedTuple):
     def gain(self, view: CellView, open_cells: Mask) -> FloatArray:
         """Return the gain of each channel of a frame over the usual colours, (3,), by the cells that show nobody."""
         rows, columns = _box(view)
-        few = (slice(None, None, _GAIN_STEP), slice(None, None, _GAIN_STEP))
+        few = (slice(None, None, _BLOCK // 2), slice(None, None, _BLOCK // 2))
         chosen = open_cells[few] & (self.noise[rows, columns][few] > 0)
-        colors, usual = view.colors[few][chosen], self.mean[rows, columns][few][chosen]
-        usable = (usual > _DARK) & (usual < _BRIGHT) & (colors < _BRIGHT)
-        usable = usable[:, 0] & usable[:, 1] & usable[:, 2]
-        if np.count_nonzero(usable) < _MIN_GAIN_CELLS:
-            return np.ones(3, np.float32)
-        return np.median(colors[usable] / usual[usable], axis=0).astype(np.float32)
+        colors, usual = view.colors[few][chosen].astype(np.float32), self.mean[rows, columns][few][chosen]
+        usable = has_usable_exposure(usual)
+        return exposure_gain(colors[usable], usual[usable])
 
     def log_density(self, view: CellView, gain: FloatArray) -> FloatArray:
         """Return the log density of the colour of each cell as background, (h, w), per cubic gray level."""
@@ -143,7 +132,7 @@ def _medians(values: FloatArray, n: NDArray[np.int64], mean: FloatArray, noise: 
                 middle = np.median(own)
                 mean[v, u, c] = middle
                 largest = max(largest, np.median(np.abs(own - middle)))
-            noise[v, u] = max(_MIN_NOISE, _MAD_TO_SIGMA * largest)
+            noise[v, u] = max(_MIN_NOISE, MAD_TO_SIGMA * largest)
 
 
 def _with_rates(
@@ -161,12 +150,12 @@ def _with_rates(
         )  # fmt: skip
     total = blocks.sum(axis=(1, 2)) + 1.0
     shares = total / total.sum()
-    rates = (blocks + _PRIOR_CELLS * shares[:, None, None]) / (blocks.sum(axis=0) + _PRIOR_CELLS)
+    rates = (blocks + _BLOCK**2 * shares[:, None, None]) / (blocks.sum(axis=0) + _BLOCK**2)
     known = before.noise > 0
     shadow, outlier = (
         np.repeat(np.repeat(rates[i], _BLOCK, axis=0), _BLOCK, axis=1)[: shape[0], : shape[1]] for i in (1, 2)
     )
-    density = np.asarray(smoothed_shares(counts) / VOLUME, np.float32)
+    density = np.exp(log_density(counts)).astype(np.float32)
     outlier, shadow = np.where(known, outlier, 1.0), np.where(known, shadow, 0.0)
     return before._replace(
         outlier=outlier.astype(np.float32), shadow=shadow.astype(np.float32), outlier_density=density
@@ -189,9 +178,9 @@ def _count(
             kind = 2
             if noise[v, u] > 0.0:
                 apart, shade, aside = _compare(colors, v, u, mean, gain)
-                if apart < (_OUTLIER_SIGMAS * noise[v, u]) ** 2:
+                if apart < (NOISE_SIGMAS * noise[v, u]) ** 2:
                     kind = 0
-                elif _DARKEST < shade < 1.0 and aside < (_OUTLIER_SIGMAS * max(noise[v, u], _HUE_NOISE)) ** 2:
+                elif MIN_SHADE < shade < 1.0 and aside < (NOISE_SIGMAS * max(noise[v, u], _HUE_NOISE)) ** 2:
                     kind = 1
                 blocks[kind, (top + v) // _BLOCK, (left + u) // _BLOCK] += 1.0
             if kind == 2:
@@ -227,10 +216,10 @@ def _log_density(
                 apart, shade, aside = _compare(colors, v, u, mean, gain)
                 usual = 1.0 - outlier[v, u] - shadow[v, u]
                 p += usual * np.exp(-0.5 * apart / sigma**2) / (15.7496 * sigma**3)  # (2 pi)^1.5
-                if _DARKEST < shade < 1.0:
+                if MIN_SHADE < shade < 1.0:
                     s = max(sigma, _HUE_NOISE)
                     length = np.sqrt(mean[v, u, 0] ** 2 + mean[v, u, 1] ** 2 + mean[v, u, 2] ** 2) + 1.0
-                    p += shadow[v, u] * np.exp(-0.5 * aside / s**2) / (6.2832 * s**2 * (1.0 - _DARKEST) * length)
+                    p += shadow[v, u] * np.exp(-0.5 * aside / s**2) / (6.2832 * s**2 * (1.0 - MIN_SHADE) * length)
             out[v, u] = np.log(p + 1e-30)
 
 

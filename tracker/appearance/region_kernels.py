@@ -16,23 +16,22 @@ from tracker.images.color_histogram import bin_of
 
 N_RATIOS, RATIO_STEP = 48, 0.5
 """Number of bins of the log ratio r, which is 0 in the middle, and their width, nats."""
-_LOG_HALF = float(np.log(0.5))
 
 
-class ViewTables(NamedTuple):
+class RegionTables(NamedTuple):
     """What is learnt of the parts in one view, or in several with one more axis in front. Parts are counted through all
     bodies."""
 
     log_density: FloatArray
     """Log density of each colour on each part, (P, BINS^3), per cubic gray level."""
     log_rest: FloatArray
-    """Log of half the density of each colour on the rest of the person, (P, BINS^3), per cubic gray level."""
+    """Log density of each colour on the rest of the person, (P, BINS^3), per cubic gray level."""
     trust: FloatArray
     """T of each bin of r, (P, `N_RATIOS`), nats."""
 
-    def of_view(self, view: int) -> "ViewTables":
+    def of_view(self, view: int) -> "RegionTables":
         """Return the tables of one of several views."""
-        return ViewTables(*(table[view] for table in self))
+        return RegionTables(*(table[view] for table in self))
 
 
 class LimbImages(NamedTuple):
@@ -58,10 +57,9 @@ class LimbCanvas(NamedTuple):
 
 
 @njit(**NO_REFCOUNT)
-def ratio_bin(tables: ViewTables, part: int, color: int, background: float) -> int:
-    """Return the bin of r of a colour: that of the part against the likelier half of background and rest of the
-    body."""
-    ratio = tables.log_density[part, color] - max(tables.log_rest[part, color], background + _LOG_HALF)
+def ratio_bin(tables: RegionTables, part: int, color: int, background: float) -> int:
+    """Return the bin of r of a colour: that of the part against the likelier of background and rest of the body."""
+    ratio = tables.log_density[part, color] - max(tables.log_rest[part, color], background)
     return min(N_RATIOS - 1, max(0, int(np.floor(ratio / RATIO_STEP)) + N_RATIOS // 2))
 
 
@@ -78,7 +76,7 @@ def count_colors(colors: Image, canvas: Canvas, share: float, weight: Array, cou
 
 @njit(**NO_REFCOUNT)
 def count_ratios(
-    colors: Image, canvas: Canvas, share: float, background: FloatArray, tables: ViewTables, weight: Array,
+    colors: Image, canvas: Canvas, share: float, background: FloatArray, tables: RegionTables, weight: Array,
     under: Array,
 ) -> None:  # fmt: skip
     """Add r under each part to histograms, (P, `N_RATIOS`), in samples, by the weight of each part, (P,)."""
@@ -93,7 +91,7 @@ def count_ratios(
 
 @njit(**NO_REFCOUNT)
 def count_ratios_around(
-    colors: Image, canvas: Canvas, share: float, background: FloatArray, tables: ViewTables, reach: float,
+    colors: Image, canvas: Canvas, share: float, background: FloatArray, tables: RegionTables, reach: float,
     around: Array,
 ) -> None:  # fmt: skip
     """Add r around each visible part to histograms, (P, `N_RATIOS`), in samples.
@@ -127,7 +125,7 @@ def count_ratios_around(
 
 @njit(**NO_REFCOUNT)
 def add_score(
-    colors: Image, canvas: Canvas, share: float, background: FloatArray, tables: ViewTables, nats: Array,
+    colors: Image, canvas: Canvas, share: float, background: FloatArray, tables: RegionTables, nats: Array,
     samples: Array,
 ) -> None:  # fmt: skip
     """Add the evidence of each visible part, (P,), nats, and the samples that show it, (P,)."""
@@ -142,7 +140,7 @@ def add_score(
 
 @njit(**NO_REFCOUNT)
 def add_unexplained(
-    colors: Image, labels: NDArray[np.uint8], background: FloatArray, tables: ViewTables, axes: Array,
+    colors: Image, labels: NDArray[np.uint8], background: FloatArray, tables: RegionTables, axes: Array,
     parts: IntArray, limbs: IntArray, nats: Array,
 ) -> None:  # fmt: skip
     """Add the evidence for each limb, (n_limbs,), nats, in cells near it that no body covers.
@@ -181,7 +179,7 @@ def add_unexplained(
 
 @njit(**NO_REFCOUNT)
 def fill_limb_images(
-    colors: Image, share: float, background: FloatArray, tables: ViewTables, parts: IntArray, images: LimbImages
+    colors: Image, share: float, background: FloatArray, tables: RegionTables, parts: IntArray, images: LimbImages
 ) -> None:
     """Fill the evidence of each cell for the static parts, and T of some parts, (n,)."""
     nearness, labels = images.static

@@ -6,13 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.appearance.background_density import BackgroundDensity, learn_background
-from tracker.appearance.color_shares import VOLUME, smoothed_shares
+from tracker.appearance.color_shares import log_density
+from tracker.appearance.part_colors import MAX_NATS
 from tracker.appearance.part_drawing import Canvas, draw_bodies, grown
 from tracker.appearance.region_cells import CELL_PX, CellView, cells_of, cells_of_image
 from tracker.appearance.region_deficit import counterparts, usual
 from tracker.appearance.region_kernels import (
     N_RATIOS,
-    ViewTables,
+    RegionTables,
     add_score,
     count_colors,
     count_ratios,
@@ -25,17 +26,11 @@ from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.images.color_histogram import BINS
 
-MAX_NATS = 3.0
-"""Largest evidence of one sample, nats: one, even of the purest colour, must not outweigh the rest of a part."""
-_SMOOTHING = 1.0
-"""Standard deviation of the Gaussian that smooths histograms of r, bins."""
 _PRIOR_SAMPLES = 30.0
 """Weight of all views in the colours of a part, and of the whole body in its histograms of r, samples: those of a
 forearm in some five frames."""
 _CLEAR = 1.0
 """Evidence of a sample that is clear, nats. A part whose usual evidence is less counts almost fully on all frames."""
-_ROUNDS = 2
-"""Rounds of learning. In the second, parts count by how far they agree with the first."""
 
 
 class LearningFrame(NamedTuple):
@@ -84,7 +79,7 @@ def learn_regions(
         backgrounds.append(_background(camera, drawn, empty[i] if empty else None))
         shown += [_Shown(k, i, c, canvas, background_of(backgrounds[i], c, canvas)) for k, c, canvas in drawn]
     weights = np.ones((len(frames), sum(len(m.parts) for m in models)))
-    for _ in range(_ROUNDS):
+    for _ in range(2):  # In the second round, parts count by how far they agree with the first.
         tables = _calibrated(_colors(models, shown, weights, len(cameras)), models, shown, weights)
         weights = _agreement(models, tables, shown, len(frames))
     return RegionModel(models, tuple(backgrounds), tables)
@@ -111,7 +106,7 @@ def _background(
     return learn_background([c for _, c, _ in drawn], occupied, shape, scene)
 
 
-def _colors(models: Sequence[BodyModel], shown: Sequence[_Shown], weights: Array, n_views: int) -> ViewTables:
+def _colors(models: Sequence[BodyModel], shown: Sequence[_Shown], weights: Array, n_views: int) -> RegionTables:
     """Learn the colours of each part in each view, by its weight on each frame, (T, P). T is 0 in these tables."""
     n_parts = weights.shape[1]
     counts = np.zeros((n_views, n_parts, BINS**3))
@@ -124,11 +119,13 @@ def _colors(models: Sequence[BodyModel], shown: Sequence[_Shown], weights: Array
     is_rest = of_body[:, None] == of_body
     is_rest[range(n_parts), range(n_parts)] = is_rest[range(n_parts), twins] = False
     rest = is_rest.astype(np.float64) @ counts
-    log_density, log_rest = (np.log(smoothed_shares(c) / VOLUME).astype(np.float32) for c in (counts + prior, rest))
-    return ViewTables(log_density, log_rest, np.zeros((n_views, n_parts, N_RATIOS), np.float32))
+    own, others = (log_density(c).astype(np.float32) for c in (counts + prior, rest))
+    return RegionTables(own, others, np.zeros((n_views, n_parts, N_RATIOS), np.float32))
 
 
-def _calibrated(tables: ViewTables, models: Sequence[BodyModel], shown: Sequence[_Shown], weights: Array) -> ViewTables:
+def _calibrated(
+    tables: RegionTables, models: Sequence[BodyModel], shown: Sequence[_Shown], weights: Array
+) -> RegionTables:
     """Return tables with T."""
     under, around = np.zeros(tables.trust.shape), np.zeros(tables.trust.shape)
     for s in shown:
@@ -147,13 +144,13 @@ def _with_prior(counts: Array, of_body: IntArray) -> Array:
     """Return smoothed shares of r, (V, P, `N_RATIOS`), shrunk to those of the whole body in all views."""
     from scipy.ndimage import gaussian_filter1d  # imported lazily: loading takes 0.1 s
 
-    smooth = np.asarray(gaussian_filter1d(counts, _SMOOTHING, axis=-1, mode="nearest")) + 1e-3
+    smooth = np.asarray(gaussian_filter1d(counts, 1.0, axis=-1, mode="nearest")) + 1e-3
     whole = np.array([smooth[:, of_body == b].sum(axis=(0, 1)) for b in of_body])
     prior = _PRIOR_SAMPLES * whole / whole.sum(axis=-1, keepdims=True)
     return np.asarray((smooth + prior) / (smooth.sum(axis=-1, keepdims=True) + _PRIOR_SAMPLES))
 
 
-def _agreement(models: Sequence[BodyModel], tables: ViewTables, shown: Sequence[_Shown], n_frames: int) -> Array:
+def _agreement(models: Sequence[BodyModel], tables: RegionTables, shown: Sequence[_Shown], n_frames: int) -> Array:
     """Return the weight of each part on each frame, (T, P), which falls with the distance from the usual evidence."""
     nats, samples = np.zeros((2, n_frames, tables.trust.shape[1]))
     for s in shown:

@@ -15,7 +15,7 @@ import numpy as np
 from tracker.appearance.background_density import BackgroundDensity
 from tracker.appearance.part_drawing import Canvas, draw_bodies, grown
 from tracker.appearance.region_cells import CellView, cells_of
-from tracker.appearance.region_kernels import ViewTables, add_score, add_unexplained
+from tracker.appearance.region_kernels import RegionTables, add_score, add_unexplained
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours.occluding_contours import part_poses
@@ -59,7 +59,7 @@ class RegionModel:
     """All people."""
     backgrounds: tuple[BackgroundDensity, ...]
     """Background of each view."""
-    tables: ViewTables
+    tables: RegionTables
     """Tables of all views: (V, P, ...)."""
 
     def frame(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> RegionFrame:

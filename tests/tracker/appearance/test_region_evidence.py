@@ -33,7 +33,7 @@ def plain_score(known, frame, bodies):
             r, g, b = view.colors[v, u].astype(int) * BINS // 256
             color = (r * BINS + g) * BINS + b
             log_part, log_rest, trust = (table[i, p] for table in known.tables)
-            ratio = log_part[color] - max(log_rest[color], frame.background[i][v, u] + np.log(0.5))
+            ratio = log_part[color] - max(log_rest[color], frame.background[i][v, u])
             side_m = 1 / (view.camera.K[0, 0] * nearness[v, u])
             samples[i, p] += (side_m / SAMPLE_M) ** 2
             nats[i, p] += (side_m / SAMPLE_M) ** 2 * trust[int(np.clip(np.floor(ratio / 0.5) + 24, 0, 47))]

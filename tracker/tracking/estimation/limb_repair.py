@@ -18,14 +18,14 @@ from tracker.body.model import PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton_compiled import solver_of
-from tracker.fitting.hypothesis import Hypothesis
+from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
 from tracker.tracking.estimation.limb_recovery import search_limbs
 from tracker.tracking.estimation.pose_score import PoseScorer, scorer_without_prediction
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings
 
-MIN_GAIN_NATS = 6.0
+MIN_GAIN_NATS = 2 * CLEAR_NATS
 """Smallest gain for which a tracked pose is replaced, nats: the other is then 400 times more likely."""
 
 
