@@ -7,8 +7,9 @@ then of frames, by their worst limb. Nothing is fitted to errors. The head does 
 joints.
 
 `--displaced` measures errors that the tracker does not make often enough: 7% of the limbs are put where they are on
-another frame, and refined there without the prediction. No stored probabilities belong to these poses. `--repair` searches the limbs whose deficit is large on all
-frames, and counts the frames that are off before and after. Poses are learnt from as they are, wrong ones included.
+another frame, and refined there without the prediction. No stored probabilities belong to these poses. `--repair`
+searches the limbs whose deficit is large on all frames, and counts the frames that are off before and after. Poses are
+learnt from as they are, wrong ones included.
 """
 
 import argparse
