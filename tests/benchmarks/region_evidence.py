@@ -29,7 +29,7 @@ from tracker.appearance.part_colors import Colors
 from tracker.appearance.region_deficit import limb_deficits
 from tracker.appearance.region_learning import LearningFrame, learn_regions
 from tracker.appearance.region_model import RegionModel
-from tracker.body.limbs import Limb, limbs
+from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
@@ -41,7 +41,7 @@ from tracker.session.session import Session, load_session
 from tracker.store.stored_poses import read_stored_poses
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
-from tracker.tracking.estimation.limb_repair import RegionEvidence, better_limbs
+from tracker.tracking.estimation.limb_repair import RegionEvidence, better_limbs, limbs_to_search
 from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
 from tracker.tracking.estimation.settings import trust
 from tracker.tracking.view_regions import regions
@@ -49,9 +49,6 @@ from tracker.tracking.view_regions import regions
 OFF_MM = 100.0
 N_LEARNING = 60
 DISPLACED_SHARE, SEED = 0.07, 5
-SEARCHED_NATS = 10.0
-"""Deficit from which the repair searches a limb, nats: 90% of the limbs that are off have more, and 32% of the others
-(pooled over acquired recordings, tracks without search at half the frame rate, and displaced limbs)."""
 AROUND = (-3, -1, 1, 3)
 """Frames around whose limbs the repair tries as they are."""
 HEADS = (
@@ -182,19 +179,13 @@ def repaired(
         evidence = RegionEvidence(measured.known, measured.known.frame(views, people))
         around = [bodies[k + step] for step in AROUND if 0 <= k + step < len(bodies)]
         for i, model in enumerate(tracked.models):
-            own = limbs(model)
-            searched = _to_search(own, measured.deficits[k, first[i] : first[i] + len(own)])
+            searched = limbs_to_search(model, measured.deficits[k, first[i] : first[i] + len(limbs(model))])
             if not tracked.is_keyframe[i, k]:
                 others = [b[i].values for b in around]
                 better = better_limbs(views, people, i, evidence, SETTINGS, searched, others, colors[i])
                 found = with_body(found, i, PosedBody(model, better.pose))
         out.append(found)
     return out, 1e3 * (time.process_time() - began) / len(bodies)
-
-
-def _to_search(own: Sequence[Limb], deficits: Array) -> list[Limb]:
-    """Return the limbs whose deficit is large, largest first."""
-    return [own[i] for i in np.argsort(-deficits) if deficits[i] > SEARCHED_NATS and own[i].name != "head"]
 
 
 def _first_limbs(models: Sequence[BodyModel]) -> list[int]:

@@ -91,6 +91,8 @@ def _with_medians(
     before: BackgroundDensity, views: Sequence[CellView], occupied: Sequence[Mask], gains: Sequence[FloatArray]
 ) -> BackgroundDensity:
     """Return a background with the median and the spread of the cells that were open in enough frames."""
+    if not views:
+        return before
     mean, noise = before.mean.copy(), before.noise.copy()
     boxes = [_box(v) for v in views]
     top, left = (min(b[i].start for b in boxes) for i in (0, 1))

@@ -65,3 +65,8 @@ def test_the_empty_scene_serves_where_people_always_stand(frames):
     seen, unknown = (learn_background(views, always, SHAPE, e) for e in (empty, None))
     assert densities(seen, WALL)[20, 35] > densities(seen, (200, 200, 220))[20, 35] + 5
     assert densities(unknown, WALL)[20, 35] == pytest.approx(densities(unknown, (200, 200, 220))[20, 35], abs=1e-6)
+
+
+def test_a_view_without_images_takes_all_colours_alike():
+    known = learn_background([], [], SHAPE, None)
+    assert np.ptp([densities(known, c)[20, 35] for c in (WALL, (200, 200, 220))]) < 1e-6

@@ -13,8 +13,8 @@ import numpy as np
 from tracker.appearance.part_colors import PartColors
 from tracker.appearance.region_limb_scorer import RegionLimbScorer
 from tracker.appearance.region_model import RegionFrame, RegionModel
-from tracker.body.limbs import Limb
-from tracker.body.model import PosedBody
+from tracker.body.limbs import Limb, limbs
+from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton_compiled import solver_of
@@ -27,6 +27,10 @@ from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, Esti
 
 MIN_GAIN_NATS = 2 * CLEAR_NATS
 """Smallest gain for which a tracked pose is replaced, nats: the other is then 400 times more likely."""
+
+SEARCHED_NATS = 10.0
+"""Deficit from which a limb is searched, nats. 90% of the limbs that are off by more than 100 mm have more, and 32% of
+the others (tests/benchmarks/region_evidence.py, pooled over its three kinds of poses)."""
 
 
 class RegionEvidence(NamedTuple):
@@ -88,6 +92,13 @@ class RegionScorer(PoseScorer):
         return with_body(self.bodies, self.person, PosedBody(self.bodies[self.person].model, pose))
 
 
+def limbs_to_search(model: BodyModel, deficits: Array) -> list[Limb]:
+    """Return the limbs of several parts whose deficits, (n_limbs,), nats, are large, largest first; see
+    `region_deficit.limb_deficits`."""
+    of_body = limbs(model)
+    return [of_body[i] for i in np.argsort(-deficits) if deficits[i] > SEARCHED_NATS and len(of_body[i].parts) > 1]
+
+
 def better_limbs(
     views: Sequence[ViewEvidence], bodies: Bodies, person: int, region: RegionEvidence, settings: EstimationSettings,
     searched: Sequence[Limb], others: Sequence[Array] = (), part_colors: PartColors | None = None,
@@ -100,7 +111,7 @@ def better_limbs(
         person: index of the person.
         region: region evidence of the frame.
         settings: of the tracker.
-        searched: the limbs to search, likeliest lost first; see `region_deficit.limb_deficits`.
+        searched: the limbs to search, likeliest lost first; see `limbs_to_search`.
         others: poses whose limbs are tried as they are, such as those of the frames around, (n_values,) each.
         part_colors: colours that rank proposals; None where they are unknown.
     """

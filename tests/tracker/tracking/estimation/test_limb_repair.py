@@ -7,9 +7,17 @@ import pytest
 from region_scenes import Walk, limb_of
 from staging import SUIT
 
+from tracker.body.limbs import limbs
 from tracker.fitting.hypothesis import SAME_POSE_M
+from tracker.formats.model_toml import load_model
 from tracker.tracking.chamfer.settings import TrackSettings
-from tracker.tracking.estimation.limb_repair import MIN_GAIN_NATS, RegionEvidence, better_limbs
+from tracker.tracking.estimation.limb_repair import (
+    MIN_GAIN_NATS,
+    SEARCHED_NATS,
+    RegionEvidence,
+    better_limbs,
+    limbs_to_search,
+)
 from tracker.tracking.estimation.settings import RecoverSettings
 
 SETTINGS = replace(TrackSettings(), recover=RecoverSettings(proposals=256, n_local_search=12, n_limb_refined=4))
@@ -44,3 +52,12 @@ def test_a_right_pose_stays(walk):
     found = repaired(walk, 3)
     assert found.gain < MIN_GAIN_NATS
     assert np.array_equal(found.pose, walk.tracked[3][0].values)
+
+
+def test_limbs_that_lack_evidence_are_searched():
+    """The largest deficit first; not the head, which has no joints to search."""
+    model = load_model("gavrila34")
+    names = [x.name for x in limbs(model)]
+    deficits = np.full(len(names), SEARCHED_NATS)
+    deficits[[names.index(n) for n in ("head", "left_calf", "right_forearm")]] += (9, 2, 5)
+    assert [x.name for x in limbs_to_search(model, deficits)] == ["right_forearm", "left_calf"]
