@@ -41,7 +41,7 @@ from tracker.session.session import Session, load_session
 from tracker.store.stored_poses import read_stored_poses
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
-from tracker.tracking.estimation.limb_repair import RegionEvidence, better_limbs, limbs_to_search
+from tracker.tracking.estimation.limb_repair import FrameEvidence, better_limbs, limbs_to_search
 from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
 from tracker.tracking.estimation.settings import trust
 from tracker.tracking.view_regions import regions
@@ -176,13 +176,14 @@ def repaired(
     began = time.process_time()
     for k, (frame, people) in enumerate(zip(tracked.frames, bodies, strict=True)):
         views, found = common_evidence(observer, frame, [people], SETTINGS), people
-        evidence = RegionEvidence(measured.known, measured.known.frame(views, people))
+        regions_there = measured.known.frame(views, people)
         around = [bodies[k + step] for step in AROUND if 0 <= k + step < len(bodies)]
         for i, model in enumerate(tracked.models):
             searched = limbs_to_search(model, measured.deficits[k, first[i] : first[i] + len(limbs(model))])
             if not tracked.is_keyframe[i, k]:
                 others = [b[i].values for b in around]
-                better = better_limbs(views, people, i, evidence, SETTINGS, searched, others, colors[i])
+                evidence = FrameEvidence(views, measured.known, regions_there, colors[i])
+                better = better_limbs(evidence, people, i, SETTINGS, searched, others)
                 found = with_body(found, i, PosedBody(model, better.pose))
         out.append(found)
     return out, 1e3 * (time.process_time() - began) / len(bodies)

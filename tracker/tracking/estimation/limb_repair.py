@@ -33,11 +33,17 @@ SEARCHED_NATS = 10.0
 the others (tests/benchmarks/region_evidence.py, pooled over its three kinds of poses)."""
 
 
-class RegionEvidence(NamedTuple):
-    """Region evidence of a frame."""
+class FrameEvidence(NamedTuple):
+    """The evidence of a frame on which poses are compared."""
 
+    views: Sequence[ViewEvidence]
+    """Evidence around all people, with all edges that may be theirs; see `common_evidence`."""
     known: RegionModel
-    frame: RegionFrame
+    """Appearance of the people and places of the run."""
+    regions: RegionFrame
+    """Region evidence of the frame."""
+    part_colors: PartColors | None = None
+    """Colours of the person's parts, which rank proposals; None where they are unknown."""
 
 
 class Repair(NamedTuple):
@@ -55,7 +61,7 @@ class Repair(NamedTuple):
 class RegionScorer(PoseScorer):
     """Scores poses by contours, priors and region evidence. Colours of parts only rank proposals."""
 
-    region: RegionEvidence
+    evidence: FrameEvidence
     bodies: Bodies
     """All people; the scored person may be in any pose."""
     person: int
@@ -67,11 +73,12 @@ class RegionScorer(PoseScorer):
 
     def restricted_to(self, limb: Limb) -> "RegionScorer":
         """See `PoseScorer.restricted_to`."""
-        return _with_region(super().restricted_to(limb), self.region, self.bodies, self.person, limb)
+        return _with_regions(super().restricted_to(limb), self.evidence, self.bodies, self.person, limb)
 
     def _color_costs(self, poses: Array) -> Array:
         if self.limb is None:
-            return -np.array([self.region.known.nats(self.region.frame, self._bodies(pose)) for pose in poses])
+            known, regions = self.evidence.known, self.evidence.regions
+            return -np.array([known.nats(regions, self._bodies(pose)) for pose in poses])
         moves = np.isin(np.arange(poses.shape[1]), self.bodies[self.person].model.dof_value[self.limb.dofs])
         rests, nats = [pose[~moves].tobytes() for pose in poses], np.zeros(len(poses))
         for rest in set(rests):
@@ -84,7 +91,8 @@ class RegionScorer(PoseScorer):
         assert self.limb is not None
         scorer = self.limb_scorers.get(rest)
         if scorer is None:
-            scorer = RegionLimbScorer(*self.region, self._bodies(poses[0]), self.person, self.limb.parts)
+            known, regions = self.evidence.known, self.evidence.regions
+            scorer = RegionLimbScorer(known, regions, self._bodies(poses[0]), self.person, self.limb.parts)
             self.limb_scorers[rest] = scorer
         return scorer(poses) + scorer.static_nats
 
@@ -100,24 +108,22 @@ def limbs_to_search(model: BodyModel, deficits: Array) -> list[Limb]:
 
 
 def better_limbs(
-    views: Sequence[ViewEvidence], bodies: Bodies, person: int, region: RegionEvidence, settings: EstimationSettings,
-    searched: Sequence[Limb], others: Sequence[Array] = (), part_colors: PartColors | None = None,
+    evidence: FrameEvidence, bodies: Bodies, person: int, settings: EstimationSettings, searched: Sequence[Limb],
+    others: Sequence[Array] = (),
 ) -> Repair:  # fmt: skip
     """Refine the pose of a person without the prediction, and search limbs.
 
     Args:
-        views: evidence of the frame around all people, with all edges that may be theirs; see `common_evidence`.
+        evidence: of the frame.
         bodies: all people as tracked; the others stay.
         person: index of the person.
-        region: region evidence of the frame.
         settings: of the tracker.
         searched: the limbs to search, likeliest lost first; see `limbs_to_search`.
         others: poses whose limbs are tried as they are, such as those of the frames around, (n_values,) each.
-        part_colors: colours that rank proposals; None where they are unknown.
     """
     model, tracked = bodies[person].model, bodies[person].values
-    plain = scorer_without_prediction(views, bodies, person, settings, part_colors)
-    scorer = _with_region(plain, region, bodies, person)
+    plain = scorer_without_prediction(evidence.views, bodies, person, settings, evidence.part_colors)
+    scorer = _with_regions(plain, evidence, bodies, person)
     fit = solver_of(model)(model, tracked, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
     before = float(scorer.costs_with_priors(model, tracked[None])[0])
     best, *rest = search_limbs(model, searched, scorer.scored(model, fit), others, scorer)
@@ -125,8 +131,8 @@ def better_limbs(
     return Repair(best.pose if gain > MIN_GAIN_NATS else tracked, gain, tuple(rest))
 
 
-def _with_region(
-    plain: PoseScorer, region: RegionEvidence, bodies: Bodies, person: int, limb: Limb | None = None
+def _with_regions(
+    plain: PoseScorer, evidence: FrameEvidence, bodies: Bodies, person: int, limb: Limb | None = None
 ) -> RegionScorer:
     own = {f.name: getattr(plain, f.name) for f in fields(PoseScorer)}
-    return RegionScorer(**own, region=region, bodies=bodies, person=person, limb=limb)
+    return RegionScorer(**own, evidence=evidence, bodies=bodies, person=person, limb=limb)

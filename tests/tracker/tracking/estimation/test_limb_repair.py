@@ -14,7 +14,7 @@ from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.limb_repair import (
     MIN_GAIN_NATS,
     SEARCHED_NATS,
-    RegionEvidence,
+    FrameEvidence,
     better_limbs,
     limbs_to_search,
 )
@@ -30,8 +30,8 @@ def walk(gavrila):
 
 def repaired(walk, k):
     bodies = tuple(walk.tracked[k])
-    region = RegionEvidence(walk.known, walk.known.frame(walk.views[k], bodies))
-    return better_limbs(walk.views[k], bodies, 0, region, SETTINGS, [limb_of(walk.model, "right_calf")])
+    evidence = FrameEvidence(walk.views[k], walk.known, walk.known.frame(walk.views[k], bodies))
+    return better_limbs(evidence, bodies, 0, SETTINGS, [limb_of(walk.model, "right_calf")])
 
 
 def off_m(walk, k, pose):
