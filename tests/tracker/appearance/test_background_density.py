@@ -20,7 +20,7 @@ def frames():
     views, occupied = [], []
     for k in range(N):
         image = WALL + rng.normal(0, 2, (*SHAPE, 3))
-        if k % 3:
+        if k % 4 == 0:
             image[8:40, :12] = rng.uniform(0, 255, 3)
         hidden = np.zeros(SHAPE, bool)
         if k > 8:
