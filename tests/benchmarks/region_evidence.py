@@ -175,16 +175,24 @@ def repaired(
     colors = [Colors(start, bodies[0], i).learn() for i in range(len(first))]
     began = time.process_time()
     for k, (frame, people) in enumerate(zip(tracked.frames, bodies, strict=True)):
-        views, found = common_evidence(observer, frame, [people], SETTINGS), people
-        regions_there = measured.known.frame(views, people)
+        found, searched = (
+            people,
+            {
+                i: limbs_to_search(model, measured.deficits[k, first[i] : first[i] + len(limbs(model))])
+                for i, model in enumerate(tracked.models)
+                if not tracked.is_keyframe[i, k]
+            },
+        )
+        if any(searched.values()):
+            views = common_evidence(observer, frame, [people], SETTINGS)
+            regions_there = measured.known.frame(views, people)
         around = [bodies[k + step] for step in AROUND if 0 <= k + step < len(bodies)]
-        for i, model in enumerate(tracked.models):
-            searched = limbs_to_search(model, measured.deficits[k, first[i] : first[i] + len(limbs(model))])
-            if not tracked.is_keyframe[i, k]:
-                others = [b[i].values for b in around]
+        for i, of_person in searched.items():
+            if of_person:
                 evidence = FrameEvidence(views, measured.known, regions_there, colors[i])
-                better = better_limbs(evidence, people, i, SETTINGS, searched, others)
-                found = with_body(found, i, PosedBody(model, better.pose))
+                others = [b[i].values for b in around]
+                better = better_limbs(evidence, people, i, SETTINGS, of_person, others)
+                found = with_body(found, i, PosedBody(tracked.models[i], better.pose))
         out.append(found)
     return out, 1e3 * (time.process_time() - began) / len(bodies)
 
