@@ -1,5 +1,6 @@
-"""Score poses by colours of body parts, and single limbs by colours and edges.
+"""Score poses by colours of body parts, and single limbs by colours and edges; region evidence, learnt over a run.
 
 The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use `part_colors.Colors`
-and the `limb_score.LimbScorer` that it makes.
+and the `limb_score.LimbScorer` that it makes; `region_learning.learn_regions`, the `region_model.RegionModel` that it
+returns, `region_limb_scorer.RegionLimbScorer` and `region_deficit.limb_deficits`.
 """

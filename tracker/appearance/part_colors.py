@@ -21,9 +21,11 @@ from tracker.appearance.axis_visibility import (
     ray_transform,
     unit_balls,
 )
+from tracker.appearance.color_shares import DOUBT, smoothed
 from tracker.appearance.limb_score import ColorView, LimbScorer, StaticParts
+from tracker.appearance.region_deficit import counterparts
 from tracker.body.kinematics import Kinematics, chain_poses
-from tracker.body.model import BodyModel, PosedBody, parts_of
+from tracker.body.model import PosedBody, parts_of
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours.occluding_contours import part_poses
@@ -32,13 +34,9 @@ from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.images.color_histogram import BINS, bin_of
 
-_SMOOTHING_BINS = 0.7
-"""Standard deviation of the Gaussian that smooths histograms, bins: light and noise move a colour to the next bin."""
 _ACROSS = 3
 """Samples across each part."""
-_DOUBT = 0.02
-"""Share of arbitrary pixels under a part: a colour that was never seen there is not impossible."""
-_MAX_NATS = 3.0
+MAX_NATS = 3.0
 """Largest score of one pixel, nats: one sample, even of the purest colour, must not outweigh the rest of a part.
 Halved, two more frames of `fast_arms` are lost from joints; doubled, one more, and its error grows by 1.2 mm
 (acquisition.py). On `walk` both change the error by less than 0.1 mm."""
@@ -120,7 +118,7 @@ class Colors:
         """
         model = self._bodies[self._person].model
         parts, colors, _ = self._samples(self._bodies[self._person].values)
-        counterparts = _counterparts(model)
+        twins = counterparts([model])
         seen = np.zeros((len(model.parts), BINS**3))
         np.add.at(seen, (parts, colors), 1.0)
         seen = np.array([_share(s) for s in seen])
@@ -133,13 +131,13 @@ class Colors:
             around = before.around + share * (around - before.around)
             usual = before.usual
         # Half of the alternative to a part's colours is the rest of the body, however small it is in the image.
-        other = 0.5 * _smoothed(around) + 0.5 * _share(_smoothed(seen.sum(axis=0)))
+        other = 0.5 * smoothed(around) + 0.5 * _share(smoothed(seen.sum(axis=0)))
         blank = seen.sum(axis=1, keepdims=True) == 0
-        own = np.where(blank, seen[counterparts], seen)
-        own = _smoothed(np.array([_share(s) for s in own]))
-        ratios = np.log(((1 - _DOUBT) * own + _DOUBT * other + 1e-7) / (other + 1e-7))
+        own = np.where(blank, seen[twins], seen)
+        own = smoothed(np.array([_share(s) for s in own]))
+        ratios = np.log(((1 - DOUBT) * own + DOUBT * other + 1e-7) / (other + 1e-7))
         ratios[own.sum(axis=1) == 0] = 0.0
-        ratios = np.clip(ratios, -_MAX_NATS, _MAX_NATS)
+        ratios = np.clip(ratios, -MAX_NATS, MAX_NATS)
         if usual is None:
             usual = _mean_by_part(ratios[parts, colors], parts, len(model.parts))[0]
         return PartColors(ratios, usual, seen, around)
@@ -222,13 +220,6 @@ class Colors:
         )  # fmt: skip
 
 
-def _smoothed(counts: Array) -> Array:
-    from scipy.ndimage import gaussian_filter  # imported lazily: loading takes 0.1 s
-
-    cubes = np.asarray(counts, dtype=np.float64).reshape(*counts.shape[:-1], BINS, BINS, BINS)
-    return np.asarray(gaussian_filter(cubes, _SMOOTHING_BINS, mode="nearest", axes=(-3, -2, -1))).reshape(counts.shape)
-
-
 def _share(counts: Array) -> Array:
     return counts / max(1e-12, float(counts.sum()))
 
@@ -236,13 +227,6 @@ def _share(counts: Array) -> Array:
 def _mean_by_part(nats: Array, parts: NDArray[np.int64], n_parts: int) -> tuple[Array, Array]:
     samples = np.bincount(parts, minlength=n_parts)
     return np.bincount(parts, weights=nats, minlength=n_parts) / np.maximum(samples, 1), samples.astype(np.float64)
-
-
-def _counterparts(model: BodyModel) -> NDArray[np.int64]:
-    """Return the index of each part's counterpart on the other side, or of itself without one."""
-    names = [p.name for p in model.parts]
-    swapped = [n.replace("left", "?").replace("right", "left").replace("?", "right") for n in names]
-    return np.array([names.index(n) if n in names else i for i, n in enumerate(swapped)])
 
 
 @njit(**NO_REFCOUNT)

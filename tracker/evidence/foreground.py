@@ -75,6 +75,11 @@ class Foreground:
                 self._background = None
             return self._measuring
 
+    def empty_scene(self) -> Image | None:
+        """Return the smoothed empty scene in working pixels, (H, W, 3); None without a background."""
+        empty = self.measure_empty_scene().result()
+        return None if empty is None else empty.smooth
+
     def prepare(self, frame: Image, k: int) -> Prepared:
         """Prepare frame k, as filmed, as far as no region is needed.
 

@@ -25,7 +25,7 @@ from tracker.evidence.view_evidence import (
 )
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.recording import Recording
-from tracker.geometry.arrays import FloatArray
+from tracker.geometry.arrays import FloatArray, Image
 from tracker.geometry.cameras import Camera, Region
 from tracker.images import background_subtraction
 from tracker.images.edge_segments import link_edges, sample_segments
@@ -91,6 +91,12 @@ class Observer:
     def working_cameras(self) -> tuple[Camera, ...]:
         """Cameras of the whole views in working pixels: without lens distortion, at working scale."""
         return tuple(v.view.camera for v in self._views)
+
+    def empty_scenes(self) -> tuple[Image | None, ...]:
+        """Return the smoothed empty scene of each view in working pixels, (H, W, 3); None without a background."""
+        for view in self._views:  # those of all views at the same time
+            view.measure_empty_scene()
+        return tuple(view.empty_scene() for view in self._views)
 
     def prefetch(
         self,

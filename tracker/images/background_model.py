@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.geometry.arrays import FloatArray, Image
 
-_MAD_TO_SIGMA = 1.4826
+MAD_TO_SIGMA = 1.4826
 """Standard deviation of a normal distribution by its median absolute deviation."""
 
 
@@ -53,4 +53,4 @@ def background_of_recording(images: Sequence[Image]) -> BackgroundModel:
     stack = np.stack(images)
     median = np.median(stack, axis=0)
     deviations = np.median(np.abs(stack - median), axis=0).max(axis=-1)
-    return BackgroundModel(np.asarray(np.round(median), np.uint8), (_MAD_TO_SIGMA * deviations).astype(np.float32))
+    return BackgroundModel(np.asarray(np.round(median), np.uint8), (MAD_TO_SIGMA * deviations).astype(np.float32))

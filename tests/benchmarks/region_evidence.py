@@ -1,0 +1,270 @@
+"""Measure region evidence on tracked recordings: `python tests/benchmarks/region_evidence.py SESSIONS --data DIR`.
+
+SESSIONS is a folder of sessions that are named as the recordings in DIR, or as the simulated people in `--scenes DIR`.
+A name may go on after a hyphen. Prints a table: the area under the curve of the deficit of region evidence for "a joint
+of that limb is off by more than 100 mm", beside that of the stored probability that the limb is lost; first of limbs,
+then of frames, by their worst limb. Nothing is fitted to errors. The head does not count: references differ in its
+joints.
+
+`--displaced` measures errors that the tracker does not make often enough: 7% of the limbs are put where they are on
+another frame, and refined there without the prediction. No stored probabilities belong to these poses. `--repair`
+searches the limbs whose deficit is large on all frames, and counts the frames that are off before and after. Poses are
+learnt from as they are, wrong ones included.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from acquisition import RECORDED
+from numpy.typing import NDArray
+from scipy.stats import rankdata
+from sections import table
+
+from tracker.appearance.part_colors import Colors
+from tracker.appearance.region_deficit import limb_deficits
+from tracker.appearance.region_learning import LearningFrame, learn_regions
+from tracker.appearance.region_model import RegionModel
+from tracker.body.limbs import limbs
+from tracker.body.model import BodyModel, PosedBody
+from tracker.evaluation.references import read_joints
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import EdgeSettings
+from tracker.footage.recording import Recording
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.geometry.arrays import Array
+from tracker.session.session import Session, load_session
+from tracker.store.stored_poses import read_stored_poses
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimation.frame_problem import Bodies, with_body
+from tracker.tracking.estimation.limb_repair import FrameEvidence, better_limbs, limbs_to_search
+from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
+from tracker.tracking.estimation.settings import trust
+from tracker.tracking.view_regions import regions
+
+OFF_MM = 100.0
+N_LEARNING = 60
+DISPLACED_SHARE, SEED = 0.07, 5
+AROUND = (-3, -1, 1, 3)
+"""Frames around whose limbs the repair tries as they are."""
+HEADS = (
+    "limbs off", "area, lost", "area, deficit", "frames off", "area, lost", "area, deficit", "learn, ms", "score, ms",
+    "off after repair", "made bad", "repair, ms",
+)  # fmt: skip
+SETTINGS = TrackSettings()
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """A tracked recording with known joints. Tuples and first axes are of its people."""
+
+    session: Session
+    frames: list[int]
+    bodies: list[Bodies]
+    """All people, on each frame."""
+    is_keyframe: NDArray[np.bool_]
+    """(n_people, T)."""
+    lost: tuple[Array, ...]
+    """Stored probability that each limb is lost, (T, n_limbs) each; NaN where not assessed."""
+    joints: tuple[dict[int, dict[str, Array]], ...]
+    """Known limb joints by frame and name, metres."""
+
+    @property
+    def models(self) -> list[BodyModel]:
+        """Body of each person."""
+        return [body.model for body in self.bodies[0]]
+
+    def errors_mm(self, bodies: Sequence[Bodies], person: int) -> Array:
+        """Return the largest error of a joint of each limb on each frame, (T, n_limbs), mm; NaN if unknown."""
+        known, model = self.joints[person], self.models[person]
+        out = np.full((len(bodies), len(limbs(model))), np.nan)
+        for row, frame, people in zip(out, self.frames, bodies, strict=True):
+            found = dict(zip(model.point_names, model.joint_centers_world(people[person].values), strict=True))
+            for i, limb in enumerate(limbs(model)):
+                of_limb = [
+                    n for n in known.get(frame, {}) if model.point_parts[model.point_names.index(n)] in limb.parts
+                ]
+                if of_limb:
+                    row[i] = 1000 * max(np.linalg.norm(found[n] - known[frame][n]) for n in of_limb)
+        return out
+
+
+class Measured(NamedTuple):
+    """The region evidence of a recording."""
+
+    known: RegionModel
+    deficits: Array
+    """See `limb_deficits`, (T, n_limbs)."""
+    learn_ms: float
+    """Processor time of learning, for each frame learnt from."""
+    score_ms: float
+    """Processor time of scoring a frame."""
+
+
+def read_tracked(folder: Path, references: Sequence[Path]) -> Tracked:
+    """Read a session and the true joints of its people."""
+    session = load_session(folder)
+    stored = [read_stored_poses(session.annotations_path, p.name, p.model) for p in session.people]
+    frames = sorted(set.intersection(*(set(s) for s in stored)))
+    lost = []
+    for own in stored:
+        n = len(limbs(own[frames[0]].body.model))
+        lost.append(np.array([own[k].record.limbs_lost or [np.nan] * n for k in frames]))
+    joints = []
+    for path in references:
+        read = read_joints(path, session.fps)
+        joints.append({
+            int(k): {n: p for n, p in zip(read.names, row, strict=True) if n in LIMB_JOINTS and np.all(np.isfinite(p))}
+            for k, row in zip(read.frames, read.points, strict=True)
+        })  # fmt: skip
+    bodies = [tuple(own[k].body for own in stored) for k in frames]
+    is_keyframe = np.array([[own[k].record.keyframe for k in frames] for own in stored])
+    return Tracked(session, frames, bodies, is_keyframe, tuple(lost), tuple(joints))
+
+
+def displaced(tracked: Tracked, observer: Observer) -> list[Bodies]:
+    """Return the bodies with some limbs where they are on other frames, refined there."""
+    rng, out = np.random.default_rng(SEED), list[Bodies]()
+    for k, (frame, people) in enumerate(zip(tracked.frames, tracked.bodies, strict=True)):
+        bodies, moved = people, set[int]()
+        for i, model in enumerate(tracked.models):
+            for limb in limbs(model):
+                other = tracked.bodies[rng.integers(len(tracked.frames))][i]
+                if limb.name == "head" or rng.random() >= DISPLACED_SHARE or tracked.is_keyframe[i, k]:
+                    continue
+                step = np.where(limb.dofs, model.difference(other.values, bodies[i].values), 0.0)
+                bodies = with_body(bodies, i, PosedBody(model, model.clip(model.retract(bodies[i].values, step))))
+                moved.add(i)
+        views = common_evidence(observer, frame, [bodies, people], SETTINGS) if moved else ()
+        for i in moved:
+            model, scorer = tracked.models[i], scorer_without_prediction(views, bodies, i, SETTINGS)
+            refined = scorer.refined(model, [bodies[i].values], trust(model, SETTINGS))[0]
+            bodies = with_body(bodies, i, PosedBody(model, refined))
+        out.append(bodies)
+    return out
+
+
+def measure(tracked: Tracked, bodies: Sequence[Bodies], observer: Observer) -> Measured:
+    """Learn region evidence from some frames, and score all."""
+    cameras, colors_only = observer.working_cameras, EdgeSettings(foreground=False)
+    views = [
+        observer.evidence(frame, regions(cameras, people), edges=colors_only)
+        for frame, people in zip(tracked.frames, bodies, strict=True)
+    ]
+    chosen = np.unique(np.linspace(0, len(views) - 1, N_LEARNING).round().astype(int))
+    began = time.process_time()
+    known = learn_regions([LearningFrame(views[k], bodies[k]) for k in chosen], cameras, observer.empty_scenes())
+    learnt = time.process_time()
+    scores = [known.score(known.frame(v, b), b) for v, b in zip(views, bodies, strict=True)]
+    scored = time.process_time()
+    nats, unexplained = (np.array([getattr(s, name).sum(axis=0) for s in scores]) for name in ("nats", "unexplained"))
+    deficits = limb_deficits(nats, unexplained, tracked.models)
+    return Measured(known, deficits, 1e3 * (learnt - began) / len(chosen), 1e3 * (scored - learnt) / len(views))
+
+
+def repaired(
+    tracked: Tracked, bodies: Sequence[Bodies], observer: Observer, measured: Measured
+) -> tuple[list[Bodies], float]:
+    """Return the bodies after the repair of all frames, and its processor time for each frame, ms."""
+    out, first = list[Bodies](), _first_limbs(tracked.models)
+    start = observer.evidence(tracked.frames[0], regions(observer.working_cameras, bodies[0]))
+    colors = [Colors(start, bodies[0], i).learn() for i in range(len(first))]
+    began = time.process_time()
+    for k, (frame, people) in enumerate(zip(tracked.frames, bodies, strict=True)):
+        found, searched = (
+            people,
+            {
+                i: limbs_to_search(model, measured.deficits[k, first[i] : first[i] + len(limbs(model))])
+                for i, model in enumerate(tracked.models)
+                if not tracked.is_keyframe[i, k]
+            },
+        )
+        if any(searched.values()):
+            views = common_evidence(observer, frame, [people], SETTINGS)
+            regions_there = measured.known.frame(views, people)
+        around = [bodies[k + step] for step in AROUND if 0 <= k + step < len(bodies)]
+        for i, of_person in searched.items():
+            if of_person:
+                evidence = FrameEvidence(views, measured.known, regions_there, colors[i])
+                others = [b[i].values for b in around]
+                better = better_limbs(evidence, people, i, SETTINGS, of_person, others)
+                found = with_body(found, i, PosedBody(tracked.models[i], better.pose))
+        out.append(found)
+    return out, 1e3 * (time.process_time() - began) / len(bodies)
+
+
+def _first_limbs(models: Sequence[BodyModel]) -> list[int]:
+    """Return the index of the first limb of each person."""
+    return np.cumsum([0, *(len(limbs(m)) for m in models)])[:-1].tolist()
+
+
+def area(scores: Array, happened: NDArray[np.bool_]) -> str:
+    """Return the area under the curve as a cell; empty where nothing or everything happened, or scores are the same."""
+    n, n_other = int(happened.sum()), int((~happened).sum())
+    if not n or not n_other or np.ptp(scores) == 0:
+        return ""
+    return f"{(rankdata(scores)[happened].sum() - n * (n + 1) / 2) / (n * n_other):.2f}"
+
+
+def rows(tracked: Tracked, is_displaced: bool, with_repair: bool) -> Iterator[list[str]]:
+    """Yield the cells of each person, in the order of `HEADS`."""
+    with Recording(tracked.session.cameras) as recording:
+        observer = Observer(tracked.session.cameras, recording)
+        bodies = displaced(tracked, observer) if is_displaced else tracked.bodies
+        measured = measure(tracked, bodies, observer)
+        after, repair_ms = repaired(tracked, bodies, observer, measured) if with_repair else (bodies, 0.0)
+    for i, first in enumerate(_first_limbs(tracked.models)):
+        names = [x.name for x in limbs(tracked.models[i])]
+        error = tracked.errors_mm(bodies, i)
+        lost = np.zeros_like(error) if is_displaced else tracked.lost[i]
+        deficit = measured.deficits[:, first : first + len(names)]
+        use = np.isfinite(error) & np.isfinite(lost) & (np.array(names) != "head") & ~tracked.is_keyframe[i][:, None]
+        chosen, off = use.any(axis=1), error > OFF_MM
+        lost_of_frame, deficit_of_frame, off_frame, off_after = (
+            np.where(use, of_limb, -np.inf).max(axis=1)[chosen]
+            for of_limb in (lost, deficit, off, tracked.errors_mm(after, i) > OFF_MM)
+        )
+        off_frame, off_after = off_frame > 0, off_after > 0
+        repair = [str(off_after.sum()), str((off_after & ~off_frame).sum()), f"{repair_ms:.0f}"]
+        yield [
+            f"{off[use].sum()} of {use.sum()}", area(lost[use], off[use]), area(deficit[use], off[use]),
+            f"{off_frame.sum()} of {len(off_frame)}", area(lost_of_frame, off_frame), area(deficit_of_frame, off_frame),
+            f"{measured.learn_ms:.1f}", f"{measured.score_ms:.1f}", *(repair if with_repair else [""] * 3),
+        ]  # fmt: skip
+
+
+def main() -> None:
+    """Measure and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sessions", type=Path, help="folder of tracked sessions")
+    parser.add_argument("--data", type=Path, help="folder of recordings")
+    parser.add_argument("--scenes", type=Path, help="folder of simulated recordings")
+    parser.add_argument("--only", nargs="+", help="names of sessions")
+    parser.add_argument("--displaced", action="store_true", help="put limbs elsewhere first")
+    parser.add_argument("--repair", action="store_true", help="search limbs, and count what is off afterwards")
+    words = parser.parse_args()
+    found = dict[str, list[str]]()
+    for folder in sorted(words.sessions.iterdir()):
+        name = folder.name.split("-")[0]
+        root = words.data if name in RECORDED else words.scenes
+        if (
+            root is None
+            or not (folder / "annotations.sqlite").exists()
+            or folder.name not in (words.only or [folder.name])
+        ):
+            continue
+        references = sorted((root / name).glob("*.trc"))
+        tracked = read_tracked(folder, references)
+        for person, cells in zip(tracked.session.people, rows(tracked, words.displaced, words.repair), strict=True):
+            label = folder.name if len(references) == 1 else f"{folder.name}, {person.name}"
+            found[label] = cells
+            print(f"{label}: {', '.join(cells)}", flush=True)
+    print(table(HEADS, found).replace("| variant |", "| recording |", 1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,65 @@
+"""Repair of a leg that lies elsewhere, by contours and region evidence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from region_scenes import Walk, limb_of
+from staging import SUIT
+
+from tracker.body.limbs import limbs
+from tracker.body.model import PosedBody
+from tracker.fitting.hypothesis import SAME_POSE_M
+from tracker.formats.model_toml import load_model
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimation.limb_repair import (
+    MIN_GAIN_NATS,
+    SEARCHED_NATS,
+    FrameEvidence,
+    better_limbs,
+    limbs_to_search,
+)
+from tracker.tracking.estimation.settings import RecoverSettings
+
+SETTINGS = replace(TrackSettings(), recover=RecoverSettings(proposals=256, n_local_search=12, n_limb_refined=4))
+
+
+@pytest.fixture(scope="module")
+def walk(gavrila):
+    return Walk(gavrila, SUIT)
+
+
+def repaired(walk, k, bodies):
+    evidence = FrameEvidence(walk.views[k], walk.known, walk.known.frame(walk.views[k], bodies))
+    return better_limbs(evidence, bodies, 0, SETTINGS, [limb_of(walk.model, "right_calf")])
+
+
+def off_m(walk, k, pose):
+    """Largest distance of a point of the leg from the truth, metres."""
+    points = np.isin(walk.model.point_parts, limb_of(walk.model, "right_calf").parts)
+    true = walk.true[k][0].points_world
+    return np.linalg.norm(walk.model.points_world(pose) - true, axis=1)[points].max()
+
+
+def test_a_wrong_leg_is_found(walk):
+    assert off_m(walk, 5, walk.tracked[5][0].values) > 2 * SAME_POSE_M
+    found = repaired(walk, 5, tuple(walk.tracked[5]))
+    assert found.gain > 5 * MIN_GAIN_NATS
+    assert off_m(walk, 5, found.pose) < SAME_POSE_M
+
+
+def test_a_right_pose_stays(walk):
+    """Although another costs a little less."""
+    tracked = PosedBody(walk.model, walk.model.retract(walk.true[3][0].values, np.full(walk.model.n_dofs, 0.002)))
+    found = repaired(walk, 3, (tracked,))
+    assert 0.1 < found.gain < MIN_GAIN_NATS
+    assert np.array_equal(found.pose, tracked.values)
+
+
+def test_limbs_that_lack_evidence_are_searched():
+    """The largest deficit first; not the head, which has no joints to search."""
+    model = load_model("gavrila34")
+    names = [x.name for x in limbs(model)]
+    deficits = np.full(len(names), SEARCHED_NATS)
+    deficits[[names.index(n) for n in ("head", "left_calf", "right_forearm")]] += (9, 2, 5)
+    assert [x.name for x in limbs_to_search(model, deficits)] == ["right_forearm", "left_calf"]

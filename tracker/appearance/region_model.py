@@ -1,0 +1,141 @@
+"""Region evidence: how much likelier the colours under each part are there than around it, learnt over a run.
+
+In each view and under each part, r is the log ratio of the colours of the part against the background of that place or
+the rest of the body. The run itself calibrates it: T(r) = log h1(r) / h0(r), where h1 is the histogram of r under the
+part and h0 that around it. A part that looks like its surroundings has a T near 0, so that the table is the trust of
+that view for that part. No rule states what is a shadow, a ghost, or a bystander in the same colours.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.appearance.background_density import BackgroundDensity
+from tracker.appearance.part_drawing import Canvas, draw_bodies, grown
+from tracker.appearance.region_cells import CellView, cells_of
+from tracker.appearance.region_kernels import RegionTables, add_score, add_unexplained
+from tracker.body.limbs import limbs
+from tracker.body.model import BodyModel, PosedBody
+from tracker.contours.occluding_contours import part_poses
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.geometry.arrays import Array, FloatArray, IntArray
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
+
+SAMPLE_M = 0.07
+"""Side of an independent sample on the body, metres: nearer cells show the same cloth in the same light."""
+REACH_M = 0.25
+"""How far around a part its surroundings reach, metres: a limb that is lost lies mostly that near."""
+OCCUPIED_M = 0.12
+"""Distance from the bodies up to which cells may show people, metres: hair and cloth, and the error of a pose."""
+
+
+class RegionFrame(NamedTuple):
+    """What region evidence needs of a frame, for all poses that are compared on it."""
+
+    views: tuple[CellView | None, ...]
+    """Cells of each view; None without an image."""
+    background: tuple[FloatArray, ...]
+    """Log density of the colour of each cell as background, (h, w) for each view."""
+
+
+class RegionScore(NamedTuple):
+    """Region evidence of posed bodies on a frame. Parts and limbs are counted through all bodies."""
+
+    nats: Array
+    """Evidence for each part in each view, (V, P), nats."""
+    samples: Array
+    """Independent samples of each part that each view shows, (V, P)."""
+    unexplained: Array
+    """Evidence for the parts of each limb in cells near it that no body covers, (V, n_limbs), nats."""
+
+
+@dataclass(frozen=True, eq=False)
+class RegionModel:
+    """The appearance of people and places in a run."""
+
+    models: tuple[BodyModel, ...]
+    """All people."""
+    backgrounds: tuple[BackgroundDensity, ...]
+    """Background of each view."""
+    tables: RegionTables
+    """Tables of all views: (V, P, ...)."""
+
+    def frame(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> RegionFrame:
+        """Return what region evidence needs of a frame.
+
+        Args:
+            views: evidence of each view.
+            bodies: rough poses of all people; the exposure is measured beside them.
+        """
+        cells = tuple(map(cells_of, views))
+        background = [
+            np.zeros((0, 0), np.float32) if c is None else background_of(known, c, draw_bodies(bodies, c))
+            for known, c in zip(self.backgrounds, cells, strict=True)
+        ]
+        return RegionFrame(cells, tuple(background))
+
+    def nats(self, frame: RegionFrame, bodies: Sequence[PosedBody]) -> float:
+        """Return the sum of `score(...).nats`, in less time."""
+        return float(self._parts(frame, self._draw(frame, bodies))[0].sum())
+
+    def score(self, frame: RegionFrame, bodies: Sequence[PosedBody]) -> RegionScore:
+        """Return the evidence of each part in each view, for bodies of the models that were learnt."""
+        drawn = self._draw(frame, bodies)
+        unexplained = np.zeros((len(frame.views), sum(len(limbs(m)) for m in self.models)))
+        ends, parts, of_limb = _limb_axes(bodies)
+        for i, (view, canvas) in enumerate(zip(frame.views, drawn, strict=True)):
+            if view is None or canvas is None:
+                continue
+            depths, share = view.camera.depths(ends), sample_share(view.camera)
+            shown = depths.min(axis=1) > NEAR_PLANE_M
+            depth, px = depths[shown].mean(axis=1), view.camera.project(ends[shown]).reshape(-1, 4)
+            reach, weight = REACH_M * view.camera.K[0, 0] / depth, share * depth**2
+            axes = np.concatenate([px, reach[:, None], weight[:, None]], axis=1)
+            add_unexplained(
+                view.colors, canvas.labels, frame.background[i], self.tables.of_view(i), axes, parts[shown],
+                of_limb[shown], unexplained[i],
+            )  # fmt: skip
+        return RegionScore(*self._parts(frame, drawn), unexplained)
+
+    @staticmethod
+    def _draw(frame: RegionFrame, bodies: Sequence[PosedBody]) -> list[Canvas | None]:
+        return [None if view is None else draw_bodies(bodies, view) for view in frame.views]
+
+    def _parts(self, frame: RegionFrame, drawn: Sequence[Canvas | None]) -> tuple[Array, Array]:
+        """Return the first two fields of a score."""
+        nats, samples = np.zeros((2, len(frame.views), self.tables.trust.shape[1]))
+        for i, (view, canvas) in enumerate(zip(frame.views, drawn, strict=True)):
+            if view is not None and canvas is not None:
+                at = view.colors, canvas, sample_share(view.camera), frame.background[i]
+                add_score(*at, self.tables.of_view(i), nats[i], samples[i])
+        return nats, samples
+
+
+def background_of(known: BackgroundDensity, view: CellView, canvas: Canvas) -> FloatArray:
+    """Return the log density of each cell as background, (h, w), with the exposure beside the bodies."""
+    gain = known.gain(view, ~grown(canvas, OCCUPIED_M * view.camera.K[0, 0]))
+    return known.log_density(view, gain)
+
+
+def sample_share(camera: Camera) -> float:
+    """Return the share of a cell in an independent sample at a depth of 1 m, per m^2."""
+    return float(1 / (camera.K[0, 0] * camera.K[1, 1] * SAMPLE_M**2))
+
+
+def _limb_axes(bodies: Sequence[PosedBody]) -> tuple[Array, IntArray, IntArray]:
+    """Return the ends of the axes of all parts of limbs in the world, (n, 2, 3), their parts and limbs, (n,) each."""
+    ends, parts, of_limb, first, n = [], [], [], 0, 0
+    for body in bodies:
+        model, Ts = body.model, part_poses([body])
+        for limb in limbs(model):
+            for p in limb.parts:
+                half = np.array([0.0, 0.0, model.shapes[p].half_axes[2]])
+                both = model.centers_part[p] + np.array([-half, half])
+                ends.append(both @ Ts[p, :3, :3].T + Ts[p, :3, 3])
+                parts.append(first + int(p))
+                of_limb.append(n)
+            n += 1
+        first += len(model.parts)
+    return np.array(ends), np.array(parts), np.array(of_limb)

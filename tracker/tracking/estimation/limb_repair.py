@@ -1,0 +1,138 @@
+"""Repair the pose of a person on one frame: refine it without the prediction, and search every limb.
+
+A tracker searches the limbs that seem lost. Most wrong limbs do not: they lie on edges, and the search would have found
+the right place. Therefore all are searched, and poses are compared by contours and region evidence together.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.appearance.part_colors import PartColors
+from tracker.appearance.region_limb_scorer import RegionLimbScorer
+from tracker.appearance.region_model import RegionFrame, RegionModel
+from tracker.body.limbs import Limb, limbs
+from tracker.body.model import BodyModel, PosedBody
+from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.contour_residuals import MIN_DECREASE
+from tracker.fitting.gauss_newton_compiled import solver_of
+from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
+from tracker.geometry.arrays import Array
+from tracker.tracking.estimation.frame_problem import Bodies, with_body
+from tracker.tracking.estimation.limb_recovery import search_limbs
+from tracker.tracking.estimation.pose_score import PoseScorer, scorer_without_prediction
+from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings
+
+MIN_GAIN_NATS = 2 * CLEAR_NATS
+"""Smallest gain for which a tracked pose is replaced, nats: the other is then 400 times more likely."""
+
+SEARCHED_NATS = 10.0
+"""Deficit from which a limb is searched, nats. 90% of the limbs that are off by more than 100 mm have more, and 32% of
+the others (tests/benchmarks/region_evidence.py, pooled over its three kinds of poses)."""
+
+
+class FrameEvidence(NamedTuple):
+    """The evidence of a frame on which poses are compared."""
+
+    views: Sequence[ViewEvidence]
+    """Evidence around all people, with all edges that may be theirs; see `common_evidence`."""
+    known: RegionModel
+    """Appearance of the people and places of the run."""
+    regions: RegionFrame
+    """Region evidence of the frame."""
+    part_colors: PartColors | None = None
+    """Colours of the person's parts, which rank proposals; None where they are unknown."""
+
+
+class Repair(NamedTuple):
+    """The best pose of a person on a frame."""
+
+    pose: Array
+    """Pose, (n_values,): the tracked one unless another is better by `MIN_GAIN_NATS`."""
+    gain: float
+    """How much less the best pose costs than the tracked one, nats, at least 0."""
+    alternatives: tuple[Hypothesis, ...]
+    """Poses about as good as the best, with a limb elsewhere, cheapest first."""
+
+
+@dataclass(frozen=True, eq=False)
+class RegionScorer(PoseScorer):
+    """Scores poses by contours, priors and region evidence. Colours of parts only rank proposals."""
+
+    evidence: FrameEvidence
+    bodies: Bodies
+    """All people; the scored person may be in any pose."""
+    person: int
+    """Index of the scored person."""
+    limb: Limb | None = None
+    """The limb in which poses differ; None if they may differ everywhere."""
+    limb_scorers: dict[bytes, RegionLimbScorer] = field(default_factory=dict)
+    """Scorer of the limb by the rest of the pose."""
+
+    def restricted_to(self, limb: Limb) -> "RegionScorer":
+        """See `PoseScorer.restricted_to`."""
+        return _with_regions(super().restricted_to(limb), self.evidence, self.bodies, self.person, limb)
+
+    def _color_costs(self, poses: Array) -> Array:
+        if self.limb is None:
+            known, regions = self.evidence.known, self.evidence.regions
+            return -np.array([known.nats(regions, self._bodies(pose)) for pose in poses])
+        moves = np.isin(np.arange(poses.shape[1]), self.bodies[self.person].model.dof_value[self.limb.dofs])
+        rests, nats = [pose[~moves].tobytes() for pose in poses], np.zeros(len(poses))
+        for rest in set(rests):
+            own = np.array([r == rest for r in rests])
+            nats[own] = self._limb_nats(rest, poses[own])
+        return -nats
+
+    def _limb_nats(self, rest: bytes, poses: Array) -> Array:
+        """Return the evidence for poses, (n, n_values), of one rest, (n,), nats."""
+        assert self.limb is not None
+        scorer = self.limb_scorers.get(rest)
+        if scorer is None:
+            known, regions = self.evidence.known, self.evidence.regions
+            scorer = RegionLimbScorer(known, regions, self._bodies(poses[0]), self.person, self.limb.parts)
+            self.limb_scorers[rest] = scorer
+        return scorer(poses) + scorer.static_nats
+
+    def _bodies(self, pose: Array) -> Bodies:
+        return with_body(self.bodies, self.person, PosedBody(self.bodies[self.person].model, pose))
+
+
+def limbs_to_search(model: BodyModel, deficits: Array) -> list[Limb]:
+    """Return the limbs of several parts whose deficits, (n_limbs,), nats, are large, largest first; see
+    `region_deficit.limb_deficits`."""
+    of_body = limbs(model)
+    return [of_body[i] for i in np.argsort(-deficits) if deficits[i] > SEARCHED_NATS and len(of_body[i].parts) > 1]
+
+
+def better_limbs(
+    evidence: FrameEvidence, bodies: Bodies, person: int, settings: EstimationSettings, searched: Sequence[Limb],
+    others: Sequence[Array] = (),
+) -> Repair:  # fmt: skip
+    """Refine the pose of a person without the prediction, and search limbs.
+
+    Args:
+        evidence: of the frame.
+        bodies: all people as tracked; the others stay.
+        person: index of the person.
+        settings: of the tracker.
+        searched: the limbs to search, likeliest lost first; see `limbs_to_search`.
+        others: poses whose limbs are tried as they are, such as those of the frames around, (n_values,) each.
+    """
+    model, tracked = bodies[person].model, bodies[person].values
+    plain = scorer_without_prediction(evidence.views, bodies, person, settings, evidence.part_colors)
+    scorer = _with_regions(plain, evidence, bodies, person)
+    fit = solver_of(model)(model, tracked, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
+    before = float(scorer.costs_with_priors(model, tracked[None])[0])
+    best, *rest = search_limbs(model, searched, scorer.scored(model, fit), others, scorer)
+    gain = max(0.0, before - best.cost)
+    return Repair(best.pose if gain > MIN_GAIN_NATS else tracked, gain, tuple(rest))
+
+
+def _with_regions(
+    plain: PoseScorer, evidence: FrameEvidence, bodies: Bodies, person: int, limb: Limb | None = None
+) -> RegionScorer:
+    own = {f.name: getattr(plain, f.name) for f in fields(PoseScorer)}
+    return RegionScorer(**own, evidence=evidence, bodies=bodies, person=person, limb=limb)
