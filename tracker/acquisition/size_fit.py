@@ -27,10 +27,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import ContourResiduals, MatchSettings
 from tracker.fitting.gauss_newton import (
     AT_LIMIT,
-    INITIAL_DAMPING,
-    MAX_DAMPING,
-    MIN_DAMPING,
-    MIN_RETRY_DAMPING,
+    DAMPING,
     NormalEquations,
     PointTargets,
     PosePrior,
@@ -210,7 +207,7 @@ class _Problem:
         sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
         usual = PosePrior.of_spreads(model)
         self._priors = [[PosePrior(f.pose, 1 / sigma), usual] for f in frames]
-        self.sizes, self.poses, self._damping = sizes, [f.pose for f in frames], INITIAL_DAMPING
+        self.sizes, self.poses, self._damping = sizes, [f.pose for f in frames], DAMPING.first
         self.n_evaluations = 0
         self._here = self._linearize(self.sizes, self.poses)
 
@@ -236,11 +233,11 @@ class _Problem:
             there = self._linearize(sizes, poses)
             if there.cost < here.cost:
                 break
-            if self._damping > MAX_DAMPING:
+            if self._damping > DAMPING.most:
                 return False
-            self._damping = max(10 * self._damping, MIN_RETRY_DAMPING)
+            self._damping = max(10 * self._damping, DAMPING.least_again)
         self.sizes, self.poses, self._here = sizes, poses, there
-        self._damping = max(MIN_DAMPING, self._damping / 10)
+        self._damping = max(DAMPING.least, self._damping / 10)
         return here.cost - there.cost > _TOLERANCE * here.cost
 
     def _moved(self, step: Array) -> tuple[Array, list[Array]]:

@@ -9,20 +9,24 @@ from tracker.errors import CalibrationError
 EXPECTED = "a calibration of a layout that docs/recordings.md lists"
 _POSE2SIM = "convert it with Pose2Sim (calibration_type = 'convert' in its Config.toml), which writes a Calib.toml"
 _TO_JSON = "write K, distortion, R and t of each camera to JSON"
+_MATLAB = ("a MATLAB file", f"{_TO_JSON} with jsonencode")
+_ARCHIVE = ("a NumPy archive or ZIP file", _TO_JSON)
+_ARRAY = ("a NumPy array", _TO_JSON)
+_PICKLE = ("a Python pickle, as OpenCap writes", f"{_POSE2SIM}, with convert_from = 'opencap'")
 _BEGINNINGS = (
-    (b"MATLAB", "a MATLAB file", f"{_TO_JSON} with jsonencode"),
+    (b"MATLAB", *_MATLAB),
     (b"\x89HDF", "a MATLAB or HDF5 file", f"{_TO_JSON} with jsonencode"),
-    (b"PK\x03\x04", "a NumPy archive or ZIP file", _TO_JSON),
-    (b"\x93NUMPY", "a NumPy array", _TO_JSON),
-    (b"\x80", "a Python pickle, as OpenCap writes", f"{_POSE2SIM}, with convert_from = 'opencap'"),
+    (b"PK\x03\x04", *_ARCHIVE),
+    (b"\x93NUMPY", *_ARRAY),
+    (b"\x80", *_PICKLE),
 )
 """First bytes of files of other programs, their names, and how to convert them."""
 _SUFFIXES = {
-    ".pickle": _BEGINNINGS[4][1:],
-    ".pkl": _BEGINNINGS[4][1:],
-    ".mat": _BEGINNINGS[0][1:],
-    ".npz": _BEGINNINGS[2][1:],
-    ".npy": _BEGINNINGS[3][1:],
+    ".pickle": _PICKLE,
+    ".pkl": _PICKLE,
+    ".mat": _MATLAB,
+    ".npz": _ARCHIVE,
+    ".npy": _ARRAY,
     ".mcal": ("a calibration of OptiTrack Motive", _POSE2SIM),
     ".cal": ("a calibration of OptiTrack or a project of another program", _POSE2SIM),
     ".c3d": ("a file of markers", "export the calibration of the cameras"),

@@ -7,6 +7,7 @@ level: the others turn the axes apart, let the cameras look away, or put all at 
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,10 +38,21 @@ OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 FITS_DEG = 30.0
 """Cost up to which a convention fits, and angle up to which a camera looks at a point, degrees: half a usual lens.
 Checked, as all here, on rigs of test_pose_conventions.py."""
-_RATIO, _MARGIN = 1.3, 5.0
-"""A convention is doubted if it costs more than this many times another, and this many degrees more."""
-_PAIR_RATIO, _PAIR_MARGIN = 2.0, 20.0
-"""The same for two cameras, whose axes meet by chance more often."""
+
+
+class _Lead(NamedTuple):
+    """A convention is doubted if it costs more than a number of times another, and a number of degrees more."""
+
+    ratio: float
+    """Number of times."""
+    margin: float
+    """Degrees."""
+
+
+_LEAD = _Lead(1.3, 5.0)
+"""Of three cameras or more."""
+_LEAD_OF_PAIR = _Lead(2.0, 20.0)
+"""Of two cameras, whose axes meet by chance more often."""
 _MAX_ANGLE = 60.0
 """Largest cost of an axis, degrees: what points elsewhere counts alike. Also the cost of axes that are all parallel:
 the cameras may look at one place, but nothing shows it."""
@@ -132,7 +144,9 @@ def check_convention(
     cost = costs(Ts_stated)
     stated = cost.pop(STATED)
     best = min(cost.values())
-    others = _distinct([c for c in cost if cost[c] <= min(FITS_DEG, max(_RATIO * best, best + _MARGIN))], Ts_stated)
+    others = _distinct(
+        [c for c in cost if cost[c] <= min(FITS_DEG, max(_LEAD.ratio * best, best + _LEAD.margin))], Ts_stated
+    )
     if is_clearly_worse(stated, best, len(Ts_stated)):
         rewrite = _rewrite(others[0])
         condition = f"if R and t, as read, are changed ({rewrite})" if is_turned else f"if {in_words(others[0])}"
@@ -146,7 +160,7 @@ def check_convention(
             f"{where}: {misfit}, found that several others fit: {'; '.join(f'{c} ({in_words(c)})' for c in others)}",
             Remedy("choose_poses"),
         )
-    others = [c for c in others if cost[c] <= _RATIO * stated + _MARGIN]
+    others = [c for c in others if cost[c] <= _LEAD.ratio * stated + _LEAD.margin]
     if is_fixed or not others or stated >= _MAX_ANGLE:
         return None
     return (
@@ -172,7 +186,7 @@ def odd_camera(Ts_stated: Sequence[Array]) -> int | None:
 
 def is_clearly_worse(cost: float, best: float, n_cameras: int) -> bool:
     """Return whether the best of several readings fits some cameras, and another, of a given cost, does not."""
-    ratio, margin = (_PAIR_RATIO, _PAIR_MARGIN) if n_cameras == 2 else (_RATIO, _MARGIN)
+    ratio, margin = _LEAD_OF_PAIR if n_cameras == 2 else _LEAD
     return best < FITS_DEG and cost > ratio * best + margin
 
 

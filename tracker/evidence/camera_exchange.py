@@ -20,9 +20,9 @@ from tracker.geometry.cameras import BEYOND_PX, NEAR_PLANE_M, Camera, viewed_poi
 
 _SIDE_PX = 128
 """Longer side of the pictures."""
-_FRAMES, _FRAMES_WITHOUT_BACKGROUND = 4, 6
-"""Numbers of frames that are compared. Without backgrounds, their median is an empty scene where nobody stays half of
-the time."""
+_FRAMES = (4, 6)
+"""Numbers of frames that are compared, with backgrounds and without. Then their median is an empty scene where
+nobody stays half of the time."""
 _MIN_DIFFERENCE = 20.0
 """Smallest difference from the background that counts as a change, gray levels."""
 _MIN_MASK_PX = 20
@@ -33,12 +33,23 @@ _COARSE, _FINE = 20, 30
 """Points of the grids along each axis: of the whole room, and around what the coarse one finds."""
 _ROOM = 0.7
 """Half the side of the room, as a share of the cameras' mean distance from the point at which they look."""
-_MIN_GAIN, _MIN_COVERAGE = 0.1, 0.45
-"""An exchange is reported if it raises the coverage by this much, to this much. On seven recordings, with four cameras
+
+
+class _Least(NamedTuple):
+    """Coverage with two cameras exchanged from which the exchange is reported."""
+
+    gain: float
+    """Above the coverage of the assignment."""
+    coverage: float
+    """In all."""
+
+
+_REPORTED = _Least(gain=0.1, coverage=0.45)
+"""On seven recordings, with four cameras
 and with three of them, no right assignment is reported. Of 38 exchanges of two of four cameras with backgrounds, 36 are
 named; of the two others, in a square, the pair across is named."""
-_ABSENT, _PRESENT = 0.4, 0.6
-"""Share of a body's points on the foreground below which it is not there, and above which it is."""
+_PRESENCE = (0.4, 0.6)
+"""Shares of a body's points on the foreground: below the first it is not there, and above the second it is."""
 _MAX_CAMERAS = 8
 """Among more cameras only those with the least coverage are exchanged."""
 
@@ -74,7 +85,8 @@ def find_exchange(cameras: Sequence[CameraSource], recording: Recording) -> Came
     if len(cameras) < 2:
         return None
     views = [_SmallView(c.camera) for c in cameras]
-    n = _FRAMES if all(c.background or c.masks for c in cameras) else _FRAMES_WITHOUT_BACKGROUND
+    n_with, n_without = _FRAMES
+    n = n_with if all(c.background or c.masks for c in cameras) else n_without
     footage = _read(cameras, views, recording, recording.quick_frames(n))
     order = list(range(len(cameras)))
     room, foregrounds = _Room(views), [f.foregrounds for f in footage]
@@ -89,7 +101,7 @@ def find_exchange(cameras: Sequence[CameraSource], recording: Recording) -> Came
                 found.append((float(_coverage(room, exchanged).mean()), n_stay == 0, i, j))
     before = float(coverage.mean())
     best, with_backgrounds, i, j = max(found, default=(0.0, False, 0, 0))
-    if best < max(before + _MIN_GAIN, _MIN_COVERAGE):
+    if best < max(before + _REPORTED.gain, _REPORTED.coverage):
         return None
     return CameraExchange((cameras[i].camera.name, cameras[j].camera.name), before, best, with_backgrounds)
 
@@ -126,7 +138,8 @@ def find_body_exchange(
         now = max(share(k, footage[k].foregrounds[0]) for k in (i, j))
         for of_i, of_j in _exchanged((views[i], footage[i]), (views[j], footage[j])):
             there = min(share(i, of_i[0]), share(j, of_j[0]))
-            if now < _ABSENT and there > _PRESENT:
+            absent, present = _PRESENCE
+            if now < absent and there > present:
                 return cameras[i].camera.name, cameras[j].camera.name
     return None
 

@@ -18,11 +18,22 @@ from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, IntArray
 
-INITIAL_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-9, 1e8
-"""Damping of the first step, as a share of the diagonal (Marquardt 1963), the least one, and the one beyond which no
-step lowers the cost."""
-MIN_RETRY_DAMPING = 1e-2
-"""Smallest damping after a refused step; less would hardly change the step."""
+
+class _Damping(NamedTuple):
+    """Damping of the steps, as a share of the diagonal (Marquardt 1963)."""
+
+    first: float
+    """Of the first step."""
+    least: float
+    """Of any step."""
+    most: float
+    """Beyond it no step lowers the cost."""
+    least_again: float
+    """Smallest after a refused step; less would hardly change the step."""
+
+
+DAMPING = _Damping(first=1e-3, least=1e-9, most=1e8, least_again=1e-2)
+"""It grows tenfold after a refused step, and falls to a tenth after one that is taken."""
 AT_LIMIT = 1e-9
 """Distance from a limit that counts as at the limit, rad or metres."""
 UNKNOWN = 1.0
@@ -186,7 +197,7 @@ def iterate(
     start, is_locked = pose, value_mask(model, ~is_active)  # locked values stay, even outside the limits
     pose = np.where(is_locked, start, model.clip(start))
     here = _sum(model, pose, blocks)
-    damping, iterations = INITIAL_DAMPING, 0
+    damping, iterations = DAMPING.first, 0
     yield Fit(pose, here.cost, iterations, here.hessian)
     while iterations < max_iterations:
         iterations += 1
@@ -205,15 +216,15 @@ def iterate(
             trial = np.where(is_locked, start, model.clip(model.retract(pose, change)))
             moved = float(np.abs(model.difference(trial, pose)).max())
             there = _sum(model, trial, blocks) if worth else here
-            if there.cost < here.cost or not worth or moved < tolerance or damping > MAX_DAMPING:
+            if there.cost < here.cost or not worth or moved < tolerance or damping > DAMPING.most:
                 break
-            damping = max(10 * damping, MIN_RETRY_DAMPING)
+            damping = max(10 * damping, DAMPING.least_again)
         if there.cost >= here.cost:
             yield Fit(pose, here.cost, iterations, here.hessian)
             return
         gained = here.cost - there.cost
         pose, here = trial, there
-        damping = max(MIN_DAMPING, damping / 10)
+        damping = max(DAMPING.least, damping / 10)
         yield Fit(pose, here.cost, iterations, here.hessian)
         if moved < tolerance or gained < gain:
             return
@@ -264,6 +275,11 @@ def covariance(model: BodyModel, fit: Fit) -> Array:
     return np.asarray(np.linalg.inv(fit.hessian + np.eye(model.n_dofs) / UNKNOWN**2), dtype=np.float64)
 
 
+def weak_pull(model: BodyModel, pose: Array) -> PosePrior:
+    """Return a weak prior on a pose: it determines what points do not show, such as the twist of a straight arm."""
+    return PosePrior(pose, np.full(model.n_dofs, 1e-3 / OTHER_BODY_M))
+
+
 def fit_to_points(
     model: BodyModel, targets_world: dict[str, Array], near: Array | None = None, centers: bool = False
 ) -> Fit:
@@ -303,11 +319,10 @@ def fit_to_points(
             starts.append(model.retract(base, step))
     # Without this prior a body of other sizes would bend unnaturally to come closer to the positions.
     usual = PosePrior.of_spreads(model)
-    # A weak pull to the start determines what the points do not, such as the twist of a straight arm.
-    rest = np.full(model.n_dofs, 1e-3 / OTHER_BODY_M)
 
     def fitted(start: Array) -> Fit:
-        return solve(model, start, [block, usual, PosePrior(start if near is None else near, rest)], max_iterations=100)
+        pull = weak_pull(model, start if near is None else near)
+        return solve(model, start, [block, usual, pull], max_iterations=100)
 
     best = min(map(fitted, starts), key=lambda f: f.cost)
     # Descent cannot lead a limb at a limit around to the right angles: restart from the equivalent angles. Without

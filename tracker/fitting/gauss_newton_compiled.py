@@ -20,10 +20,7 @@ from tracker.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumula
 from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import (
     AT_LIMIT,
-    INITIAL_DAMPING,
-    MAX_DAMPING,
-    MIN_DAMPING,
-    MIN_RETRY_DAMPING,
+    DAMPING,
     Fit,
     PosePrior,
     ResidualBlock,
@@ -146,7 +143,7 @@ def _descend(
 
     The steps are those of `gauss_newton.solve`.
     """
-    n, damping, iterations = pose.shape[0], INITIAL_DAMPING, 0
+    n, damping, iterations = pose.shape[0], DAMPING.first, 0
     here, there = _room(n), _room(n)
     trial, step, active, L = pose.copy(), np.empty(n), np.empty(n, np.int64), np.empty((n, n))
     cost = _linearize(blocks, pose, here)
@@ -160,16 +157,16 @@ def _descend(
             moved = _move(pose, step, active[:n_active], blocks.limits, trial)
             worth = promised > gain
             cost_there = _linearize(blocks, trial, there) if worth else cost
-            if cost_there < cost or not worth or moved < tolerance or damping > MAX_DAMPING:
+            if cost_there < cost or not worth or moved < tolerance or damping > DAMPING.most:
                 break
-            damping = max(10.0 * damping, MIN_RETRY_DAMPING)
+            damping = max(10.0 * damping, DAMPING.least_again)
         if cost_there >= cost:
             break
         gained, cost = cost - cost_there, cost_there
         for k in range(n):  # an assignment to a slice takes a second to compile
             pose[k] = trial[k]
         here, there = there, here
-        damping = max(MIN_DAMPING, damping / 10.0)
+        damping = max(DAMPING.least, damping / 10.0)
         if moved < tolerance or gained < gain:
             break
     for i in range(n):

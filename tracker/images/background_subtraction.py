@@ -1,5 +1,6 @@
 """Find the silhouette: the pixels in which a frame differs from the empty scene."""
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import cv2
@@ -19,12 +20,18 @@ MAX_HUE_SHIFT = 7.0
 """Largest deviation of a channel from the darkened background within a shadow, gray levels."""
 MAX_HIGHLIGHT = 1.3
 """Brightness of the brightest highlight, as a share of the unlit background."""
-_DARK, _BRIGHT = 20.0, 235.0
+_RELIABLE = (20.0, 235.0)
 """Gray levels between which a ratio of colours is reliable."""
 _MIN_SAMPLES = 50
 """Fewest usable samples whose median gives a gain."""
-_SAME, _SHADOW, _NEW = 0, 1, 2
-"""Classes of a pixel."""
+
+
+class _PixelClass(IntEnum):
+    """Classes of a pixel, by growing difference from the empty scene."""
+
+    SAME = 0
+    SHADOW = 1
+    NEW = 2
 
 
 def smooth_image(image: Image) -> Image:
@@ -38,7 +45,8 @@ def has_usable_exposure(empty_colors: NDArray[np.float32]) -> Mask:
     Args:
         empty_colors: smoothed colours of the samples, (n, 3).
     """
-    return np.asarray(np.all((empty_colors > _DARK) & (empty_colors < _BRIGHT), axis=-1))
+    dark, bright = _RELIABLE
+    return np.asarray(np.all((empty_colors > dark) & (empty_colors < bright), axis=-1))
 
 
 def exposure_gain(colors: NDArray[np.float32], empty_colors: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -103,11 +111,11 @@ def subtract_background(
     _find_changes(smooth.ravel(), background.ravel(), *bounds, changed.ravel())
     if noise is not None:
         difference = cv2.absdiff(smooth, background).max(axis=-1)
-        changed[difference < NOISE_SIGMAS * noise] = _SAME
+        changed[difference < NOISE_SIGMAS * noise] = _PixelClass.SAME
     cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
     inside, anything = (
         np.asarray(cv2.morphologyEx((changed > least).view(np.uint8), cv2.MORPH_OPEN, cross)) > 0
-        for least in (_SHADOW, _SAME)
+        for least in (_PixelClass.SHADOW, _PixelClass.SAME)
     )
     return Changes(inside, anything)
 
@@ -128,10 +136,11 @@ def _find_changes(
         darkest: see `Shading`.
         brightest: see `Shading`.
         max_chromaticity: see `Shading`.
-        changed: filled with `_SAME`, `_SHADOW` or `_NEW`, (n,).
+        changed: filled with values of `_PixelClass`, (n,).
     """
     one = np.float32(1.0)
-    same, shadow, new = np.float32(_SAME), np.float32(_SHADOW), np.float32(_NEW)
+    same, shadow = np.float32(_PixelClass.SAME.value), np.float32(_PixelClass.SHADOW.value)
+    new = np.float32(_PixelClass.NEW.value)
     for i in range(changed.shape[0]):
         r, g, b = np.float32(image[3 * i]), np.float32(image[3 * i + 1]), np.float32(image[3 * i + 2])
         r0, g0, b0 = np.float32(empty[3 * i]), np.float32(empty[3 * i + 1]), np.float32(empty[3 * i + 2])

@@ -1,5 +1,7 @@
 """Distance images: compute them from edges and interpolate them between pixels."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,9 +46,19 @@ def bilinear(
     return upper + b * (lower - upper), across, lower - upper
 
 
-_STRAIGHT, _DIAGONAL, _KNIGHT = np.float32(1.0), np.float32(1.4), np.float32(2.1969)
-"""Lengths of the steps to a neighbour beside, a diagonal neighbour, and a knight's move (Borgefors 1986, 5x5 mask),
-px."""
+class _Steps(NamedTuple):
+    """Lengths of steps to other pixels, px."""
+
+    straight: np.float32
+    """To the neighbour beside."""
+    diagonal: np.float32
+    """To a diagonal neighbour."""
+    knight: np.float32
+    """By a knight's move."""
+
+
+_STEPS = _Steps(straight=np.float32(1.0), diagonal=np.float32(1.4), knight=np.float32(2.1969))
+"""Borgefors 1986, 5x5 mask."""
 _BORDER = 2
 """Width of the border around a row that a step may read, px."""
 
@@ -101,11 +113,11 @@ def _step_down(before: FloatArray, before2: FloatArray, own: FloatArray, out: Fl
     """Fill a row, (W,), from its own distances and steps from the two rows before it, (W + 2 `_BORDER`,)."""
     for x in range(np.uint64(before.shape[0] - 2 * _BORDER)):
         at = x + np.uint64(_BORDER)
-        straight = before[at] + _STRAIGHT
-        aside = min(before[at - np.uint64(1)], before[at + np.uint64(1)]) + _DIAGONAL
+        straight = before[at] + _STEPS.straight
+        aside = min(before[at - np.uint64(1)], before[at + np.uint64(1)]) + _STEPS.diagonal
         far = min(before[at - np.uint64(2)], before[at + np.uint64(2)])
         steep = min(before2[at - np.uint64(1)], before2[at + np.uint64(1)])
-        out[x] = min(min(own[x], straight), min(aside, min(far, steep) + _KNIGHT))
+        out[x] = min(min(own[x], straight), min(aside, min(far, steep) + _STEPS.knight))
 
 
 @njit(inline="always", **FAST_MATH)
@@ -123,7 +135,7 @@ def _step_aside(right: bool, limit: np.float32, a: FloatArray, b: FloatArray, ou
     """
     width, step = np.uint64(out.shape[0] - 2 * _BORDER), np.uint64(1)
     while step < width and np.float32(step) < limit:
-        length = np.float32(step) * _STRAIGHT
+        length = np.float32(step) * _STEPS.straight
         if right:
             for x in range(step):
                 b[x] = a[x]

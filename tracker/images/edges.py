@@ -10,8 +10,8 @@ from tracker.compute.jit import njit
 from tracker.compute.quantiles import quantiles
 from tracker.geometry.arrays import FloatArray, Image, Mask
 
-STRONG_FRACTION, WEAK_FRACTION = 0.92, 0.80
-"""Canny's thresholds without a foreground, as the fractions of pixels with a weaker gradient."""
+_FRACTIONS = (0.92, 0.80)
+"""Canny's strong and weak threshold without a foreground, as the fractions of pixels with a weaker gradient."""
 MIN_GRADIENT = 24.0
 """Gradient below which edges are noise, gray levels (Sobel 3x3, of 255)."""
 
@@ -42,7 +42,7 @@ def levels(strengths: FloatArray, restricted: bool) -> Levels:
         restricted: whether edges are restricted to a foreground. The bounds then follow noise, not the share of texture
             in the image.
     """
-    strongest, weaker = quantiles(strengths, (STRONG_FRACTION, WEAK_FRACTION)).tolist()
+    strongest, weaker = quantiles(strengths, _FRACTIONS).tolist()
     strong, weak = max(2 * MIN_GRADIENT, strongest), max(MIN_GRADIENT, weaker)
     return Levels(min(strong, 4 * MIN_GRADIENT), min(weak, 2 * MIN_GRADIENT)) if restricted else Levels(strong, weak)
 

@@ -18,7 +18,7 @@ _NORMAL_WINDOW = (7, 7)
 """Window over which a silhouette is blurred before its normals are taken, px: wider than the steps of its pixels."""
 SAME_PX = 2
 """Largest distance of a contour point from the image edge that it lies on, px."""
-_NO_TRUST, _FULL_TRUST = 0.5, 0.9
+_TRUST_RAMP = (0.5, 0.9)
 """Shares of the contour with an image edge along it, for no trust and for full trust."""
 MIN_TRUST = 0.5
 """Trust below which a silhouette is left out where it alone decides."""
@@ -85,7 +85,8 @@ def contour_trust(contour: SilhouetteContour, silhouette: Mask, edges: Edges) ->
     if not len(contour.points_px):
         return 0.0
     along = _count_along(contour, edges.found, edges.gradients) / len(contour.points_px)
-    seen = (along - _NO_TRUST) / (_FULL_TRUST - _NO_TRUST)
+    none, full = _TRUST_RAMP
+    seen = (along - none) / (full - none)
     is_plausible = cv2.countNonZero(silhouette.view(np.uint8)) < MAX_FILL * silhouette.size
     return min(max(seen, 0.0), 1.0) if is_plausible else 0.0
 

@@ -18,13 +18,14 @@ from tracker.geometry.arrays import Array
 
 _MAX_ACCELERATION_M_S2 = 90.0
 """Largest acceleration of hands in everyday and in vigorous motion, m/s^2; see above."""
-_MIN_THRESHOLD_M, _MAX_THRESHOLD_M = 0.05, 0.25
-"""Smaller residuals are tracking noise; larger ones are inconsistent at any frame rate."""
+_THRESHOLDS_M = (0.05, 0.25)
+"""Least and largest threshold, metres. Smaller residuals are tracking noise; larger ones are inconsistent at any frame
+rate."""
 
 
 def threshold_m(fps: float) -> float:
     """Return the largest consistent residual of a step at a frame rate, metres."""
-    return float(np.clip(_MAX_ACCELERATION_M_S2 / fps**2, _MIN_THRESHOLD_M, _MAX_THRESHOLD_M))
+    return float(np.clip(_MAX_ACCELERATION_M_S2 / fps**2, *_THRESHOLDS_M))
 
 
 def motion_residuals_m(points_world: Array) -> Array:

@@ -11,7 +11,7 @@ from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M
 from tracker.posing.grab import Grab, Holds, limb_points
 from tracker.posing.orient import orient
-from tracker.posing.reaching import HOLD_WEIGHT, QUICK, PointerTarget, as_other_views_placed, reach, restore_held
+from tracker.posing.reaching import QUICK, WEIGHTS, PointerTarget, as_other_views_placed, reach, restore_held
 
 _ON_JOINT_PX = 8.0
 """Largest distance of a grabbed point from its joint at which turning works like a knob, px."""
@@ -121,7 +121,7 @@ def push(grabbed: Grab, pointer_px: Array, pose: Array) -> Array:
     up_m = float(grabbed.pointer_px[1] - np.asarray(pointer_px)[1]) * grabbed.depth_m / camera.K[1, 1]
     depth = max(NEAR_PLANE_M, grabbed.depth_m + _PUSH_GAIN * up_m)
     target = camera.back_project(grabbed.pointer_px + grabbed.offset_px, depth)
-    return _follow(grabbed, target, pose, HOLD_WEIGHT)
+    return _follow(grabbed, target, pose, WEIGHTS.hold)
 
 
 def _follow(grabbed: Grab, target_world: Array, pose: Array, depth_weight: float | None) -> Array:
@@ -167,7 +167,7 @@ def _turned_about_vertical(grabbed: Grab, target_world: Array, pose: Array, dept
     placed = grabbed.holds.of(~grabbed.holds.moved_by(model, model.limb_dofs))
     if grabbed.placed_elsewhere is not None:
         placed = placed.joined(grabbed.placed_elsewhere)
-    placed = placed.scaled(HOLD_WEIGHT)
+    placed = placed.scaled(WEIGHTS.hold)
     arms = np.vstack([grabbed.point_world(grabbed.pose), placed.targets_world]) - T_root[:3, 3]
     level, across = arms - (arms @ up)[:, None] * up, np.cross(up, arms)
     target = rigid.apply(camera.T_camera_world, target_world)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TypedDict
+from typing import NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,29 +33,44 @@ class _Solving(TypedDict):
     tolerance: float
 
 
-HOLD_WEIGHT = 0.5
-"""Weight of keeping a held point of the dragged limb, or a pushed point's depth, against 1 per metre for being under
-the pointer."""
-_DEPTH_WEIGHT = 0.1
-"""Weight of keeping the dragged point's depth. If the limb's lengths allow only one of the two, the point follows the
-pointer."""
-_REST_WEIGHT = 0.003
-"""Weight of keeping the chain at its pose at the grab, per rad. It determines what the pointer does not, and holds the
-point back by some 0.1 mm."""
-_STIFF_WEIGHT = 0.015
-"""The same for joints that bend little, such as the waist: a drag of the trunk turns the body before it bends it."""
+class _Weights(NamedTuple):
+    """Weights of the residuals of a drag, per metre or rad, against 1 per metre for being under the pointer."""
+
+    hold: float
+    """Of a held point of the dragged limb, or a pushed point's depth."""
+    depth: float
+    """Of the dragged point's depth. If the limb's lengths allow only one of the two, the point follows the pointer."""
+    rest: float
+    """Of the chain's pose at the grab. It determines what the pointer does not, and holds the point back by some
+    0.1 mm."""
+    stiff: float
+    """The same for joints that bend little, such as the waist: a drag of the trunk turns the body before it bends
+    it."""
+    middle: float
+    """Of an elbow or knee that was not placed and moves farther than the wrist or ankle is dragged."""
+    twist: float
+    """Of the twist of such a limb."""
 
 
-_MIDDLE_WEIGHT, _BOW = 0.35, 0.35
-"""Weight of keeping an elbow or knee that was not placed from moving farther than the wrist or ankle is dragged; and
-the share of its distance from the line between base and end that it may move besides."""
-_TWIST_WEIGHT, _AXIAL = 0.1, 0.1
-"""Weight of the twist of such a limb, per rad; and the motion of the elbow or knee, in lengths of the upper bone, below
-which a degree of freedom counts as a twist."""
+WEIGHTS = _Weights(hold=0.5, depth=0.1, rest=0.003, stiff=0.015, middle=0.35, twist=0.1)
+"""The weights of `reach` and `restore_held`."""
+_BOW = 0.35
+"""Share of its distance from the line between base and end that such an elbow or knee may move besides."""
+_AXIAL = 0.1
+"""Motion of the elbow or knee, in lengths of the upper bone, below which a degree of freedom counts as a twist."""
 
-_REACHED_M, _REACHED_DEPTH_M = 0.002, 0.02
-"""Tolerances across the line of sight and along it within which a point has reached its target, metres. The pull to the
-rest pose holds a point back in depth by some 4 mm."""
+
+class _Tolerances(NamedTuple):
+    """Distances from its target within which a point has reached it, metres."""
+
+    across_m: float
+    """Across the line of sight."""
+    depth_m: float
+    """Along it. The pull to the rest pose holds a point back in depth by some 4 mm."""
+
+
+_REACHED = _Tolerances(across_m=0.002, depth_m=0.02)
+"""The tolerances of `_has_reached` and `restore_held`."""
 _NEAR_M = 0.05
 """Distance in space from the target beyond which the other sides of a limb are tried, metres."""
 _STRETCHED = 0.999
@@ -73,7 +88,7 @@ class PointerTarget:
     grabbed: Grab
     target_world: Array
     """Target of the point, (3,), metres: under the pointer, at the depth."""
-    depth_weight: float = _DEPTH_WEIGHT
+    depth_weight: float = WEIGHTS.depth
 
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
@@ -126,7 +141,7 @@ class MiddleJoint:
         if moved <= allowed_m:
             return normal_equations(np.zeros(1), np.zeros((1, model.n_dofs)))
         way = (place - start) / moved
-        return normal_equations(np.array([_MIDDLE_WEIGHT * (moved - allowed_m)]), _MIDDLE_WEIGHT * way[None] @ J)
+        return normal_equations(np.array([WEIGHTS.middle * (moved - allowed_m)]), WEIGHTS.middle * way[None] @ J)
 
     def is_exceeded(self, pose: Array) -> bool:
         """Return whether the joint moved farther than is allowed."""
@@ -142,7 +157,7 @@ class MiddleJoint:
         length_m = np.linalg.norm(place - kinematics.Ts_world_part[grabbed.model.parents[self._part], :3, 3])
         is_twist = first & self.active_dofs & (np.linalg.norm(J, axis=0) < _AXIAL * length_m)
         weights = _rest_prior(grabbed.model, grabbed.pose).weights
-        return PosePrior(grabbed.pose, np.where(is_twist, _TWIST_WEIGHT, weights))
+        return PosePrior(grabbed.pose, np.where(is_twist, WEIGHTS.twist, weights))
 
     @property
     def _part(self) -> int:
@@ -191,7 +206,7 @@ def reach(
     holds = holds.of(holds.moved_by(model, active_dofs))
     if depth_weight is None:
         target_world, depth_weight = as_other_views_placed(grabbed, target_world)
-        depth_weight = max(depth_weight, _DEPTH_WEIGHT)
+        depth_weight = max(depth_weight, WEIGHTS.depth)
     # For a held wrist to stay while the elbow is dragged, the elbow must bend: joints beyond the point follow too.
     beyond = np.any(model.moves[:, model.point_parts[holds.points]], axis=1) & model.limb_dofs
     active = active_dofs | (beyond & grabbed.unlocked_dofs)
@@ -200,7 +215,7 @@ def reach(
         _rest_prior(model, grabbed.pose),
     ]
     if len(holds.points):
-        blocks.append(holds.scaled(HOLD_WEIGHT))
+        blocks.append(holds.scaled(WEIGHTS.hold))
 
     def is_done(found: Array) -> bool:
         return _has_reached(grabbed, found, target_world) or _is_stretched(grabbed, found, active_dofs, target_world)
@@ -250,9 +265,9 @@ def as_other_views_placed(grabbed: Grab, target_world: Array) -> tuple[Array, fl
     sight = sight / np.linalg.norm(sight)
     across, off = own.weights[0] @ sight, own.weights[0] @ (target_world - own.targets_world[0])
     information = float(across @ across)
-    step = -float(across @ off) / (information + _DEPTH_WEIGHT**2)
+    step = -float(across @ off) / (information + WEIGHTS.depth**2)
     trust = 1 / (1 + (float(np.linalg.norm(off + step * across)) / SAME_POSE_M) ** 2)
-    return target_world + trust * step * sight, HOLD_WEIGHT * trust * information**0.5
+    return target_world + trust * step * sight, WEIGHTS.hold * trust * information**0.5
 
 
 def restore_held(model: BodyModel, pose: Array, holds: Holds, unlocked_dofs: NDArray[np.bool_]) -> Array:
@@ -271,7 +286,7 @@ def restore_held(model: BodyModel, pose: Array, holds: Holds, unlocked_dofs: NDA
             continue
 
         def is_done(found: Array, of_limb: Holds = of_limb) -> bool:
-            return bool(np.all(of_limb.distances(model, found) < _REACHED_M))
+            return bool(np.all(of_limb.distances(model, found) < _REACHED.across_m))
 
         if np.any(of_limb.distances(model, pose) > AT_LIMIT):
             blocks: list[ResidualBlock] = [of_limb, _rest_prior(model, pose)]
@@ -281,7 +296,7 @@ def restore_held(model: BodyModel, pose: Array, holds: Holds, unlocked_dofs: NDA
 
 def _rest_prior(model: BodyModel, pose: Array) -> PosePrior:
     """Return the prior that keeps the chain near a pose, (n_values,)."""
-    return PosePrior(pose, np.where(np.isfinite(model.spreads), _STIFF_WEIGHT, _REST_WEIGHT))
+    return PosePrior(pose, np.where(np.isfinite(model.spreads), WEIGHTS.stiff, WEIGHTS.rest))
 
 
 def _solve_bending(
@@ -356,7 +371,7 @@ def _has_reached(grabbed: Grab, pose: Array, target_world: Array) -> bool:
     """Return whether the grabbed point is at its target, within visible tolerances."""
     seen = rigid.apply(grabbed.camera.T_camera_world, np.stack([grabbed.point_world(pose), target_world]))
     across = grabbed.depth_m * np.diff(seen[:, :2] / np.maximum(seen[:, 2:], NEAR_PLANE_M), axis=0)
-    return bool(np.linalg.norm(across) < _REACHED_M and abs(seen[1, 2] - seen[0, 2]) < _REACHED_DEPTH_M)
+    return bool(np.linalg.norm(across) < _REACHED.across_m and abs(seen[1, 2] - seen[0, 2]) < _REACHED.depth_m)
 
 
 def _is_stretched(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_], target_world: Array) -> bool:

@@ -36,7 +36,7 @@ NEXT_TO_NOTHING = 0.005
 _HEAD = "head"
 """Name of the limb that looks different from each side."""
 _UNCERTAIN = " uncertain"
-"""Last word of the reason against a pose of which a limb may be off."""
+"""Word of the reason against a pose of which a limb may be off."""
 _LIMIT_RAD = 0.05
 """An angle is at its limit where it is nearer, rad."""
 
@@ -65,11 +65,25 @@ OFF_ODDS, LOST_ODDS = _odds(0.05), _odds(0.25)
 """A limb is doubtful above these log odds that a joint is off by more than 100 mm, and lost above these that one is by
 more than 150 mm. To call a wrong pose good is the worse error."""
 
-_SEARCH_WEIGHTS = np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704])
-"""Weights of `search_features`, in their order, and the constant."""
-_SEARCH, _SEARCH_OF_SEVERAL = -3.5, -3.0
-"""Search odds above which a limb is searched, of a single person and of one of several. A wrong limb misleads the
-frames after it, so that a search begins early. Among several people a search may take another person's limb."""
+
+class _SearchModel(NamedTuple):
+    """Search odds of a limb, linear in its features, and the odds above which it is searched.
+
+    A wrong limb misleads the frames after it, so that a search begins early.
+    """
+
+    weights: Array
+    """Weights of `search_features`, in their order, and the constant."""
+    alone: float
+    """Least odds of a single person."""
+    of_several: float
+    """Least odds of one of several people. A search may take another person's limb."""
+
+
+_SEARCH = _SearchModel(
+    np.array([-1.611, 0.579, 2.663, 5.724, 6.632, -2.025, -2.906, -5.704]), alone=-3.5, of_several=-3.0
+)
+"""The model of `search_odds`."""
 _MAX_UNEXPLAINED = 0.07
 """A larger unexplained share of a silhouette's contour shows a limb that is elsewhere."""
 _LOST_FORWARD = 0.6
@@ -153,7 +167,7 @@ class PoseQuality(NamedTuple):
 
     def doubtful_limbs(self, alone: bool) -> tuple[str, ...]:
         """Return the names of limbs that are worth a search themselves, of a single person or of one of several."""
-        least = _SEARCH if alone else _SEARCH_OF_SEVERAL
+        least = _SEARCH.alone if alone else _SEARCH.of_several
         return self._searched_from(least)
 
     @property
@@ -228,7 +242,7 @@ def _log_odds(found: PoseQuality) -> Array:
 
 @lru_cache(maxsize=8)
 def _search_odds(found: PoseQuality) -> Array:
-    odds = np.array([_SEARCH_WEIGHTS @ [*search_features(found, x), 1.0] for x in found.limbs])
+    odds = np.array([_SEARCH.weights @ [*search_features(found, x), 1.0] for x in found.limbs])
     odds.flags.writeable = False
     return odds
 
@@ -372,14 +386,14 @@ def reason(found: PoseQuality) -> str:
     return uncertain(found.limbs[int(found.log_odds.argmax())].name)
 
 
-def uncertain(limb: str) -> str:
-    """Return the reason against a pose of which the limb of a name may be off."""
-    return f"{limb_display_name(limb)}{_UNCERTAIN}"
+def uncertain(limb: str, without: str = "") -> str:
+    """Return the reason against a pose of which the limb of a name may be off: it is elsewhere without some view."""
+    return f"{limb_display_name(limb)}{_UNCERTAIN}" + (f" without {without}" if without else "")
 
 
 def is_uncertainty(reason: str) -> bool:
     """Return whether a reason is that a limb may be off."""
-    return reason.endswith(_UNCERTAIN)
+    return _UNCERTAIN in reason
 
 
 def status_named(name: str) -> Status:

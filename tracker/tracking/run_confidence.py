@@ -57,3 +57,10 @@ def run_features(frame_features: Array, steps: Array) -> Array:
 def log_odds(found: Array) -> Array:
     """Return the log odds of off and lost, (..., 2), of features, (..., 8)."""
     return np.asarray((found @ RUN_MODEL.weights)[..., None] + (RUN_MODEL.off, RUN_MODEL.lost))
+
+
+def probability_off(lost: Array) -> Array:
+    """Return the probabilities that limbs are off by those that they are lost, of any shape."""
+    with np.errstate(divide="ignore"):
+        odds = np.log(lost) - np.log1p(-lost)
+    return probabilities(odds + RUN_MODEL.off - RUN_MODEL.lost)

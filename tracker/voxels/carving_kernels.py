@@ -4,6 +4,7 @@ A block is enclosed in a sphere. The sphere's pixels in a view lie within a squa
 an integral image gives. If all squares are uniform the block is decided as a whole (an octree, Szeliski 1993).
 """
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +15,14 @@ from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.cameras import BEYOND_PX, NEAR_PLANE_M
 
-_UNSEEN, _OUTSIDE, _INSIDE = 1, 2, 4
-"""Flags of a block in a view: some of its voxels may be out of the image, out of the silhouette, or within it."""
-_ANY = _UNSEEN | _OUTSIDE | _INSIDE
+
+class _BlockFlag(IntEnum):
+    """Flags of a block in a view: some of its voxels may be out of the image, out of the silhouette, or within it."""
+
+    UNSEEN = 1
+    OUTSIDE = 2
+    INSIDE = 4
+    ANY = UNSEEN | OUTSIDE | INSIDE
 
 
 class ViewTables(NamedTuple):
@@ -125,10 +131,10 @@ def _decide(
         found = _view_test(views, v, x, y, z, radius)
         if found & (found - 1) == 0:  # all voxels alike
             settled |= 1 << v
-        n_inside += found == _INSIDE
-        n_maybe += found & _INSIDE != 0
-        n_outside += found == _OUTSIDE
-        n_maybe_outside += found & _OUTSIDE != 0
+        n_inside += found == _BlockFlag.INSIDE
+        n_maybe += found & _BlockFlag.INSIDE != 0
+        n_outside += found == _BlockFlag.OUTSIDE
+        n_maybe_outside += found & _BlockFlag.OUTSIDE != 0
         if n_outside > rule[1]:
             decided = 0
             break
@@ -146,9 +152,9 @@ def _view_test(views: ViewTables, v: int, x: float, y: float, z: float, radius: 
     depth = P[2, 0] * x + P[2, 1] * y + P[2, 2] * z + P[2, 3]
     near = np.float32(NEAR_PLANE_M)
     if depth + radius < near:
-        return _UNSEEN
+        return _BlockFlag.UNSEEN
     if depth - radius < near:
-        return _ANY if radius > 0 else _UNSEEN
+        return _BlockFlag.ANY if radius > 0 else _BlockFlag.UNSEEN
     inverse = np.float32(1.0) / depth
     sx = (P[0, 0] * x + P[0, 1] * y + P[0, 2] * z + P[0, 3]) * inverse
     sy = (P[1, 0] * x + P[1, 1] * y + P[1, 2] * z + P[1, 3]) * inverse
@@ -157,34 +163,34 @@ def _view_test(views: ViewTables, v: int, x: float, y: float, z: float, radius: 
     fx, fy = (sx - views.lookup_scale[v, 0]) * scale, (sy - views.lookup_scale[v, 1]) * scale
     if radius == 0:
         if not (fx > np.float32(-0.5) and fy > np.float32(-0.5) and fx < columns - 0.5 and fy < rows - 0.5):
-            return _UNSEEN
+            return _BlockFlag.UNSEEN
         at = views.lookup_layout[v, 0] + int(fy + np.float32(0.5)) * columns + int(fx + np.float32(0.5))
         u, w = int(views.lookups[at, 0]), int(views.lookups[at, 1])
         if u < 0 or w < 0 or u >= views.sizes[v, 0] or w >= views.sizes[v, 1]:
-            return _UNSEEN
-        return _INSIDE if _count(views, v, u, w, u + 1, w + 1) else _OUTSIDE
+            return _BlockFlag.UNSEEN
+        return _BlockFlag.INSIDE if _count(views, v, u, w, u + 1, w + 1) else _BlockFlag.OUTSIDE
     # A point of the sphere lies within radius * sqrt(1 + s^2) / (depth - radius) of the centre's sensor coordinates.
     steepest = max(abs(sx), abs(sy))
     reach = radius * np.sqrt(np.float32(1.0) + steepest * steepest) / (depth - radius)
     entries = reach * scale + np.float32(1.0)
     if fx < -entries or fy < -entries or fx > columns - 1 + entries or fy > rows - 1 + entries:
-        return _UNSEEN
+        return _BlockFlag.UNSEEN
     if fx < entries or fy < entries or fx > columns - 1 - entries or fy > rows - 1 - entries:
-        return _ANY
+        return _BlockFlag.ANY
     at = views.lookup_layout[v, 0] + int(fy + np.float32(0.5)) * columns + int(fx + np.float32(0.5))
     u, w = int(views.lookups[at, 0]), int(views.lookups[at, 1])
     if u == BEYOND_PX:
-        return _ANY
+        return _BlockFlag.ANY
     d = int(entries / scale * views.lookup_scale[v, 3]) + 1  # one for the rounding of both pixels
     u0, v0, u1, v1 = u - d, w - d, u + d + 1, w + d + 1
     width, height = views.sizes[v, 0], views.sizes[v, 1]
     if u1 <= 0 or v1 <= 0 or u0 >= width or v0 >= height:
-        return _UNSEEN
+        return _BlockFlag.UNSEEN
     whole = u0 >= 0 and v0 >= 0 and u1 <= width and v1 <= height
     count = _count(views, v, u0, v0, u1, v1)
     if count == 0:
-        return _OUTSIDE if whole else _UNSEEN | _OUTSIDE
-    return _INSIDE if whole and count == (u1 - u0) * (v1 - v0) else _ANY
+        return _BlockFlag.OUTSIDE if whole else _BlockFlag.UNSEEN | _BlockFlag.OUTSIDE
+    return _BlockFlag.INSIDE if whole and count == (u1 - u0) * (v1 - v0) else _BlockFlag.ANY
 
 
 @njit(inline="always", **NO_REFCOUNT)

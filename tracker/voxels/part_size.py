@@ -12,8 +12,8 @@ from tracker.geometry.arrays import Array
 
 ELLIPSOID = np.sqrt(5.0)
 """Half-axis of a solid ellipsoid in standard deviations, along all axes."""
-CYLINDER_ACROSS, CYLINDER_ALONG = 2.0, np.sqrt(3.0)
-"""Half-axes of a solid elliptical cylinder in standard deviations, across and along its axis."""
+CYLINDER = np.array([2.0, 2.0, np.sqrt(3.0)])
+"""Half-axes of a solid elliptical cylinder in standard deviations, twice across and once along its axis, (3,)."""
 
 
 class PrincipalAxes(NamedTuple):

@@ -188,7 +188,7 @@ def test_a_limb_that_has_followed_is_not_tried_bent(gavrila, pose, monkeypatch):
     assert len(solved) == 1
     assert np.linalg.norm(SIDE.project(end) - start - way) < 0.5
     assert 0.002 < abs(SIDE.depths(end) - hand.depth_m) < 0.02  # as far as the pull of the rest holds it back
-    monkeypatch.setattr(reaching, "_REACHED_DEPTH_M", 0.002)
+    monkeypatch.setattr(reaching, "_REACHED", reaching._REACHED._replace(depth_m=0.002))
     np.testing.assert_allclose(drag(hand, start + way, pose), values, atol=0.01)
     assert len(solved) == 4
 

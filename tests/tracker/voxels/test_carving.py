@@ -7,7 +7,7 @@ from tracker.errors import TrackerError
 from tracker.geometry import rigid
 from tracker.voxels.bounding_volume import bounding_volume
 from tracker.voxels.carving import Carver, CarveSettings
-from tracker.voxels.part_size import CYLINDER_ACROSS, CYLINDER_ALONG, ELLIPSOID, principal_axes
+from tracker.voxels.part_size import CYLINDER, ELLIPSOID, principal_axes
 from tracker.voxels.voxel_grid import VoxelGrid
 
 TURNED = rigid.so3_exp(np.array([0.4, -0.7, 0.2]))
@@ -28,11 +28,10 @@ def carved(silhouettes, size_m, **settings):
 )
 def test_sizes_of_solids_within_half_a_voxel(size_m, lens):
     cameras = cameras_around(30, lens)
-    cylindrical = np.array([CYLINDER_ACROSS, CYLINDER_ACROSS, CYLINDER_ALONG])
     for solid, half_axes, expected in (
         (ellipsoid((0.01, 0, 0), np.full(3, 0.12)), ELLIPSOID, np.full(3, 0.12)),
         (ellipsoid((0, 0.02, 0), AXES, TURNED), ELLIPSOID, AXES),
-        (cylinder((0, 0, -0.01), AXES, TURNED), cylindrical, AXES),
+        (cylinder((0, 0, -0.01), AXES, TURNED), CYLINDER, AXES),
     ):
         voxels = carved(silhouettes_of([solid], cameras), size_m)
         found = half_axes * principal_axes(voxels.points_world, size_m).sigmas

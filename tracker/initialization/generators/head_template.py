@@ -43,9 +43,9 @@ _UPPER_M, _MIN_UPPER_SCORE = 0.35, 0.4
 """Depth of the upper end of a figure below its highest voxel, metres, and the smallest score of a head there."""
 _ADULT_M3 = 0.10
 """Volume of the visual hull of a typical adult, cubic metres."""
-_HEAD_M, _HEAD_GROWTH_M = 0.0945, 0.0405
-"""Distance from the centre within which voxels belong to the head, metres. It is a constant plus a slope by the size of
-the person as a share of an adult's, because heads grow less than bodies."""
+_RADIUS_M = (0.0945, 0.0405)
+"""Distance from the centre within which voxels belong to the head, metres: a constant, and a slope by the size of the
+person as a share of an adult's, because heads grow less than bodies."""
 
 
 class Head(NamedTuple):
@@ -141,7 +141,8 @@ def _head(figure: Voxels, graph: VoxelGraph, place: _Place) -> Head | None:
     path_m = place.radius_m + float(lengths[np.isfinite(lengths)].max())
     # A person cut off by an image has short paths, yet the volume of more than a child.
     scale = min(1.0, max(path_m / DEFAULT_HEIGHT_M, float(np.cbrt(figure.volume_m3 / _ADULT_M3))))
-    is_head = place.distances <= _HEAD_M + _HEAD_GROWTH_M * scale
+    constant, slope = _RADIUS_M
+    is_head = place.distances <= constant + slope * scale
     neck = _neck(figure, is_head)
     if neck is None:
         return None

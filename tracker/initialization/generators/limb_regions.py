@@ -24,12 +24,21 @@ _LEG_ROOT = -0.75
 """A limb that begins lower on the trunk, as a share of half its length from its middle, is a leg, raised or not."""
 _SLICE_M = 0.03
 """Half the thickness of the slice whose mean is a limb's centre, metres."""
-_SPLIT = {"arm": 0.53, "leg": 0.52}
-"""Place of elbow and knee, as a share of the length through the limb to wrist or ankle, bent or not. P. de Leva 1996
-(J. Biomech. 29:1223) has 0.51 and 0.49 from shoulder and hip, but the region begins at the trunk's surface, and with
-these the heavy and the tall thin man of `tests/benchmarks/from_nothing.py` ended at 26 and 32 mm, not at 20 and 15."""
-_END_M = {"arm": 0.10, "leg": 0.12}
-"""Distance of the wrist and the ankle from the end of the limb, metres."""
+
+
+class _Division(NamedTuple):
+    """Places of the joints of a limb along it."""
+
+    middle: float
+    """Elbow or knee, as a share of the length through the limb to wrist or ankle, bent or not."""
+    end_m: float
+    """Distance of the wrist or ankle from the end of the limb, metres."""
+
+
+_DIVISIONS = {"arm": _Division(0.53, 0.10), "leg": _Division(0.52, 0.12)}
+"""P. de Leva 1996 (J. Biomech. 29:1223) has elbow and knee at 0.51 and 0.49 from shoulder and hip, but the region
+begins at the trunk's surface. With these the heavy and the tall thin man of `tests/benchmarks/from_nothing.py` ended at
+26 and 32 mm, not at 20 and 15."""
 
 
 class LimbRegion(NamedTuple):
@@ -114,11 +123,12 @@ def _limb(points: Array, branch: _Branch, distances: Array, torso: Torso) -> Lim
     (begins_z, tip_z) = torso.local(np.stack([first, tip]))[:, 2]
     own_root = branch.begins_m < _SKIN_M + 0.05
     kind = "leg" if tip_z < -half - _LEG_M or (own_root and begins_z < _LEG_ROOT * half) else "arm"
-    length = from_torso.max() - _END_M[kind]
+    length = from_torso.max() - _DIVISIONS[kind].end_m
     side = np.sign(torso.local(first[None])[0, 1]) or 1.0
     across, along = (0.35, -0.75) if kind == "leg" else (1.0, 0.85)
     root = torso.center + torso.axes @ np.array([0.0, side * across * max(0.12, torso.half_axes[1]), along * half])
-    middle, distal = (_at(region, from_torso, (root, branch.begins_m, first), s * length) for s in (_SPLIT[kind], 1.0))
+    shares = (_DIVISIONS[kind].middle, 1.0)
+    middle, distal = (_at(region, from_torso, (root, branch.begins_m, first), s * length) for s in shares)
     return LimbRegion(kind, root, middle, distal, branch.own)
 
 

@@ -1,5 +1,7 @@
 """Measure the height of a person who stands upright on a frame."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tracker.errors import TrackerError
@@ -12,10 +14,21 @@ from tracker.voxels.shadows import is_changed_at
 
 UPRIGHT = 0.9
 """Smallest cosine of the angle between the trunk and the vertical of a person who stands."""
-_NECK, _NECK_GROWTH, _NECK_SPREAD = 0.70, 0.18, 0.04
-"""Height of the base of a standing person's head, as a fraction of the body's height. It is a constant plus a slope by
-the person's size as a share of an adult's; the last number is its largest relative error. Folded legs and hands on the
-head change it."""
+
+
+class _NeckHeight(NamedTuple):
+    """Height of the base of a standing person's head, as a fraction of the body's height, linear in the body's size."""
+
+    constant: float
+    """Of no size."""
+    slope: float
+    """By the person's size as a share of an adult's."""
+    spread: float
+    """Largest relative error of the height."""
+
+
+_NECK = _NeckHeight(constant=0.70, slope=0.18, spread=0.04)
+"""Folded legs and hands on the head change it."""
 _MAX_PATH = 1.25
 """Largest path from the top of the head to the soles, as a share of a standing person's height. Folded legs make it
 longer. The grid lengthens paths by up to a tenth."""
@@ -72,8 +85,8 @@ def standing_height(scene: PersonScene, trunk_up: Array, top: Array, head: Head 
     if head is None:
         return height_m
     neck = (float(head.neck @ scene.up) - low) / height_m
-    usual = _NECK + _NECK_GROWTH * head.scale
-    stands = abs(neck / usual - 1) < _NECK_SPREAD and head.path_m <= _MAX_PATH * height_m
+    usual = _NECK.constant + _NECK.slope * head.scale
+    stands = abs(neck / usual - 1) < _NECK.spread and head.path_m <= _MAX_PATH * height_m
     return height_m if stands else None
 
 

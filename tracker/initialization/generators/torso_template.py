@@ -10,16 +10,33 @@ from tracker.geometry.arrays import Array
 from tracker.voxels.part_size import principal_axes
 from tracker.voxels.voxel_grid import Voxels
 
-_AVERAGE_M = (0.50, 0.13)
-"""Length and radius of the template, metres: an average torso."""
-_SMALL_M = (0.20, 0.05)
-"""Length and radius from which it grows, metres."""
-_MAX_M = (0.70, 0.30)
-"""Largest length and half-width, metres."""
+
+class _Size(NamedTuple):
+    """Size of a cylinder."""
+
+    length_m: float
+    """Metres."""
+    radius_m: float
+    """Radius or half-width, metres."""
+
+
+class _TorsoSizes(NamedTuple):
+    """Sizes of a torso."""
+
+    average: _Size
+    """Of the template that turns to the voxels: an average torso."""
+    smallest: _Size
+    """From which the template grows."""
+    largest: _Size
+    """To which it grows."""
+
+
+_TORSO = _TorsoSizes(average=_Size(0.50, 0.13), smallest=_Size(0.20, 0.05), largest=_Size(0.70, 0.30))
+"""Sizes of the template in `_axis`, and of the one that `_grown` grows."""
 _MIN_FILLED = 0.75
 """Smallest share of occupied voxels in a layer that is added; a lower one meets empty voxels."""
-_GIRDLE_M = (0.25, 0.28)
-"""Length and radius of the shoulder girdle below the neck, metres. It is wide where arms hang at a trunk's sides."""
+_GIRDLE = _Size(0.25, 0.28)
+"""Size of the shoulder girdle below the neck, which is wide where arms hang at a trunk's sides."""
 
 
 class Torso(NamedTuple):
@@ -66,7 +83,7 @@ def find_torso(figure: Voxels, neck: Array, is_head: NDArray[np.bool_]) -> Torso
     """
     points, others = figure.points_world, ~is_head
     up = _axis(points[others], neck)
-    girdle = others & _in_cylinder(points, neck, up, *_GIRDLE_M)
+    girdle = others & _in_cylinder(points, neck, up, *_GIRDLE)
     if not girdle.any():
         raise TrackerError(
             "expected a trunk below the head in the silhouettes, found none",
@@ -85,7 +102,7 @@ def _axis(points: Array, neck: Array) -> Array:
 
     It turns until it holds the same voxels as before.
     """
-    length, radius = _AVERAGE_M
+    length, radius = _TORSO.average
     down = points.mean(axis=0) - neck
     down /= np.linalg.norm(down)
     before = set[bytes]()
@@ -119,14 +136,14 @@ def _grown(figure: Voxels, neck: Array, axes: Array) -> Array:
     It grows across both axes first, then towards the legs, until they part.
     """
     size = figure.grid.size_m
-    half = np.array([_SMALL_M[1], _SMALL_M[1], _SMALL_M[0] / 2])
+    smallest, largest = (np.array([s.radius_m, s.radius_m, s.length_m / 2]) for s in (_TORSO.smallest, _TORSO.largest))
+    half = smallest
     growing = [0, 1, 2]
     while growing:
         for axis in list(growing):
             larger = half.copy()
             larger[axis] += size / (2 if axis == 2 else 1)
-            limit = _MAX_M[0] / 2 if axis == 2 else _MAX_M[1]
-            if larger[axis] > limit or _filled(figure, neck, axes, half, larger) < _MIN_FILLED:
+            if larger[axis] > largest[axis] or _filled(figure, neck, axes, half, larger) < _MIN_FILLED:
                 growing.remove(axis)
             else:
                 half = larger

@@ -4,7 +4,6 @@ from dataclasses import replace
 from typing import Any
 
 from tracker.tracking.method import Option
-from tracker.tracking.person_memory import HISTORY_FRAMES
 
 
 def _with_recovery(settings: Any, on: bool) -> Any:
@@ -29,9 +28,10 @@ ORDER = Option(
 WINDOW = Option(
     "window", "Past poses", "number of poses from which the motion is predicted", "3 by default, 8 in the paper's mode",
     "whole", lambda s: s.predict.window,
-    lambda s, value: replace(s, predict=replace(s.predict, window=int(value))), limits=(1, HISTORY_FRAMES),
+    lambda s, value: replace(s, predict=replace(s.predict, window=int(value))), limits=(1, 8),
 )  # fmt: skip
-"""More than 8 poses, a quarter of a second, fit no polynomial of a person's motion."""
+"""More than 8 poses, a quarter of a second, fit no polynomial of a person's motion. A memory keeps as many
+(`person_memory`, which is not imported here: it loads kernels)."""
 RECOVER = Option(
     "recover", "Search lost limbs", "search for a limb that is not where edges and colours are", "", "switch",
     lambda s: s.recover is not None, _with_recovery,
@@ -44,4 +44,9 @@ BACKWARD_PASS = Option(
 SMOOTH = Option(
     "smooth", "Smooth", "at the end, smooth the poses over time; keyframes stay, lost limbs are not trusted", "",
     "switch", lambda s: s.smooth, lambda s, on: replace(s, smooth=on),
+)  # fmt: skip
+AUDIT = Option(
+    "audit", "Audit",
+    "at the end, track once more without each camera in turn: the median is the pose, and how far these tracks lie "
+    "apart is its error", "", "switch", lambda s: s.audit, lambda s, on: replace(s, audit=on),
 )  # fmt: skip

@@ -10,7 +10,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.shapes import Ellipsoid
-from tracker.voxels.part_size import CYLINDER_ACROSS, CYLINDER_ALONG, ELLIPSOID
+from tracker.voxels.part_size import CYLINDER, ELLIPSOID
 
 PARTS = (
     "torso", "head", "left_upper_arm", "right_upper_arm", "left_thigh", "right_thigh",
@@ -55,8 +55,7 @@ class FigureJoints(NamedTuple):
     @property
     def sigma_shares(self) -> Array:
         """Standard deviation of the voxels of a part along its axes, in half sizes, (10, 3)."""
-        cylinder = 1 / np.array([CYLINDER_ACROSS, CYLINDER_ACROSS, CYLINDER_ALONG])
-        return np.where(self.is_ellipsoid[:, None], 1 / ELLIPSOID, cylinder)
+        return np.where(self.is_ellipsoid[:, None], 1 / ELLIPSOID, 1 / CYLINDER)
 
 
 class FigureOfBody(NamedTuple):
