@@ -181,6 +181,7 @@ def _is_possible(pose: PoseRecord) -> bool:
         and pose.status in STATUSES
         and _are_finite((*pose.view_costs_px, *pose.part_costs_px, *pose.limbs_lost))
         and all(0 <= p <= 1 for p in pose.limbs_lost)
+        and (pose.errors is None or (pose.errors.shape[1:] == (3, 3) and bool(np.isfinite(pose.errors).all())))
     )
 
 
@@ -194,4 +195,5 @@ def _require(is_so: bool, otherwise: str) -> None:
 
 
 def _array(_: type, values: Any) -> Any:
-    return np.array(msgspec.convert(values, list[float]), dtype=np.float64)
+    is_nested = isinstance(values, list) and len(values) > 0 and isinstance(values[0], list)
+    return np.array(msgspec.convert(values, list[list[list[float]]] if is_nested else list[float]), dtype=np.float64)

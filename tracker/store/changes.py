@@ -45,11 +45,11 @@ def _is_keyframe(db: sqlite3.Connection, person: str, frame: int) -> bool:
 
 def _set_pose(db: sqlite3.Connection, edit: int, change: PoseChange) -> None:
     pose = change.pose
-    content = (None,) * 12 if pose is None else (*rows.record_to_row(pose), _settings_record(db, pose.settings))
+    content = (None,) * 13 if pose is None else (*rows.record_to_row(pose), _settings_record(db, pose.settings))
     change_id = db.execute(
         f"INSERT INTO pose_changes (edit, previous, person, frame, {rows.WRITTEN_COLUMNS}) VALUES (?1, (SELECT "
         "change FROM poses WHERE (person, frame) = (?2, ?3)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, "
-        "?14, ?15)",
+        "?14, ?15, ?16)",
         (edit, change.person, change.frame, *content),
     ).lastrowid
     show_change(db, "pose", change_id, change_id)

@@ -14,7 +14,7 @@ _COLUMNS = {
     "model_revisions": "id, person, toml, time",
     "program_settings": "id, settings",
     "pose_changes": "id, edit, previous, person, frame, numbers, sources, keyframe, status, cost_px, model_revision, "
-    "settings, views_px, parts_px, remark, program_settings, reviewed, limbs",
+    "settings, views_px, parts_px, remark, program_settings, reviewed, limbs, errors",
     "poses": "person, frame, change",
     "alternatives": "change, rank, model_revision, numbers, cost_px",
     "pin_changes": "id, edit, previous, person, frame, point, camera, u, v",
@@ -22,9 +22,12 @@ _COLUMNS = {
     "settings": "key, value",
 }
 """Columns of each table that its checksums cover."""
-_LATER_COLUMNS = {6: {"pose_changes": ("limbs",)}}
-"""Columns that the tables of an older version with checksums lack."""
-OLDEST_VERSION = 6
+LATER_COLUMNS: dict[int, dict[str, tuple[str, ...]]] = {
+    6: {"pose_changes": ("limbs", "errors")},
+    7: {"pose_changes": ("errors",)},
+}
+"""Columns that the tables of each older version with checksums lack."""
+OLDEST_VERSION = min(LATER_COLUMNS)
 """The first version of a store with checksums."""
 _KEYS = {
     "poses": "person, frame",
@@ -105,7 +108,7 @@ def differences(db: sqlite3.Connection, version: int) -> list[str]:
     if set(known) != {*_COLUMNS, _SCHEMA}:
         found.append("the list of its tables is not as it was written")
     for table, all_columns in _COLUMNS.items():
-        later = _LATER_COLUMNS.get(version, {}).get(table, ())
+        later = LATER_COLUMNS.get(version, {}).get(table, ())
         columns = ", ".join(c for c in all_columns.split(", ") if c not in later)
         wrong = db.execute(
             f"SELECT {_label(table)} FROM {table} WHERE checksum IS NOT row_checksum({columns})"

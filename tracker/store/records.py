@@ -48,6 +48,9 @@ class PoseRecord:
     """Whether a person has checked it and left it unchanged. A keyframe counts as reviewed too."""
     limbs_lost: tuple[float, ...] = ()
     """Probability that each limb is lost, in the order of `tracker.body.limbs.limbs`; empty where not assessed."""
+    errors: Array | None = None
+    """Covariance of each point of the body in the order of its `point_names`, (n_points, 3, 3), m^2; None where not
+    known."""
 
 
 @dataclass(frozen=True, eq=False)

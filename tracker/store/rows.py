@@ -73,6 +73,7 @@ class _Pose(msgspec.Struct):
     remark: str | None
     reviewed: _Flag | None
     limbs: bytes | None
+    errors: bytes | None
 
 
 class _FramePose(msgspec.Struct):
@@ -117,7 +118,8 @@ ALTERNATIVES = "FROM alternatives a JOIN pose_changes c ON c.id = a.change"
 
 RECORD_COLUMNS = (
     "c.numbers, c.sources, c.model_revision, c.keyframe, c.status, c.cost_px, coalesce(t.settings, c.settings), "
-    "e.author, e.time, e.program, c.views_px, c.parts_px, c.remark, c.reviewed, c.limbs"
+    "e.author, e.time, e.program, c.views_px, c.parts_px, c.remark, c.reviewed, c.limbs, "
+    "c.errors"
 )
 """Columns that `row_to_record` reads; `e` is the edit, `t` the row of the settings."""
 FRAME_ROW_COLUMNS = (
@@ -129,13 +131,14 @@ FRAME_POSE_COLUMNS = "c.frame, c.numbers, c.cost_px, c.views_px, c.model_revisio
 """Columns that `row_to_frame_pose` reads."""
 WRITTEN_COLUMNS = (
     "numbers, sources, keyframe, status, cost_px, model_revision, views_px, parts_px, remark, reviewed, "
-    "limbs, program_settings"
+    "limbs, errors, program_settings"
 )
 """Columns that `record_to_row` fills, and `program_settings`, the id of the row of the settings."""
 ALTERNATIVE_COLUMNS = "a.numbers, a.model_revision, a.cost_px"
 """Columns that `row_to_alternative` reads; `a` is the alternative."""
 UNMARKED_COLUMNS = (
-    "numbers, sources, status, cost_px, model_revision, views_px, parts_px, remark, limbs, program_settings, settings"
+    "numbers, sources, status, cost_px, model_revision, views_px, parts_px, remark, limbs, errors, "
+    "program_settings, settings"
 )
 """Columns that marking a pose copies unchanged."""
 
@@ -171,7 +174,7 @@ def row_to_record(row: Sequence[Any], where: object) -> PoseRecord:
         values, sources, found.model_revision, bool(found.keyframe), found.status, found.cost_px,
         check(decoded_json(found.settings, where), dict[str, Any], f"{where}, settings", DamagedStoreError),
         found.author, found.time, found.program, _costs(found.view_costs_px, where), _costs(found.part_costs_px, where),
-        found.remark or "", bool(found.reviewed), _numbers(found.limbs, where),
+        found.remark or "", bool(found.reviewed), _numbers(found.limbs, where), _covariances(found.errors, where),
     )  # fmt: skip
 
 
@@ -272,6 +275,7 @@ def record_to_row(pose: PoseRecord) -> tuple[Any, ...]:
         pose.remark,
         pose.reviewed,
         _blob(pose.limbs_lost),
+        None if pose.errors is None else pose.errors[(..., *np.triu_indices(3))].astype("<f4").tobytes(),
     )
 
 
@@ -282,6 +286,21 @@ def _array(blob: bytes, where: object) -> Array:
         raise DamagedStoreError(f"{where}: expected finite values, found {values[~np.isfinite(values)][0]}")
     values.setflags(write=False)
     return values
+
+
+def _covariances(blob: bytes | None, where: object) -> Array | None:
+    """Decode covariances, (n, 3, 3)."""
+    if blob is None:
+        return None
+    if len(blob) % 24:
+        raise DamagedStoreError(f"{where}: expected covariances of 24 bytes, found {len(blob)} bytes")
+    triangles = np.frombuffer(blob, dtype="<f4").reshape(-1, 6)
+    if not np.isfinite(triangles).all():
+        raise DamagedStoreError(f"{where}: expected finite covariances, found {triangles[~np.isfinite(triangles)][0]}")
+    out = np.empty((len(triangles), 3, 3))
+    rows, columns = np.triu_indices(3)
+    out[:, rows, columns] = out[:, columns, rows] = triangles
+    return out
 
 
 def _whole(blob: bytes, where: object) -> bytes:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from tracker.store import checksums
 
-VERSION = 7
+VERSION = 8
 """Version of the store; older ones are upgraded, newer ones are refused."""
 
 _SCHEMA = """
@@ -45,7 +45,8 @@ CREATE TABLE pose_changes (
     remark TEXT,
     program_settings INTEGER REFERENCES program_settings,
     reviewed INTEGER,                                            -- NULL: written before version 4, not reviewed
-    limbs BLOB                                                   -- like views_px: probability that a limb is lost
+    limbs BLOB,                                                  -- like views_px: probability that a limb is lost
+    errors BLOB                                                  -- little-endian float32: upper triangles, m^2
 );
 CREATE INDEX pose_changes_edit ON pose_changes (edit);
 CREATE TABLE poses (
@@ -95,6 +96,7 @@ _UPGRADES = {
         *checksums.ADDED,
     ),
     6: ("ALTER TABLE pose_changes ADD COLUMN limbs BLOB",),
+    7: ("ALTER TABLE pose_changes ADD COLUMN errors BLOB",),
 }
 """Statements that upgrade a store from each older version to the next."""
 STATEMENTS = (*_SCHEMA.split(";\n"), *checksums.ADDED, *(text for texts in _UPGRADES.values() for text in texts))
@@ -103,12 +105,12 @@ _FORMER_SETTINGS = "told"
 """Name of the table and the column of settings in stores of versions 3 to 5."""
 _RENAMED_SETTINGS = f"{_FORMER_SETTINGS} AS program_settings"
 _MISSING_COLUMNS = {
-    1: ("views_px", "parts_px", "remark", "program_settings", "reviewed", "limbs"),
-    2: ("program_settings", "reviewed", "limbs"),
-    3: (_RENAMED_SETTINGS, "reviewed", "limbs"),
-    4: (_RENAMED_SETTINGS, "limbs"),
-    5: (_RENAMED_SETTINGS, "limbs"),
-    6: ("limbs",),
+    1: ("views_px", "parts_px", "remark", "program_settings", "reviewed", "limbs", "errors"),
+    2: ("program_settings", "reviewed", "limbs", "errors"),
+    3: (_RENAMED_SETTINGS, "reviewed", "limbs", "errors"),
+    4: (_RENAMED_SETTINGS, "limbs", "errors"),
+    5: (_RENAMED_SETTINGS, "limbs", "errors"),
+    **{version: later["pose_changes"] for version, later in checksums.LATER_COLUMNS.items()},
 }
 """Columns of `pose_changes` that each older version lacks or names differently. A store opened read only is read
 through temporary views, which hide the tables of the same names."""

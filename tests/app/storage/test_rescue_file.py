@@ -97,7 +97,7 @@ def with_camera(name):
     [
         (with_pose(values=[1.0, 2.0]), "'ann' in frame 4 does not fit its body"),
         (with_pose(values={"a": 1}), "Expected `array`"),
-        (with_pose(values=[[1.0]] * N_VALUES), "Expected `float`"),
+        (with_pose(values=[[1.0]] * N_VALUES), "Expected `array`, got `float`"),
         (with_pose(values=["1"] * N_VALUES), "Expected `float`"),
         (with_pose(model_revision=4), "has a body that the file lacks"),
         (with_pose(sources=["manual"]), "impossible sources"),

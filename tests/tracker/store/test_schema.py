@@ -75,6 +75,32 @@ def version_6(path):
     return written(path, "store_version_6.sql")
 
 
+@pytest.fixture
+def version_7(path):
+    """A store as its version 7 was written, with limbs: a keyframe and two tracked frames."""
+    return written(path, "store_version_7.sql")
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_in_version_7_errors_were_not_known(version_7, read_only):
+    before = version_7.read_bytes()
+    store = AnnotationStore(version_7, read_only=read_only)
+    assert [(r.frame, r.status, r.limbs_lost) for r in store.frames("ann")] == [
+        (1, "", ()), (2, "lost", (0.5, 0.01)), (3, "doubtful", (0.5, 0.01)),
+    ]  # fmt: skip
+    assert [store.pose("ann", k).errors for k in (1, 2, 3)] == [None] * 3
+    store.close()
+    assert (version_7.read_bytes() == before) == read_only
+
+
+def test_a_store_of_version_7_takes_errors_and_is_still_checked(version_7):
+    store = AnnotationStore(version_7)
+    errors = np.array([[[4, 1, 0], [1, 5, 2], [0, 2, 6]], np.eye(3)])
+    store.commit("track", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("tracked",) * 2, 1, errors=errors))])
+    store.close()
+    np.testing.assert_array_equal(AnnotationStore(version_7).pose("ann", 4).errors, errors)
+
+
 @pytest.mark.parametrize("read_only", [False, True])
 def test_in_version_6_limbs_were_not_assessed(version_6, read_only):
     before = version_6.read_bytes()
