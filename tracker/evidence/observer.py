@@ -35,7 +35,7 @@ from tracker.images.working_view import fit_region
 
 FOREGROUND_MARGIN = 0.012
 """Width of the margin around the silhouette in which edges count, as a fraction of the longer side of the image."""
-_FRAMES_AHEAD = 2
+FRAMES_AHEAD = 2
 """Frames that are read ahead, each by a thread of its own."""
 
 
@@ -56,14 +56,16 @@ class Observer:
     """Computes evidence from the frames of a recording. Thread-safe."""
 
     def __init__(
-        self, cameras: Sequence[CameraSource], recording: Recording, in_recording: Sequence[int] | None = None
-    ) -> None:
+        self, cameras: Sequence[CameraSource], recording: Recording, in_recording: Sequence[int] | None = None,
+        views: Sequence[Foreground] | None = None,
+    ) -> None:  # fmt: skip
         """Read the backgrounds.
 
         Args:
             cameras: the views, with their side files.
             recording: their footage.
             in_recording: index of each view in the recording, if it has others too.
+            views: the foreground of each view, if another observer has read the backgrounds.
 
         Raises:
             RecordingError: a background is missing, unreadable or of the wrong size.
@@ -74,18 +76,23 @@ class Observer:
         self._in_recording = in_recording
         # OpenCV's own threads would compete with the threads of other views.
         self._pool, self._pool_ahead = (
-            ThreadPoolExecutor(_FRAMES_AHEAD, name, initializer=cv2.setNumThreads, initargs=(1,))
+            ThreadPoolExecutor(FRAMES_AHEAD, name, initializer=cv2.setNumThreads, initargs=(1,))
             for name in ("observe", "observe ahead")
         )
-        self._views = [Foreground(c, self._pool) for c in self.cameras]
+        self._views = [Foreground(c, self._pool) for c in self.cameras] if views is None else list(views)
         self._reader, self._finder = (ThreadPoolExecutor(1, name) for name in ("read ahead", "find ahead"))
         self._ahead: OrderedDict[int, _Ahead] = OrderedDict()
         self._lock = threading.Lock()
 
     def with_cameras(self, chosen: Sequence[int]) -> "Observer":
         """Return an observer of some of the views, by their indices, of the same footage."""
+        return Observer(*self._of(chosen))
+
+    def _of(self, chosen: Sequence[int]) -> tuple[list[CameraSource], Recording, list[int], list[Foreground]]:
+        """Return the arguments of an observer of some of the views."""
         known = range(len(self.cameras)) if self._in_recording is None else self._in_recording
-        return Observer([self.cameras[i] for i in chosen], self.recording, [known[i] for i in chosen])
+        cameras = [self.cameras[i] for i in chosen]
+        return cameras, self.recording, [known[i] for i in chosen], [self._views[i] for i in chosen]
 
     @property
     def working_cameras(self) -> tuple[Camera, ...]:
@@ -122,13 +129,13 @@ class Observer:
             if regions is not None and ahead.features is None:
                 ahead = ahead._replace(
                     features=self._finder.submit(
-                        self._find_ahead, ahead.prepared, list(regions), with_static_edges, edges
+                        self._find_ahead, k, ahead.prepared, list(regions), with_static_edges, edges
                     ),
                     with_static_edges=with_static_edges,
                     edges=edges,
                 )
             self._ahead[k] = ahead
-            while len(self._ahead) > _FRAMES_AHEAD:
+            while len(self._ahead) > FRAMES_AHEAD:
                 self._ahead.popitem(last=False)[1].prepared.cancel()
 
     def evidence(
@@ -167,7 +174,7 @@ class Observer:
             i: int, region: Region | None, predicted_px: FloatArray | None, model: StaticEdgeModel | None
         ) -> ViewEvidence:
             known = features and features[i].box == self._box(i, region)
-            seen = features[i] if known else self._find_features(i, prepared[i], region, with_static_edges, edges)
+            seen = features[i] if known else self._find_features(k, i, prepared[i], region, with_static_edges, edges)
             if predicted_px is not None:
                 predicted_px = predicted_px - np.array([*seen.corner_px, *seen.corner_px], np.float32)
             model = model if seen.silhouette is None else None
@@ -189,6 +196,7 @@ class Observer:
 
     def _find_ahead(
         self,
+        k: int,
         prepared: Future[list[Prepared | None]],
         regions: Sequence[Region | None],
         with_static_edges: bool,
@@ -197,7 +205,13 @@ class Observer:
         n = len(self._views)
         return list(
             self._pool_ahead.map(
-                self._find_features, range(n), prepared.result(), regions, [with_static_edges] * n, [edges] * n
+                self._find_features,
+                [k] * n,
+                range(n),
+                prepared.result(),
+                regions,
+                [with_static_edges] * n,
+                [edges] * n,
             )
         )
 
@@ -206,8 +220,10 @@ class Observer:
         return view.whole if region is None else fit_region(region, view.camera.size)
 
     def _find_features(
-        self, i: int, prepared: Prepared | None, region: Region | None, with_static_edges: bool, settings: EdgeSettings
-    ) -> RegionFeatures:
+        self, k: int, i: int, prepared: Prepared | None, region: Region | None, with_static_edges: bool,
+        settings: EdgeSettings,
+    ) -> RegionFeatures:  # fmt: skip
+        """Return the features of a region of view i of frame k."""
         view, box = self._views[i], self._box(i, region)
         working = view.view.camera
         camera, scale, filmed = working.cropped(box), view.view.scale, view.view.filmed

@@ -1,6 +1,6 @@
 """The interface of a tracker: settings, a generator of pose estimates, and an optional backward pass."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -9,6 +9,7 @@ import numpy as np
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Region
 from tracker.geometry.ground_plane import GroundPlane
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
 from tracker.tracking.subjects import Subjects
@@ -23,6 +24,10 @@ class TrackerSettings(Protocol):
     @property
     def smooth(self) -> bool:
         """Whether the poses are smoothed at the end of a run."""
+
+    @property
+    def audit(self) -> bool:
+        """Whether the poses are compared with tracks without each view at the end of a run; see `view_tracks`."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -47,6 +52,9 @@ class TrackingRun:
     """Frame rate of the recording, 1/s."""
     floor: GroundPlane | None = None
     """The floor, by which trackers that use silhouettes recover clothes classified as shadows; None if unknown."""
+    regions: Callable[[int], Sequence[Region | None]] | None = None
+    """Returns regions of the views of a frame that other runs over the same frames use, too. They are used where they
+    hold the prediction."""
 
     def __post_init__(self) -> None:
         """Check the poses: from one that is no number, none of the frames after it would be."""

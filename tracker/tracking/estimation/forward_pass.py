@@ -20,8 +20,12 @@ from tracker.tracking.estimation.frame_problem import Bodies
 from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
 from tracker.tracking.estimation.start_pose import StartFrame, settle_starts
 from tracker.tracking.person_memory import PersonMemory
+from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.view_regions import confirmed_regions, regions, regions_ahead, visible_pieces_px
+
+_Predict = Callable[[PersonMemory, PredictSettings], Array]
+"""Predicts a pose, (n_values,)."""
 
 
 def track_forward(
@@ -47,17 +51,10 @@ def track_forward(
     ]
     learns_static, edges = settings.segments and settings.edges.static, settings.edges
     static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if learns_static else None
-    cameras, ahead = observer.working_cameras, list[Region | None]()
-    everywhere: list[Region | None] | None = [None] * len(cameras) if edges.whole_images else None
+    cameras, chosen = observer.working_cameras, _Regions(run, edges.whole_images)
 
-    def placed(frame: int, predict: Callable[[PersonMemory, PredictSettings], Array]) -> Bodies:
-        """Return all people on a frame, in their keyframes or as predicted."""
-        keyframes = subjects.keyframes_at(frame)
-        poses = [
-            keyframes.get(p, predict(m, settings.predict) if p in subjects.tracked else m.history[-1])
-            for p, m in enumerate(memories)
-        ]
-        return tuple(PosedBody(m, v) for m, v in zip(models, poses, strict=True))
+    def placed(frame: int, predict: _Predict) -> Bodies:
+        return _placed(subjects, memories, frame, lambda m: predict(m, settings.predict))
 
     def observe(
         frame: int, bodies: Bodies, where: Sequence[Region | None]
@@ -67,31 +64,32 @@ def track_forward(
         visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
         return contours, observer.evidence(frame, where, visible, static_edges, edges)
 
-    def around(bodies: Bodies) -> list[Region | None]:
-        return everywhere or regions(cameras, bodies)
-
     for i, frame in enumerate(frames):
         if i == 0:  # a run that goes on from known poses uses the regions that one without a break would use
-            if several and all(len(m.history) > 1 for m in memories):
-                ahead = everywhere or regions_ahead(cameras, placed(frame, PersonMemory.predict_before_last))
-            observer.prefetch(frame, ahead or None, learns_static, edges)
+            if run.regions is not None:
+                chosen.look_ahead(frame, ())
+            elif several and all(len(m.history) > 1 for m in memories):
+                chosen.look_ahead(frame, placed(frame, PersonMemory.predict_before_last))
+            observer.prefetch(frame, chosen.ahead or None, learns_static, edges)
         keyframes, predicted = subjects.keyframes_at(frame), placed(frame, PersonMemory.predict)
-        where = confirmed_regions(ahead, cameras, predicted) if ahead and not everywhere else around(predicted)
+        where = chosen.around(predicted)
         following = frames[i + 1 : i + 2]
-        for k in following if several else ():
-            ahead = everywhere or regions_ahead(cameras, placed(k, PersonMemory.predict_two_ahead))
-            observer.prefetch(k, ahead, learns_static, edges)
+        for k in following if chosen.is_ahead else ():
+            chosen.look_ahead(k, placed(k, PersonMemory.predict_two_ahead))
+            observer.prefetch(k, chosen.ahead, learns_static, edges)
         contours, views = observe(frame, predicted, where)
         settled: Mapping[int, PosedBody] = {}
         if i == 0 and not lead_in:
-            begun = StartFrame(predicted, contours, views, lambda bodies: observe(frames[0], bodies, around(bodies))[1])
+            begun = StartFrame(
+                predicted, contours, views, lambda bodies: observe(frames[0], bodies, chosen.new(bodies))[1]
+            )
             settled = settle_starts(begun, memories, subjects.tracked, settings)
             for p, body in settled.items():
                 memories[p] = PersonMemory(models[p], body.values, subjects.active_dofs[p], alone=not several)
             if not settled.keys() <= keyframes.keys():
                 predicted = tuple(b if p in keyframes else settled.get(p, b) for p, b in enumerate(predicted))
-                contours, views = observe(frame, predicted, around(predicted))
-        for k in () if several else following:  # for one person later: this frame has kept all cores busy
+                contours, views = observe(frame, predicted, chosen.new(predicted))
+        for k in () if chosen.is_ahead else following:  # for one person later: this frame has kept all cores busy
             observer.prefetch(k)
         estimator = make_estimator(views, memories, predicted, settings, contours)
         estimates = estimator.estimate([p for p in subjects.tracked if p not in keyframes])
@@ -106,6 +104,43 @@ def track_forward(
         if i >= lead_in:
             found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in range(len(models))]
             yield make_estimate(frame, cost_of, estimator.bodies, found, settings)
+
+
+class _Regions:
+    """Chooses the regions of each frame, a frame ahead for several people and where other runs use the same."""
+
+    def __init__(self, run: TrackingRun, whole_images: bool) -> None:
+        self._cameras, self._shared = run.observer.working_cameras, run.regions
+        self._whole: list[Region | None] | None = [None] * len(self._cameras) if whole_images else None
+        self.is_ahead = len(run.subjects.models) > 1 or run.regions is not None
+        self.ahead: list[Region | None] = []
+        """Regions of the frame that is read ahead."""
+
+    def look_ahead(self, frame: int, predicted: Bodies) -> None:
+        """Choose the regions of a frame that is read ahead."""
+        if self._shared is not None:
+            self.ahead = list(self._shared(frame))
+        else:
+            self.ahead = self._whole or regions_ahead(self._cameras, predicted)
+
+    def around(self, bodies: Bodies) -> list[Region | None]:
+        """Return the regions that were chosen ahead, where they hold all bodies; else new ones."""
+        if self.ahead and self._whole is None:
+            return confirmed_regions(self.ahead, self._cameras, bodies)
+        return self.new(bodies)
+
+    def new(self, bodies: Bodies) -> list[Region | None]:
+        """Return regions around all bodies."""
+        return self._whole or regions(self._cameras, bodies)
+
+
+def _placed(
+    subjects: Subjects, memories: Sequence[PersonMemory], frame: int, predict: Callable[[PersonMemory], Array]
+) -> Bodies:
+    """Return all people on a frame, in their keyframes, as predicted, or where they stay if they are not tracked."""
+    keyframes = subjects.keyframes_at(frame)
+    poses = [keyframes.get(p, predict(m) if p in subjects.tracked else m.history[-1]) for p, m in enumerate(memories)]
+    return tuple(PosedBody(m, v) for m, v in zip(subjects.models, poses, strict=True))
 
 
 def make_estimate(
