@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from app.cli.arguments import OptionalClock, OptionalName, OptionalPath, OptionalRange, OptionalWhole, SessionArg
-from app.cli.json_output import format_json
 from app.cli.target import Target, check_stride, load_target, parse_frames
 from app.remedies import command_line_text
+from app.cli.json_output import format_json
 from tracker.errors import SessionError, TrackerError
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def evaluate(
     poses = motion.poses
     wanted = range(min(poses), max(poses) + 1) if frames is None else parse_frames(frames, session)
     wanted = wanted[:: check_stride(stride) if stride is not None else gcd(*np.diff(sorted(poses)).tolist()) or 1]
-    result = evaluate_joints(joints, reference.joints, wanted, align, stored.statuses)
+    result = evaluate_joints(joints, reference.joints, wanted, align, stored.assessed)
     result = evaluate_offsets(result, motion, (joints, reference.joints), wanted, align)
     if reference.motion is not None:
         result = evaluate_poses(result, motion, reference.motion, wanted)

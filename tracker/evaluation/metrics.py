@@ -86,6 +86,21 @@ class FrameError(NamedTuple):
     """Largest distance of a limb joint."""
     worst_joint: str | None
     """The joint with this distance."""
+    probability_off: float | None = None
+    """Probability that a limb is off, the largest of all limbs; None where it was not assessed."""
+    reason: str = ""
+    """The tracker's reason against the pose; empty where there is none."""
+
+
+class PoseDoubt(NamedTuple):
+    """What the tracker says of a stored pose."""
+
+    status: str
+    """`keyframe` for a pose that a person set; empty where it was not assessed."""
+    probability_off: float | None = None
+    """See `FrameError`."""
+    reason: str = ""
+    """See `FrameError`."""
 
 
 class JointErrors(NamedTuple):
@@ -122,7 +137,7 @@ def evaluate_joints(
     reference: MarkerTable,
     frames: Sequence[int],
     align: Alignment = "none",
-    statuses: Mapping[int, str] | None = None,
+    assessed: Mapping[int, PoseDoubt] | None = None,
 ) -> Evaluation:
     """Compare joints frame by frame. Both tables have the project's names (`joint_maps.joints_of`) and frame numbers.
 
@@ -131,7 +146,7 @@ def evaluate_joints(
         reference: the truth; a frame or a position may be missing.
         frames: the frames to compare.
         align: `rigid-all` first moves the estimate as a whole by the best rotation and translation over all frames.
-        statuses: of the estimated poses by frame, for `Evaluation.per_frame`.
+        assessed: the estimated poses by frame, for `Evaluation.per_frame`.
 
     Raises:
         FormatError: there is nothing to compare.
@@ -163,7 +178,7 @@ def evaluate_joints(
         fps=fps,
         acceleration_error_m_s2=_acceleration_error(found.vectors[:, is_limb], fps),
         per_frame=tuple(
-            _frame_error(frame, limb_joints, 1000 * errors, statuses or {})
+            _frame_error(frame, limb_joints, 1000 * errors, (assessed or {}).get(frame, PoseDoubt("")))
             for frame, errors in zip(frames, limb_error, strict=True)
         ),
     )
@@ -206,12 +221,13 @@ def _acceleration_error(vectors: Array, fps: float) -> float | None:
     return float(norms.mean()) * fps**2 if len(norms) else None
 
 
-def _frame_error(frame: int, joints: Sequence[str], errors_mm: Array, statuses: Mapping[int, str]) -> FrameError:
-    status = statuses.get(frame) or None
+def _frame_error(frame: int, joints: Sequence[str], errors_mm: Array, assessed: PoseDoubt) -> FrameError:
+    status, off, reason = assessed
     if not np.isfinite(errors_mm).any():
-        return FrameError(frame, status, None, None, None)
+        return FrameError(frame, status or None, None, None, None, off, reason)
     worst = int(np.nanargmax(errors_mm))
-    return FrameError(frame, status, float(np.nanmean(errors_mm)), float(errors_mm[worst]), joints[worst])
+    mean = float(np.nanmean(errors_mm))
+    return FrameError(frame, status or None, mean, float(errors_mm[worst]), joints[worst], off, reason)
 
 
 def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: Sequence[int]) -> Evaluation:

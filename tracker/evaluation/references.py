@@ -10,7 +10,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError, SessionError
 from tracker.evaluation.clocks import Clock, Placement, place_rows
-from tracker.evaluation.metrics import Motion, joints_of_poses, remap_axes
+from tracker.evaluation.metrics import Motion, PoseDoubt, joints_of_poses, remap_axes
 from tracker.formats.joint_maps import joints_of, read_joint_map
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.formats.pose_csv import PoseTable, read_pose_table
@@ -18,6 +18,7 @@ from tracker.formats.trc import MarkerTable, read_trc
 from tracker.geometry.arrays import Array
 from tracker.session.folder import SESSION_FILE
 from tracker.session.session import Session, load_session
+from tracker.store.records import PoseRecord
 from tracker.store.stored_poses import read_stored_poses
 
 
@@ -30,8 +31,8 @@ class Reference(NamedTuple):
     """Poses of any body; None if unknown."""
     n_frames: int | None = None
     """Length of the recording that it is of, in the session's frames; None if unknown."""
-    statuses: Mapping[int, str] = MappingProxyType({})
-    """Status of stored poses by frame, `keyframe` for those that a person set."""
+    assessed: Mapping[int, PoseDoubt] = MappingProxyType({})
+    """PoseDoubt of stored poses by frame."""
 
 
 def read_joints(
@@ -101,15 +102,22 @@ def stored_motion(session: Session, person: int) -> Reference:
     """
     name, model = session.people[person].name, session.people[person].model
     by_model: dict[BodyModel, dict[int, Array]] = {}
-    statuses: dict[int, str] = {}
+    assessed: dict[int, PoseDoubt] = {}
     for frame, stored in read_stored_poses(session.annotations_path, name, model).items():
-        statuses[frame] = "keyframe" if stored.record.keyframe else stored.record.status
+        assessed[frame] = _assessment(stored.record)
         if len(stored.body.values) == len(model.value_names):
             by_model.setdefault(stored.body.model, {})[frame] = stored.body.values
     tables = [joints_of_poses(m, poses, session.fps) for m, poses in by_model.items()]
     poses = {frame: values for some in by_model.values() for frame, values in some.items()}
     joints = _merged(tables) if tables else joints_of_poses(model, {}, session.fps)
-    return Reference(joints, Motion(model, poses), statuses=statuses)
+    return Reference(joints, Motion(model, poses), assessed=assessed)
+
+
+def _assessment(record: PoseRecord) -> PoseDoubt:
+    from tracker.tracking.run_confidence import probability_off  # imported lazily: it loads kernels
+
+    off = float(probability_off(np.array(record.limbs_lost)).max()) if record.limbs_lost else None
+    return PoseDoubt("keyframe" if record.keyframe else record.status, off, record.remark)
 
 
 def _merged(tables: Sequence[MarkerTable]) -> MarkerTable:

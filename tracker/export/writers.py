@@ -29,7 +29,9 @@ from tracker.formats.opensim_mot import write_mot
 from tracker.formats.pose_csv import value_units
 from tracker.formats.trc import write_trc
 from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
+from tracker.store.records import PoseRecord
 
 Tick = Callable[[], None]
 """Called after each frame of each file; it may raise to stop the export."""
@@ -69,14 +71,19 @@ def write_tables(motion: ExportedMotion, options: ExportOptions, paths: Sequence
                 model, body = stored.body.model, stored.body
                 places = (per_metre * rigid.apply(T_file_world, body.joint_centers_world)).tolist()
                 by_point = dict(zip(model.point_names, places, strict=True))
-                joint_values = [x for name in points for x in by_point.get(name, (np.nan,) * 3)]
+                errors = _errors(stored.record) * per_metre
+                of_errors = dict(zip(model.point_names, errors.tolist(), strict=False))
+                joint_values = [
+                    x for name in points for x in (*by_point.get(name, (np.nan,) * 3), of_errors.get(name, np.nan))
+                ]
                 by_value = dict(zip(model.value_names, body.values.tolist(), strict=True))
                 angle_values = [by_value.get(v, np.nan) * factor for v, (_, factor) in units.items()]
             joints.append(replace(row, values=joint_values))
             angles.append(replace(row, values=angle_values))
             if person is motion.exported[0]:
                 tick()
-    write_motion_csv(paths[0], cameras, [f"{name}.{axis}_{options.units}" for name in points for axis in "xyz"], joints)
+    columns = [f"{name}.{what}_{options.units}" for name in points for what in ("x", "y", "z", "error")]
+    write_motion_csv(paths[0], cameras, columns, joints)
     write_motion_csv(paths[1], cameras, [v + suffix for v, (suffix, _) in units.items()], angles)
 
 
@@ -181,6 +188,11 @@ def _row(motion: ExportedMotion, person: PersonMotion, frame: int) -> MotionRow:
     record = stored.record
     costs = (record.cost_px, *record.view_costs_px)
     return replace(row, status=record.status, source=stored.source, is_keyframe=record.keyframe, costs_px=costs)
+
+
+def _errors(record: PoseRecord) -> Array:
+    """Return the root mean square error of each point of a pose, (n_points,), metres; empty where it is not known."""
+    return np.zeros(0) if record.errors is None else np.sqrt(np.trace(record.errors, axis1=1, axis2=2))
 
 
 def _unit(unit: str, options: ExportOptions) -> tuple[str, float]:

@@ -5,7 +5,7 @@ import pytest
 from bodies import with_center
 
 from tracker.evaluation.joint_offsets import evaluate_offsets
-from tracker.evaluation.metrics import Motion, evaluate_joints, joints_of_poses
+from tracker.evaluation.metrics import Motion, PoseDoubt, evaluate_joints, joints_of_poses
 from tracker.formats.model_toml import load_model
 
 MODEL = load_model("gavrila34", 1.7)
@@ -66,9 +66,11 @@ def test_each_frame_has_its_worst_joint():
     estimate, truth = (joints_of_poses(MODEL, poses(4), FPS) for _ in range(2))
     truth.points[1, truth.names.index("right_knee"), 2] += 0.06
     truth.points[2, :] = np.nan
-    found = evaluate_joints(estimate, truth, range(4), statuses={0: "keyframe", 1: "lost", 2: ""}).per_frame
+    assessed = {0: PoseDoubt("keyframe"), 1: PoseDoubt("lost", 0.9, "left leg uncertain"), 2: PoseDoubt("")}
+    found = evaluate_joints(estimate, truth, range(4), assessed=assessed).per_frame
     assert [f.frame for f in found] == [0, 1, 2, 3]
     assert [f.status for f in found] == ["keyframe", "lost", None, None]
     assert (found[1].worst_joint, found[1].worst_mm) == ("right_knee", pytest.approx(60))
     assert found[1].mean_mm == pytest.approx(5)
-    assert found[2][2:] == (None, None, None)
+    assert found[2][2:5] == (None, None, None)
+    assert [(f.probability_off, f.reason) for f in found[:2]] == [(None, ""), (0.9, "left leg uncertain")]
