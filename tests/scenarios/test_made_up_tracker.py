@@ -35,6 +35,7 @@ class SonarSettings:
     method: ClassVar[str] = "sonar"
     pings: int = 3
     smooth: bool = False
+    audit: bool = False
 
 
 PINGS = Option(

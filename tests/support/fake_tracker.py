@@ -66,7 +66,7 @@ class FakeTracker:
 
     def with_settings(self, settings):
         """Stands for the tracker's constructor."""
-        self.settings = settings
+        self.settings = replace(settings, audit=False)
         return self
 
     def estimates(self, run):

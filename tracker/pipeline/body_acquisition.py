@@ -233,7 +233,7 @@ def refitted_record(record: PoseRecord, pose: Array, revision: int) -> PoseRecor
     return replace(
         record, values=pose, model_revision=revision, status="", cost_px=None,
         settings={"method": "refit", "model_revision": record.model_revision, **kept}, view_costs_px=(),
-        part_costs_px=(), limbs_lost=(), remark="refitted to other sizes",
+        part_costs_px=(), limbs_lost=(), errors=None, remark="refitted to other sizes",
     )  # fmt: skip
 
 

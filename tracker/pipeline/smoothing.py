@@ -13,21 +13,19 @@ from numpy.typing import NDArray
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.errors import DamagedStoreError
+from tracker.fitting.consensus import Consensus, consensus
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
+from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks
 from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.confidence import (
     PoseQuality,
-    classify_limbs,
     frame_features,
-    is_uncertainty,
-    probabilities,
-    uncertain,
-    worst,
 )
-from tracker.tracking.run_confidence import LOST_FROM, log_odds, run_features, smoothing_steps
+from tracker.tracking.run_confidence import LOST_FROM, run_features, smoothing_steps
 from tracker.tracking.subjects import Subjects
+from tracker.tracking.view_tracks import FrameTracks
 
 
 class TrackedRows:
@@ -38,6 +36,8 @@ class TrackedRows:
         self._changes: dict[int, PoseChange] = {}
         self._covariances: dict[int, NDArray[np.float32]] = {}  # upper triangle: half of the memory
         self._features: dict[int, NDArray[np.float32]] = {}  # of frames whose limbs were assessed
+        self._unseen = set[int]()  # frames on which no edge is near the body
+        self._tracks: dict[int, FrameTracks] = {}
 
     def add(self, change: PoseChange, covariance: Array, quality: PoseQuality | None) -> None:
         """Add a row, or replace that of the same frame.
@@ -51,8 +51,20 @@ class TrackedRows:
         self._changes[frame] = change
         self._covariances[frame] = covariance[np.triu_indices(len(covariance))].astype(np.float32)
         self._features.pop(frame, None)
-        if quality is not None and not quality.is_unseen:
+        self._unseen.discard(frame)
+        if quality is not None and quality.is_unseen:
+            self._unseen.add(frame)
+        elif quality is not None:
             self._features[frame] = frame_features(quality).astype(np.float32)
+
+    def add_tracks(self, frame: int, tracks: FrameTracks) -> None:
+        """Add the poses of a frame by tracks without a view each."""
+        self._tracks[frame] = tracks
+
+    @property
+    def has_tracks(self) -> bool:
+        """Whether there are poses by tracks without a view each."""
+        return len(self._tracks) > 0
 
     def record(self) -> dict[str, list[str]]:
         """Return covariances and features by frame as texts, for a run that is resumed later."""
@@ -74,9 +86,11 @@ class TrackedRows:
         self._changes[change.frame], self._covariances[change.frame] = change, covariance
         if features and change.pose is not None:
             self._features[change.frame] = features[0].reshape(len(change.pose.limbs_lost), -1)
+        elif change.pose is not None and change.pose.status == "lost":
+            self._unseen.add(change.frame)
 
-    def finished(self, subjects: Subjects, person: int, fps: float) -> list[PoseChange]:
-        """Return the rows with smoothed poses and their final statuses, in the order of time.
+    def finished(self, subjects: Subjects, person: int, fps: float, smooth: bool = True) -> list[PoseChange]:
+        """Return the rows with consensus poses, smoothed, and their final statuses, in the order of time.
 
         Costs and alternatives stay those of the tracked pose, and so does the status of a pose whose limbs were not
         assessed.
@@ -85,10 +99,41 @@ class TrackedRows:
             subjects: of the run; keyframes are exact.
             person: index of the person.
             fps: frame rate, 1/s.
+            smooth: whether the poses are smoothed.
         """
-        smoothed, model = self.smoothed(subjects, person, fps), subjects.models[person]
+        model, active = subjects.models[person], subjects.active_dofs[person]
+        agreed = {f: self._consensus(model, f, active) for f in self._changes.keys() & self._tracks.keys()}
+        tracked, self._changes = self._changes, self._with_poses({f: c.pose for f, c in agreed.items()})
+        smoothed = self.smoothed(subjects, person, fps) if smooth else [*self._changes.values()]
+        self._changes = tracked
         features = self.run_features(model, smoothed)
-        return [_classified(model, c, features[c.frame]) if c.frame in features else c for c in smoothed]
+        out = []
+        for change in smoothed:
+            assert change.pose is not None
+            pose, frame, is_ambiguous = change.pose, change.frame, len(change.alternatives) > 0
+            if frame in agreed and frame not in self._unseen:
+                tracks, own = self._tracks[frame], features.get(frame)
+                pose = assessed_by_tracks(model, pose, agreed[frame], tracks, is_ambiguous, own)
+            elif frame in features:
+                pose = assessed_by_features(model, pose, features[frame], is_ambiguous)
+            out.append(replace(change, pose=pose))
+        return out
+
+    def _consensus(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Consensus:
+        """Return the consensus of the tracked pose of a frame and of those by tracks without a view each."""
+        pose, tracks = self._changes[frame].pose, self._tracks[frame]
+        assert pose is not None
+        lost = np.array(pose.limbs_lost) if pose.limbs_lost else np.zeros(tracks.trust.shape[1])
+        return consensus(model, pose.values, tracks.poses, np.vstack([1 - lost, tracks.trust]), active)
+
+    def _with_poses(self, poses: Mapping[int, Array]) -> dict[int, PoseChange]:
+        """Return the rows with other poses, (n_values,) each, on some frames."""
+        out = dict(self._changes)
+        for frame, values in poses.items():
+            change = out[frame]
+            assert change.pose is not None
+            out[frame] = replace(change, pose=replace(change.pose, values=values))
+        return out
 
     def run_features(self, model: BodyModel, smoothed: Sequence[PoseChange]) -> dict[int, Array]:
         """Return the features of all limbs by frame, (n_limbs, 8) each, from which their final statuses follow.
@@ -159,20 +204,6 @@ def resumed_rows(
                         f"{change.frame}, found other bytes; track again with other settings, or from another frame"
                     ) from error
     return out
-
-
-def _classified(model: BodyModel, change: PoseChange, features: Array) -> PoseChange:
-    """Return a row with the status that follows from the features of its limbs, (n_limbs, 8)."""
-    assert change.pose is not None
-    odds = log_odds(features)
-    status = classify_limbs(odds)
-    if change.alternatives:
-        status = worst([status, "doubtful"])
-    remarks = [r for r in change.pose.remark.split(", ") if r and not is_uncertainty(r)]
-    if not remarks and status != "good":
-        remarks = [uncertain(limbs(model)[int(odds[:, 1].argmax())].name)]
-    lost = tuple(map(float, probabilities(odds[:, 1])))
-    return replace(change, pose=replace(change.pose, status=status, limbs_lost=lost, remark=", ".join(remarks)))
 
 
 def _unpacked(packed: NDArray[np.float32], n: int) -> Array:

@@ -12,8 +12,10 @@ from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
+from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import Tracker, TrackingRun
+from tracker.tracking.view_tracks import FrameTracks, tracks_without_views
 
 
 class SmoothedRows(NamedTuple):
@@ -23,8 +25,20 @@ class SmoothedRows(NamedTuple):
     """The rows of all people, which take the place of those with tracked poses."""
 
 
-Step = PoseEstimate | BackwardStep | SmoothedRows
-"""A step of a run: a tracked frame of the first pass, a visit to a frame of the second, or all smoothed poses."""
+class AuditStep(NamedTuple):
+    """A frame that was tracked without each view in turn."""
+
+    frame: int
+    tracks: Mapping[int, FrameTracks]
+    """By index of the person."""
+    done: int
+    """Frames so far."""
+    total: int
+
+
+Step = PoseEstimate | BackwardStep | AuditStep | SmoothedRows
+"""A step of a run: a tracked frame of the first pass, a visit to a frame of the second, a frame of the audit, or all
+smoothed poses."""
 
 
 class PoseWriter(Protocol):
@@ -93,6 +107,12 @@ class Leg(NamedTuple):
         """The frames that this leg stores poses of."""
         return [k for k in self.run.frames if k != self.start]
 
+    @property
+    def whole(self) -> list[int]:
+        """All frames from the first known one on, in the order of tracking."""
+        known = [f.frame for f in self.before]
+        return [*known, *(k for k in self.run.frames if k not in known)]
+
 
 def outward(frames: Sequence[int], start: int) -> list[Sequence[int]]:
     """Return the frames of each leg of a run that goes out from a frame: back to the first, then on to the last.
@@ -119,10 +139,10 @@ def _with_starts(legs: Sequence[Leg]) -> Subjects:
 class TrackSession:
     """One run of a tracker and its results so far. It has one leg, or two that go out from a start.
 
-    `first_pass`, `backward_pass` and `smoothing` do the work in this order. Another thread than the one that reads
-    results may drain them. Each step is handed to `take` before the next one is asked for: its caller holds whatever
-    lock guards the results and the writer. A run stops where its steps are no longer asked for, and goes on where they
-    are again.
+    `first_pass`, `backward_pass`, `audit` and `smoothing` do the work in this order. Another thread than the one that
+    reads results may drain them. Each step is handed to `take` before the next one is asked for: its caller holds
+    whatever lock guards the results and the writer. A run stops where its steps are no longer asked for, and goes on
+    where they are again.
     """
 
     def __init__(
@@ -187,9 +207,10 @@ class TrackSession:
         return next((a, b) for a, b in known if min(a, b) <= frame <= max(a, b))
 
     def steps(self) -> Iterator[Step]:
-        """Run both passes and smooth the poses."""
+        """Run both passes, audit and smooth the poses."""
         yield from self.first_pass()
         yield from self.backward_pass()
+        yield from self.audit()
         yield from self.smoothing()
 
     def first_pass(self) -> Iterator[PoseEstimate]:
@@ -205,11 +226,28 @@ class TrackSession:
             tracked = [self.tracked[k] for k in (*known, *leg.frames)]
             yield from self.tracker.backward_pass(leg.run, tracked)
 
+    def audit(self) -> Iterator[AuditStep]:
+        """Track all frames once more without each view in turn, each leg from its first pose; see `view_tracks`.
+
+        A leg that is shorter than what a tracker remembers is left out: its tracks would have no history of their own.
+        """
+        legs = [leg for leg in self.legs if self.tracker.settings.audit and len(leg.whole) > HISTORY_FRAMES]
+        done, total = 0, sum(len(leg.whole) for leg in legs)
+        for leg in legs:
+            first = self.tracked[leg.whole[0]].poses
+            # A pose and the same one before it are a prediction: the tracker does not search around it again.
+            run = replace(leg.run, start=[[pose, pose] for pose in first], frames=leg.whole)
+            known = {k: self.tracked[k].poses for k in leg.whole}
+            for frame, tracks in tracks_without_views(self.tracker, run, known):
+                done += 1
+                yield AuditStep(frame, tracks, done, total)
+
     def smoothing(self) -> Iterator[SmoothedRows]:
-        """Smooth the poses of all people; a single step, so that a run is smoothed as a whole or not at all."""
-        if self.tracker.settings.smooth:
+        """Take the consensus of all tracks, smooth it and assess it, as a single step: as a whole or not at all."""
+        smooth = self.tracker.settings.smooth
+        if smooth or any(rows.has_tracks for rows in self._rows.values()):
             held, fps = self._held, self.legs[0].run.fps
-            found = (rows.finished(held, person, fps) for person, rows in self._rows.items())
+            found = (rows.finished(held, person, fps, smooth) for person, rows in self._rows.items())
             yield SmoothedRows(tuple(change for changes in found for change in changes))
         self.finished = True
 
@@ -223,6 +261,10 @@ class TrackSession:
             return
         if isinstance(step, SmoothedRows):
             self._take_finished(step)
+            return
+        if isinstance(step, AuditStep):
+            for person, tracks in step.tracks.items():
+                self._rows[person].add_tracks(step.frame, tracks)
             return
         self._waiting += self._rows_of([step], self.subjects.tracked)
         self._n_waiting += 1

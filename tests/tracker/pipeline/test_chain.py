@@ -94,7 +94,7 @@ def opened(tmp_path, sample_folder):
 
 
 def run(opened, sink=None, frames=range(6), smooth=False, acquire=(), is_finding=True):
-    plan = TrackPlan(frames, (0,), TrackSettings(smooth=smooth))
+    plan = TrackPlan(frames, (0,), TrackSettings(smooth=smooth, audit=False))
     return run_chain(ChainPlan(plan, FindSettings() if is_finding else None, acquire), opened, sink or Notes())
 
 

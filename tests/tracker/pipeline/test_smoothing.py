@@ -29,7 +29,7 @@ CLEAR = PoseQuality(
     tuple(LimbFeatures(n, 1.0, 0.0, 1.2, 0.05, 0.6, 0.5, 0.0, 1.2, 0.06, 1.0, 1.0, 0.01) for n in "abcde"),
 )  # fmt: skip
 """Of a pose that its own frame does not contradict."""
-SETTINGS = TrackSettings()
+SETTINGS = TrackSettings(audit=False)
 
 
 @dataclass

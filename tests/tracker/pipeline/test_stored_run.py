@@ -20,7 +20,7 @@ from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 STEP_M = 0.01
-SETTINGS = TrackSettings(smooth=False)
+SETTINGS = TrackSettings(smooth=False, audit=False)
 
 
 @dataclass
@@ -124,7 +124,7 @@ def test_the_same_task_goes_on_where_it_was_interrupted(session, store, n):
         assert list(run.frames) == list(range(6))
 
 
-@pytest.mark.parametrize(("frames", "settings"), [(range(5), SETTINGS), (range(6), TrackSettings(trust_rad=0.2))])
+@pytest.mark.parametrize(("frames", "settings"), [(range(5), SETTINGS), (range(6), replace(SETTINGS, trust_rad=0.2))])
 def test_another_task_begins_at_its_first_frame(session, store, frames, settings):
     with run_of(session, store) as run:
         track(run, 2)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from tracker.tracking.chamfer.constants import PAPER_BODY
-from tracker.tracking.estimation.options import BACKWARD_PASS, ORDER, RECOVER, SMOOTH, THETA, WINDOW
+from tracker.tracking.estimation.options import AUDIT, BACKWARD_PASS, ORDER, RECOVER, SMOOTH, THETA, WINDOW
 from tracker.tracking.method import Method, Option, PaperMode
 
 if TYPE_CHECKING:
@@ -54,6 +54,6 @@ ESTIMATE = Option(
 CHAMFER = Method(
     "chamfer", "Chamfer matching",
     "edges; predicted, refined by Gauss-Newton, and searched if that does not suffice",
-    _settings, _tracker, (ESTIMATE, ORDER, WINDOW, RECOVER, BACKWARD_PASS, SMOOTH, THETA),
+    _settings, _tracker, (ESTIMATE, ORDER, WINDOW, RECOVER, BACKWARD_PASS, AUDIT, SMOOTH, THETA),
     PaperMode("Gavrila and Davis 1996", _paper_settings, PAPER_BODY, _require_paper_body), _at_stride,
 )  # fmt: skip

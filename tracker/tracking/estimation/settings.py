@@ -82,6 +82,8 @@ class EstimationSettings:
     """Whether people are tracked backward through intervals in which they were lost, see `backward_pass`."""
     smooth: bool = True
     """Whether the poses are smoothed at the end of a run."""
+    audit: bool = True
+    """Whether the poses are compared with tracks without each view at the end of a run; see `view_tracks`."""
     apart: float = 1.0
     """Weight of the term against people passing through each other; 0 leaves it out."""
     max_iterations: int = MAX_ITERATIONS

@@ -63,6 +63,9 @@ class VoxelSettings:
     None: the figure's joints are balls without limits, as in the paper."""
     smooth: bool = True
     """Whether the poses are smoothed at the end of a run."""
+    audit: bool = False
+    """Whether the poses are compared with tracks without each view at the end of a run. A hull of fewer views is wider,
+    so that these tracks differ by more than their errors."""
     paper: bool = False
     """Whether the run is that of the paper."""
 

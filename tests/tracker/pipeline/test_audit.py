@@ -1,0 +1,159 @@
+"""The audit at the end of a run: the consensus of tracks without a view each, errors of joints, and statuses."""
+
+import shutil
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from tracker.body.limbs import limbs
+from tracker.fitting.consensus import agreement
+from tracker.formats.model_toml import format_model, load_model
+from tracker.pipeline import track_session
+from tracker.pipeline.assessed_poses import assessed_by_tracks
+from tracker.pipeline.methods import METHODS
+from tracker.pipeline.stored_run import TrackPlan, stored_run
+from tracker.pipeline.track_session import AuditStep
+from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
+from tracker.tracking.chamfer.method import CHAMFER
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.confidence import LimbFeatures, PoseQuality
+from tracker.tracking.estimate import PoseEstimate
+from tracker.tracking.person_memory import HISTORY_FRAMES
+from tracker.tracking.view_tracks import FrameTracks
+
+N, WRONG, APART = 10, 3, 4
+SETTINGS = TrackSettings(smooth=False)
+CLEAR = PoseQuality(
+    0.05, 4, 0.0, 0.02,
+    tuple(LimbFeatures(n, 1.0, 0.0, 1.2, 0.05, 0.6, 0.5, 0.0, 1.2, 0.06, 1.0, 1.0, 0.01) for n in "abcd"),
+)  # fmt: skip
+
+
+@dataclass
+class Stands:
+    """Stands for a tracker: the person stands still, but is half a metre aside on one frame."""
+
+    settings: TrackSettings
+
+    def estimates(self, run):
+        for frame in run.frames:
+            pose = np.array(run.subjects.models[0].neutral())
+            pose[0] = 0.5 if frame == WRONG else 0.0
+            pose = run.subjects.keyframes_at(frame).get(0, pose)
+            n = run.subjects.models[0].n_dofs
+            yield PoseEstimate(
+                frame, (pose,), 1.0, np.ones(4), 0, ("good",), ("",), (np.ones(10),), (1e-4 * np.eye(n),), (CLEAR,),
+                ((),), "chamfer",
+            )  # fmt: skip
+
+    def backward_pass(self, run, tracked):
+        return iter(())
+
+
+@pytest.fixture
+def audited(monkeypatch):
+    """The runs of the audit: frames and poses to begin with. The tracks agree, but on one frame."""
+    runs = []
+
+    def tracks(tracker, run, known):
+        runs.append((list(run.frames), [p[0] for p in run.start[0]], sorted(known)))
+        for frame in run.frames:
+            poses = np.array([run.subjects.models[0].neutral()] * 4)
+            poses[:, 0] = [0.2, -0.2, 0.2, -0.2] if frame == APART else 0.0
+            yield frame, {0: FrameTracks(poses, np.ones((4, 4)), ("FRONT", "RIGHT", "BACK", "LEFT"))}
+
+    monkeypatch.setattr(track_session, "tracks_without_views", tracks)
+    return runs
+
+
+@pytest.fixture
+def session(tmp_path, sample_folder, monkeypatch):
+    monkeypatch.setitem(METHODS, "chamfer", replace(CHAMFER, make_tracker=Stands))
+    return load_session(shutil.copytree(sample_folder, tmp_path / "session"))
+
+
+@pytest.fixture
+def store(session):
+    """With a keyframe on frame 0."""
+    store, (person,) = AnnotationStore(session.annotations_path), session.people
+    revision, values = store.add_model_revision(person.name, format_model(person.model)), person.model.neutral()
+    keyframe = PoseRecord(values, ("manual",) * len(values), revision, True)
+    store.commit("init", [PoseChange(person.name, 0, keyframe)])
+    yield store
+    store.close()
+
+
+def track(session, store, settings=SETTINGS, stop=lambda step: False):
+    with stored_run(session, store, None, TrackPlan(range(N), (0,), settings)) as run:
+        for step in run.steps():
+            run.take(step)
+            if stop(step):
+                break
+    return run
+
+
+def records(store):
+    return [store.pose("person", k) for k in range(N)]
+
+
+def test_the_consensus_is_stored_with_its_errors_and_status(session, store, audited):
+    run = track(session, store)
+    assert audited == [([*range(N)], [0.0, 0.0], [*range(N)])]
+    found = records(store)
+    assert found[WRONG].values[0] == pytest.approx(0.0, abs=0.001)  # outvoted
+    assert [r.status for r in found] == ["", *["good"] * 3, "lost", *["good"] * 5]
+    assert found[APART].remark == "left arm uncertain without FRONT"
+    sigmas = [np.sqrt(np.trace(r.errors, axis1=1, axis2=2)).max() for r in found[1:]]
+    assert sigmas[APART - 1] == pytest.approx(0.2, rel=0.02)
+    assert max(s for k, s in enumerate(sigmas, start=1) if k != APART) < 0.03
+    assert found[0].keyframe
+    assert found[0].values[0] == 0.0
+    assert run.status_counts()[0]["lost"] == 1
+    assert store.undo() == f"track frames 0:{N}"
+
+
+def test_it_can_be_left_out(session, store, audited):
+    track(session, store, replace(SETTINGS, audit=False))
+    assert audited == []
+    found = records(store)
+    assert found[WRONG].values[0] == 0.5
+    assert {r.errors is None for r in found} == {True}
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_a_run_that_was_stopped_meanwhile_ends_like_one_without_a_break(session, store, audited, smooth):
+    settings = replace(SETTINGS, smooth=smooth)
+    track(session, store, settings)
+    whole = [(r.values.tobytes(), r.status, None if r.errors is None else r.errors.tobytes()) for r in records(store)]
+    store.undo()
+    stopped = track(session, store, settings, stop=lambda step: isinstance(step, AuditStep) and step.done == 3)
+    assert not stopped.finished
+    assert records(store)[WRONG].values[0] == 0.5  # as tracked
+    resumed = track(session, store, settings)
+    assert (resumed.finished, resumed.frames) == (True, [])
+    again = [(r.values.tobytes(), r.status, None if r.errors is None else r.errors.tobytes()) for r in records(store)]
+    assert again == whole
+
+
+def test_a_short_run_has_no_tracks_with_a_history(session, store, audited):
+    plan = TrackPlan(range(HISTORY_FRAMES), (0,), SETTINGS)
+    with stored_run(session, store, None, plan) as run:
+        for step in run.steps():
+            run.take(step)
+    assert audited == []
+    assert store.pose("person", WRONG).values[0] == 0.5
+
+
+@pytest.mark.parametrize(("has_history", "status"), [(False, "lost"), (True, "good")])
+def test_near_the_start_the_features_of_a_limb_count_as_well(has_history, status):
+    model = load_model("gavrila22")
+    pose, n = model.neutral(), len(limbs(model))
+    tracks = FrameTracks(np.array([pose] * 3), np.ones((3, n)), ("a", "b", "c"), has_history)
+    features = np.zeros((n, 8))
+    features[1] = [3, 1, -2, 0, 1, 0, 0, 0]  # of a limb that is lost
+    record = PoseRecord(pose, ("tracked",) * len(pose), 1)
+    found = agreement(model, pose, tracks.poses, tracks.trust)
+    assert assessed_by_tracks(model, record, found, tracks, False, features).status == status

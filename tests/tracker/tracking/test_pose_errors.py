@@ -1,0 +1,34 @@
+"""Errors of joints, and the status that follows from them."""
+
+import numpy as np
+import pytest
+
+from tracker.body.limbs import limbs
+from tracker.tracking.confidence import classify_limbs
+from tracker.tracking.pose_errors import SHARED_M, beyond, limb_odds, point_covariances
+
+
+@pytest.mark.parametrize(("sigma", "radius"), [(0.02, 0.03), (0.05, 0.1), (0.1, 0.1)])
+def test_the_probability_of_a_longer_error(sigma, radius):
+    errors = np.random.default_rng(1).normal(scale=sigma, size=(200_000, 3))
+    share = np.mean(np.linalg.norm(errors, axis=1) > radius)
+    assert beyond(radius, np.array(sigma)) == pytest.approx(share, abs=0.004)
+
+
+def test_the_limb_whose_tracks_lie_apart_is_doubted_then_lost(gavrila):
+    arm = next(i for i, x in enumerate(limbs(gavrila)) if x.name == "left_forearm")
+    wrist = gavrila.point_names.index("left_wrist")
+    statuses = []
+    for apart_m in (0.03, 0.08, 0.2):
+        steps = np.zeros((len(gavrila.point_names), 3, 3))
+        steps[wrist] = np.diag([apart_m**2, 0, 0])
+        odds = limb_odds(gavrila, point_covariances(steps))
+        statuses.append(classify_limbs(odds))
+        assert odds[:, 1].argmax() == arm
+        assert np.all(odds[:, 1] < odds[:, 0])
+    assert statuses == ["good", "doubtful", "lost"]
+
+
+def test_tracks_that_agree_leave_the_error_that_they_share(gavrila):
+    errors = point_covariances(np.zeros((4, 3, 3)))
+    np.testing.assert_allclose(np.sqrt(np.diagonal(errors, axis1=1, axis2=2)), SHARED_M)

@@ -1,0 +1,50 @@
+"""Errors of joints from how far tracks without a view each lie apart, and the status of a pose from them.
+
+The error of a point is normal. Its covariance is the mean square of the steps to the tracks without a view, and what
+all views share: sizes of the body, and where its joints lie in the flesh. Both were measured on simulated people by
+`tests/benchmarks/joint_errors.py`: a joint whose tracks lie 20, 40 and 80 mm apart is off by as much.
+"""
+
+import numpy as np
+
+from tracker.body.limbs import limbs
+from tracker.body.model import BodyModel
+from tracker.geometry.arrays import Array
+from tracker.tracking.run_confidence import RUN_MODEL
+
+SHARED_M = 0.010
+"""Standard deviation along each axis of the error that all views share, metres."""
+_OFF_M = 0.10
+"""A limb is off where one of its joints is farther from its true place, metres."""
+
+
+def point_covariances(steps: Array) -> Array:
+    """Return the covariances of points by the mean squares of the steps to other tracks, (..., 3, 3) each, m^2."""
+    return np.asarray(steps + SHARED_M**2 * np.eye(3))
+
+
+def limb_odds(model: BodyModel, covariances: Array) -> Array:
+    """Return the log odds that each limb is off and lost, (n_limbs, 2).
+
+    Args:
+        model: the body.
+        covariances: of its points, (n_points, 3, 3), m^2.
+    """
+    from scipy.special import logit  # imported lazily, as below
+
+    sigmas = np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 3)
+    worst = np.array([sigmas[np.isin(model.point_parts, limb.parts)].max() for limb in limbs(model)])
+    return np.asarray(logit(beyond(_OFF_M, worst))[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
+
+
+def beyond(radius_m: float, sigma_m: Array) -> Array:
+    """Return the probability that a normal error in three dimensions is longer than a radius, metres.
+
+    Args:
+        radius_m: the radius, metres.
+        sigma_m: standard deviation along each axis, of any shape, metres.
+    """
+    from scipy.special import erfc  # imported lazily: loading takes 0.1 s
+
+    x = radius_m / np.maximum(sigma_m, 1e-9)
+    return np.asarray(erfc(x / np.sqrt(2)) + np.sqrt(2 / np.pi) * x * np.exp(-(x**2) / 2))
