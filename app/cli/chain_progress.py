@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from app.runtime.progress import Reporter
 from tracker.compute.kernel_cache import compiled_mark
+from tracker.pipeline.track_session import AuditStep
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 if TYPE_CHECKING:
@@ -58,9 +59,9 @@ class ChainProgress:
             if len(run.costs_px) == 1:
                 self._count(len(run.frames), "tracking")
             self._tick()
-        elif isinstance(step, BackwardStep):
+        elif isinstance(step, BackwardStep | AuditStep):
             if step.done == 1:
-                self._count(step.total, "tracking back")
+                self._count(step.total, "tracking back" if isinstance(step, BackwardStep) else "checking each camera")
             self._tick()
 
     def _count(self, total: int, what: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.drawing import dof_labels, overlays, part_outlines, pin_marks
 from app.drawing.curves import CurveGroup, plots_of, samples
+from app.drawing.error_ellipses import error_ellipses
 from app.drawing.floor_lines import floor_lines
 from app.drawing.former_limbs import former_limb_lines
 from app.page import search_messages
@@ -92,6 +93,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
         status=_status(shown.status),
         remark=shown.remark,
         part_costs_px=shown.part_costs_px,
+        expected_errors_m=tuple(shown.expected_errors_m.round(4).tolist()),
         dofs=tuple(dof_labels.shown(session.people[state.person].model, shown.values)),
         locked=tuple(sorted(state.locked[state.person])),
         other_sizes=state.revisions[state.person] != state.present[state.person],
@@ -134,6 +136,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         *pin_marks.pin_lines(session, state, view),
         *floor_lines(session, state),
         *former_limb_lines(session, state, view),
+        *error_ellipses(session, state, view),
     ]:
         count = len(path.segments_px)
         rows.append(Path(path.camera, path.person, path.kind, path.color, path.side, first, count))
@@ -303,7 +306,7 @@ def _track(track: TrackState) -> wire.Track:
         per_second=track.per_second,
         doubtful=track.doubtful,
         lost=track.lost,
-        back=track.back,
+        stage=track.stage,
         message=track.message,
     )
 

@@ -24,6 +24,7 @@ from app.page.search_messages import (
     UnseenDepth,
 )
 from app.state.comparison import ComparedWork
+from app.state.progress import TrackStage
 
 # --- session -------------------------------------------------------------------------------------------------------
 
@@ -158,8 +159,8 @@ class Track(Part, frozen=True):
     """Frames with status `doubtful`."""
     lost: int
     """Frames with status `lost`."""
-    back: bool
-    """Whether the run is in its backward pass."""
+    stage: TrackStage
+    """Stage of the run: all frames, lost people backward, or all frames without each camera in turn."""
     message: str
     """Result of the last run, or empty."""
 
@@ -267,6 +268,8 @@ class StateMessage(Message, frozen=True, tag="state"):
     """Note of the tracker about this frame."""
     part_costs_px: tuple[float | None, ...]
     """By part; null for an unseen one, empty where unknown."""
+    expected_errors_m: tuple[float, ...]
+    """Of each point of the person worked on, root mean square; empty where unknown."""
     dofs: tuple[float, ...]
     """Degrees of freedom of the person worked on, degrees and centimetres."""
     locked: tuple[int, ...]

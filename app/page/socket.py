@@ -361,6 +361,7 @@ def _drawn(state: State) -> tuple[object, ...]:
     drawn = (
         state.frame,
         tuple(Identity(p.values) for p in state.people),
+        Identity(state.drawn.people[state.person].errors),
         state.revisions,
         state.draft,
         None if state.search.candidate is None else tuple(map(Identity, state.search.candidate)),

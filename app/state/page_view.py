@@ -23,6 +23,7 @@ Layer = Literal[
     "skeleton",
     "joints",
     "observability",
+    "errors",
     "epipolar",
     "axes",
 ]

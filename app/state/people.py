@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
@@ -34,6 +36,13 @@ class ShownPose:
     """Alternatives that the tracker found, (n_values,) each, best first; empty for a keyframe."""
     seen: tuple[PointObservation, ...] = ()
     """Positions of points that the user has just placed in a view, to be stored with the pose."""
+    errors: Array | None = None
+    """Covariance of each point of a stored pose, (n_points, 3, 3), m^2; None where not known, as after an edit."""
+
+    @property
+    def expected_errors_m(self) -> Array:
+        """Expected error of each point, root mean square, (n_points,), metres; empty where not known."""
+        return np.zeros(0) if self.errors is None else np.sqrt(np.trace(self.errors, axis1=1, axis2=2))
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from tracker.body.model import PosedBody
 
 Line = tuple[float, float, float, float]
 """x0, y0, x1, y1, undistorted px."""
+
+
+TrackStage = Literal["tracking", "back", "audit"]
+"""Stages of a run: all frames, lost people backward, and all frames without each camera in turn."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +35,8 @@ class TrackState:
     """Number of doubtful frames."""
     lost: int = 0
     """Number of lost frames."""
-    back: bool = False
-    """Whether the run is in its backward pass, tracking lost people backward; `done` and `total` count that pass."""
+    stage: TrackStage = "tracking"
+    """Stage of the run; `done` and `total` count its steps."""
     message: str = ""
     """How the last run ended."""
     failed: bool = False

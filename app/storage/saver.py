@@ -98,6 +98,7 @@ class Saver:
             record.part_costs_px,
             revision=record.model_revision,
             alternatives=() if record.keyframe else tuple(a.values for a in self.alternatives(person, frame)),
+            errors=record.errors,
         )
 
     def record(self, person: int, frame: int) -> PoseRecord | None:

@@ -20,6 +20,10 @@ const SHOWN_FACTS = /** @type {const} */ (["state", "session", "observability", 
  */
 export function jointSection({ store, notify }, { posing }) {
   const body = document.createElement("div");
+  const expectedError = Object.assign(document.createElement("p"), {
+    className: "section-note",
+    title: "Root mean square error of the joint that the audit after tracking expects. The layer Error ellipses draws it in the views",
+  });
   /** @type {Row[]} */
   let rows = [];
   let built = "";
@@ -70,8 +74,11 @@ export function jointSection({ store, notify }, { posing }) {
       title.className = "section-note";
       title.textContent = dofs.length ? capital(displayName(point)) : `The ${displayName(point)} has no angles of its own; drag it in a view.`;
       rows = dofs.map((dof) => makeRow(person.dofs[dof], dof));
-      body.replaceChildren(title, ...rows.map(({ element }) => element));
+      body.replaceChildren(title, expectedError, ...rows.map(({ element }) => element));
     }
+    const error_m = state.expected_errors_m[person.points.indexOf(point)];
+    expectedError.hidden = error_m === undefined;
+    expectedError.textContent = `Expected error ${Math.round(1000 * error_m)} mm`;
     for (const { dof, field, slider, element, title } of rows) {
       const observed = ofDof(store.facts, dof);
       element.title = observed ? `${title}\n${observed.sentence}` : title;

@@ -1,4 +1,4 @@
-/** Theme of the page, and what the 3-D view shows: layers, the camera to look through, the floor and trails. */
+/** Theme of the page, error ellipses, and what the 3-D view shows: layers, the camera to look through, the floor and trails. */
 
 import { displayName } from "../widgets/text.js";
 import { checkRow, choiceRow, sliderRow, textButton } from "./rows.js";
@@ -33,7 +33,7 @@ const LAYERS = [
  * @param {import("../panes/index.js").Panes} panes
  * @returns {import("./inspector.js").Section}
  */
-export function viewSection({ store, send, themes }, { floor }, panes) {
+export function viewSection({ store, send, themes, layers: paneLayers }, { floor }, panes) {
   const set = (/** @type {import("../model/protocol.js").View3dChanges} */ changes) => send({ type: "view_3d", changes });
   const theme = choiceRow({
     label: "Theme",
@@ -46,6 +46,14 @@ export function viewSection({ store, send, themes }, { floor }, panes) {
     title: "All camera views show the place that one is zoomed to, at the same size of the people (Alt+0)",
     change: () => panes.grid.toggleLink(),
   });
+  const ellipses = checkRow({
+    label: "Error ellipses",
+    title:
+      "Draw around each joint of the selected person the ellipse that holds 90% of its error in the camera view. Errors come from tracking with the audit; a pose changed by hand has none",
+    change: (on) => paneLayers.toggle(["errors"], on),
+  });
+  const noErrors = note();
+  noErrors.textContent = "The errors of this pose are not known: they come from tracking with the audit.";
   const camera = choiceRow({
     label: "Look through",
     title: "Look through a camera, its image behind the bodies (Y: the camera under the pointer). Turning the view leaves the camera",
@@ -101,7 +109,7 @@ export function viewSection({ store, send, themes }, { floor }, panes) {
   const body = document.createElement("div");
   const [bodies, ...others] = layers.map(({ row }) => row.element);
   body.append(
-    theme.element, link.element, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction, character.element,
+    theme.element, link.element, ellipses.element, noErrors, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction, character.element,
     heading("Floor"), floorText, buttons(setFloor, formerFloor),
     heading("Trails"), trails.element, points, buttons(noTrails),
   ); // prettier-ignore
@@ -110,9 +118,11 @@ export function viewSection({ store, send, themes }, { floor }, panes) {
   let offered = "";
 
   const show = () => {
-    const { view3d, state, session, linkedViews, theme: chosen } = store.facts;
+    const { view3d, state, session, linkedViews, theme: chosen, layers: { shown } } = store.facts;
     theme.show(chosen.choice);
     link.show(linkedViews);
+    ellipses.show(shown.errors);
+    noErrors.hidden = !shown.errors || state?.expected_errors_m.length !== 0;
     const cameras = session?.cameras.map(({ name }) => name) ?? [];
     if (cameras.join("\n") !== listed) {
       listed = cameras.join("\n"); // an open list of choices must not be replaced
@@ -148,9 +158,9 @@ export function viewSection({ store, send, themes }, { floor }, panes) {
   return {
     id: "view",
     title: "View",
-    hint: "Theme of the page, and what the 3-D view shows",
+    hint: "Theme of the page, error ellipses, and what the 3-D view shows",
     body,
-    update: (changed) => ["view3d", "state", "session", "theme", "linkedViews"].some((fact) => changed.has(/** @type {"state"} */ (fact))) && show(),
+    update: (changed) => ["view3d", "state", "session", "theme", "linkedViews", "layers"].some((fact) => changed.has(/** @type {"state"} */ (fact))) && show(),
   };
 }
 

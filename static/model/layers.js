@@ -87,6 +87,14 @@ export const LAYERS = [
     opacity: 1,
   },
   {
+    id: "errors",
+    group: "Model",
+    label: "Error ellipses",
+    title: "Ellipses that hold 90% of the error of each joint of the selected person in the view, known from tracking with the audit",
+    shown: false,
+    opacity: 0.9,
+  },
+  {
     id: "epipolar",
     group: "Model",
     label: "Epipolar lines",

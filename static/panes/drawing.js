@@ -48,6 +48,7 @@ export const LINE_STYLES = {
   alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
   new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
   former: { width: 1.5, dash: [9, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
+  error: { width: 1.25, dash: [], layer: "errors", hasOutline: true, ofPerson: true },
   residual: { width: 1, dash: [], layer: null, hasOutline: true },
   part_edge: { width: 1, dash: [], layer: "part_edges", hasOutline: true },
   epipolar: { width: 1.25, dash: [6, 4], layer: "epipolar", hasOutline: true },

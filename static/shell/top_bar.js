@@ -89,15 +89,18 @@ export class TopBar {
   }
 
   /** @param {import("../model/protocol.js").Track} track */
-  #showTrack({ running, first, last, at, done, total, per_second, doubtful, lost, back, message }) {
+  #showTrack({ running, first, last, at, done, total, per_second, doubtful, lost, stage, message }) {
     const isActive = first !== null;
     const [how, ...rest] = message.split(", ");
-    const work = back ? "checking alternatives" : `tracked ${done} of ${total}`;
-    const way = back ? "Tracking lost people backward; you can go on" : `Frame ${at ?? first}, tracking to frame ${last}`;
+    const [work, way] = {
+      tracking: [`tracked ${done} of ${total}`, `Frame ${at ?? first}, tracking to frame ${last}`],
+      back: ["checking alternatives", "Tracking lost people backward; you can go on"],
+      audit: ["checking each camera", "Tracking once more without each camera in turn; you can go on"],
+    }[stage];
     this.#stage.textContent = isActive ? (running ? work : `paused ${done} of ${total}`) : how;
     this.#stage.title = isActive ? way : message;
     const counts = [doubtful && `${doubtful} doubtful`, lost && `${lost} lost`].filter(Boolean);
-    const rate = back ? "" : per_second > 0 ? `${per_second.toFixed(1)}/s` : done === 0 && "starting";
+    const rate = stage !== "tracking" ? "" : per_second > 0 ? `${per_second.toFixed(1)}/s` : done === 0 && "starting";
     const figures = [rate, ...counts].filter(Boolean).join(" · ");
     this.#figures.textContent = isActive ? figures : rest.join(" · ");
     const bar = document.createElement("i");

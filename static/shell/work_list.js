@@ -227,11 +227,12 @@ export class WorkList {
  * @param {() => void} stop
  * @returns {Work}
  */
-function trackWork({ running, back, done, total }, stop) {
-  // The backward pass visits stretches, and no frame waits for it.
-  const text = running ? (back ? "Checking alternatives" : "Tracking") : "Tracking is paused";
+function trackWork({ running, stage, done, total }, stop) {
+  // No frame waits for what comes after the first pass.
+  const text = { tracking: "Tracking", back: "Checking alternatives", audit: "Checking each camera" }[stage];
   const figures = ofTotal(done, total);
-  return { id: "track", text, ...figures, done: back ? "you can go on" : figures.done, stop };
+  const isFirst = stage === "tracking";
+  return { id: "track", text: running ? text : "Tracking is paused", ...figures, done: isFirst ? figures.done : "you can go on", stop };
 }
 
 /** @param {number} share 0 to 1 */

@@ -51,7 +51,7 @@ HIDDEN_LINE = np.column_stack([np.arange(100, 300), np.full(200, 60), np.arange(
 """What the layer of hidden contours shows: a line of short pieces, px."""
 NO_TRACK = {
     "running": False, "first": None, "last": None, "at": None, "done": 0, "total": 0, "per_second": 0.0, "doubtful": 0,
-    "lost": 0, "back": False, "message": "",
+    "lost": 0, "stage": "tracking", "message": "",
 }  # fmt: skip
 DISAGREEING = [44, 45]
 AMBIGUOUS = (71, 72)
@@ -182,7 +182,8 @@ class FakeEndpoint:
         self.state = {
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
-            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "replay": None,
+            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "expected_errors_m": [],
+            "replay": None,
             "compared": None, "unseen_depth": None, "compared_run": None, "preview": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,
@@ -531,6 +532,8 @@ class FakeEndpoint:
                     add(camera, person, "model", COLORS[person], HIDDEN_LINE, "right")
                 if "hidden" in self.views[-1]["layers"]:
                     add(camera, person, "hidden", COLORS[person], HIDDEN_LINE)
+                if "errors" in self.views[-1]["layers"] and self.state["expected_errors_m"]:
+                    add(camera, person, "error", COLORS[person], self.error_circle(camera, person))
                 if self.other_kind:
                     add(camera, person, self.other_kind, "#ff9df2", self.outline(camera, person, 0.2))
                 if candidate is not None:
@@ -554,6 +557,13 @@ class FakeEndpoint:
             "out_of_reach": self.out_of_reach,
         }  # fmt: skip
         await self.send_binary(header, np.concatenate(segments).astype("<f4").tobytes(), sockets)
+
+    def error_circle(self, camera, person):
+        """A circle of 40 px around the head as line segments, (N, 4) px."""
+        around = np.linspace(0, 2 * np.pi, 33)
+        (center,) = project((self.pose[person, "head"] + self.walked)[None], camera)
+        ring = center + 40 * np.stack([np.cos(around), np.sin(around)], axis=1)
+        return np.concatenate([ring[:-1], ring[1:]], axis=1)
 
     def outline(self, camera, person, shift):
         """A capsule round each bone as line segments, (N, 4) px."""

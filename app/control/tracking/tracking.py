@@ -19,7 +19,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.pipeline.methods import make_tracker
-from tracker.pipeline.track_session import Leg, SmoothedRows, Step, TrackSession, outward
+from tracker.pipeline.track_session import AuditStep, Leg, SmoothedRows, Step, TrackSession, outward
 from tracker.pipeline.tracked_changes import StoredPerson
 from tracker.store.records import PoseChange
 from tracker.tracking import confidence
@@ -269,6 +269,9 @@ class Tracking:
                 run.session.take(step)
                 if isinstance(step, SmoothedRows):
                     self._show_finished(run)
+                elif isinstance(step, AuditStep):
+                    track = replace(self._session_state.state.track, stage="audit", done=step.done, total=step.total)
+                    self._session_state.set(track=replace(track, running=run.job.running))
                 elif isinstance(step, BackwardStep):
                     self._show_improved(run, step, seconds)
                     self._session_state.refresh_saving()
@@ -291,7 +294,7 @@ class Tracking:
             track = _with_doubts(track, run)
         steps = len(tracked) + step.done
         track = replace(
-            track, running=run.job.running, back=True, done=step.done, total=step.total,
+            track, running=run.job.running, stage="back", done=step.done, total=step.total,
             per_second=steps / max(1e-6, seconds),
         )  # fmt: skip
         if session_state.state.frame in {found.frame for found in step.better}:

@@ -203,7 +203,7 @@ def test_lines_are_legible_on_any_footage(ground):
     """The outline darkens bright footage around a line; a line without an outline is legible by itself."""
     share = int(re.search(r"/ (\d+)%", tokens("dark")["image-outline"])[1]) / 100
     outline = over(BLACK, share, ground)
-    kinds = {**KIND_COLORS, **dict.fromkeys(("model", "hidden", "facing", "facing_away"), None)}
+    kinds = {**KIND_COLORS, **dict.fromkeys(("model", "hidden", "facing", "facing_away", "error"), None)}
     low = []
     for kind, own in kinds.items():
         for color in PALETTE if own is None else [own]:

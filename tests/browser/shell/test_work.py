@@ -53,7 +53,14 @@ async def test_all_long_work_is_listed_in_one_place_and_can_be_stopped(page, end
 
 @pytest.mark.slow
 async def test_the_backward_pass_says_what_it_does_and_that_one_can_go_on(page, endpoint):
-    track = endpoint.state["track"] | {"running": True, "first": 12, "last": 30, "at": 30, "back": True, "total": 490}
+    track = endpoint.state["track"] | {
+        "running": True,
+        "first": 12,
+        "last": 30,
+        "at": 30,
+        "stage": "back",
+        "total": 490,
+    }
     for done in (0, 200, 434):
         endpoint.state["track"] = track | {"done": done}
         await endpoint.broadcast(endpoint.state)

@@ -409,7 +409,7 @@ def test_a_frame_that_is_looked_at_shows_what_the_backward_pass_found(placed, tr
     wait_for(lambda: placed.state.track.message)
     assert placed.state.frame == 7
     assert placed.state.people[0].status == "good"
-    assert {(t.done, t.total) for t in seen if t.back} == {(1, 2), (2, 2)}
+    assert {(t.done, t.total) for t in seen if t.stage == "back"} == {(1, 2), (2, 2)}
 
 
 @pytest.mark.slow
