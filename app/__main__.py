@@ -12,6 +12,7 @@ from rich.console import Console
 
 from app.cli import (
     acquire,
+    audit,
     bench,
     evaluate,
     experiment,
@@ -43,6 +44,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "init": init.command,
     "acquire": acquire.command,
     "track": track.command,
+    "audit": audit.command,
     "evaluate": evaluate.command,
     "observability": observability.command,
     "export": export.command,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from app.cli.arguments import OptionalName, OptionalPath, OptionalRange, SessionArg
-from app.cli.json_output import format_json
 from app.cli.target import Target, load_target, parse_frames
+from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 

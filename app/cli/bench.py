@@ -3,7 +3,7 @@
 import sys
 
 from app.cli.arguments import OptionalPath
-from app.cli.json_output import format_json
+from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 
 

@@ -10,7 +10,7 @@ import tyro
 from app.cli.arguments import OptionalClock, OptionalName, OptionalPath, OptionalRange, OptionalWhole, SessionArg
 from app.cli.target import Target, check_stride, load_target, parse_frames
 from app.remedies import command_line_text
-from app.cli.json_output import format_json
+from app.runtime.json_output import format_json
 from tracker.errors import SessionError, TrackerError
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from app.cli.arguments import OptionalName, OptionalRange, SessionArg
-from app.cli.json_output import format_json
 from app.cli.target import load_target, parse_frames
 from app.export.formats import FORMATS, OPTIONS, ExportFormat, find_format
+from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 

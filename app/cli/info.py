@@ -4,7 +4,7 @@ from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 from app.cli.arguments import SessionArg
-from app.cli.json_output import format_json
+from app.runtime.json_output import format_json
 
 if TYPE_CHECKING:
     from tracker.session.session import Session

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from app.cli.arguments import OptionalClock, OptionalName, OptionalPath, OptionalWhole, SessionArg
-from app.cli.json_output import format_json
 from app.cli.target import Target, load_target
+from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from app.cli.arguments import OptionalName, OptionalRange, OptionalWhole, SessionArg
-from app.cli.json_output import format_json
 from app.cli.target import Target, load_target, parse_frames
+from app.runtime.json_output import format_json
 from tracker.errors import SessionError, TrackerError
 
 if TYPE_CHECKING:

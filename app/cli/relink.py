@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.cli.arguments import NamedPaths, OptionalPath, Paths, SessionArg, parse_pairs
-from app.cli.json_output import format_json
+from app.runtime.json_output import format_json
 from tracker.errors import SessionError
 
 if TYPE_CHECKING:

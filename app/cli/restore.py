@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.cli.arguments import OptionalName, OptionalPath, SessionArg
-from app.cli.json_output import format_json
 from app.remedies import command_line_text
+from app.runtime.json_output import format_json
 from tracker.errors import DamagedStoreError, SessionError
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from app.cli.arguments import Names, OptionalName, OptionalNumber, OptionalRange, OptionalWhole, SessionArg
-from app.cli.json_output import format_json
 from app.cli.target import check_stride, load_target, parse_frames
 from app.cli.track_report import format_summary, summarize
+from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 from tracker.pipeline.methods import METHODS, all_options

@@ -1,0 +1,110 @@
+"""`quadrille audit`: assess stored poses by tracks without each camera in turn."""
+
+from collections import Counter
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import tyro
+
+from app.cli.arguments import OptionalName, OptionalRange, SessionArg
+from app.cli.target import Target, load_target, parse_frames
+from app.runtime.json_output import format_json
+from app.runtime.progress import Reporter
+
+_LISTED = 8
+"""Number of doubted frames that are listed for a person, the most doubtful first."""
+
+
+@dataclass(frozen=True)
+class AuditArguments:
+    """Arguments of `quadrille audit`."""
+
+    session: SessionArg
+    """session folder."""
+    person: OptionalName = None
+    """name; all people who have poses by default."""
+    frames: OptionalRange = None
+    """A:B, half open; all by default."""
+    consensus: bool = False
+    """let the consensus of these tracks take the place of the poses; by default they stay as they are."""
+    json: bool = False
+    """print one JSON object; docs/trackers.md lists its keys."""
+
+
+def command(arguments: Annotated[AuditArguments, tyro.conf.arg(name="")]) -> None:
+    """Assess stored poses: track once more without each camera in turn, and compare.
+
+    Writes expected errors, statuses and reasons as one entry of the history; keyframes stay. Poses may come from
+    anywhere: tracked, interpolated or imported. Ctrl+C stops it and changes nothing; the page undoes it.
+    """
+    at = load_target(arguments.session, arguments.person, several=True)
+    frames = parse_frames(arguments.frames, at.session)
+    found = audit(at, frames, arguments.consensus, Reporter(silent=arguments.json))
+    print(format_json(found) if arguments.json else _format(found))
+
+
+def audit(at: Target, frames: range, takes_consensus: bool, progress: Reporter) -> dict[str, Any]:
+    """Audit the stored poses of people, and store their assessment.
+
+    Returns:
+        By name, `statuses` with the number of poses of each, and `doubts`: of each pose that is not good its `frame`,
+        `status`, `probability_off` and `reason`, the most doubtful first.
+
+    Raises:
+        TrackerError: there are fewer than three cameras, or no two frames in a row with poses.
+    """
+    import numpy as np
+
+    from tracker.evidence.observer import Observer
+    from tracker.footage.recording import Recording
+    from tracker.pipeline.audit import AuditPlan, audit_poses
+    from tracker.session.lock import SessionLock
+    from tracker.session.relink import require_files
+    from tracker.store.annotation_store import AnnotationStore
+    from tracker.tracking.chamfer.settings import TrackSettings
+    from tracker.tracking.run_confidence import probability_off
+
+    session, people = at
+    require_files(session)
+    with (
+        SessionLock(session.folder),
+        Recording(session.cameras) as recording,
+        closing(AnnotationStore(session.annotations_path)) as store,
+    ):
+        people = tuple(i for i in people if store.frames(session.people[i].name)) or people
+        plan = AuditPlan(frames, people, TrackSettings(), takes_consensus)
+        with progress.share("checking each camera") as advance:
+
+            def report(stage: str, share: float, text: str = "", /) -> None:
+                advance(share)
+
+            rows = audit_poses(session, store, Observer(session.cameras, recording), plan, report)
+        if rows:
+            store.commit(f"audit frames {rows[0].frame}:{rows[-1].frame + 1}", rows, by_program=True)
+    out: dict[str, Any] = {}
+    for name in (session.people[i].name for i in people):
+        own = [(r.frame, r.pose) for r in rows if r.person == name and r.pose is not None]
+        off = {frame: float(probability_off(np.array(pose.limbs_lost)).max()) for frame, pose in own}
+        doubts = [
+            {"frame": frame, "status": pose.status, "probability_off": off[frame], "reason": pose.remark}
+            for frame, pose in sorted(own, key=lambda x: -off[x[0]])
+            if pose.status != "good"
+        ]
+        out[name] = {"statuses": dict(Counter(pose.status for _, pose in own)), "doubts": doubts}
+    return out
+
+
+def _format(found: dict[str, Any]) -> str:
+    lines = []
+    for name, person in found.items():
+        counts = [f"{n} {status}" for status in ("good", "doubtful", "lost") if (n := person["statuses"].get(status))]
+        lines.append(f"{name}: {', '.join(counts) or 'keyframes alone, which stay'}")
+        doubts = person["doubts"]
+        lines += [
+            f"  frame {d['frame']}: {d['reason']}, {100 * d['probability_off']:.0f}% chance that it is off"
+            for d in doubts[:_LISTED]
+        ]
+        if len(doubts) > _LISTED:
+            lines.append(f"  and {len(doubts) - _LISTED} more frames")
+    return "\n".join(lines)

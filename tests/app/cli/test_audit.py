@@ -1,0 +1,77 @@
+"""`quadrille audit`: statuses, errors and reasons of stored poses; its JSON, and what it refuses."""
+
+import json
+from contextlib import closing
+
+import numpy as np
+import pytest
+from command_line import SAMPLE, assert_refused, stored
+
+from tracker.pipeline import audit
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import MarkChange
+from tracker.tracking.view_tracks import FrameTracks
+
+FRAMES, APART = range(20, 26), 23
+
+
+@pytest.fixture
+def tracks(monkeypatch):
+    """The tracks agree with the poses, but on one frame the left wrist is elsewhere in all but one."""
+    asked = []
+
+    def without_views(tracker, run, known):
+        asked.append(list(run.frames))
+        model = run.subjects.models[0]
+        shoulder = next(i for i, name in enumerate(model.value_names) if name.startswith("left_shoulder"))
+        for frame in run.frames:
+            poses = np.array([known[frame][0]] * 4)
+            if frame == APART:
+                poses[1:, shoulder] += 0.4
+            yield frame, {0: FrameTracks(poses, np.ones((4, 4)), ("FRONT", "RIGHT", "BACK", "LEFT"))}
+
+    monkeypatch.setattr(audit, "tracks_without_views", without_views)
+    return asked
+
+
+@pytest.fixture
+def posed(run, session):
+    """The sample with known poses on some frames, none of them a keyframe."""
+    for frame in FRAMES:
+        assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", str(frame), "--json")[0] == 0
+    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+        store.commit("no keyframes", [MarkChange("person", frame, False, False) for frame in FRAMES])
+    return session
+
+
+@pytest.mark.slow
+def test_poses_are_assessed_but_stay(run, posed, tracks):
+    before = stored(posed)
+    status, out, _ = run("audit", posed, "--json")
+    assert status == 0
+    found, after = json.loads(out)["person"], stored(posed)
+    assert tracks == [[*FRAMES]]
+    (doubt,) = found["doubts"]
+    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain without RIGHT")
+    assert doubt["probability_off"] > 0.05
+    assert after[APART].status == doubt["status"] != "good"
+    assert after[APART].errors.shape[1:] == (3, 3)
+    assert {after[k].status for k in FRAMES if k != APART} == {"good"}
+    for k in FRAMES:
+        np.testing.assert_array_equal(after[k].values, before[k].values)
+
+
+@pytest.mark.slow
+def test_the_consensus_takes_the_place_of_the_poses_if_that_is_asked(run, posed, tracks):
+    before = stored(posed)
+    status, out, _ = run("audit", posed, "--consensus", "--frames", "22:25")
+    assert status == 0
+    assert "person: 3 good" in out  # it lies where most of the tracks are
+    after = stored(posed)
+    assert not np.array_equal(after[APART].values, before[APART].values)
+    assert after[20].errors is None
+    assert tracks == [[22, 23, 24]]
+
+
+def test_poses_are_needed(run, session):
+    assert_refused(run("audit", session), ["two frames in a row", "found none"])

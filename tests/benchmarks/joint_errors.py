@@ -1,0 +1,143 @@
+"""Measure the audit of tracked poses: `python tests/benchmarks/joint_errors.py SESSIONS --data DIR --scenes DIR`.
+
+SESSIONS is a folder of sessions that have bodies and start poses, named as the recordings in `--data DIR` or as the
+simulated people in `--scenes DIR`; a name may go on after `@`. Copies of them are tracked without the audit and with
+it. The table has the error of the limb joints, frames with a joint that is off by more than 100 mm, and what the
+statuses are worth: the area under the curve, frames that are flagged, those of them that are fine, and frames called
+good that are off. Coverage is the share of joints within their 90% ellipsoid. Processor times are those of the whole
+command.
+"""
+
+import argparse
+import resource
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from acquisition import RECORDED, quadrille
+from scipy.stats import chi2, rankdata
+from sections import put_section, table
+
+from tracker.evaluation.references import read_joints
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.session.session import load_session
+from tracker.store.stored_poses import read_stored_poses
+
+OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
+OFF_MM = 100.0
+HEADS = ("mm", "frames off", "area", "flagged", "fine", "good, yet off", "covered", "processor time")
+
+
+class Assessed(NamedTuple):
+    """The stored poses of a person against the reference."""
+
+    errors_mm: np.ndarray
+    """Of each limb joint, (T, 12); NaN where unknown."""
+    odds: np.ndarray
+    """What ranks the frames: the largest probability that a limb is lost, (T,)."""
+    flagged: np.ndarray
+    """Whether a frame is not good, (T,)."""
+    covered: np.ndarray
+    """Whether a joint lies in its 90% ellipsoid, (n,); empty without errors."""
+
+    @property
+    def off(self) -> np.ndarray:
+        """Whether a joint of a frame is off, (T,)."""
+        return np.nanmax(self.errors_mm, axis=1) > OFF_MM
+
+
+def processor_s() -> float:
+    """Processor time of the programs that were run, seconds."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def area(scores: np.ndarray, is_off: np.ndarray) -> float:
+    """Area under the curve; NaN where all or none are off."""
+    n, m = is_off.sum(), (~is_off).sum()
+    return float((rankdata(scores)[is_off].sum() - n * (n + 1) / 2) / (n * m)) if n and m else np.nan
+
+
+def assessed(folder: Path, person: int, reference: Path) -> Assessed:
+    """Compare the stored poses of a person with known joints."""
+    session = load_session(folder)
+    who = session.people[person]
+    stored = read_stored_poses(session.annotations_path, who.name, who.model)
+    joints = read_joints(reference, session.fps)
+    known = dict(zip(joints.frames.tolist(), joints.points, strict=True))
+    names = [n for n in joints.names if n in LIMB_JOINTS]
+    of_file, of_body = [joints.names.index(n) for n in names], [who.model.point_names.index(n) for n in names]
+    frames = [k for k, s in sorted(stored.items()) if k in known and not s.record.keyframe]
+    steps = np.array([stored[k].body.joint_centers_world[of_body] - known[k][of_file] for k in frames])
+    errors = [stored[k].record.errors for k in frames]
+    covered = [
+        np.einsum("ni,nij,nj->n", e, np.linalg.inv(own[of_body]), e) < chi2.ppf(0.9, 3)
+        for e, own in zip(steps, errors, strict=True)
+        if own is not None
+    ]
+    is_known = np.isfinite(steps[..., 0])
+    return Assessed(
+        1000 * np.linalg.norm(steps, axis=-1),
+        np.array([max(stored[k].record.limbs_lost, default=0.0) for k in frames]),
+        np.array([stored[k].record.status != "good" for k in frames]),
+        np.concatenate([c[i] for c, i in zip(covered, is_known, strict=False)]) if covered else np.zeros(0),
+    )
+
+
+def measured(folder: Path, references: Sequence[Path]) -> Iterator[tuple[str, list[str]]]:
+    """Track a copy of a session without the audit and with it; yield a row for each person."""
+    runs, seconds = [], []
+    for options in (("--no-audit",), ()):
+        with tempfile.TemporaryDirectory() as scratch:
+            at = Path(shutil.copytree(folder, Path(scratch) / "session"))
+            before = processor_s()
+            quadrille("track", at, *options)
+            seconds.append(processor_s() - before)
+            runs.append([assessed(at, i, path) for i, path in enumerate(references)])
+    for i, reference in enumerate(references):
+        plain, audited = (run[i] for run in runs)
+        pairs = [(plain, audited)] if len(plain.off) else []
+        for a, b in pairs:
+            yield (
+                folder.name + (f", {reference.stem}" if len(references) > 1 else ""),
+                [
+                    f"{np.nanmean(a.errors_mm):.1f} → {np.nanmean(b.errors_mm):.1f}",
+                    f"{a.off.sum()} → {b.off.sum()} of {len(b.off)}",
+                    f"{area(a.odds, a.off):.2f} → {area(b.odds, b.off):.2f}".replace("nan", "–"),
+                    f"{a.flagged.sum()} → {b.flagged.sum()}",
+                    f"{(a.flagged & ~a.off).sum()} → {(b.flagged & ~b.off).sum()}",
+                    f"{(~a.flagged & a.off).sum()} → {(~b.flagged & b.off).sum()}",
+                    f"{100 * b.covered.mean():.0f}%" if len(b.covered) else "",
+                    f"x {seconds[1] / seconds[0]:.1f}",
+                ],
+            )
+
+
+def references_of(name: str, data: Path, scenes: Path | None) -> list[Path]:
+    """Return the reference of each person of a session."""
+    name = name.split("@")[0]
+    if name in RECORDED:
+        return [data / name / f"ground_truth_{p}.trc" for p in RECORDED[name]] or sorted((data / name).glob("*.trc"))[
+            :1
+        ]
+    return sorted((scenes / name).glob("truth*.trc")) if scenes is not None else []
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sessions", type=Path)
+    parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
+    parser.add_argument("--scenes", type=Path, help="folder of the simulated recordings")
+    parser.add_argument("--out", type=Path, default=OUT, help="document whose section is written")
+    given = parser.parse_args()
+    rows: dict[str, list[str]] = {}
+    for folder in sorted(p for p in given.sessions.iterdir() if (p / "session.toml").exists()):
+        known = references_of(folder.name, given.data, given.scenes)
+        for name, cells in measured(folder, known) if known else ():
+            rows[name] = cells
+            print(f"{name}: {' | '.join(cells)}", flush=True)
+    lines = ["## What the audit is worth", "", "Made by `python tests/benchmarks/joint_errors.py`.", ""]
+    put_section(given.out, "\n".join([*lines, table(HEADS, {k.replace("_", " "): v for k, v in rows.items()})]))
