@@ -16,6 +16,8 @@ from tracker.body.model import PosedBody
 from tracker.contours.label_image import part_labels
 from tracker.images.color_histogram import BINS
 
+pytestmark = pytest.mark.slow  # its kernels are compiled for the benchmark alone
+
 
 @pytest.fixture(scope="module")
 def run(gavrila):

@@ -165,6 +165,7 @@ def test_two_frames_that_agree_end_the_trial(session, silhouettes, fits, monkeyp
     assert tried == frames
 
 
+@pytest.mark.slow
 def test_the_first_two_frames_are_tried_at_the_same_time(session, silhouettes, monkeypatch):
     silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
     at_once = threading.Barrier(2, timeout=20)
@@ -183,6 +184,7 @@ def test_the_first_two_frames_are_tried_at_the_same_time(session, silhouettes, m
     assert found.frame == 20
 
 
+@pytest.mark.slow
 def test_a_stop_ends_both_frames(session, silhouettes, monkeypatch):
     silhouettes += silhouettes_of_figure(figure()[0], CAMERAS)
     at_once, ended = threading.Barrier(2, timeout=20), []

@@ -21,6 +21,8 @@ from tracker.tracking.estimation.limb_repair import (
 )
 from tracker.tracking.estimation.settings import RecoverSettings
 
+pytestmark = pytest.mark.slow  # its kernels are compiled for the benchmark alone
+
 SETTINGS = replace(TrackSettings(), recover=RecoverSettings(proposals=256, n_local_search=12, n_limb_refined=4))
 
 
