@@ -139,5 +139,5 @@ if __name__ == "__main__":
         for name, cells in measured(folder, known) if known else ():
             rows[name] = cells
             print(f"{name}: {' | '.join(cells)}", flush=True)
-    lines = ["## What the audit is worth", "", "Made by `python tests/benchmarks/joint_errors.py`.", ""]
+    lines = ["## The audit, session by session", "", "Made by `python tests/benchmarks/joint_errors.py`.", ""]
     put_section(given.out, "\n".join([*lines, table(HEADS, {k.replace("_", " "): v for k, v in rows.items()})]))
