@@ -297,8 +297,8 @@ class TrackSession:
         return {str(person): rows.record() for person, rows in self._rows.items()}
 
     def status_counts(self) -> list[Counter[Status]]:
-        """Return how often each person had which status on the frames of this run."""
-        of_frames = [self.tracked[k].statuses for k in self.costs_px]
+        """Return how often each person had which status on the frames of this run; on all if none was left to track."""
+        of_frames = [self.tracked[k].statuses for k in self.costs_px or self.tracked]
         return [Counter(s[i] for s in of_frames) for i in range(len(self._stored))]
 
     def _take_improved(self, step: BackwardStep) -> None:
