@@ -14,9 +14,11 @@ from tracker.acquisition.size_parameters import SizeParameters
 from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.contours import occluding_contours
 from tracker.fitting.contour_residuals import MatchSettings, PieceSums
-from tracker.fitting.gauss_newton import UNKNOWN
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
+
+_POSE_WEIGHT = 10.0
+"""Weight of a known pose, per radian or metre: little, as poses are found together with the sizes."""
 
 
 def choose_frames(
@@ -58,7 +60,7 @@ def _information(
     b, M = sum_motions(pieces, model, kinematics)
     by_sizes = parameters.derivatives(np.zeros(len(parameters.names)))
     H, n = to_unknowns(motions_by_unknowns(model, kinematics, by_sizes), b, M)[1], len(parameters.names)
-    by_pose = H[n:, n:] + np.eye(model.n_dofs) / UNKNOWN**2
+    by_pose = H[n:, n:] + np.eye(model.n_dofs) * _POSE_WEIGHT
     return np.asarray(H[:n, :n] - H[:n, n:] @ np.linalg.solve(by_pose, H[n:, :n]))
 
 
