@@ -6,7 +6,6 @@ the same minimum and shows nothing.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -74,10 +73,10 @@ def tracks_without_views(
     observers = shared_observers(run.observer, groups)
     runs = [replace(run, observer=o, regions=around(views)) for o, views in zip(observers, groups, strict=True)]
     ways = [tracker.estimates(own) for own in runs]
-    with ThreadPoolExecutor(max(1, len(ways)), thread_name_prefix="view tracks") as pool:
-        for n_before, frame in enumerate(run.frames if ways else ()):
-            found, has_history = list(pool.map(next, ways)), n_before >= HISTORY_FRAMES
-            yield frame, {person: _of_person(found, person, without, has_history) for person in run.subjects.tracked}
+    # One after the other: a thread for each track was no faster, since they share the interpreter.
+    for n_before, frame in enumerate(run.frames if ways else ()):
+        found, has_history = [next(way) for way in ways], n_before >= HISTORY_FRAMES
+        yield frame, {person: _of_person(found, person, without, has_history) for person in run.subjects.tracked}
 
 
 def _of_person(found: Sequence[PoseEstimate], person: int, without: tuple[str, ...], has_history: bool) -> FrameTracks:
