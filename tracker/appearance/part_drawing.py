@@ -34,7 +34,7 @@ class Meshes(NamedTuple):
 
 
 class Canvas(NamedTuple):
-    """What is drawn into the cells of a view."""
+    """Cells of a view with the parts that are drawn into them."""
 
     nearness: FloatArray
     """1 / depth of the visible surface, (h, w), 1/m; 0 without a part."""

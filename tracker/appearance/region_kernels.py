@@ -19,7 +19,7 @@ N_RATIOS, RATIO_STEP = 48, 0.5
 
 
 class RegionTables(NamedTuple):
-    """What is learnt of the parts in one view, or in several with one more axis in front. Parts are counted through all
+    """Tables learnt of the parts in one view, or in several with one more axis in front. Parts are counted through all
     bodies."""
 
     log_density: FloatArray

@@ -32,7 +32,7 @@ OCCUPIED_M = 0.12
 
 
 class RegionFrame(NamedTuple):
-    """What region evidence needs of a frame, for all poses that are compared on it."""
+    """Region evidence of a frame, for all poses that are compared on it."""
 
     views: tuple[CellView | None, ...]
     """Cells of each view; None without an image."""

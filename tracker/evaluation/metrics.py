@@ -93,7 +93,7 @@ class FrameError(NamedTuple):
 
 
 class PoseDoubt(NamedTuple):
-    """What the tracker says of a stored pose."""
+    """Status of a stored pose, and the tracker's reason for it."""
 
     status: str
     """`keyframe` for a pose that a person set; empty where it was not assessed."""

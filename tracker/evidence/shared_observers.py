@@ -65,7 +65,7 @@ class _SharedObserver(Observer):
 def shared_observers(whole: Observer, groups: Sequence[Sequence[int]]) -> list[Observer]:
     """Return an observer of each of several groups of the views of another one, by their indices.
 
-    What they have computed of the last frames they keep and share; use them side by side.
+    They keep and share results of the last frames; use them side by side.
     """
     shared = _Shared()
     return [_SharedObserver(whole, chosen, shared) for chosen in groups]

@@ -88,14 +88,15 @@ def audit_poses(
         row
         for person, own in zip(plan.people, records, strict=True)
         for frame in sorted(tracks)
-        if (row := _row(session, plan, person, frame, own[frame], tracks[frame][person])) is not None
+        if (row := _row(session, store, plan, person, frame, own[frame], tracks[frame][person])) is not None
     ]
 
 
 def _row(
-    session: Session, plan: AuditPlan, person: int, frame: int, record: PoseRecord, tracks: FrameTracks
-) -> PoseChange | None:
-    """Return the row of a pose with its assessment; None for a keyframe."""
+    session: Session, store: AnnotationStore, plan: AuditPlan, person: int, frame: int, record: PoseRecord,
+    tracks: FrameTracks,
+) -> PoseChange | None:  # fmt: skip
+    """Return the row of a pose with its assessment, and its alternatives as they are; None for a keyframe."""
     if record.keyframe:
         return None
     model, n_limbs = session.people[person].model, tracks.trust.shape[1]
@@ -104,10 +105,10 @@ def _row(
         record = replace(record, values=found.pose)
     else:
         found = agreement(model, record.values, tracks.poses, tracks.trust)
-    is_ambiguous = False
-    return PoseChange(
-        session.people[person].name, frame, assessed_by_tracks(model, record, found, tracks, is_ambiguous)
-    )
+    name = session.people[person].name
+    alternatives = tuple(store.alternatives(name, frame))
+    assessed = assessed_by_tracks(model, record, found, tracks, len(alternatives) > 0)
+    return PoseChange(name, frame, assessed, alternatives)
 
 
 def _tracks(
@@ -119,20 +120,36 @@ def _tracks(
     locks = load_locks(session.people, store.setting)
     active = [active_dofs(m, locked) for m, locked in zip(models, locks, strict=True)]
     start = next((k for k in stretch if all(_is_placed(own[k]) for own in records)), stretch[0])
-    poses = {k: _poses(session, people, records, k) for k in stretch}
+    others = _others(session, store, people, stretch)
+    subjects = Subjects.of(models, people, active, others)
+    poses = {k: _poses(session, people, records, k, others.get(k, {})) for k in stretch}
     for frames in outward(stretch, start):
         run = TrackingRun(
-            observer, Subjects.of(models, people, active), [[p, p] for p in poses[frames[0]]], frames, session.fps,
+            observer, subjects, [[p, p] for p in poses[frames[0]]], frames, session.fps,
             floor_plane(session.up, session.floor),
         )  # fmt: skip
         yield from tracks_without_views(make_tracker(plan.settings), run, poses)
 
 
+def _others(
+    session: Session, store: AnnotationStore, people: Sequence[int], frames: Sequence[int]
+) -> dict[int, dict[int, Array]]:
+    """Return the stored poses of people who are not audited, who stay there, by frame and index of the person."""
+    out: dict[int, dict[int, Array]] = {}
+    for i, person in enumerate(session.people):
+        found = {} if i in people else store.poses(person.name, range(frames[0], frames[-1] + 1))
+        for frame, record in found.items():
+            if len(record.values) == len(person.model.value_names):
+                out.setdefault(frame, {})[i] = record.values
+    return out
+
+
 def _poses(
-    session: Session, people: Sequence[int], records: Sequence[Mapping[int, PoseRecord]], frame: int
-) -> list[Array]:
-    """Return the poses of all people on a frame; of people who are not audited the neutral one."""
-    own = {i: of_person[frame].values for i, of_person in zip(people, records, strict=True)}
+    session: Session, people: Sequence[int], records: Sequence[Mapping[int, PoseRecord]], frame: int,
+    others: Mapping[int, Array],
+) -> list[Array]:  # fmt: skip
+    """Return the poses of all people on a frame; the neutral one of people who have none."""
+    own = {**others, **{i: of_person[frame].values for i, of_person in zip(people, records, strict=True)}}
     return [own.get(i, p.model.neutral()) for i, p in enumerate(session.people)]
 
 

@@ -33,7 +33,7 @@ _FINDING = 0.5
 
 @dataclass(frozen=True)
 class ChainPlan:
-    """What a chain does. The same plan goes on where it was stopped."""
+    """Stages of a chain. The same plan goes on where it was stopped."""
 
     track: TrackPlan
     """Whom to track on which frames, without a start; frames ascending."""

@@ -9,7 +9,7 @@ from command_line import SAMPLE, assert_refused, stored
 
 from tracker.pipeline import audit
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import MarkChange
+from tracker.store.records import Alternative, MarkChange, PoseChange
 from tracker.tracking.view_tracks import FrameTracks
 
 FRAMES, APART = range(20, 26), 23
@@ -59,6 +59,19 @@ def test_poses_are_assessed_but_stay(run, posed, tracks):
     assert {after[k].status for k in FRAMES if k != APART} == {"good"}
     for k in FRAMES:
         np.testing.assert_array_equal(after[k].values, before[k].values)
+
+
+@pytest.mark.slow
+def test_alternatives_stay_and_keep_a_pose_doubtful(run, posed, tracks):
+    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+        pose = store.pose("person", 21)
+        other = Alternative(pose.values + 0.1, pose.model_revision, 2.0)
+        store.commit("alternative", [PoseChange("person", 21, pose, (other,))])
+    assert run("audit", posed, "--json")[0] == 0
+    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+        (kept,) = store.alternatives("person", 21)
+        assert store.pose("person", 21).status == "doubtful"
+    np.testing.assert_array_equal(kept.values, other.values)
 
 
 @pytest.mark.slow
