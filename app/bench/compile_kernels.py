@@ -138,7 +138,8 @@ def _call_tracking(session: Session) -> None:
 def _call_others(session: Session) -> None:
     """Call the kernels that the chamfer tracker does not need.
 
-    They label parts in an image, carve and label voxels, compare bodies with silhouettes, and film simulated people.
+    They label parts in an image, carve and label voxels, compare bodies with silhouettes, film simulated people, and
+    learn what is usual in a run.
     """
     from tracker.contours.label_image import part_labels
     from tracker.evidence.silhouettes import SilhouetteFinder
@@ -148,6 +149,7 @@ def _call_others(session: Session) -> None:
     from tracker.simulate.stage.camera_rig import make_cameras
     from tracker.simulate.stage.film import film, freeze
     from tracker.simulate.stage.room import see_room
+    from tracker.tracking.estimation.part_evidence import learn_run
     from tracker.tracking.voxel.body_pose import state_of
     from tracker.tracking.voxel.labels import label_voxels
     from tracker.tracking.voxel.settings import VoxelSettings
@@ -166,6 +168,9 @@ def _call_others(session: Session) -> None:
     label_voxels(middle[None], [state_of(model, [body.values], 0.04, settings)], _VOXEL_M, settings.label_rule)
     overlap = SilhouetteOverlap(model, [s.mask for s in silhouettes], [s.camera for s in silhouettes], middle)
     overlap.added(body.kinematics.Ts_world_part[None], np.arange(len(model.parts)), overlap.nothing())
+    with Recording(sources) as recording:
+        frames = [(k, (body,)) for k in range(_FRAME, _FRAME + _FRAMES)]
+        learn_run(Observer(sources, recording), frames)
 
 
 def _track(

@@ -21,6 +21,7 @@ from app.control.posing.held_points import HeldPoints
 from app.control.posing.pinning import Pinning
 from app.control.posing.pose_edits import PoseEdits
 from app.control.search.cost_landscape import CostLandscapes
+from app.control.search.reasons import Reasons
 from app.control.search.replay import Replay
 from app.control.search.search_runs import SearchRuns
 from app.control.search.searching import SearchRunner
@@ -109,6 +110,8 @@ class Controller:
         """Moves along the history."""
         self.cost_landscape = CostLandscapes(session_state, activities)
         """Samples the cost along one degree of freedom."""
+        self.reasons = Reasons(session_state)
+        """Explains the shown pose by what each view shows of each part."""
         self.floor = FloorEditing(session_state, activities)
         """Sets the floor."""
         self.visibility = PeopleVisibility(session_state)
@@ -169,4 +172,5 @@ class Controller:
         if self._compiling is not None:
             self._compiling.close()
         self.cost_landscape.close()
+        self.reasons.close()
         self.frames.close()

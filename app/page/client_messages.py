@@ -26,6 +26,7 @@ from app.page.inspector_messages import (
 from app.page.message_types import Command, Frame, Index, Name, Number
 from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack
 from app.page.search_messages import (
+    AskReason,
     CompareRun,
     PreviewCandidate,
     RepeatSearch,
@@ -237,7 +238,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     Seek, Select, SetView, ShowPerson, Solo, ShowBefore, ShowCurves, WatchTab, ShowHistory, LookThrough, Pause3d,
     Drag, PoseEdit, DragPin, RemovePins, FitPose, TakeLimbBack,
     RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
-    TakeCandidate, ShowLandscape, SetLandscapeDof,
+    TakeCandidate, ShowLandscape, SetLandscapeDof, AskReason,
     StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
     FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, DraftSizes,

@@ -8,6 +8,7 @@ from app.control.controller import Controller
 from app.control.tracking import track_settings
 from app.page import inspector_messages as wire
 from app.page.message_types import Message
+from app.page.search_messages import LimbReason, PartReason, ReasonMessage
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.people import AcquisitionState
@@ -15,7 +16,9 @@ from app.state.progress import FindState
 from app.state.run_choices import RunChoices
 from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
+from tracker.body.limbs import limb_display_name, limbs
 from tracker.formats.model_toml import PRESETS
+from tracker.geometry.arrays import Array
 from tracker.pipeline.methods import METHODS
 from tracker.posing.grab import minor_points
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -39,6 +42,7 @@ class InspectorFeed:
         now: list[Message] = [
             settings(state.settings, state.run_choices), view_3d(controller, state), body_sizes(controller, state),
             acquisition(state.acquisition), finding(state.finding, [c.camera.name for c in controller.session.cameras]),
+            reason(state, controller.session.camera_names),
         ]  # fmt: skip
         changed = [message for message in now if message not in self._sent]
         self._sent = now
@@ -50,7 +54,7 @@ def _ingredients(state: State) -> tuple[Identity, ...]:
     made_from = (
         state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
-        state.finding,
+        state.finding, state.reasons, state.reason,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
 
@@ -159,6 +163,49 @@ def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
         found.running, found.stage, found.share, found.notes, found.message, found.failed, found.tried, found.camera,
         found.frame, axes,
     )  # fmt: skip
+
+
+def reason(state: State, cameras: Sequence[str]) -> ReasonMessage:
+    """Describe why the shown pose is in doubt, or how far the work on that is.
+
+    Args:
+        state: with the reason.
+        cameras: names of all cameras.
+    """
+    found, work = state.reason, state.reasons
+    limbs_of, parts, notes = tuple[LimbReason, ...](), tuple[PartReason, ...](), tuple[str, ...]()
+    worst = None if found is None else found.contradiction
+    if found is not None:
+        table, model = found.table, state.models[found.person]
+        of_limbs = limbs(model)
+        trunk = tuple(sorted(set(range(len(model.parts))).difference(*(x.parts.tolist() for x in of_limbs))))
+        limbs_of = (
+            LimbReason("trunk", trunk, (None,) * len(cameras)),
+            *(
+                LimbReason(limb_display_name(x.name), tuple(x.parts.tolist()), _column(table.beside, i))
+                for i, x in enumerate(of_limbs)
+            ),
+        )
+        parts = tuple(
+            PartReason(
+                _column(table.below, i), _column(table.outside, i), _column(table.usual_outside, i),
+                _column(table.contour_px, i), _column(table.usual_contour_px, i), float(table.below_in_all[i]),
+            )
+            for i in range(len(model.parts))
+        )  # fmt: skip
+        bare = [name for name, row in zip(cameras, table.outside, strict=True) if np.isnan(row).all()]
+        if bare:
+            notes = (f"Without a background or masks, nothing is known of the outside in {', '.join(bare)}.",)
+    return ReasonMessage(
+        state.frame, state.person, work.running, work.stage, work.share, work.message,
+        "" if worst is None else worst.sentence, None if worst is None else worst.part,
+        None if worst is None else worst.view, limbs_of, parts, notes,
+    )  # fmt: skip
+
+
+def _column(cells: Array, i: int) -> tuple[float | None, ...]:
+    """Return a column of cells by view, (V, n), for JSON."""
+    return tuple(round(float(c), 3) if np.isfinite(c) else None for c in cells[:, i])
 
 
 def _floor(floor: FloorState) -> wire.FloorInfo:

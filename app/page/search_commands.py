@@ -39,6 +39,13 @@ def _replay(controller: Controller, _: int, message: wire.ReplayStep) -> None:
         controller.replay.show(message.run, message.step)
 
 
+def _reason(controller: Controller, page: int, message: wire.AskReason) -> None:
+    if message.action == "stop":
+        controller.reasons.stop()
+    else:
+        controller.reasons.watch(page, message.action == "ask")
+
+
 SEARCH_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.RunSearch: _search,
     wire.RepeatSearch: lambda controller, _, m: controller.search.run_again(m.run, m.person),
@@ -49,5 +56,6 @@ SEARCH_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.PreviewCandidate: lambda controller, _, m: controller.replay.preview(m.run, m.candidate),
     wire.TakeCandidate: lambda controller, _, m: controller.replay.take(m.run, m.candidate),
     wire.ShowLandscape: lambda controller, _, m: controller.cost_landscape.choose(m.dof),
+    wire.AskReason: _reason,
     wire.SetLandscapeDof: lambda controller, _, m: controller.cost_landscape.set_value(m.person, m.dof, m.value),
 }

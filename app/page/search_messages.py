@@ -126,6 +126,12 @@ class SetLandscapeDof(Command, frozen=True, tag="landscape_set"):
     """Radians or metres."""
 
 
+class AskReason(Command, frozen=True, tag="reason"):
+    """Subscribe to the reason for the shown pose, or no longer; or stop the work on it until somebody asks again."""
+
+    action: Literal["ask", "leave", "stop"]
+
+
 # --- to the page ----------------------------------------------------------------------------------------------------
 
 
@@ -259,3 +265,57 @@ class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
     """All of them, ascending. A doubted keyframe stands for its neighbours."""
     keyframes: tuple[KeyframeDoubt, ...]
     """By person and frame."""
+
+
+class PartReason(Part, frozen=True):
+    """What each view shows of a part. Tuples are by camera; null where it does not show the part, or not that."""
+
+    below_nats: tuple[float | None, ...]
+    """Evidence of the part's colours below the usual of the run; negative where it is above."""
+    outside: tuple[float | None, ...]
+    """Share of the part outside the silhouette, 0 to 1."""
+    usual_outside: tuple[float | None, ...]
+    """Median over the run."""
+    contour_px: tuple[float | None, ...]
+    """Mean distance of the part's contour to the edges."""
+    usual_contour_px: tuple[float | None, ...]
+    """Median over the run."""
+    below_in_all_nats: float
+    """Of all views together, which a hidden part is below, too."""
+
+
+class LimbReason(Part, frozen=True):
+    """A limb: its parts, and what is beside it."""
+
+    name: str
+    """For display: `left arm`; the trunk holds the parts of no limb."""
+    parts: tuple[int, ...]
+    """Indices of its parts, from the trunk outwards."""
+    beside_nats: tuple[float | None, ...]
+    """By camera, evidence for its colours where no part is, above the usual of the run; null for the trunk."""
+
+
+class ReasonMessage(Message, frozen=True, tag="reason"):
+    """Why the pose of the selected person is in doubt, for pages that ask."""
+
+    frame: int
+    person: int
+    running: bool
+    stage: str
+    """The kind of work."""
+    share: float
+    """Share of the work that is done, 0 to 1."""
+    message: str
+    """Why there is no table; empty where there is one."""
+    sentence: str
+    """The part and the view that contradict the pose most: `left calf: outside the person in LEFT`."""
+    part: int | None
+    """Index of that part; null where nothing contradicts the pose clearly."""
+    camera: int | None
+    """The view; null for all of them together."""
+    limbs: tuple[LimbReason, ...]
+    """Empty without a table."""
+    parts: tuple[PartReason, ...]
+    """By part of the person; empty without a table."""
+    notes: tuple[str, ...]
+    """Sentences on what views cannot show."""

@@ -19,6 +19,7 @@ from app.page.search_messages import (
     InconsistentMessage,
     MovedLimb,
     RangeComparisonMessage,
+    ReasonMessage,
     SearchRunsMessage,
     SearchSetupMessage,
     UnseenDepth,
@@ -388,7 +389,7 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
     RangeComparisonMessage, ObservabilityMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
-    AcquisitionMessage, FindingMessage,
+    AcquisitionMessage, FindingMessage, ReasonMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -18,6 +18,7 @@ from app.state.people import (
     Visibility,
 )
 from app.state.progress import FindState, FootageState, RangeState, TrackState
+from app.state.reason import Reason, ReasonState
 from app.state.run_choices import RunChoices
 from app.state.search import CostLandscape, SearchState, SearchView
 from app.state.view_3d import View3d
@@ -63,6 +64,8 @@ class State:
     """The poses of a range against those that they replaced; None while nothing is compared."""
     search: SearchState = field(default_factory=SearchState)
     search_view: SearchView = field(default_factory=SearchView)
+    reasons: ReasonState = field(default_factory=ReasonState)
+    """Why the shown pose is in doubt, as far as a page asks."""
     landscape: CostLandscape | None = None
     """Of the shown pose or one shortly before; None until a page displays it."""
     track: TrackState = field(default_factory=TrackState)
@@ -141,6 +144,14 @@ class State:
             return None
         pairs = zip(self.people, last.after, strict=True)
         return last if all(p.values is v or np.array_equal(p.values, v) for p, v in pairs) else None
+
+    @property
+    def reason(self) -> Reason | None:
+        """The reason for the shown pose of the selected person, if it is made and the pose is shown unchanged."""
+        last = self.reasons.found
+        if last is None or (last.frame, last.person) != (self.frame, self.person):
+            return None
+        return last if self.people[last.person].values is last.values else None
 
     @property
     def unseen_depth(self) -> DepthNote | None:
@@ -224,6 +235,7 @@ class StateChanges(TypedDict, total=False):
     range_comparison: RangeComparison | None
     search: SearchState
     search_view: SearchView
+    reasons: ReasonState
     landscape: CostLandscape | None
     track: TrackState
     finding: FindState

@@ -10,6 +10,7 @@ import { findSection } from "./find_section.js";
 import { BodySection } from "./body_section.js";
 import { Inspector } from "./inspector.js";
 import { jointSection } from "./joint_section.js";
+import { reasonSection } from "./reason_section.js";
 import { searchSection } from "./search_section.js";
 import { trackSection } from "./track_section.js";
 import { viewSection } from "./view_section.js";
@@ -33,6 +34,7 @@ const THEMES = [
 export function mount(context, { panes, posing, scene }) {
   const sections = [
     jointSection(context, posing),
+    reasonSection(context, panes),
     findSection(context),
     new BodySection(context),
     trackSection(context),
@@ -45,6 +47,7 @@ export function mount(context, { panes, posing, scene }) {
     context.send({ type: "find_people", action: "start" });
   };
   button("first-find", findPeople);
+  button("show-reason", () => inspector.reveal("reason"));
   const bindings = inArea("Inspector", [
     {
       keys: ["Alt I"],
@@ -55,13 +58,21 @@ export function mount(context, { panes, posing, scene }) {
       run: () => inspector.toggle(),
     },
     {
+      keys: ["Alt W"],
+      label: "Why this pose is in doubt: parts by views",
+      area: "Views",
+      words: "reason explain evidence colours outside silhouette contour nats",
+      matches: alt("KeyW", false),
+      run: () => inspector.reveal("reason"),
+    },
+    {
       keys: [],
       label: "Find people",
       words: "start automatically initialize bootstrap first pose acquire track nobody placed",
       matches: () => false,
       run: findPeople,
     },
-    ...sections.filter(({ id }) => id !== "find").map(({ id, title, hint }) => ({
+    ...sections.filter(({ id }) => id !== "find" && id !== "reason").map(({ id, title, hint }) => ({
       keys: [],
       label: id === "view" ? "View settings: theme, 3-D view" : title,
       words: `${hint} inspector settings`,

@@ -62,6 +62,7 @@
  * @typedef {{type: "take", run: number, candidate: number | null}} TakeCandidate
  * @typedef {{type: "landscape", dof: string}} ShowLandscape
  * @typedef {{type: "landscape_set", person: number, dof: number, value: number}} SetLandscapeDof
+ * @typedef {{type: "reason", action: "ask" | "leave" | "stop"}} AskReason
  * @typedef {{type: "track", action: "forward" | "backward", until?: number | null}} StartTracking
  * @typedef {{type: "track", action: "pause" | "resume" | "stop"}} ControlTracking
  * @typedef {{type: "range", action: RangeAction, first: number, last: number, person?: number | null}} EditRange
@@ -184,6 +185,12 @@
  * @typedef {{camera: number, people: [number, number, number, number][][]}} SilhouetteAxes
  * @typedef {{type: "finding", running: boolean, stage: string, share: number, notes: string[], message: string, failed:
  *   boolean, tried: number | null, camera: number | null, frame: number | null, axes: SilhouetteAxes[]}} FindingMessage
+ * @typedef {{name: string, parts: number[], beside_nats: (number | null)[]}} LimbReason
+ * @typedef {{below_nats: (number | null)[], outside: (number | null)[], usual_outside: (number | null)[], contour_px:
+ *   (number | null)[], usual_contour_px: (number | null)[], below_in_all_nats: number}} PartReason
+ * @typedef {{type: "reason", frame: number, person: number, running: boolean, stage: string, share: number, message:
+ *   string, sentence: string, part: number | null, camera: number | null, limbs: LimbReason[], parts: PartReason[],
+ *   notes: string[]}} ReasonMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
@@ -216,13 +223,13 @@
  *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
  *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | TakeLimbBack | RunSearch | RepeatSearch |
  *   SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape |
- *   SetLandscapeDof | StartTracking | ControlTracking | EditRange | CompareRange | StopRange | ToggleMark |
+ *   SetLandscapeDof | AskReason | StartTracking | ControlTracking | EditRange | CompareRange | StopRange | ToggleMark |
  *   ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d | SetHeight | SetPartSizes | SetGirdleWidth |
  *   CoupleSides | ApplySizes | DraftSizes | AcquireSizes | FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo |
  *   Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
- *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage} TextMessage
+ *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | ReasonMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

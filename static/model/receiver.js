@@ -78,6 +78,9 @@ export class Receiver {
       case "observability":
         this.#store.set({ observability: message });
         break;
+      case "reason":
+        this.#store.set({ reason: message });
+        break;
       case "range_comparison":
         this.#store.set({ rangeComparison: message.first === null ? null : message });
         break;

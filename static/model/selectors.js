@@ -75,3 +75,12 @@ export function stopTitle(isRunning) {
     ? "Pause the search and keep the best pose; Step, Stage or Frame continue it (Esc)"
     : "End the paused search and keep the best pose (Esc)";
 }
+
+/**
+ * The part and view that contradict the shown pose most, as in "left calf: outside the person in LEFT"; empty while unknown.
+ *
+ * @param {import("./store.js").Facts} facts
+ */
+export function reasonOf({ reason, state }) {
+  return reason && state && reason.frame === state.frame && reason.person === state.person ? reason.sentence : "";
+}

@@ -6,6 +6,7 @@ import { PeopleFollower, boxOf, followView, keepLink, keptLink, seen } from "./l
 import { Pane } from "./pane.js";
 import { PaneBorders } from "../layout/pane_borders.js";
 import { isInSight } from "../model/selectors.js";
+import { cornersOf } from "./part_hit.js";
 import { PaneShares } from "../layout/pane_shares.js";
 
 /** Smallest size of what is framed, in that of the body: a limb is judged by what it hangs on. */
@@ -204,6 +205,23 @@ export class PaneGrid {
       this.panes[camera].frame(boxOf(cameras.has(camera) ? withMargin(own, extentOf(ofBody)) : ofBody));
     }
     this.#zoomedToJoints = cameras;
+  }
+
+  /**
+   * Zoom a view to a part of a person; a view that another covers comes in its place.
+   *
+   * @param {{camera: number, person: number, part: number}} meant
+   */
+  framePart({ camera, person, part }) {
+    const { overlay, filled } = this.#store.facts;
+    const outline = overlay?.outlines.find((one) => one.camera === camera && one.person === person && one.part === part);
+    if (!overlay || !outline) return;
+    if (filled !== null && filled !== camera) this.#store.set({ filled: camera });
+    const body = overlay.handles.filter((one) => one.camera === camera && one.person === person);
+    this.#following = new Set([camera]);
+    this.panes[camera].frame(boxOf(withMargin(cornersOf(overlay.segments, outline), extentOf(body))));
+    this.#store.set({ active: camera });
+    this.#zoomedToJoints.add(camera);
   }
 
   /** Whether panes have other sizes than the automatic ones. */

@@ -36,3 +36,13 @@ function holds(segments, { first, count }, u, v) {
   }
   return side !== 0;
 }
+
+/**
+ * Corners of an outline.
+ *
+ * @param {Float32Array} segments of the overlay
+ * @param {import("../model/protocol.js").Outline} outline
+ */
+export function cornersOf(segments, { first, count }) {
+  return Array.from({ length: count }, (_, i) => ({ u: segments[4 * (first + i)], v: segments[4 * (first + i) + 1] }));
+}

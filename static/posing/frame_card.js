@@ -1,6 +1,7 @@
 /** Card with the status of the current frame, which opens to the cost of each body part. */
 
 import { contradictions, keyframeDoubt } from "../model/keyframe_doubts.js";
+import { reasonOf } from "../model/selectors.js";
 import { button, byId } from "../widgets/elements.js";
 import { displayName, px } from "../widgets/text.js";
 
@@ -13,6 +14,7 @@ export class FrameCard {
   #card = byId("frame-card", HTMLDetailsElement);
   #badge = byId("frame-status", HTMLElement);
   #remark = byId("frame-remark", HTMLElement);
+  #why = byId("show-reason", HTMLButtonElement);
   #parts = byId("frame-parts", HTMLElement);
   #other;
 
@@ -29,7 +31,7 @@ export class FrameCard {
       this.#show();
     });
     store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("keyframeDoubts")) this.#show();
+      if (changed.has("state") || changed.has("keyframeDoubts") || changed.has("reason")) this.#show();
     });
   }
 
@@ -44,7 +46,8 @@ export class FrameCard {
     this.#badge.textContent = doubt ? "check" : status || "not assessed";
     this.#remark.textContent = doubt
       ? `This keyframe disagrees ${contradictions(doubt, session).join("; ")}. Correct it, or keep it (Alt+Enter).`
-      : remark;
+      : [remark, reasonOf(this.#store.facts)].filter(Boolean).join(" · ");
+    this.#why.hidden = status !== "doubtful" && status !== "lost" && !doubt;
     if (this.#card.hidden || !this.#card.open) return;
     const names = session.people[person].parts;
     const cells = leftBesideRight(names).flatMap((part) => (part === null ? gap() : row(names[part], part_costs_px[part] ?? null)));

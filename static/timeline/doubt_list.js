@@ -2,6 +2,7 @@
 
 import { byId, iconButton } from "../widgets/elements.js";
 import { count, displayName, percent } from "../widgets/text.js";
+import { reasonOf } from "../model/selectors.js";
 import { contradictions } from "../model/keyframe_doubts.js";
 import { countDoubts } from "./doubts.js";
 import { ThumbnailLoader } from "./thumbnail_loader.js";
@@ -53,7 +54,7 @@ export class DoubtList {
         return;
       }
       if (listed.some((fact) => changed.has(fact))) this.#show();
-      if (listed.some((fact) => changed.has(fact)) || changed.has("target") || changed.has("state")) this.#mark();
+      if (listed.some((fact) => changed.has(fact)) || changed.has("target") || changed.has("state") || changed.has("reason")) this.#mark();
     });
   }
 
@@ -97,6 +98,7 @@ export class DoubtList {
     const key = current ? this.#key(current) : null;
     for (const [own, row] of this.#rows) {
       const isCurrent = own === key;
+      if (isCurrent) explain(row, current?.worst === this.#store.facts.reason?.frame ? reasonOf(this.#store.facts) : "");
       if (row.classList.contains("is-current") === isCurrent) continue;
       row.classList.toggle("is-current", isCurrent);
       row.querySelector("button")?.setAttribute("aria-current", String(isCurrent));
@@ -183,6 +185,20 @@ function line(kind, text, more) {
   if (more) one.classList.add(more);
   one.textContent = text;
   return one;
+}
+
+/**
+ * Show the part and the view that contradict the pose of an entry.
+ *
+ * @param {HTMLElement} row
+ * @param {string} sentence empty while unknown
+ */
+function explain(row, sentence) {
+  if (!sentence) return;
+  const known = row.querySelector(".doubt-reason") ?? line("doubt-reason", "");
+  known.textContent = sentence;
+  row.classList.add("is-explained");
+  row.querySelector(".doubt-text > .quiet")?.before(known);
 }
 
 /** @param {import("../model/protocol.js").PersonInfo} person */

@@ -131,6 +131,15 @@ class ViewEvidence:
         return self.theta_px if theta_px is None else theta_px * self.scale
 
 
+def with_colors_only(view: ViewEvidence, colors: Image | None = None) -> ViewEvidence:
+    """Return a view without its edges, which takes a tenth of the memory; with other colours, (H, W, 3), if given."""
+    no_points, no_distance = np.empty((0, 2), np.float32), np.empty((0, 0), np.float32)
+    return ViewEvidence(
+        view.camera, view.scale, no_points, no_distance, view.corner_px, view.image_size,
+        colors=view.colors if colors is None else colors,
+    )  # fmt: skip
+
+
 def default_theta_px(camera: Camera) -> float:
     """Return the outlier distance of a camera: 3% of the longer side of its image (20 px at 640x480)."""
     return _theta_px(camera.size)

@@ -1,0 +1,198 @@
+"""Explain the shown pose in the background: what each view shows of each part, against what is usual in the run."""
+
+import logging
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from app.control.session.session_state import SessionState
+from app.remedies import page_text
+from app.runtime.jobs import LatestWinsWorker
+from app.state.identity import Identity
+from app.state.reason import Reason
+from app.state.state import State
+from tracker.body.model import PosedBody
+from tracker.errors import TrackerError
+from tracker.geometry.arrays import Array
+from tracker.tracking.estimation.frame_problem import Bodies
+from tracker.tracking.estimation.part_evidence import RunEvidence, contradiction, learn_run, read_frame
+
+_LOG = logging.getLogger(__name__)
+_N_LEARNING = 60
+"""Frames to learn from, spread over the run: as many as `tests/benchmarks/region_evidence.py` measures with."""
+_MIN_LEARNING = 8
+"""Fewest frames to learn from: a place of a view has a colour of its own from 8 open frames on."""
+_REST_S = 0.1
+"""Minimum time between two reasons; the pose may change faster."""
+_GIVE_WAY_S = 0.05
+"""Time between two looks at whether a drag has ended, which goes first."""
+
+
+class _StoppedError(Exception):
+    """The user has stopped the work, or the pose has changed."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Learnt:
+    """What is usual in a run, and the poses that it was learnt from."""
+
+    run: RunEvidence
+    people: tuple[int, ...]
+    poses: Mapping[int, tuple[Array, ...]]
+    """Of these people in their present bodies by frame, (n_values,) each."""
+
+    def holds(self, people: tuple[int, ...], poses: Mapping[int, tuple[Array, ...]]) -> bool:
+        """Return whether most poses of a run are still those that it was learnt from."""
+        same = [k for k in poses.keys() & self.poses.keys() if all(map(np.array_equal, poses[k], self.poses[k]))]
+        return people == self.people and 2 * len(same) > len(poses)
+
+
+class Reasons:
+    """Explains the newest pose while a page asks for it. What is usual is learnt once for the poses of a run."""
+
+    def __init__(self, session_state: SessionState) -> None:
+        """Subscribe to the state; nothing is computed until a page asks."""
+        self._session_state = session_state
+        self._pages: set[int] = set()
+        self._stopping = threading.Event()
+        self._learnt: _Learnt | None = None
+        self._computed: tuple[object, ...] = ()
+        self._latest = LatestWinsWorker(self._compute, "reasons", _REST_S)
+        session_state.subscribe(self._changed)
+
+    def watch(self, page: int, looks: bool) -> None:
+        """Note whether a page shows the reason; the work begins where it does, and ends with the last page.
+
+        Args:
+            page: number of the page.
+            looks: whether it shows the reason.
+        """
+        (self._pages.add if looks else self._pages.discard)(page)
+        if not looks:
+            self._stopping.set() if not self._pages else None
+            return
+        self._stopping.clear()
+        self._computed = ()
+        self._latest.offer(self._session_state.state)
+
+    def stop(self) -> None:
+        """Stop the work until a page asks again, by `watch`."""
+        self._stopping.set()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._stopping.set()
+        self._latest.close()
+
+    def _changed(self, state: State) -> None:
+        if self._pages and not self._stopping.is_set() and _ingredients(state) != self._computed:
+            self._latest.offer(state)
+
+    def _compute(self, _: State) -> None:
+        session_state = self._session_state
+        state = session_state.state  # the newest: work on the one that was offered may have waited
+        ingredients = _ingredients(state)
+        if not self._pages or self._stopping.is_set() or ingredients == self._computed:
+            return
+        if state.is_dragging or state.search.running:
+            return  # offered again with the next state
+        self._computed = ingredients
+        try:
+            self._set(running=True, stage="reading the frame", share=0.0, message="")
+            self._set(found=self._explained(state), message="")
+        except _StoppedError:
+            if self._stopping.is_set():
+                self._computed = ()
+                self._set(message="Stopped.")
+        except TrackerError as error:
+            text = page_text(error)
+            self._set(message=f"{text[:1].upper()}{text[1:]}.")
+        except Exception:
+            _LOG.exception("a pose could not be explained")
+            self._set(message="Expected to explain this pose, found a fault; the log of the program has more.")
+        finally:
+            self._set(running=False)
+
+    def _set(self, **changes: object) -> None:
+        session_state = self._session_state
+        with session_state.lock:
+            session_state.set(reasons=replace(session_state.state.reasons, **changes))  # type: ignore[arg-type]
+
+    def _report(self, stage: str, share: float, text: str = "", /) -> None:
+        """Show progress, and let a drag go first."""
+        session_state = self._session_state
+        while session_state.state.is_dragging and not self._stopping.is_set():
+            time.sleep(_GIVE_WAY_S)
+        if self._stopping.is_set():
+            raise _StoppedError
+        if session_state.state.track.running:
+            raise TrackerError(_TRACKING)
+        self._set(stage=stage, share=share)
+
+    def _explained(self, state: State) -> Reason:
+        """Return the reason for the pose of the selected person.
+
+        Raises:
+            TrackerError: there is no pose, or too few frames have one.
+        """
+        session_state, person = self._session_state, state.person
+        names = [p.name for p in session_state.session.people]
+        if state.compiling is not None:
+            raise TrackerError("expected compiled kernels, found that they are being compiled; the reason follows")
+        if state.track.running:
+            raise TrackerError(_TRACKING)
+        if state.people[person].source is None:
+            raise TrackerError(
+                f"expected a pose of {names[person]} on frame {state.frame}, found none; place the body first"
+            )
+        people = tuple(i for i, p in enumerate(state.people) if p.source is not None)
+        run = self._run(people)
+        bodies = tuple(PosedBody(state.models[i], state.people[i].values) for i in people)
+        seen = read_frame(session_state.frames.observer, state.frame, bodies)
+        table = run.table(seen, people.index(person))
+        views = session_state.session.camera_names
+        worst = contradiction(state.models[person], table, seen.thetas_px, views)
+        return Reason(state.frame, person, state.people[person].values, table, worst)
+
+    def _run(self, people: tuple[int, ...]) -> RunEvidence:
+        """Return what is usual in the run, learnt if that is to do."""
+        session_state = self._session_state
+        poses = self._poses(people)
+        if self._learnt is None or not self._learnt.holds(people, poses):
+            if len(poses) < _MIN_LEARNING:
+                raise TrackerError(
+                    f"expected {_MIN_LEARNING} frames with poses or more, to learn what is usual in each view, found "
+                    f"{len(poses)}; track the recording first"
+                )
+            models = session_state.present
+            frames: list[tuple[int, Bodies]] = [
+                (k, tuple(PosedBody(models[i], values) for i, values in zip(people, own, strict=True)))
+                for k, own in poses.items()
+            ]
+            run = learn_run(session_state.frames.observer, frames, self._report)
+            self._learnt = _Learnt(run, people, poses)
+        return self._learnt.run
+
+    def _poses(self, people: tuple[int, ...]) -> dict[int, tuple[Array, ...]]:
+        """Return poses of people in their present bodies, (n_values,) each, on frames on which all of them have one."""
+        saver = self._session_state.saver
+        with self._session_state.lock:
+            common = sorted(set.intersection(*(set(saver.index.frames(i)) for i in people)))
+        chosen = [common[i] for i in np.unique(np.linspace(0, len(common) - 1, _N_LEARNING).round().astype(int))]
+        found: list[dict[int, Array]] = []
+        for person in people:
+            rows = [r for r in saver.pose_rows(person, chosen) if saver.revisions.fits(person, r.model_revision)]
+            found.append({r.frame: saver.revisions.in_present_body(person, r.values, r.model_revision) for r in rows})
+        return {k: tuple(own[k] for own in found) for k in chosen if all(k in own for own in found)}
+
+
+_TRACKING = "expected no tracking run at work, found one; the reason follows at its end"
+
+
+def _ingredients(state: State) -> tuple[object, ...]:
+    """Return what a reason is made from, for comparison. Poses are compared by identity."""
+    shown = tuple(Identity(p.values) for p in state.people)
+    return state.frame, state.person, shown, state.revisions, state.track.running, state.compiling

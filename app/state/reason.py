@@ -1,0 +1,48 @@
+"""Why a pose is in doubt: what each view shows of each part, and poses that are about as good."""
+
+from dataclasses import dataclass
+
+from tracker.geometry.arrays import Array
+from tracker.tracking.estimation.part_evidence import Contradiction, PartTable
+
+
+@dataclass(frozen=True, eq=False)
+class RankedPose:
+    """Another pose of the person."""
+
+    values: Array
+    """Pose, (n_values,)."""
+    nats: float
+    """How much more it costs than the shown pose, nats; negative if it is better."""
+    limbs: tuple[str, ...]
+    """Limbs that are elsewhere, as text for the user."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reason:
+    """The table of one pose, and the poses beside it."""
+
+    frame: int
+    person: int
+    values: Array
+    """The pose that it is about, (n_values,)."""
+    table: PartTable
+    contradiction: Contradiction | None
+    """The worst cell; None where no view clearly contradicts the pose."""
+    alternatives: tuple[RankedPose, ...] = ()
+    """Cheapest first; all within 6 nats of the best pose."""
+
+
+@dataclass(frozen=True)
+class ReasonState:
+    """The reason for the shown pose, or how far the work on it is."""
+
+    running: bool = False
+    stage: str = ""
+    """The kind of work, as text for the user."""
+    share: float = 0.0
+    """Share of the work that is done, 0 to 1."""
+    message: str = ""
+    """Why there is no table; empty where there is one, and while it is being made."""
+    found: Reason | None = None
+    """The newest one; see `State.reason`."""

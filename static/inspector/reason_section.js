@@ -1,0 +1,115 @@
+/** Reason for a doubt: what each view shows of each part of the shown pose, as a table whose cells zoom to the part. */
+
+import { capital } from "../widgets/text.js";
+import { MEASURES, reasonTable } from "./reason_table.js";
+import { textButton } from "./rows.js";
+
+/** @typedef {import("./reason_table.js").Measure} Measure */
+
+const STORED = "quadrille.reason-measure";
+const SHOWN_FACTS = /** @type {const} */ (["reason", "session", "state", "connected"]);
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {import("../panes/index.js").Panes} panes
+ * @returns {import("./inspector.js").Section}
+ */
+export function reasonSection({ store, send }, { grid }) {
+  const body = document.createElement("div");
+  body.className = "reason";
+  const sentence = Object.assign(document.createElement("p"), { className: "reason-sentence" });
+  sentence.setAttribute("aria-live", "polite");
+  const progress = document.createElement("progress");
+  const stop = textButton("Stop", "Stop learning what is usual in this run; nothing changes", () => send({ type: "reason", action: "stop" }));
+  const stage = Object.assign(document.createElement("span"), { className: "section-note" });
+  const work = Object.assign(document.createElement("div"), { className: "acquisition-work" });
+  work.append(progress, stop);
+  const message = Object.assign(document.createElement("p"), { className: "section-note" });
+  const again = textButton("Explain this pose", "Learn what is usual in this run, and compare this pose with it", () => ask());
+  const notes = Object.assign(document.createElement("p"), { className: "section-note" });
+  let measure = MEASURES.find(({ id }) => id === localStorage.getItem(STORED)) ?? MEASURES[0];
+  const choice = measureChoice(measure, (chosen) => {
+    measure = chosen;
+    localStorage.setItem(STORED, measure.id);
+    show();
+  });
+  const table = reasonTable({
+    point: (cell) => store.set({ hoverPart: cell }),
+    zoom: (cell) => grid.framePart(cell),
+  });
+  body.append(sentence, stage, work, message, again, choice, table.element, notes);
+
+  let isAsking = false;
+  const ask = () => {
+    isAsking = true;
+    send({ type: "reason", action: "ask" });
+  };
+  /** Ask for the reason while the section is in sight. */
+  const follow = () => {
+    const isSeen = store.facts.connected && body.getClientRects().length > 0;
+    if (isSeen === isAsking) return;
+    if (isSeen) ask();
+    else {
+      isAsking = false;
+      if (store.facts.connected) send({ type: "reason", action: "leave" });
+    }
+  };
+  new ResizeObserver(follow).observe(body);
+
+  const show = () => {
+    const { reason, session, state } = store.facts;
+    const person = session?.people[reason?.person ?? 0];
+    const isKnown = !!reason && reason.parts.length > 0;
+    const hasWork = reason?.running ?? false;
+    work.hidden = stage.hidden = !hasWork;
+    progress.value = reason?.share ?? 0;
+    stage.textContent = capital(reason?.stage ?? "");
+    message.textContent = hasWork ? "" : (reason?.message ?? "");
+    message.hidden = !message.textContent;
+    again.hidden = hasWork || isKnown || !message.textContent;
+    sentence.hidden = !isKnown;
+    sentence.textContent = isKnown ? reason.sentence ? `${capital(reason.sentence)}.` : noContradiction(state?.status ?? "") : "";
+    sentence.classList.toggle("is-doubt", isKnown && reason.sentence !== "");
+    choice.hidden = table.element.hidden = !isKnown && !hasWork;
+    notes.textContent = isKnown ? reason.notes.join(" ") : "";
+    notes.hidden = !notes.textContent;
+    table.element.classList.toggle("is-former", !isKnown);
+    if (isKnown && person && session) table.show({ reason, measure, person, cameras: session.cameras });
+    else if (!hasWork) table.clear();
+  };
+  show();
+  return {
+    id: "reason",
+    title: "Reason",
+    hint: "Why this pose is in doubt: what each view shows of each part (Alt+W)",
+    body,
+    update(changed) {
+      if (changed.has("connected") && !store.facts.connected) isAsking = false;
+      if (changed.has("connected")) follow();
+      if (SHOWN_FACTS.some((fact) => changed.has(fact))) show();
+    },
+  };
+}
+
+/** @param {string} status */
+function noContradiction(status) {
+  const more = status === "doubtful" || status === "lost" ? " The status comes from tracks without one view each, which disagree." : "";
+  return `No view contradicts this pose clearly.${more}`;
+}
+
+/**
+ * @param {Measure} chosen
+ * @param {(measure: Measure) => void} change
+ */
+function measureChoice(chosen, change) {
+  const element = Object.assign(document.createElement("fieldset"), { className: "segmented" });
+  element.setAttribute("aria-label", "Measure");
+  for (const measure of MEASURES) {
+    const label = Object.assign(document.createElement("label"), { title: measure.title });
+    const input = Object.assign(document.createElement("input"), { type: "radio", name: "reason-measure", checked: measure === chosen });
+    input.addEventListener("change", () => change(measure));
+    label.append(input, Object.assign(document.createElement("span"), { textContent: measure.label }));
+    element.append(label);
+  }
+  return element;
+}

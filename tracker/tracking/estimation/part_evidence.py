@@ -1,0 +1,239 @@
+"""Compare what each view shows of each part of a pose with what it usually shows in the run.
+
+A status says that a limb may be off; this says which part and which view contradict it. Three measures do: the colours
+(`tracker.appearance.region_model`), the share of the part outside the silhouette, and the distance of its contour to
+the edges. The run itself says what is usual. Parts are counted through all people.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.appearance.part_drawing import draw_bodies
+from tracker.appearance.region_cells import cells_of
+from tracker.appearance.region_deficit import UNEXPLAINED_SHARE
+from tracker.appearance.region_learning import LearningFrame, learn_regions
+from tracker.appearance.region_model import RegionModel, RegionScore
+from tracker.body.limbs import Limb, display_name, limb_display_name, limbs
+from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.progress import Report, unreported
+from tracker.evidence.observer import Observer
+from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, with_colors_only
+from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.geometry.arrays import Array
+from tracker.tracking.estimation.frame_problem import Bodies
+from tracker.tracking.estimation.limb_repair import MIN_GAIN_NATS
+from tracker.tracking.view_regions import read_views
+
+
+class SeenFrame(NamedTuple):
+    """What the views show of posed bodies on a frame."""
+
+    views: tuple[ViewEvidence, ...]
+    """Colours alone."""
+    bodies: Bodies
+    outside: Array
+    """Share of each part outside the silhouette, (V, P); NaN without a silhouette, and where the part is hidden."""
+    contour_px: Array
+    """Mean distance of the contour of each part to the edges, (V, P), px of the footage; NaN where it is hidden."""
+    thetas_px: Array
+    """Outlier distance of each view, (V,), px of the footage."""
+
+
+class PartTable(NamedTuple):
+    """What each view shows of each part of one person in a pose; NaN where it does not show the part, or not that."""
+
+    below: Array
+    """Evidence of the colours below the usual of as many samples, (V, n_parts), nats; negative where it is above."""
+    below_in_all: Array
+    """Evidence of the colours in all views below the usual, (n_parts,), nats. A part that is hidden lacks it, too."""
+    beside: Array
+    """Evidence beside each limb that no part explains, above its median over the run, (V, n_limbs), nats."""
+    outside: Array
+    """Share of the part outside the silhouette, (V, n_parts)."""
+    usual_outside: Array
+    """Its median over the run, (V, n_parts)."""
+    contour_px: Array
+    """Mean distance of the part's contour to the edges, (V, n_parts), px of the footage."""
+    usual_contour_px: Array
+    """Its median over the run, (V, n_parts), px."""
+
+
+class Contradiction(NamedTuple):
+    """The part and the view that contradict a pose most."""
+
+    part: int
+    """Index among the parts of the person."""
+    view: int | None
+    """Index of the view; None for all together."""
+    sentence: str
+    """As text for people, such as `left calf: 80% outside the person in LEFT`."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunEvidence:
+    """What is usual in a run: its colours, and the medians of all measures."""
+
+    known: RegionModel
+    """Appearance of the people and places."""
+    rates: Array
+    """Median evidence of each part, (V, P), nats per sample; NaN where no frame shows it."""
+    nats: Array
+    """Median evidence of each part in all views, (P,), nats."""
+    beside: Array
+    """Median of the evidence beside each limb, (V, n_limbs), nats."""
+    outside: Array
+    """Median share of each part outside the silhouette, (V, P)."""
+    contour_px: Array
+    """Median distance of the contour of each part, (V, P), px of the footage."""
+
+    def table(self, seen: SeenFrame, person: int) -> PartTable:
+        """Return the table of one person, given by index, on a frame with the same people."""
+        score = self.known.score(self.known.frame(seen.views, seen.bodies), seen.bodies)
+        is_shown = _is_shown(score)
+        below, outside, contour_px = (
+            np.where(is_shown, cells, np.nan)
+            for cells in (self.rates * score.samples - score.nats, seen.outside, seen.contour_px)
+        )
+        parts, of_limbs = _slices(self.known.models, person)
+        return PartTable(
+            below[:, parts], (self.nats - score.nats.sum(axis=0))[parts],
+            (score.unexplained - self.beside)[:, of_limbs], outside[:, parts], self.outside[:, parts],
+            contour_px[:, parts], self.contour_px[:, parts],
+        )  # fmt: skip
+
+
+def read_frame(observer: Observer, frame: int, bodies: Bodies) -> SeenFrame:
+    """Read a frame around posed bodies."""
+    views = read_views(observer, frame, bodies)
+    return SeenFrame(
+        tuple(map(with_colors_only, views)), bodies, np.array([_outside(v, bodies) for v in views]),
+        np.concatenate([_contours_px(views, bodies, i) for i in range(len(bodies))], axis=1),
+        np.array([v.theta_px / v.scale for v in views]),
+    )  # fmt: skip
+
+
+def learn_run(observer: Observer, frames: Sequence[tuple[int, Bodies]], report: Report = unreported) -> RunEvidence:
+    """Learn what is usual from some sixty frames of a run, which may have some wrong poses.
+
+    Args:
+        observer: of the recording.
+        frames: frames with all people, in one order and in the same bodies.
+        report: shows progress. An exception that it raises ends the work.
+    """
+    seen = []
+    for k, (frame, bodies) in enumerate(frames):
+        report("reading frames", k / (len(frames) + 1))
+        seen.append(read_frame(observer, frame, bodies))
+    report("learning the colours", len(frames) / (len(frames) + 1))
+    learning = [LearningFrame(s.views, s.bodies) for s in seen]
+    known = learn_regions(learning, observer.working_cameras, observer.empty_scenes())
+    scores = [known.score(known.frame(s.views, s.bodies), s.bodies) for s in seen]
+    is_shown = np.array([_is_shown(s) for s in scores])
+    samples, nats = (np.array([getattr(s, name) for s in scores]) for name in ("samples", "nats"))
+    rates = np.divide(nats, samples, out=np.full_like(nats, np.nan), where=is_shown)
+    outside, contour_px = (
+        np.where(is_shown, [getattr(s, name) for s in seen], np.nan) for name in ("outside", "contour_px")
+    )
+    beside = np.array([s.unexplained for s in scores])
+    return RunEvidence(known, *map(_medians, (rates, nats.sum(axis=1), beside, outside, contour_px)))
+
+
+def contradiction(model: BodyModel, table: PartTable, thetas_px: Array, views: Sequence[str]) -> Contradiction | None:
+    """Return the part and the view that contradict a pose most; None where nothing does clearly.
+
+    Colours decide, because nats can be compared between parts and views. Contours do where colours say nothing.
+
+    Args:
+        model: the body.
+        table: of its pose.
+        thetas_px: outlier distance of each view, (V,), px of the footage.
+        views: names of the views.
+    """
+    names, of_body = [display_name(p.name) for p in model.parts], limbs(model)
+    below, beside = np.nan_to_num(table.below), UNEXPLAINED_SHARE * np.nan_to_num(table.beside)
+    if max(below.max(), beside.max()) > MIN_GAIN_NATS:
+        if beside.max() > below.max():
+            view, at = _largest(beside)
+            limb = of_body[at]
+            return Contradiction(_last_part(limb), view, _beside(limb, views[view]))
+        view, part = _largest(below)
+        return Contradiction(part, view, f"{names[part]}: {_off(table, view, part)} in {views[view]}")
+    hidden = np.where(np.isnan(table.below).all(axis=0), table.below_in_all, 0.0)
+    if hidden.max() > MIN_GAIN_NATS:
+        part = int(hidden.argmax())
+        return Contradiction(part, None, f"{names[part]}: hidden in all views, which usually show it")
+    excess = np.nan_to_num(table.contour_px - table.usual_contour_px)
+    view, part = _largest(excess / thetas_px[:, None])
+    if excess[view, part] > ACCEPTED_SHARE * thetas_px[view]:
+        px, often = table.contour_px[view, part], table.usual_contour_px[view, part]
+        sentence = f"{names[part]}: contour {px:.0f} px from edges in {views[view]}, usually {often:.0f} px"
+        return Contradiction(part, view, sentence)
+    return None
+
+
+def _is_shown(score: RegionScore) -> NDArray[np.bool_]:
+    """Return whether each view shows as much as one independent sample of each part, (V, P)."""
+    return np.asarray(score.samples >= 1.0)
+
+
+def _off(table: PartTable, view: int, part: int) -> str:
+    """Return how the part differs in a view, for people to read."""
+    outside = table.outside[view, part]
+    if not outside - table.usual_outside[view, part] > 0.1:  # also where one is unknown
+        return "its colours are not there"
+    return "outside the person" if outside > 0.5 else f"{outside:.0%} outside the person"
+
+
+def _beside(limb: Limb, view: str) -> str:
+    return f"{limb_display_name(limb.name)}: its colours are where no part is in {view}"
+
+
+def _last_part(limb: Limb) -> int:
+    return int(limb.parts[-1])
+
+
+def _largest(cells: Array) -> tuple[int, int]:
+    """Return the view and the column of the largest cell, (V, n)."""
+    view, column = np.unravel_index(int(cells.argmax()), cells.shape)
+    return int(view), int(column)
+
+
+def _outside(view: ViewEvidence, bodies: Sequence[PosedBody]) -> Array:
+    """Return the share of each part outside the silhouette of a view, (P,)."""
+    n, silhouette, cells = sum(len(b.model.parts) for b in bodies), view.silhouette, cells_of(view)
+    if silhouette is None or cells is None:
+        return np.full(n, np.nan)
+    labels = draw_bodies(bodies, cells).labels.ravel()
+    inside = cells_of(with_colors_only(view, np.repeat(np.uint8(255) * silhouette.inside[..., None], 3, axis=2)))
+    assert inside is not None  # of the same region
+    total = np.bincount(labels, minlength=n + 1)[1:].astype(np.float64)
+    apart = np.bincount(labels, 1 - inside.colors[..., 0].ravel() / 255, minlength=n + 1)[1:]
+    return np.divide(apart, total, out=np.full(n, np.nan), where=total > 0)
+
+
+def _contours_px(views: Sequence[ViewEvidence], bodies: Bodies, person: int) -> Array:
+    """Return the mean distance of the contour of each part of a person, (V, n_parts), px of the footage."""
+    costs = ContourResiduals(views, bodies, person).part_costs(bodies[person].values)
+    has_edges = np.array([len(v.points_px) > 0 for v in views])[:, None]
+    return np.where(has_edges, costs.forward_px / np.array([v.scale for v in views])[:, None], np.nan)
+
+
+def _medians(rows: Array) -> Array:
+    """Return the medians of the known values over frames, (T, ...); NaN where none is known."""
+    out = np.full(rows.shape[1:], np.nan)
+    for at in np.ndindex(out.shape):
+        column = rows[(slice(None), *at)]
+        if np.isfinite(column).any():
+            out[at] = np.median(column[np.isfinite(column)])
+    return out
+
+
+def _slices(models: Sequence[BodyModel], person: int) -> tuple[slice, slice]:
+    """Return the parts and the limbs of one person among those of all."""
+    counts = [(len(m.parts), len(limbs(m))) for m in models]
+    first = [sum(c[i] for c in counts[:person]) for i in (0, 1)]
+    return tuple(slice(f, f + n) for f, n in zip(first, counts[person], strict=True))  # type: ignore[return-value]
