@@ -36,6 +36,7 @@ from app.control.session.stored_poses import StoredPoses
 from app.control.tracking.comparing_runs import ComparingRuns
 from app.control.tracking.finding import FindingPeople
 from app.control.tracking.inconsistent_frames import InconsistentFrames
+from app.control.tracking.pose_checks import PoseChecks
 from app.control.tracking.ranges import Ranges
 from app.control.tracking.tracking import Tracking
 from app.control.view.floor import FloorEditing
@@ -100,7 +101,8 @@ class Controller:
         """Changes poses by values, steps and whole operations."""
         self.dof_locks = DofLocks(session_state, activities)
         """Locks degrees of freedom."""
-        self.alternatives = Alternatives(session_state, activities)
+        self._pose_checks = PoseChecks(session_state)
+        self.alternatives = Alternatives(session_state, activities, self._pose_checks.check)
         """Replaces poses by their alternatives."""
         self.body_sizes = BodySizeEditing(session_state, runs, activities)
         """Edits the sizes of bodies."""
@@ -173,4 +175,5 @@ class Controller:
             self._compiling.close()
         self.cost_landscape.close()
         self.reasons.close()
+        self._pose_checks.close()
         self.frames.close()

@@ -106,7 +106,8 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
     out = []
     tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
-    drafted, others = _with_draft(state, bodies), _alternatives(state, bodies)
+    drafted = _with_draft(state, bodies)
+    others = _alternatives(state, bodies) if "alternatives" in view.layers else []
     replaced = {} if state.range_comparison is None else state.range_comparison.others.get(state.frame, {})
     former = [PosedBody(p.model, replaced.get(i, state.poses[i])) for i, p in enumerate(session.people)]
     result = stored.poses if state is not stored and state.search_view.replay is None else None
@@ -277,13 +278,15 @@ def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
 
 
 def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
-    """Return the bodies with everybody who has alternatives in the best of these; empty if nobody has any."""
-    if not any(shown.alternatives for shown in state.people):
+    """Return the bodies with everybody who has alternatives in the best of these; empty if nobody has any.
+
+    The alternatives of a person whose reason is known are drawn one by one; see `app.drawing.ghosts`.
+    """
+    explained = None if state.reason is None else state.person
+    best = [() if i == explained else shown.alternatives[:1] for i, shown in enumerate(state.people)]
+    if not any(best):
         return []
-    return [
-        PosedBody(b.model, s.alternatives[0]) if s.alternatives else b
-        for b, s in zip(bodies, state.people, strict=True)
-    ]
+    return [PosedBody(b.model, poses[0]) if poses else b for b, poses in zip(bodies, best, strict=True)]
 
 
 def _found(state: State, bodies: Sequence[PosedBody], camera: Camera, index: int, view: View) -> list[Path]:

@@ -12,6 +12,7 @@ from app.drawing.curves import CurveGroup, plots_of, samples
 from app.drawing.error_ellipses import error_ellipses
 from app.drawing.floor_lines import floor_lines
 from app.drawing.former_limbs import former_limb_lines
+from app.drawing.ghosts import ghost_lines
 from app.page import search_messages
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
@@ -92,6 +93,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
         source=shown.source,
         status=_status(shown.status),
         remark=shown.remark,
+        is_checked=(state.person, state.frame) in state.checked,
         part_costs_px=shown.part_costs_px,
         expected_errors_m=tuple(shown.expected_errors_m.round(4).tolist()),
         dofs=tuple(dof_labels.shown(session.people[state.person].model, shown.values)),
@@ -136,6 +138,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         *pin_marks.pin_lines(session, state, view),
         *floor_lines(session, state),
         *former_limb_lines(session, state, view),
+        *ghost_lines(session, state, view),
         *error_ellipses(session, state, view),
     ]:
         count = len(path.segments_px)

@@ -55,7 +55,7 @@ POSE_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.Mirror: lambda controller, _, m: controller.pose_edits.mirror(m.person, m.frame),
     wire.CopyFrame: lambda controller, _, m: controller.pose_edits.copy_from(m.person, m.source, m.frame),
     wire.CopyPerson: _copy_person,
-    wire.TakeAlternative: lambda controller, _, m: controller.alternatives.take_alternative(m.person, m.frame),
+    wire.TakeAlternative: lambda controller, _, m: controller.alternatives.take_alternative(m.person, m.frame, m.rank),
     wire.ResetLimb: _reset,
     wire.LockDofs: _lock,
     wire.HoldPoint: _hold,

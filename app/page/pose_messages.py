@@ -100,6 +100,8 @@ class TakeAlternative(_PoseEdit, frozen=True, tag="pose"):
     """
 
     action: Literal["alternative"]
+    rank: Index | None = None
+    """Rank among those of the pose's reason; null for the best that the tracker stored."""
 
 
 class ResetLimb(_PoseEdit, frozen=True, tag="pose"):

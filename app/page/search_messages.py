@@ -295,6 +295,15 @@ class LimbReason(Part, frozen=True):
     """By camera, evidence for its colours where no part is, above the usual of the run; null for the trunk."""
 
 
+class OtherPose(Part, frozen=True):
+    """Another pose of the person, drawn as a ghost."""
+
+    nats: float
+    """How much more it costs than the shown pose; negative if it is better."""
+    limbs: tuple[str, ...]
+    """Limbs that are elsewhere, for display."""
+
+
 class ReasonMessage(Message, frozen=True, tag="reason"):
     """Why the pose of the selected person is in doubt, for pages that ask."""
 
@@ -319,3 +328,5 @@ class ReasonMessage(Message, frozen=True, tag="reason"):
     """By part of the person; empty without a table."""
     notes: tuple[str, ...]
     """Sentences on what views cannot show."""
+    alternatives: tuple[OtherPose, ...]
+    """Poses within 6 nats of the best, cheapest first. The overlay draws them in this order."""

@@ -267,6 +267,8 @@ class StateMessage(Message, frozen=True, tag="state"):
     status: Status
     remark: str
     """Note of the tracker about this frame."""
+    is_checked: bool
+    """Whether the pose is being assessed."""
     part_costs_px: tuple[float | None, ...]
     """By part; null for an unseen one, empty where unknown."""
     expected_errors_m: tuple[float, ...]

@@ -376,6 +376,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.undrawn,
         state.compiled,
         Identity(state.finding.candidates),
+        Identity(None if state.reason is None else state.reason.alternatives),
     )
     return (*drawn, _pins(state), state.floor.picking)
 

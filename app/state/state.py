@@ -64,6 +64,8 @@ class State:
     """The poses of a range against those that they replaced; None while nothing is compared."""
     search: SearchState = field(default_factory=SearchState)
     search_view: SearchView = field(default_factory=SearchView)
+    checked: frozenset[tuple[int, int]] = frozenset()
+    """Index of the person and frame of the poses that are being assessed."""
     reasons: ReasonState = field(default_factory=ReasonState)
     """Why the shown pose is in doubt, as far as a page asks."""
     landscape: CostLandscape | None = None
@@ -235,6 +237,7 @@ class StateChanges(TypedDict, total=False):
     range_comparison: RangeComparison | None
     search: SearchState
     search_view: SearchView
+    checked: frozenset[tuple[int, int]]
     reasons: ReasonState
     landscape: CostLandscape | None
     track: TrackState

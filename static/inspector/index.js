@@ -34,7 +34,7 @@ const THEMES = [
 export function mount(context, { panes, posing, scene }) {
   const sections = [
     jointSection(context, posing),
-    reasonSection(context, panes),
+    reasonSection(context, panes, posing),
     findSection(context),
     new BodySection(context),
     trackSection(context),

@@ -1,5 +1,6 @@
 /** Reason for a doubt: what each view shows of each part of the shown pose, as a table whose cells zoom to the part. */
 
+import { otherPosesOf } from "../model/selectors.js";
 import { capital } from "../widgets/text.js";
 import { MEASURES, reasonTable } from "./reason_table.js";
 import { textButton } from "./rows.js";
@@ -12,9 +13,10 @@ const SHOWN_FACTS = /** @type {const} */ (["reason", "session", "state", "connec
 /**
  * @param {import("../model/index.js").Context} context
  * @param {import("../panes/index.js").Panes} panes
+ * @param {import("../posing/index.js").PosingRoom} room
  * @returns {import("./inspector.js").Section}
  */
-export function reasonSection({ store, send }, { grid }) {
+export function reasonSection({ store, send }, { grid }, { posing }) {
   const body = document.createElement("div");
   body.className = "reason";
   const sentence = Object.assign(document.createElement("p"), { className: "reason-sentence" });
@@ -37,7 +39,10 @@ export function reasonSection({ store, send }, { grid }) {
     point: (cell) => store.set({ hoverPart: cell }),
     zoom: (cell) => grid.framePart(cell),
   });
-  body.append(sentence, stage, work, message, again, choice, table.element, notes);
+  const others = Object.assign(document.createElement("ol"), { className: "reason-others" });
+  others.setAttribute("aria-label", "Alternative poses");
+  let listed = "";
+  body.append(sentence, stage, work, others, message, again, choice, table.element, notes);
 
   let isAsking = false;
   const ask = () => {
@@ -71,6 +76,12 @@ export function reasonSection({ store, send }, { grid }) {
     sentence.textContent = isKnown ? reason.sentence ? `${capital(reason.sentence)}.` : noContradiction(state?.status ?? "") : "";
     sentence.classList.toggle("is-doubt", isKnown && reason.sentence !== "");
     choice.hidden = table.element.hidden = !isKnown && !hasWork;
+    const ranked = otherPosesOf(store.facts);
+    others.hidden = ranked.length === 0;
+    if (JSON.stringify(ranked) !== listed) {
+      listed = JSON.stringify(ranked);
+      others.replaceChildren(...ranked.map((other, rank) => otherRow(other, rank, () => posing.takeAlternative(rank))));
+    }
     notes.textContent = isKnown ? reason.notes.join(" ") : "";
     notes.hidden = !notes.textContent;
     table.element.classList.toggle("is-former", !isKnown);
@@ -89,6 +100,20 @@ export function reasonSection({ store, send }, { grid }) {
       if (SHOWN_FACTS.some((fact) => changed.has(fact))) show();
     },
   };
+}
+
+/**
+ * @param {import("../model/protocol.js").OtherPose} other
+ * @param {number} rank
+ * @param {() => void} take
+ */
+function otherRow({ nats, limbs }, rank, take) {
+  const row = document.createElement("li");
+  const where = limbs.length ? `${limbs.join(", ")} elsewhere` : "body elsewhere";
+  const cost = `${Math.abs(nats).toFixed(Math.abs(nats) < 10 ? 1 : 0)} nats ${nats < 0 ? "better" : "worse"}`;
+  const title = `Take this pose, drawn blue with the number ${rank + 1} (Alt+${rank + 1}). Can be undone`;
+  row.append(textButton(`Take ${rank + 1}`, title, take), Object.assign(document.createElement("span"), { textContent: `${where}: ${cost}` }));
+  return row;
 }
 
 /** @param {string} status */

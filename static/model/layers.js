@@ -95,6 +95,14 @@ export const LAYERS = [
     opacity: 0.9,
   },
   {
+    id: "alternatives",
+    group: "Model",
+    label: "Alternatives",
+    title: "Other poses that fit about as well, numbered where the reason of the pose is shown (Alt+W)",
+    shown: true,
+    opacity: 1,
+  },
+  {
     id: "epipolar",
     group: "Model",
     label: "Epipolar lines",

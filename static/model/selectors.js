@@ -81,6 +81,20 @@ export function stopTitle(isRunning) {
  *
  * @param {import("./store.js").Facts} facts
  */
-export function reasonOf({ reason, state }) {
-  return reason && state && reason.frame === state.frame && reason.person === state.person ? reason.sentence : "";
+export function reasonOf(facts) {
+  return isExplained(facts) ? (facts.reason?.sentence ?? "") : "";
+}
+
+/**
+ * Poses about as good as the shown one, or better, cheapest first; they are drawn and taken by their rank.
+ *
+ * @param {import("./store.js").Facts} facts
+ */
+export function otherPosesOf(facts) {
+  return isExplained(facts) ? (facts.reason?.alternatives ?? []) : [];
+}
+
+/** @param {import("./store.js").Facts} facts */
+function isExplained({ reason, state }) {
+  return !!reason && !!state && reason.frame === state.frame && reason.person === state.person;
 }

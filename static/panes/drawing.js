@@ -45,7 +45,7 @@ export const LINE_STYLES = {
   compared: { width: 1.5, dash: [6, 4], layer: "contours", hasOutline: true, ofPerson: true },
   preview: { width: 1.75, dash: [2, 4], layer: "contours", hasOutline: true, ofPerson: true },
   result: { width: 2, dash: [0.5, 4.5], layer: "contours", hasOutline: true, ofPerson: true },
-  alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
+  alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: "alternatives", hasOutline: true, ofPerson: true },
   new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
   former: { width: 1.5, dash: [9, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
   error: { width: 1.25, dash: [], layer: "errors", hasOutline: true, ofPerson: true },
@@ -131,6 +131,37 @@ export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
     stroke(context, line, path.color, style.width, style.hasOutline && !isFaint);
   }
   context.setLineDash([]);
+  context.globalAlpha = 1;
+}
+
+/**
+ * Number the ghosts of one view in their order, each at the middle of its lines.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {PaneView} view
+ * @param {Overlay} overlay
+ * @param {number} camera
+ * @param {number} opacity
+ */
+export function drawGhostRanks(context, view, overlay, camera, opacity) {
+  const ghosts = overlay.paths.filter((path) => path.camera === camera && path.kind === "alternative");
+  context.globalAlpha = opacity;
+  context.font = "600 11px system-ui, sans-serif";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  ghosts.forEach(({ first, count, color }, rank) => {
+    if (count === 0) return;
+    const lines = overlay.segments.subarray(4 * first, 4 * (first + count));
+    const mean = (/** @type {number} */ at) => lines.reduce((sum, value, i) => (i % 4 === at ? sum + value : sum), 0) / count;
+    const { x, y } = view.toScreen(mean(0), mean(1));
+    context.fillStyle = "rgba(12, 13, 15, 0.85)";
+    context.beginPath();
+    context.roundRect(x - 7, y - 8, 14, 16, 3);
+    context.fill();
+    context.fillStyle = color;
+    context.fillText(String(rank + 1), x, y + 0.5);
+  });
+  context.textAlign = "start";
   context.globalAlpha = 1;
 }
 

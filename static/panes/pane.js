@@ -7,7 +7,7 @@ import { ofJoint } from "../model/observability.js";
 import { jointLabel } from "./joint_label.js";
 import { drawObservability } from "./observability_marks.js";
 import { drawAxes } from "./axis_lines.js";
-import { isDimmed, isInSight, isStoredDrawn } from "../model/selectors.js";
+import { isDimmed, isInSight, isStoredDrawn, otherPosesOf } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
 import { PaneCorner } from "./pane_corner.js";
@@ -213,6 +213,9 @@ export class Pane {
     this.#showJoint(state);
     if (bare) return;
     drawing.drawPaths(context, this.view, overlay, this.#camera, layers, (person) => isDimmed(state, person));
+    if (layers.shown.alternatives && otherPosesOf(this.#store.facts).length > 0) {
+      drawing.drawGhostRanks(context, this.view, overlay, this.#camera, layers.opacity.alternatives);
+    }
     drawAxes(context, this.view, this.#store.facts, this.#camera);
     this.#drawJoints(context, state, session.people);
     drawPins(context, this.view, this.#store.facts, this.#camera, width);

@@ -43,7 +43,7 @@ export class FrameCard {
     const doubt = keyframeDoubt(this.#store.facts, state.frame, person);
     this.#card.hidden = !doubt && status === "" && part_costs_px.length === 0;
     this.#badge.className = `status-badge is-${doubt ? "doubtful" : status}`;
-    this.#badge.textContent = doubt ? "check" : status || "not assessed";
+    this.#badge.textContent = doubt ? "check" : state.is_checked ? "being assessed" : status || "not assessed";
     this.#remark.textContent = doubt
       ? `This keyframe disagrees ${contradictions(doubt, session).join("; ")}. Correct it, or keep it (Alt+Enter).`
       : [remark, reasonOf(this.#store.facts)].filter(Boolean).join(" · ");

@@ -1,5 +1,7 @@
 /** Edit poses without a drag: selection, steps, mirror, copies, resets and locks. */
 
+import { otherPosesOf } from "../model/selectors.js";
+
 /** Minimum interval of messages while a key is held down. */
 const SEND_MS = 50;
 const REQUEST_MS = 1500;
@@ -157,9 +159,18 @@ export class Posing {
     this.#edit({ ...this.#head(), action: "mirror" });
   }
 
-  /** Switch to the alternative pose, or back. */
-  takeAlternative() {
-    this.#edit({ ...this.#head(), action: "alternative" });
+  /**
+   * Switch to the best alternative pose, or back.
+   *
+   * @param {number} [rank] of another one among those of the reason
+   */
+  takeAlternative(rank) {
+    this.#edit({ ...this.#head(), action: "alternative", rank: rank ?? null });
+  }
+
+  /** Why no alternative can be taken by its number; null if one can. */
+  get whyNoRanked() {
+    return otherPosesOf(this.#store.facts).length > 0 ? null : "No numbered alternative is shown. Alt+W looks for some.";
   }
 
   resetLimb() {

@@ -58,6 +58,13 @@ export function posingBindings(posing, jointBar, why) {
       matches: plain("x", undefined, true),
       run: () => posing.takeAlternative(),
     },
+    {
+      keys: ["Alt 1 – 9"],
+      label: "Take an alternative pose by its number in the views",
+      matches: (/** @type {KeyboardEvent} */ event) => /^Digit[1-9]$/.test(event.code) && alt(event.code, false)(event),
+      why: () => why() ?? posing.whyNoRanked,
+      run: (/** @type {KeyboardEvent} */ event) => posing.takeAlternative(Number(event.code.at(-1)) - 1),
+    },
     { keys: ["R"], label: "Reset the joint's limb to neutral", matches: plain("r"), run: () => posing.resetLimb() },
     { keys: ["Alt ,"], label: "Copy the pose from the previous frame", matches: alt("Comma", false), run: () => posing.copyNeighbour(-1) },
     { keys: ["Alt ."], label: "Copy the pose from the next frame", matches: alt("Period", false), run: () => posing.copyNeighbour(1) },

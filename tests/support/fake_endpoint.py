@@ -182,8 +182,8 @@ class FakeEndpoint:
         self.state = {
             "type": "state", "frame": 12, "person": 0, "point": None,
             "cost_px": 1.47, "view_costs_px": [0.84, 1.1, 2.31, None, *[1.0] * self.n_cameras][: self.n_cameras],
-            "source": "manual", "status": "", "remark": "", "part_costs_px": [], "expected_errors_m": [],
-            "replay": None,
+            "source": "manual", "status": "", "remark": "", "is_checked": False, "part_costs_px": [],
+            "expected_errors_m": [], "replay": None,
             "compared": None, "unseen_depth": None, "compared_run": None, "preview": None,
             "job": self.idle_job(""),
             "track": dict(NO_TRACK), "range": dict(NO_RANGE), "follow": True, "undo": "drag l_wrist", "redo": None,

@@ -1,6 +1,8 @@
 """Replace a tracked pose by one of its alternatives."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+
+import numpy as np
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
@@ -11,44 +13,74 @@ from tracker.store.records import Alternative, PoseChange, PoseRecord
 class Alternatives:
     """The stored alternatives of the shown frame."""
 
-    def __init__(self, session_state: SessionState, activities: Activities) -> None:
+    def __init__(
+        self, session_state: SessionState, activities: Activities, assess: Callable[[PoseChange, int | None], None]
+    ) -> None:
         """Replace nothing yet.
 
         Args:
             session_state: holds the state.
             activities: ends jobs and gestures before an edit.
+            assess: called with each row that was stored and its edit, None where it waits to be written.
         """
-        self._session_state, self._activities = session_state, activities
+        self._session_state, self._activities, self._assess = session_state, activities, assess
 
-    def take_alternative(self, person: int, frame: int | None = None) -> None:
-        """Replace a person's pose by its best alternative, as a keyframe. The former pose becomes the last alternative.
+    def take_alternative(self, person: int, frame: int | None = None, rank: int | None = None) -> None:
+        """Replace a person's pose by an alternative, as a keyframe. The former pose becomes the last alternative.
 
-        Both people of a possible identity swap are replaced. Repeated calls cycle through all alternatives.
+        Both people of a possible identity swap are replaced. Repeated calls cycle through all alternatives. Then the
+        pose is assessed.
 
         Args:
             person: index of the person; if there is no alternative, the first person with one.
             frame: the frame that the user saw, which a tracker may have left; None for the shown one.
+            rank: of the alternative among those of the reason for the shown pose; None for the best that is stored.
 
         Raises:
-            TrackerError: the frame has no alternative that fits a present body.
+            TrackerError: the frame has no such alternative that fits a present body.
         """
         with self._activities.editing():
             session_state = self._session_state
             session_state.go_to(frame)
             found = self._stored()
+            at = 0
+            if rank is not None:
+                found, at = self._with_ranked(found, person, rank)
             if not found:
                 raise TrackerError(
                     f"expected an alternative pose on frame {session_state.state.frame}, found none; "
                     "go to a frame that the timeline marks as ambiguous"
                 )
             first = person if person in found else min(found)
-            changes = [self._change(i, found[i], at) for i, at in _together(found, first).items()]
+            changes = [self._change(i, found[i], k) for i, k in _together(found, first, at).items()]
             names = " and ".join(c.person for c in changes)
             whose = f" of {names}" if len(session_state.session.people) > 1 else ""
             label = f"take alternative pose{whose}, frame {session_state.state.frame}"
-            session_state.saver.write(label, changes, None, by_program=False)
+            edit = session_state.saver.write(label, changes, None, by_program=False)
             session_state.show_frame(session_state.state.frame)
             session_state.refresh_saving()
+        for change in changes:
+            self._assess(change, edit)
+
+    def _with_ranked(
+        self, found: dict[int, tuple[Alternative, ...]], person: int, rank: int
+    ) -> tuple[dict[int, tuple[Alternative, ...]], int]:
+        """Return alternatives with one of the reason's among them, by person, and its index.
+
+        Raises:
+            TrackerError: there is no reason for this pose, or it has fewer alternatives.
+        """
+        reason = self._session_state.state.reason
+        if reason is None or reason.person != person or rank >= len(reason.alternatives):
+            raise TrackerError(
+                f"expected an alternative {rank + 1} of the shown pose, found none; show the reason of this frame first"
+            )
+        values, own = reason.alternatives[rank].values, found.get(person, ())
+        for at, stored in enumerate(own):
+            if np.array_equal(stored.values, values):
+                return found, at
+        searched = Alternative(values, self._session_state.state.revisions[person], None)
+        return {**found, person: (*own, searched)}, len(own)
 
     def _stored(self) -> dict[int, tuple[Alternative, ...]]:
         """Return the alternatives of the frame by person, without people who have none."""
@@ -68,16 +100,17 @@ class Alternatives:
         return PoseChange(session_state.session.people[person].name, frame, record, (*others, back))
 
 
-def _together(found: Mapping[int, tuple[Alternative, ...]], person: int) -> dict[int, int]:
-    """Return which alternatives are taken, by person: the best one of a person, and its partner in an identity swap.
+def _together(found: Mapping[int, tuple[Alternative, ...]], person: int, at: int = 0) -> dict[int, int]:
+    """Return which alternatives are taken, by person: one of a person, and its partner in an identity swap.
 
     The alternatives of a swap have exactly equal costs: the cost of both people swapped.
 
     Args:
         found: alternatives of each person.
         person: index of the person.
+        at: index among this person's alternatives; the best by default.
     """
-    taken, cost_px = {person: 0}, found[person][0].cost_px
+    taken, cost_px = {person: at}, found[person][at].cost_px
     for other, stored in found.items():
         costs = [a.cost_px for a in stored]
         if other != person and cost_px is not None and cost_px in costs:

@@ -3,7 +3,7 @@
 import logging
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,12 +12,15 @@ from app.control.session.session_state import SessionState
 from app.remedies import page_text
 from app.runtime.jobs import LatestWinsWorker
 from app.state.identity import Identity
-from app.state.reason import Reason
+from app.state.reason import RankedPose, Reason
 from app.state.state import State
+from tracker.body.limbs import limb_display_name
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
+from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.frame_problem import Bodies
+from tracker.tracking.estimation.other_poses import limbs_in_doubt, other_poses
 from tracker.tracking.estimation.part_evidence import RunEvidence, contradiction, learn_run, read_frame
 
 _LOG = logging.getLogger(__name__)
@@ -27,6 +30,8 @@ _MIN_LEARNING = 8
 """Fewest frames to learn from: a place of a view has a colour of its own from 8 open frames on."""
 _REST_S = 0.1
 """Minimum time between two reasons; the pose may change faster."""
+_AROUND = (-3, -1, 1, 3)
+"""Frames around whose limbs are tried as they are, as in `tests/benchmarks/region_evidence.py`."""
 _GIVE_WAY_S = 0.05
 """Time between two looks at whether a drag has ended, which goes first."""
 
@@ -102,7 +107,11 @@ class Reasons:
         self._computed = ingredients
         try:
             self._set(running=True, stage="reading the frame", share=0.0, message="")
-            self._set(found=self._explained(state), message="")
+            people = self._people(state)
+            run = self._run(people)
+            found = self._explained(state, run, people)
+            self._set(found=found, message="")
+            self._set(found=replace(found, alternatives=self._others(state, run, people, found)))
         except _StoppedError:
             if self._stopping.is_set():
                 self._computed = ()
@@ -132,30 +141,53 @@ class Reasons:
             raise TrackerError(_TRACKING)
         self._set(stage=stage, share=share)
 
-    def _explained(self, state: State) -> Reason:
-        """Return the reason for the pose of the selected person.
+    def _people(self, state: State) -> tuple[int, ...]:
+        """Return the indices of the people who have a pose.
 
         Raises:
-            TrackerError: there is no pose, or too few frames have one.
+            TrackerError: the selected person has none, or other work is to end first.
         """
-        session_state, person = self._session_state, state.person
-        names = [p.name for p in session_state.session.people]
         if state.compiling is not None:
             raise TrackerError("expected compiled kernels, found that they are being compiled; the reason follows")
         if state.track.running:
             raise TrackerError(_TRACKING)
-        if state.people[person].source is None:
-            raise TrackerError(
-                f"expected a pose of {names[person]} on frame {state.frame}, found none; place the body first"
-            )
-        people = tuple(i for i, p in enumerate(state.people) if p.source is not None)
-        run = self._run(people)
-        bodies = tuple(PosedBody(state.models[i], state.people[i].values) for i in people)
-        seen = read_frame(session_state.frames.observer, state.frame, bodies)
+        if state.people[state.person].source is None:
+            name = self._session_state.session.people[state.person].name
+            raise TrackerError(f"expected a pose of {name} on frame {state.frame}, found none; place the body first")
+        return tuple(i for i, p in enumerate(state.people) if p.source is not None)
+
+    def _explained(self, state: State, run: RunEvidence, people: tuple[int, ...]) -> Reason:
+        """Return the reason for the pose of the selected person, without alternatives."""
+        session_state, person = self._session_state, state.person
+        seen = read_frame(session_state.frames.observer, state.frame, _bodies(state, people))
         table = run.table(seen, people.index(person))
-        views = session_state.session.camera_names
-        worst = contradiction(state.models[person], table, seen.thetas_px, views)
+        worst = contradiction(state.models[person], table, seen.thetas_px, session_state.session.camera_names)
         return Reason(state.frame, person, state.people[person].values, table, worst)
+
+    def _others(self, state: State, run: RunEvidence, people: tuple[int, ...], found: Reason) -> tuple[RankedPose, ...]:
+        """Return the stored alternatives of a pose, and those that a search of its limbs in doubt finds."""
+        shown, model = state.people[found.person], state.models[found.person]
+        searched = () if shown.status == "good" else limbs_in_doubt(model, found.table)
+        if not shown.alternatives and not searched:
+            return ()
+        self._report("searching for other poses", 0.0)
+        others = other_poses(
+            run.known, self._session_state.frames.observer, state.frame, _bodies(state, people),
+            people.index(found.person), state.settings, shown.alternatives, searched, self._around(state),
+        )  # fmt: skip
+        present = PosedBody(model, found.values)
+        return tuple(
+            RankedPose(o.pose, o.cost, tuple(map(limb_display_name, limbs_elsewhere(present, o.body)))) for o in others
+        )
+
+    def _around(self, state: State) -> list[Array]:
+        """Return the poses of the selected person on frames around, (n_values,) each, if they are of the same body."""
+        session_state, person = self._session_state, state.person
+        if state.revisions[person] != state.present[person]:
+            return []
+        with session_state.lock:
+            found = [session_state.saver.pose_now(person, state.frame + step) for step in _AROUND]
+        return [values for values in found if values is not None]
 
     def _run(self, people: tuple[int, ...]) -> RunEvidence:
         """Return what is usual in the run, learnt if that is to do."""
@@ -190,6 +222,10 @@ class Reasons:
 
 
 _TRACKING = "expected no tracking run at work, found one; the reason follows at its end"
+
+
+def _bodies(state: State, people: Sequence[int]) -> Bodies:
+    return tuple(PosedBody(state.models[i], state.people[i].values) for i in people)
 
 
 def _ingredients(state: State) -> tuple[object, ...]:

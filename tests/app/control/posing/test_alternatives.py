@@ -10,7 +10,7 @@ from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Alternative, PoseChange, PoseRecord
 
 ANN, BOB = 0, 1
-VIEW = View(frozenset(("contours",)), (1, 1, 1, 1))
+VIEW = View(frozenset(("contours", "alternatives")), (1, 1, 1, 1))
 
 
 @pytest.fixture

@@ -1,0 +1,129 @@
+"""Assess poses that a user has chosen, in the background, by tracks without each camera in turn."""
+
+import logging
+import time
+from typing import NamedTuple
+
+from app.control.session.session_state import SessionState
+from app.control.tracking import track_settings
+from app.remedies import page_text
+from app.runtime.jobs import LatestWinsWorker
+from app.state.state import State
+from tracker.errors import TrackerError
+from tracker.geometry.arrays import Array
+from tracker.pipeline.pose_check import PoseInRun, checked_pose, frames_around
+from tracker.store.records import PoseChange, PoseRecord
+
+_LOG = logging.getLogger(__name__)
+_GIVE_WAY_S = 0.05
+"""Time between two looks at whether a drag has ended, which goes first."""
+
+
+class _StoppedError(Exception):
+    """The program ends."""
+
+
+class _Stored(NamedTuple):
+    """A row that was stored, and its entry of the history."""
+
+    change: PoseChange
+    edit: int | None
+    """None where it waits to be written."""
+
+
+class PoseChecks:
+    """Assesses poses one after the other. A pose that changes meanwhile keeps what is stored of it then."""
+
+    def __init__(self, session_state: SessionState) -> None:
+        """Assess nothing yet.
+
+        Args:
+            session_state: holds the state.
+        """
+        self._session_state, self._closed = session_state, False
+        self._latest: LatestWinsWorker[_Stored] = LatestWinsWorker(self._check, "pose checks")
+
+    def check(self, change: PoseChange, edit: int | None) -> None:
+        """Assess a pose that has just been stored; its status becomes a part of the same entry of the history.
+
+        Args:
+            change: the row.
+            edit: the entry; None where it waits to be written.
+        """
+        at = self._person(change), change.frame
+        with self._session_state.lock:
+            self._session_state.set(checked=self._session_state.state.checked | {at})
+        self._latest.offer(_Stored(change, edit), at)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._closed = True
+        self._latest.close()
+
+    def _person(self, change: PoseChange) -> int:
+        return [p.name for p in self._session_state.session.people].index(change.person)
+
+    def _check(self, stored: _Stored) -> None:
+        session_state, change = self._session_state, stored.change
+        person = self._person(change)
+        try:
+            state = session_state.state
+            settings = track_settings.of_run(state.settings, state.run_choices)
+            pose = self._in_run(person, change)
+            if pose is not None:
+                found = checked_pose(session_state.session, session_state.frames.observer, settings, pose, self._report)
+                self._store(person, stored, found)
+        except _StoppedError:
+            return
+        except TrackerError as error:
+            _LOG.info("a pose was not assessed: %s", page_text(error))
+        finally:
+            with session_state.lock:
+                session_state.set(checked=session_state.state.checked - {(person, change.frame)})
+
+    def _report(self, stage: str, share: float, text: str = "", /) -> None:
+        """Let a drag go first."""
+        while not self._closed and _is_busy(self._session_state.state):
+            time.sleep(_GIVE_WAY_S)
+        if self._closed:
+            raise _StoppedError
+
+    def _in_run(self, person: int, change: PoseChange) -> PoseInRun | None:
+        """Return a pose with those of all people around; None where it was made with other sizes than the present."""
+        session_state, record = self._session_state, change.pose
+        saver, people = session_state.saver, range(len(session_state.session.people))
+        with session_state.lock:
+            if record is None or record.model_revision != saver.revisions.current(person):
+                return None
+            posed = sorted(set.intersection(*(set(saver.index.frames(i)) for i in people)) | {change.frame})
+            frames = sorted({k for way in frames_around(change.frame, posed) for k in way})
+            known = {k: self._poses(k) for k in frames}
+            active = session_state.active_dofs(person)
+        return PoseInRun(change.frame, person, record, {k: p for k, p in known.items() if p is not None}, active)
+
+    def _poses(self, frame: int) -> list[Array] | None:
+        """Return the poses of all people, (n_values,) each; None where somebody has none that fits the present body."""
+        saver = self._session_state.saver
+        poses = [saver.pose_now(i, frame) for i in range(len(self._session_state.session.people))]
+        known = [p for p in poses if p is not None]
+        return known if len(known) == len(poses) else None
+
+    def _store(self, person: int, stored: _Stored, found: PoseRecord) -> None:
+        """Store an assessment, unless the pose has changed meanwhile."""
+        session_state, change, saver = self._session_state, stored.change, self._session_state.saver
+        with session_state.lock:
+            now = saver.record(person, change.frame)
+            if change.pose is None or now is None or now.values.tolist() != change.pose.values.tolist():
+                return
+            last = next((e.edit for e in saver.history(1) if not e.undone), None)
+            amend = stored.edit if stored.edit is not None and stored.edit == last else None
+            row = PoseChange(change.person, change.frame, found, saver.alternatives(person, change.frame))
+            saver.write(f"assess the pose, frame {change.frame}", [row], amend, by_program=False)
+            if session_state.state.frame == change.frame:
+                session_state.show_frame(change.frame)
+            session_state.refresh_saving()
+
+
+def _is_busy(state: State) -> bool:
+    """Return whether the user does something that goes first."""
+    return state.is_dragging or state.search.running

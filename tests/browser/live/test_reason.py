@@ -1,0 +1,77 @@
+"""From a doubt to its reason: card, limb, view, table, alternative taken, status good."""
+
+import shutil
+
+import pytest
+import pytest_asyncio
+from page_driver import shows, state_of
+from program import ROOT, started, visited
+from run_with_doubt import WRONG_FRAME, store_run
+
+pytestmark = pytest.mark.slow
+
+SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
+EXPLAINED = "quadrille.state.reason?.parts.length > 0 && !quadrille.state.reason.running"
+GHOSTS = "quadrille.state.overlay.paths.filter(({ kind, count }) => kind === 'alternative' && count > 0).length"
+WORST = ".reason-table td.is-worst"
+
+
+@pytest_asyncio.fixture(loop_scope="session", scope="module")
+async def program(tmp_path_factory):
+    """The program on a tracked copy of the sample, with an arm that is wrong on one frame."""
+    folder = shutil.copytree(SAMPLE, tmp_path_factory.mktemp("reason") / "session")
+    store_run(folder)
+    async with started(folder) as running:
+        yield running
+
+
+@pytest_asyncio.fixture(loop_scope="session")
+async def live(browser, program):
+    async with visited(browser, program.address) as page:
+        yield page
+
+
+async def test_a_doubt_leads_to_its_reason_and_to_a_good_pose(live):
+    await live.keyboard.press("Shift+L")
+    card = live.locator("#doubt-list .doubt").first
+    assert "left arm: 60 % chance that it is lost" in await card.inner_text()
+    await card.click()
+    await shows(live, f"quadrille.state.shown.frame === {WRONG_FRAME}")
+    assert (await state_of(live))["state"]["point"] == "left_wrist"
+    await live.locator("#show-reason").click()
+    await shows(live, EXPLAINED, 120)
+    reason = (await state_of(live))["reason"]
+    assert "arm: " in reason["sentence"]
+    assert reason["sentence"] in await live.locator("#frame-remark").inner_text()
+    assert reason["sentence"] in await card.inner_text()
+
+    camera = reason["camera"]
+    await live.keyboard.press("0")  # whole images
+    await shows(live, "quadrille.state.views.every(({ zoom }) => zoom === 1)")
+    await live.locator(WORST).focus()
+    await shows(live, f"quadrille.state.hoverPart?.part === {reason['part']}")
+    for key in ("ArrowUp", "ArrowDown", "Enter"):
+        await live.keyboard.press(key)
+    await shows(live, f"quadrille.state.views[{camera}].zoom > 1.5 && quadrille.state.active === {camera}")
+    assert [v["zoom"] for i, v in enumerate((await state_of(live))["views"]) if i != camera] == [1, 1, 1]
+
+    assert reason["alternatives"][0]["nats"] < -6
+    assert reason["alternatives"][0]["limbs"] == ["left arm"]
+    await shows(live, f"{GHOSTS} > 0")
+    await live.keyboard.press("Alt+Digit1")
+    await shows(live, "quadrille.state.state.status === 'good' && !quadrille.state.state.is_checked", 120)
+    await shows(live, f"{EXPLAINED} && quadrille.state.reason.sentence === ''", 60)
+    assert await live.evaluate(GHOSTS) == 0
+    assert await live.locator("#doubts-empty").is_visible()
+    await live.keyboard.press("Control+z")  # one entry of the history
+    await shows(live, "quadrille.state.state.status === 'lost'")
+
+
+async def test_the_switch_hides_the_ghosts_of_all_alternatives(live):
+    await live.locator("#frame").fill(str(WRONG_FRAME))
+    await live.keyboard.press("Enter")
+    await shows(live, f"quadrille.state.shown.frame === {WRONG_FRAME}")
+    await shows(live, f"{GHOSTS} > 0")
+    await live.keyboard.press("a")
+    await live.locator("#layers-menu label", has_text="Alternatives").click()
+    await shows(live, f"{GHOSTS} === 0")
