@@ -6,6 +6,7 @@ from gestures import drag, wait_for
 from run_with_doubt import DOUBTED, WRONG_FRAME, store_run
 
 from app.control.search import reasons
+from tracker.errors import TrackerError
 
 pytestmark = pytest.mark.slow  # learns from fifty frames
 
@@ -59,6 +60,36 @@ def test_the_run_is_learnt_once_and_again_when_its_poses_change(doubted, monkeyp
     doubted.navigation.seek(40)
     wait_for(lambda: doubted.state.reason is not None and doubted.state.reason.frame == 40, 60)
     assert len(learnt) == 2
+
+
+def test_a_numbered_alternative_is_taken_assessed_and_undone_at_once(doubted):
+    wrong = doubted.state.poses[0]
+    explained(doubted)
+    best = doubted.state.reason.alternatives[0]
+    assert best.nats < -6
+    assert best.limbs == ("left arm",)
+    with pytest.raises(TrackerError, match="expected an alternative 9 of the shown pose"):
+        doubted.alternatives.take_alternative(0, WRONG_FRAME, 8)
+    doubted.alternatives.take_alternative(0, WRONG_FRAME, 0)
+    assert doubted.state.checked == {(0, WRONG_FRAME)}
+    wait_for(lambda: not doubted.state.checked, 120)
+    np.testing.assert_array_equal(doubted.state.poses[0], best.values)
+    assert (doubted.state.people[0].status, doubted.state.people[0].source) == ("good", "manual")
+    assert doubted.state.people[0].errors is not None
+    wait_for(lambda: doubted.state.reason is not None, 60)
+    assert doubted.state.reason.contradiction is None
+    doubted.history.undo()
+    np.testing.assert_array_equal(doubted.state.poses[0], wrong)
+    assert doubted.state.people[0].status == "lost"
+
+
+def test_a_pose_that_is_edited_meanwhile_keeps_its_edit(doubted):
+    doubted.alternatives.take_alternative(0, WRONG_FRAME)
+    drag(doubted, "left_wrist", (9.0, 0.0))
+    edited = doubted.state.poses[0]
+    wait_for(lambda: not doubted.state.checked, 120)
+    np.testing.assert_array_equal(doubted.state.poses[0], edited)
+    assert doubted.state.people[0].status == ""
 
 
 def test_it_can_be_stopped_and_asked_again(doubted):
