@@ -8,7 +8,7 @@ from app.control.controller import Controller
 from app.control.tracking import track_settings
 from app.page import inspector_messages as wire
 from app.page.message_types import Message
-from app.page.search_messages import LimbReason, OtherPose, PartReason, ReasonMessage
+from app.page.search_messages import GhostPose, LimbReason, PartReason, ReasonMessage
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.people import AcquisitionState
@@ -200,7 +200,7 @@ def reason(state: State, cameras: Sequence[str]) -> ReasonMessage:
         state.frame, state.person, work.running, work.stage, work.share, work.message,
         "" if worst is None else worst.sentence, None if worst is None else worst.part,
         None if worst is None else worst.view, limbs_of, parts, notes,
-        () if found is None else tuple(OtherPose(round(o.nats, 1), o.limbs) for o in found.alternatives),
+        () if found is None else tuple(GhostPose(round(o.nats, 1), o.limbs) for o in found.alternatives),
     )  # fmt: skip
 
 

@@ -295,7 +295,7 @@ class LimbReason(Part, frozen=True):
     """By camera, evidence for its colours where no part is, above the usual of the run; null for the trunk."""
 
 
-class OtherPose(Part, frozen=True):
+class GhostPose(Part, frozen=True):
     """Another pose of the person, drawn as a ghost."""
 
     nats: float
@@ -328,5 +328,5 @@ class ReasonMessage(Message, frozen=True, tag="reason"):
     """By part of the person; empty without a table."""
     notes: tuple[str, ...]
     """Sentences on what views cannot show."""
-    alternatives: tuple[OtherPose, ...]
+    alternatives: tuple[GhostPose, ...]
     """Poses within 6 nats of the best, cheapest first. The overlay draws them in this order."""

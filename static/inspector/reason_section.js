@@ -1,6 +1,6 @@
 /** Reason for a doubt: what each view shows of each part of the shown pose, as a table whose cells zoom to the part. */
 
-import { otherPosesOf } from "../model/selectors.js";
+import { alternativesOf } from "../model/selectors.js";
 import { capital } from "../widgets/text.js";
 import { MEASURES, reasonTable } from "./reason_table.js";
 import { textButton } from "./rows.js";
@@ -76,11 +76,11 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
     sentence.textContent = isKnown ? reason.sentence ? `${capital(reason.sentence)}.` : noContradiction(state?.status ?? "") : "";
     sentence.classList.toggle("is-doubt", isKnown && reason.sentence !== "");
     choice.hidden = table.element.hidden = !isKnown && !hasWork;
-    const ranked = otherPosesOf(store.facts);
+    const ranked = alternativesOf(store.facts);
     others.hidden = ranked.length === 0;
     if (JSON.stringify(ranked) !== listed) {
       listed = JSON.stringify(ranked);
-      others.replaceChildren(...ranked.map((other, rank) => otherRow(other, rank, () => posing.takeAlternative(rank))));
+      others.replaceChildren(...ranked.map((other, rank) => alternativeRow(other, rank, () => posing.takeAlternative(rank))));
     }
     notes.textContent = isKnown ? reason.notes.join(" ") : "";
     notes.hidden = !notes.textContent;
@@ -103,11 +103,11 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
 }
 
 /**
- * @param {import("../model/protocol.js").OtherPose} other
+ * @param {import("../model/protocol.js").GhostPose} other
  * @param {number} rank
  * @param {() => void} take
  */
-function otherRow({ nats, limbs }, rank, take) {
+function alternativeRow({ nats, limbs }, rank, take) {
   const row = document.createElement("li");
   const where = limbs.length ? `${limbs.join(", ")} elsewhere` : "body elsewhere";
   const cost = `${Math.abs(nats).toFixed(Math.abs(nats) < 10 ? 1 : 0)} nats ${nats < 0 ? "better" : "worse"}`;

@@ -189,10 +189,10 @@
  * @typedef {{name: string, parts: number[], beside_nats: (number | null)[]}} LimbReason
  * @typedef {{below_nats: (number | null)[], outside: (number | null)[], usual_outside: (number | null)[], contour_px:
  *   (number | null)[], usual_contour_px: (number | null)[], below_in_all_nats: number}} PartReason
- * @typedef {{nats: number, limbs: string[]}} OtherPose
+ * @typedef {{nats: number, limbs: string[]}} GhostPose
  * @typedef {{type: "reason", frame: number, person: number, running: boolean, stage: string, share: number, message:
  *   string, sentence: string, part: number | null, camera: number | null, limbs: LimbReason[], parts: PartReason[],
- *   notes: string[], alternatives: OtherPose[]}} ReasonMessage
+ *   notes: string[], alternatives: GhostPose[]}} ReasonMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}

@@ -90,7 +90,7 @@ export function reasonOf(facts) {
  *
  * @param {import("./store.js").Facts} facts
  */
-export function otherPosesOf(facts) {
+export function alternativesOf(facts) {
   return isExplained(facts) ? (facts.reason?.alternatives ?? []) : [];
 }
 

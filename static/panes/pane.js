@@ -7,7 +7,7 @@ import { ofJoint } from "../model/observability.js";
 import { jointLabel } from "./joint_label.js";
 import { drawObservability } from "./observability_marks.js";
 import { drawAxes } from "./axis_lines.js";
-import { isDimmed, isInSight, isStoredDrawn, otherPosesOf } from "../model/selectors.js";
+import { isDimmed, isInSight, isStoredDrawn, alternativesOf } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
 import { PaneCorner } from "./pane_corner.js";
@@ -213,7 +213,7 @@ export class Pane {
     this.#showJoint(state);
     if (bare) return;
     drawing.drawPaths(context, this.view, overlay, this.#camera, layers, (person) => isDimmed(state, person));
-    if (layers.shown.alternatives && otherPosesOf(this.#store.facts).length > 0) {
+    if (layers.shown.alternatives && alternativesOf(this.#store.facts).length > 0) {
       drawing.drawGhostRanks(context, this.view, overlay, this.#camera, layers.opacity.alternatives);
     }
     drawAxes(context, this.view, this.#store.facts, this.#camera);

@@ -1,6 +1,6 @@
 /** Edit poses without a drag: selection, steps, mirror, copies, resets and locks. */
 
-import { otherPosesOf } from "../model/selectors.js";
+import { alternativesOf } from "../model/selectors.js";
 
 /** Minimum interval of messages while a key is held down. */
 const SEND_MS = 50;
@@ -170,7 +170,7 @@ export class Posing {
 
   /** Why no alternative can be taken by its number; null if one can. */
   get whyNoRanked() {
-    return otherPosesOf(this.#store.facts).length > 0 ? null : "No numbered alternative is shown. Alt+W looks for some.";
+    return alternativesOf(this.#store.facts).length > 0 ? null : "No numbered alternative is shown. Alt+W looks for some.";
   }
 
   resetLimb() {

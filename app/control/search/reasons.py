@@ -19,8 +19,8 @@ from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
+from tracker.tracking.estimation.alternative_poses import alternative_poses, limbs_in_doubt
 from tracker.tracking.estimation.frame_problem import Bodies
-from tracker.tracking.estimation.other_poses import limbs_in_doubt, other_poses
 from tracker.tracking.estimation.part_evidence import RunEvidence, contradiction, learn_run, read_frame
 
 _LOG = logging.getLogger(__name__)
@@ -171,7 +171,7 @@ class Reasons:
         if not shown.alternatives and not searched:
             return ()
         self._report("searching for other poses", 0.0)
-        others = other_poses(
+        others = alternative_poses(
             run.known, self._session_state.frames.observer, state.frame, _bodies(state, people),
             people.index(found.person), state.settings, shown.alternatives, searched, self._around(state),
         )  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 
 from tracker.body.limbs import limbs
 from tracker.formats.model_toml import load_model
-from tracker.tracking.estimation.other_poses import limbs_in_doubt
+from tracker.tracking.estimation.alternative_poses import limbs_in_doubt
 from tracker.tracking.estimation.part_evidence import PartTable, contradiction, with_colors_only
 
 MODEL = load_model("gavrila34")

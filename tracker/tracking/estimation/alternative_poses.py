@@ -24,7 +24,7 @@ def limbs_in_doubt(model: BodyModel, table: PartTable) -> list[Limb]:
     return limbs_to_search(model, np.array(of_parts) + UNEXPLAINED_SHARE * table.beside.sum(axis=0))
 
 
-def other_poses(
+def alternative_poses(
     known: RegionModel, observer: Observer, frame: int, bodies: Bodies, person: int, settings: EstimationSettings,
     stored: Sequence[Array], searched: Sequence[Limb] = (), around: Sequence[Array] = (),
 ) -> list[Hypothesis]:  # fmt: skip
