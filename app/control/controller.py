@@ -21,6 +21,7 @@ from app.control.posing.held_points import HeldPoints
 from app.control.posing.pinning import Pinning
 from app.control.posing.pose_edits import PoseEdits
 from app.control.search.cost_landscape import CostLandscapes
+from app.control.search.cost_map import CostMaps
 from app.control.search.reasons import Reasons
 from app.control.search.replay import Replay
 from app.control.search.search_runs import SearchRuns
@@ -112,6 +113,8 @@ class Controller:
         """Moves along the history."""
         self.cost_landscape = CostLandscapes(session_state, activities)
         """Samples the cost along one degree of freedom."""
+        self.cost_map = CostMaps(session_state, activities)
+        """Samples the cost over two degrees of freedom."""
         self.reasons = Reasons(session_state)
         """Explains the shown pose by what each view shows of each part."""
         self.floor = FloorEditing(session_state, activities)
@@ -174,6 +177,7 @@ class Controller:
         if self._compiling is not None:
             self._compiling.close()
         self.cost_landscape.close()
+        self.cost_map.close()
         self.reasons.close()
         self._pose_checks.close()
         self.frames.close()

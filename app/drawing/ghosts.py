@@ -20,7 +20,12 @@ def ghost_lines(session: Session, state: State, view: View) -> list[Path]:
     Each has a path in each view, which may be empty: the rank of a path is that of its alternative.
     """
     reason = state.drawn.reason
-    if reason is None or "alternatives" not in view.layers or "contours" not in state.compiled:
+    if (
+        reason is None
+        or reason.alternatives is None
+        or "alternatives" not in view.layers
+        or "contours" not in state.compiled
+    ):
         return []
     person, out = reason.person, []
     if person in state.undrawn:

@@ -280,9 +280,9 @@ def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
 def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     """Return the bodies with everybody who has alternatives in the best of these; empty if nobody has any.
 
-    The alternatives of a person whose reason is known are drawn one by one; see `app.drawing.ghosts`.
+    Where the alternatives are ranked they are drawn one by one; see `app.drawing.ghosts`.
     """
-    explained = None if state.reason is None else state.person
+    explained = None if state.reason is None or state.reason.alternatives is None else state.person
     best = [() if i == explained else shown.alternatives[:1] for i, shown in enumerate(state.people)]
     if not any(best):
         return []

@@ -6,9 +6,10 @@ import numpy as np
 
 from app.control.controller import Controller
 from app.control.tracking import track_settings
+from app.drawing import dof_labels
 from app.page import inspector_messages as wire
 from app.page.message_types import Message
-from app.page.search_messages import GhostPose, LimbReason, PartReason, ReasonMessage
+from app.page.search_messages import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.people import AcquisitionState
@@ -42,7 +43,7 @@ class InspectorFeed:
         now: list[Message] = [
             settings(state.settings, state.run_choices), view_3d(controller, state), body_sizes(controller, state),
             acquisition(state.acquisition), finding(state.finding, [c.camera.name for c in controller.session.cameras]),
-            reason(state, controller.session.camera_names),
+            reason(state, controller.session.camera_names), *cost_map(state),
         ]  # fmt: skip
         changed = [message for message in now if message not in self._sent]
         self._sent = now
@@ -54,7 +55,7 @@ def _ingredients(state: State) -> tuple[Identity, ...]:
     made_from = (
         state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
-        state.finding, state.reasons, state.reason,
+        state.finding, state.reasons, state.reason, state.cost_map,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
 
@@ -200,8 +201,19 @@ def reason(state: State, cameras: Sequence[str]) -> ReasonMessage:
         state.frame, state.person, work.running, work.stage, work.share, work.message,
         "" if worst is None else worst.sentence, None if worst is None else worst.part,
         None if worst is None else worst.view, limbs_of, parts, notes,
-        () if found is None else tuple(GhostPose(round(o.nats, 1), o.limbs) for o in found.alternatives),
+        () if found is None else tuple(GhostPose(round(o.nats, 1), o.limbs) for o in found.alternatives or ()),
     )  # fmt: skip
+
+
+def cost_map(state: State) -> tuple[CostMapMessage, ...]:
+    """Describe the cost over two degrees of freedom; empty without one."""
+    found = state.cost_map
+    if found is None:
+        return ()
+    a, b = (float(dof_labels.factors(state.models[found.person])[dof]) for dof in found.dofs)
+    across, up = tuple((a * found.across).round(2).tolist()), tuple((b * found.up).round(2).tolist())
+    nats = tuple(tuple(row) for row in found.nats.round(1).tolist())
+    return (CostMapMessage(found.person, found.dofs, (a * found.current[0], b * found.current[1]), across, up, nats),)
 
 
 def _column(cells: Array, i: int) -> tuple[float | None, ...]:

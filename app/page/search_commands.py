@@ -4,9 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from app.control.controller import Controller
 from app.control.search import search_settings
+from app.drawing import dof_labels
 from app.page import search_messages as wire
 from app.page.message_types import Command
 
@@ -39,6 +41,19 @@ def _replay(controller: Controller, _: int, message: wire.ReplayStep) -> None:
         controller.replay.show(message.run, message.step)
 
 
+def _cost_map(controller: Controller, page: int, message: wire.ShowCostMap) -> None:
+    if message.dofs is None:
+        controller.cost_map.leave(page)
+    else:
+        controller.cost_map.watch(page, message.person, message.dofs)
+
+
+def _set_two(controller: Controller, _: int, message: wire.SetCostMapPlace) -> None:
+    factors = dof_labels.factors(controller.models[message.person])
+    values = [v / factors[d] if d < len(factors) else np.nan for v, d in zip(message.values, message.dofs, strict=True)]
+    controller.cost_map.set_values(message.person, message.dofs, (float(values[0]), float(values[1])))
+
+
 def _reason(controller: Controller, page: int, message: wire.AskReason) -> None:
     if message.action == "stop":
         controller.reasons.stop()
@@ -56,6 +71,8 @@ SEARCH_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.PreviewCandidate: lambda controller, _, m: controller.replay.preview(m.run, m.candidate),
     wire.TakeCandidate: lambda controller, _, m: controller.replay.take(m.run, m.candidate),
     wire.ShowLandscape: lambda controller, _, m: controller.cost_landscape.choose(m.dof),
+    wire.ShowCostMap: _cost_map,
+    wire.SetCostMapPlace: _set_two,
     wire.AskReason: _reason,
     wire.SetLandscapeDof: lambda controller, _, m: controller.cost_landscape.set_value(m.person, m.dof, m.value),
 }

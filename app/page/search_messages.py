@@ -126,6 +126,23 @@ class SetLandscapeDof(Command, frozen=True, tag="landscape_set"):
     """Radians or metres."""
 
 
+class ShowCostMap(Command, frozen=True, tag="cost_map"):
+    """Subscribe to the cost over two degrees of freedom around the shown pose; null unsubscribes."""
+
+    person: Index
+    dofs: tuple[Index, Index] | None
+    """The horizontal one first."""
+
+
+class SetCostMapPlace(Command, frozen=True, tag="cost_map_set"):
+    """Set two degrees of freedom to a place of their cost map, as an edit."""
+
+    person: Index
+    dofs: tuple[Index, Index]
+    values: tuple[Number, Number]
+    """Degrees or centimetres."""
+
+
 class AskReason(Command, frozen=True, tag="reason"):
     """Subscribe to the reason for the shown pose, or no longer; or stop the work on it until somebody asks again."""
 
@@ -330,3 +347,19 @@ class ReasonMessage(Message, frozen=True, tag="reason"):
     """Sentences on what views cannot show."""
     alternatives: tuple[GhostPose, ...]
     """Poses within 6 nats of the best, cheapest first. The overlay draws them in this order."""
+
+
+class CostMapMessage(Message, frozen=True, tag="cost_map"):
+    """The cost over two degrees of freedom around the shown pose, for the page that asked last."""
+
+    person: int
+    dofs: tuple[int, int]
+    """The horizontal one first."""
+    current: tuple[float, float]
+    """Their values in the pose, degrees or centimetres."""
+    across: tuple[float, ...]
+    """Sampled values of the first, ascending."""
+    up: tuple[float, ...]
+    """Sampled values of the second, ascending."""
+    nats: tuple[tuple[float, ...], ...]
+    """Costs above that of the pose, a row for each value of the second."""

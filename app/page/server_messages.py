@@ -16,6 +16,7 @@ from app.page.inspector_messages import (
 )
 from app.page.message_types import Message, Part, Status
 from app.page.search_messages import (
+    CostMapMessage,
     InconsistentMessage,
     MovedLimb,
     RangeComparisonMessage,
@@ -391,7 +392,7 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
     RangeComparisonMessage, ObservabilityMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
-    AcquisitionMessage, FindingMessage, ReasonMessage,
+    AcquisitionMessage, FindingMessage, ReasonMessage, CostMapMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -116,6 +116,7 @@ class PageConnection:
             await asyncio.to_thread(self._controller.view_3d.pause, self._number, False)
             self._controller.cost_landscape.watch(self._number, False)
             self._controller.reasons.watch(self._number, False)
+            self._controller.cost_map.leave(self._number)
 
     def _wake(self, _: State) -> None:
         """Wake the sender; called from any thread."""

@@ -29,8 +29,8 @@ class Reason:
     table: PartTable
     contradiction: Contradiction | None
     """The worst cell; None where no view clearly contradicts the pose."""
-    alternatives: tuple[RankedPose, ...] = ()
-    """Cheapest first; all within 6 nats of the best pose."""
+    alternatives: tuple[RankedPose, ...] | None = None
+    """Cheapest first, all within 6 nats of the best pose; None before they are known."""
 
 
 @dataclass(frozen=True)

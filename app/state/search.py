@@ -1,4 +1,4 @@
-"""The search on the shown frame: its progress, how it is watched, and the cost landscape."""
+"""The search on the shown frame: its progress, how it is watched, and the cost around a pose."""
 
 from dataclasses import dataclass, field
 
@@ -100,3 +100,20 @@ class CostLandscape:
     """Costs, (N,), px."""
     view_costs_px: Array
     """Costs in each view, (N, V), px; NaN for views without edges."""
+
+
+@dataclass(frozen=True, eq=False)
+class CostMap:
+    """The cost over two degrees of freedom, all others fixed."""
+
+    person: int
+    dofs: tuple[int, int]
+    """Indices among the degrees of freedom of the person's body, the horizontal one first."""
+    current: tuple[float, float]
+    """Their values in the pose, rad or metres."""
+    across: Array
+    """Sampled values of the first, (W,), ascending, rad or metres."""
+    up: Array
+    """Sampled values of the second, (H,), ascending, rad or metres."""
+    nats: Array
+    """Costs above that of the pose, (H, W), nats."""

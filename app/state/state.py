@@ -20,7 +20,7 @@ from app.state.people import (
 from app.state.progress import FindState, FootageState, RangeState, TrackState
 from app.state.reason import Reason, ReasonState
 from app.state.run_choices import RunChoices
-from app.state.search import CostLandscape, SearchState, SearchView
+from app.state.search import CostLandscape, CostMap, SearchState, SearchView
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel
 from tracker.compute.kernel_cache import STAGES
@@ -66,6 +66,8 @@ class State:
     search_view: SearchView = field(default_factory=SearchView)
     checked: frozenset[tuple[int, int]] = frozenset()
     """Index of the person and frame of the poses that are being assessed."""
+    cost_map: CostMap | None = None
+    """Of the shown pose or one shortly before; None until a page displays it."""
     reasons: ReasonState = field(default_factory=ReasonState)
     """Why the shown pose is in doubt, as far as a page asks."""
     landscape: CostLandscape | None = None
@@ -238,6 +240,7 @@ class StateChanges(TypedDict, total=False):
     search: SearchState
     search_view: SearchView
     checked: frozenset[tuple[int, int]]
+    cost_map: CostMap | None
     reasons: ReasonState
     landscape: CostLandscape | None
     track: TrackState

@@ -32,8 +32,9 @@ const THEMES = [
  *   scene: import("../scene/index.js").SceneRoom}} rooms
  */
 export function mount(context, { panes, posing, scene }) {
+  const joint = jointSection(context, posing);
   const sections = [
-    jointSection(context, posing),
+    joint,
     reasonSection(context, panes, posing),
     findSection(context),
     new BodySection(context),
@@ -64,6 +65,16 @@ export function mount(context, { panes, posing, scene }) {
       words: "reason explain evidence colours outside silhouette contour nats",
       matches: alt("KeyW", false),
       run: () => inspector.reveal("reason"),
+    },
+    {
+      keys: [],
+      label: "Cost over two angles of the joint",
+      words: "landscape map nats inspector",
+      matches: () => false,
+      run: () => {
+        inspector.reveal("joint");
+        joint.openMap();
+      },
     },
     {
       keys: [],

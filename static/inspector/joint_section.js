@@ -3,27 +3,30 @@
 import { ofDof } from "../model/observability.js";
 import { meaning } from "../posing/dof_names.js";
 import { capital, displayName } from "../widgets/text.js";
+import { costMap } from "./cost_map.js";
 import { boundedField } from "./rows.js";
 
 const UNITS = { deg: "°", cm: "cm" };
 /** Range of the slider of an angle without limits, degrees. */
 const FULL_TURN = { low: -180, high: 180 };
 const MAX_CM = 1e5;
-const SHOWN_FACTS = /** @type {const} */ (["state", "session", "observability", "layers"]);
+const SHOWN_FACTS = /** @type {const} */ (["state", "session", "observability", "layers", "costMap", "theme"]);
 
 /** @typedef {{dof: number, field: ReturnType<typeof boundedField>, slider: HTMLInputElement | null, element: HTMLElement, title: string}} Row */
 
 /**
  * @param {import("../model/index.js").Context} context
  * @param {import("../posing/index.js").PosingRoom} room
- * @returns {import("./inspector.js").Section}
+ * @returns {import("./inspector.js").Section & {openMap: () => void}}
  */
-export function jointSection({ store, notify }, { posing }) {
+export function jointSection(context, { posing }) {
+  const { store, notify } = context;
   const body = document.createElement("div");
   const expectedError = Object.assign(document.createElement("p"), {
     className: "section-note",
     title: "Root mean square error of the joint that the audit after tracking expects. The layer Error ellipses draws it in the views",
   });
+  const map = costMap(context, posing);
   /** @type {Row[]} */
   let rows = [];
   let built = "";
@@ -74,8 +77,9 @@ export function jointSection({ store, notify }, { posing }) {
       title.className = "section-note";
       title.textContent = dofs.length ? capital(displayName(point)) : `The ${displayName(point)} has no angles of its own; drag it in a view.`;
       rows = dofs.map((dof) => makeRow(person.dofs[dof], dof));
-      body.replaceChildren(title, expectedError, ...rows.map(({ element }) => element));
+      body.replaceChildren(title, expectedError, ...rows.map(({ element }) => element), map.element);
     }
+    map.update();
     const error_m = state.expected_errors_m[person.points.indexOf(point)];
     expectedError.hidden = error_m === undefined;
     expectedError.textContent = `Expected error ${Math.round(1000 * error_m)} mm`;
@@ -97,6 +101,7 @@ export function jointSection({ store, notify }, { posing }) {
     title: "Joint",
     hint: "Angles of the selected joint (J selects the next one)",
     body,
+    openMap: map.open,
     update: (changed) => SHOWN_FACTS.some((fact) => changed.has(fact)) && show(),
   };
 }

@@ -62,6 +62,8 @@
  * @typedef {{type: "take", run: number, candidate: number | null}} TakeCandidate
  * @typedef {{type: "landscape", dof: string}} ShowLandscape
  * @typedef {{type: "landscape_set", person: number, dof: number, value: number}} SetLandscapeDof
+ * @typedef {{type: "cost_map", person: number, dofs: [number, number] | null}} ShowCostMap
+ * @typedef {{type: "cost_map_set", person: number, dofs: [number, number], values: [number, number]}} SetCostMapPlace
  * @typedef {{type: "reason", action: "ask" | "leave" | "stop"}} AskReason
  * @typedef {{type: "track", action: "forward" | "backward", until?: number | null}} StartTracking
  * @typedef {{type: "track", action: "pause" | "resume" | "stop"}} ControlTracking
@@ -193,6 +195,8 @@
  * @typedef {{type: "reason", frame: number, person: number, running: boolean, stage: string, share: number, message:
  *   string, sentence: string, part: number | null, camera: number | null, limbs: LimbReason[], parts: PartReason[],
  *   notes: string[], alternatives: GhostPose[]}} ReasonMessage
+ * @typedef {{type: "cost_map", person: number, dofs: [number, number], current: [number, number], across: number[], up:
+ *   number[], nats: number[][]}} CostMapMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
@@ -225,13 +229,14 @@
  *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
  *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | TakeLimbBack | RunSearch | RepeatSearch |
  *   SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape |
- *   SetLandscapeDof | AskReason | StartTracking | ControlTracking | EditRange | CompareRange | StopRange | ToggleMark |
- *   ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d | SetHeight | SetPartSizes | SetGirdleWidth |
- *   CoupleSides | ApplySizes | DraftSizes | AcquireSizes | FindPeople | EditFloor | MarkFloor | Undo | Redo | GoTo |
- *   Save} ClientMessage
+ *   SetLandscapeDof | ShowCostMap | SetCostMapPlace | AskReason | StartTracking | ControlTracking | EditRange |
+ *   CompareRange | StopRange | ToggleMark | ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d | SetHeight
+ *   | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes | AcquireSizes | FindPeople | EditFloor |
+ *   MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
- *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | ReasonMessage} TextMessage
+ *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | ReasonMessage | CostMapMessage}
+ *   TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

@@ -81,6 +81,9 @@ export class Receiver {
       case "reason":
         this.#store.set({ reason: message });
         break;
+      case "cost_map":
+        this.#store.set({ costMap: message });
+        break;
       case "range_comparison":
         this.#store.set({ rangeComparison: message.first === null ? null : message });
         break;

@@ -26,6 +26,7 @@ import { defaultLayers } from "./layers.js";
  * @property {number[]} disagreeing frames whose pose is inconsistent with its neighbours, ascending
  * @property {import("./protocol.js").KeyframeDoubt[]} keyframeDoubts keyframes that their neighbours or views contradict
  * @property {import("./protocol.js").ObservabilityMessage | null} observability of the selected person
+ * @property {import("./protocol.js").CostMapMessage | null} costMap cost over two degrees of freedom, where one is asked for
  * @property {import("./protocol.js").ReasonMessage | null} reason why the shown pose is in doubt, while the section is open
  * @property {import("./protocol.js").RangeComparisonMessage | null} rangeComparison poses of a range and those that they replaced
  * @property {import("../widgets/frame_axis.js").Span | null} visible the visible part of timeline and curves; null for all
@@ -87,6 +88,7 @@ export class Store {
     timeline: new Cells(0),
     lanes: [],
     observability: null,
+    costMap: null,
     reason: null,
     rangeComparison: null,
     disagreeing: [],

@@ -71,11 +71,12 @@ class Alternatives:
             TrackerError: there is no reason for this pose, or it has fewer alternatives.
         """
         reason = self._session_state.state.reason
-        if reason is None or reason.person != person or rank >= len(reason.alternatives):
+        ranked = () if reason is None or reason.person != person else reason.alternatives or ()
+        if rank >= len(ranked):
             raise TrackerError(
                 f"expected an alternative {rank + 1} of the shown pose, found none; show the reason of this frame first"
             )
-        values, own = reason.alternatives[rank].values, found.get(person, ())
+        values, own = ranked[rank].values, found.get(person, ())
         for at, stored in enumerate(own):
             if np.array_equal(stored.values, values):
                 return found, at

@@ -75,3 +75,36 @@ async def test_the_switch_hides_the_ghosts_of_all_alternatives(live):
     await live.keyboard.press("a")
     await live.locator("#layers-menu label", has_text="Alternatives").click()
     await shows(live, f"{GHOSTS} === 0")
+
+
+async def test_a_place_of_the_cost_over_two_angles_is_taken_and_undone(live):
+    await live.locator("#frame").fill("10")
+    await live.keyboard.press("Enter")
+    await shows(live, "quadrille.state.shown.frame === 10 && quadrille.state.state.frame === 10")
+    await live.keyboard.press("Control+k")
+    await live.keyboard.type("select left shoulder")
+    await live.keyboard.press("Enter")
+    await shows(live, "quadrille.state.state.point === 'left_shoulder'")
+    await live.keyboard.press("Control+k")
+    await live.keyboard.type("cost over two angles")
+    await live.keyboard.press("Enter")
+    await shows(live, "quadrille.state.costMap?.nats.length === 31", 60)
+    first, second = (await state_of(live))["costMap"]["dofs"]
+    before = (await state_of(live))["state"]["dofs"]
+    box = await live.locator(".cost-map canvas").bounding_box()
+    await live.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 0.25 * box["height"])
+    values = "quadrille.state.state.dofs"
+    await shows(
+        live,
+        f"Math.abs({values}[{first}] - {before[first]}) > 5 && Math.abs({values}[{second}] - {before[second]}) > 5",
+    )
+    current = f"Math.abs(quadrille.state.costMap.current[0] - {values}[{first}]) < 0.1"
+    await shows(live, current, 60)  # the map follows
+    taken = (await state_of(live))["state"]["dofs"]
+    await live.locator(".cost-map canvas").focus()
+    for key in ("ArrowRight", "ArrowUp", "Enter"):
+        await live.keyboard.press(key)
+    await shows(live, f"{values}[{first}] > {taken[first]} + 1 && {values}[{second}] > {taken[second]} + 1")
+    for _ in range(2):
+        await live.keyboard.press("Control+z")
+    await shows(live, f"Math.abs({values}[{first}] - {before[first]}) < 0.01")

@@ -26,6 +26,7 @@ def doubted(session, opened):
 def explained(controller, timeout_s=120):
     controller.reasons.watch(PAGE, True)
     wait_for(lambda: controller.state.reason is not None and not controller.state.reasons.running, timeout_s)
+    assert controller.state.reason.alternatives is not None
     return controller.state.reason
 
 

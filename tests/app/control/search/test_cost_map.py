@@ -1,0 +1,71 @@
+"""The cost over two degrees of freedom, against costs computed one by one."""
+
+import numpy as np
+import pytest
+from gestures import drag, wait_for
+
+from app.control.search.cost_map import SAMPLES, cost_map
+from tracker.body.model import PosedBody
+from tracker.errors import TrackerError
+from tracker.tracking.estimation.pose_score import scorer_without_prediction
+
+PAGE = 7
+JOINTS = ("left_shoulder.abduction", "left_elbow.extension")
+
+
+def dofs_of(controller):
+    return tuple(controller.models[0].dof_names.index(name) for name in JOINTS)
+
+
+@pytest.mark.slow
+def test_it_is_what_the_score_says_one_by_one(opened):
+    controller = opened()
+    model, pose, dofs = controller.models[0], controller.state.poses[0], dofs_of(controller)
+    views, bodies, settings = controller.frames.evidence(0), (PosedBody(model, pose),), controller.state.settings
+    found = cost_map(views, bodies, 0, dofs, settings)
+    assert found.nats.shape == (SAMPLES, SAMPLES)
+    assert found.current == tuple(pose[list(dofs)])
+    for dof, values in zip(dofs, (found.across, found.up), strict=True):
+        assert values[0] >= model.limits[dof, 0] - 1e-9
+        assert values[-1] <= model.limits[dof, 1] + 1e-9
+        assert values[-1] - values[0] <= np.radians(120) + 1e-9
+    scorer = scorer_without_prediction(views, bodies, 0, settings)
+    present = scorer.costs_with_priors(model, pose[None])[0]
+    for row, column in ((0, 0), (7, 21), (30, 4)):
+        other = pose.copy()
+        other[list(dofs)] = found.across[column], found.up[row]
+        cost = scorer.costs_with_priors(model, other[None])[0]
+        assert found.nats[row, column] == pytest.approx(cost - present, abs=1e-6)
+
+
+def test_it_follows_the_pose_while_a_page_looks_and_a_place_is_taken(opened):
+    controller, names = opened(), " and ".join(JOINTS).replace("_", " ").replace(".", " ")
+    dofs = dofs_of(controller)
+    drag(controller, "torso", (4.0, 0.0))
+    assert controller.state.cost_map is None  # nobody looks
+    controller.cost_map.watch(PAGE, 0, dofs)
+    wait_for(lambda: controller.state.cost_map is not None, 60)
+    controller.cost_map.set_values(0, dofs, (0.4, 0.7))
+    assert tuple(controller.state.poses[0][list(dofs)]) == pytest.approx((0.4, 0.7))
+    assert controller.state.undo == f"set {names}, frame 0"
+    wait_for(lambda: controller.state.cost_map.current == pytest.approx((0.4, 0.7)), 60)
+    controller.history.undo()
+    wait_for(lambda: controller.state.cost_map.current != pytest.approx((0.4, 0.7)), 60)
+    controller.cost_map.leave(PAGE)
+    before = controller.state.cost_map
+    controller.pose_edits.set_dof(0, dofs[0], 0.2)
+    controller.navigation.seek(1)
+    assert controller.state.cost_map is before
+
+
+def test_wrong_degrees_of_freedom_are_refused(opened):
+    controller = opened()
+    dofs = dofs_of(controller)
+    for wrong in ((dofs[0], dofs[0]), (0, 999), (-1, 2)):
+        with pytest.raises(TrackerError, match="expected two different degrees of freedom"):
+            controller.cost_map.watch(PAGE, 0, wrong)
+    with pytest.raises(TrackerError, match="expected two finite values"):
+        controller.cost_map.set_values(0, dofs, (0.1, np.nan))
+    controller.dof_locks.set(0, [dofs[1]], True)
+    with pytest.raises(TrackerError, match=r"left_elbow\.extension"):
+        controller.cost_map.set_values(0, dofs, (0.1, 0.2))
