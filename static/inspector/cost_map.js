@@ -12,8 +12,6 @@ import { textButton } from "./rows.js";
 const HEIGHT_PX = 190;
 /** Poses up to so many nats above the best have a line around them: they are about as good. */
 const NEAR_NATS = 6;
-/** Costs from so many nats above the best on look the same. */
-const FULL_NATS = 200;
 const UNITS = { deg: "°", cm: " cm" };
 const STEPS = new Map([["ArrowLeft", [-1, 0]], ["ArrowRight", [1, 0]], ["ArrowUp", [0, 1]], ["ArrowDown", [0, -1]]]); // prettier-ignore
 
@@ -117,7 +115,7 @@ export function costMap({ store, send }, posing) {
       listed = described;
       cursor = null;
       for (const choice of [across, up]) {
-        choice.replaceChildren(...offered.map((dof) => new Option(`${own.length > 1 ? "" : `${displayName(person.dofs[dof].joint)} `}${person.dofs[dof].name}`, String(dof))));
+        choice.replaceChildren(...offered.map((dof) => new Option(nameOf(person.dofs[dof], own.length > 1), String(dof))));
       }
       across.value = String(offered[0]);
       up.value = String(offered[1]);
@@ -128,6 +126,14 @@ export function costMap({ store, send }, posing) {
   };
   new ResizeObserver(() => draw()).observe(element);
   return { element, update, open: () => toggle(true) };
+}
+
+/**
+ * @param {import("../model/protocol.js").DofInfo} info
+ * @param {boolean} isOfJoint whether all are of the selected joint
+ */
+function nameOf({ joint, name }, isOfJoint) {
+  return isOfJoint ? name : `${displayName(joint).replace(/^(left|right) /, "")} ${name}`;
 }
 
 /**
@@ -155,10 +161,14 @@ function drawMap(context, map, width, cursor, style) {
   context.fillStyle = style.getPropertyValue("--plot");
   context.fillRect(0, 0, width, HEIGHT_PX);
   context.fillStyle = style.getPropertyValue("--accent");
+  const range = Math.max(NEAR_NATS, Math.max(...nats.flat()) - best);
   nats.forEach((costs, row) =>
     costs.forEach((cost, column) => {
-      context.globalAlpha = 0.85 * (1 - Math.sqrt(Math.min(1, (cost - best) / FULL_NATS)));
-      context.fillRect(column * w, HEIGHT_PX - (row + 1) * h, w + 0.5, h + 0.5);
+      context.globalAlpha = 0.85 * (1 - Math.sqrt((cost - best) / range));
+      // Whole pixels: seams would look like a grid.
+      const [left, right] = [column * w, (column + 1) * w].map(Math.round);
+      const [top, bottom] = [HEIGHT_PX - (row + 1) * h, HEIGHT_PX - row * h].map(Math.round);
+      context.fillRect(left, top, right - left, bottom - top);
     }),
   );
   context.globalAlpha = 1;

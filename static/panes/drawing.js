@@ -33,7 +33,8 @@ const DIMMED = 0.3;
  * Line style and layer of each kind of path. A layer of null is always drawn.
  *
  * @typedef {{width: number, dash: number[], layer: import("../model/protocol.js").Layer | null, hasOutline: boolean,
- *   ofPerson?: boolean}} LineStyle ofPerson: whether they are dimmed with their person
+ *   ofPerson?: boolean, switch?: import("../model/protocol.js").Layer}} LineStyle ofPerson: whether they are dimmed with
+ *   their person; switch: a layer that hides them, too, and has their opacity
  * @type {Record<import("../model/protocol.js").Path["kind"], LineStyle>}
  */
 export const LINE_STYLES = {
@@ -45,7 +46,7 @@ export const LINE_STYLES = {
   compared: { width: 1.5, dash: [6, 4], layer: "contours", hasOutline: true, ofPerson: true },
   preview: { width: 1.75, dash: [2, 4], layer: "contours", hasOutline: true, ofPerson: true },
   result: { width: 2, dash: [0.5, 4.5], layer: "contours", hasOutline: true, ofPerson: true },
-  alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: "alternatives", hasOutline: true, ofPerson: true },
+  alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: "contours", switch: "alternatives", hasOutline: true, ofPerson: true },
   new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
   former: { width: 1.5, dash: [9, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
   error: { width: 1.25, dash: [], layer: "errors", hasOutline: true, ofPerson: true },
@@ -123,10 +124,11 @@ export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
   for (const path of overlay.paths) {
     if (path.camera !== camera || path.count === 0) continue;
     const style = LINE_STYLES[path.kind];
-    if (style.layer && !layers.shown[style.layer]) continue;
+    if ([style.layer, style.switch].some((layer) => layer && !layers.shown[layer])) continue;
     const line = tracePath(view, overlay.segments, path.first, path.count);
     const isFaint = style.ofPerson && isDimmed(path.person);
-    context.globalAlpha = (style.layer ? layers.opacity[style.layer] : 1) * (isFaint ? DIMMED : 1);
+    const layer = style.switch ?? style.layer;
+    context.globalAlpha = (layer ? layers.opacity[layer] : 1) * (isFaint ? DIMMED : 1);
     context.setLineDash(path.kind === "model" && path.side === "right" ? RIGHT_DASH : style.dash);
     stroke(context, line, path.color, style.width, style.hasOutline && !isFaint);
   }

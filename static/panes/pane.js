@@ -213,7 +213,7 @@ export class Pane {
     this.#showJoint(state);
     if (bare) return;
     drawing.drawPaths(context, this.view, overlay, this.#camera, layers, (person) => isDimmed(state, person));
-    if (layers.shown.alternatives && alternativesOf(this.#store.facts).length > 0) {
+    if (layers.shown.contours && layers.shown.alternatives && alternativesOf(this.#store.facts).length > 0) {
       drawing.drawGhostRanks(context, this.view, overlay, this.#camera, layers.opacity.alternatives);
     }
     drawAxes(context, this.view, this.#store.facts, this.#camera);

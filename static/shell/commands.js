@@ -2,7 +2,7 @@
 
 import { REVIEWED, STATUSES } from "../model/cells.js";
 import { LAYERS } from "../model/layers.js";
-import { hasSearch, hasTrack } from "../model/selectors.js";
+import { alternativesOf, hasSearch, hasTrack } from "../model/selectors.js";
 import { displayName } from "../widgets/text.js";
 
 /**
@@ -122,6 +122,11 @@ export function contextCommands({ store, navigation, grid, posing, layers, actio
       if (index !== state?.person) add("Person", `Copy the pose of ${name}`, () => posing.copyPerson(index), "person joint angles");
     });
   }
+  alternativesOf(store.facts).forEach(({ limbs }, rank) => {
+    const where = limbs.length ? limbs.join(", ") : "body";
+    add("Posing", `Take alternative ${rank + 1}: ${where} elsewhere`, () => posing.takeAlternative(rank), "another pose ghost number");
+    commands[commands.length - 1].id = `alternative ${rank + 1}`;
+  });
   const points = session?.people[state?.person ?? 0]?.points ?? [];
   for (const point of points) add("Joint", `Select ${displayName(point)}`, () => posing.selectPoint(point), "joint");
   return commands;

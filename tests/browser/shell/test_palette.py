@@ -155,6 +155,7 @@ async def test_every_key_and_button_is_in_it(page):
     )
     # These stand for many keys, and the palette has the places that they lead to one by one.
     assert [m for m in missing if m != "Commands"] == [
+        "Take an alternative pose by its number in the views",
         "Show or hide a layer, by its number in the menu",
         "Fill the grid with a camera (toggle); two digits for 10 to 16",
     ]
