@@ -345,6 +345,8 @@ class ReasonMessage(Message, frozen=True, tag="reason"):
     """By part of the person; empty without a table."""
     notes: tuple[str, ...]
     """Sentences on what views cannot show."""
+    searched: tuple[str, ...]
+    """Limbs that were searched for alternatives, for display."""
     alternatives: tuple[GhostPose, ...]
     """Poses within 6 nats of the best, cheapest first. The overlay draws them in this order."""
 

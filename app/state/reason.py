@@ -29,6 +29,8 @@ class Reason:
     table: PartTable
     contradiction: Contradiction | None
     """The worst cell; None where no view clearly contradicts the pose."""
+    searched: tuple[str, ...] = ()
+    """Limbs that were searched for alternatives, as text for the user."""
     alternatives: tuple[RankedPose, ...] | None = None
     """Cheapest first, all within 6 nats of the best pose; None before they are known."""
 

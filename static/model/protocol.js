@@ -194,7 +194,7 @@
  * @typedef {{nats: number, limbs: string[]}} GhostPose
  * @typedef {{type: "reason", frame: number, person: number, running: boolean, stage: string, share: number, message:
  *   string, sentence: string, part: number | null, camera: number | null, limbs: LimbReason[], parts: PartReason[],
- *   notes: string[], alternatives: GhostPose[]}} ReasonMessage
+ *   notes: string[], searched: string[], alternatives: GhostPose[]}} ReasonMessage
  * @typedef {{type: "cost_map", person: number, dofs: [number, number], current: [number, number], across: number[], up:
  *   number[], nats: number[][]}} CostMapMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:

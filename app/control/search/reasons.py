@@ -111,7 +111,7 @@ class Reasons:
             run = self._run(people)
             found = self._explained(state, run, people)
             self._set(found=found, message="")
-            self._set(found=replace(found, alternatives=self._others(state, run, people, found)))
+            self._set(found=self._with_alternatives(state, run, people, found))
         except _StoppedError:
             if self._stopping.is_set():
                 self._computed = ()
@@ -164,21 +164,23 @@ class Reasons:
         worst = contradiction(state.models[person], table, seen.thetas_px, session_state.session.camera_names)
         return Reason(state.frame, person, state.people[person].values, table, worst)
 
-    def _others(self, state: State, run: RunEvidence, people: tuple[int, ...], found: Reason) -> tuple[RankedPose, ...]:
-        """Return the stored alternatives of a pose, and those that a search of its limbs in doubt finds."""
+    def _with_alternatives(self, state: State, run: RunEvidence, people: tuple[int, ...], found: Reason) -> Reason:
+        """Return a reason with the stored alternatives of its pose, and those that a search of limbs in doubt finds."""
         shown, model = state.people[found.person], state.models[found.person]
         searched = () if shown.status == "good" else limbs_in_doubt(model, found.table)
         if not shown.alternatives and not searched:
-            return ()
-        self._report("searching for other poses", 0.0)
+            return replace(found, alternatives=())
+        names = tuple(limb_display_name(x.name) for x in searched)
+        self._report(f"searching the {' and the '.join(names)}" if names else "comparing alternatives", 0.0)
         others = alternative_poses(
             run.known, self._session_state.frames.observer, state.frame, _bodies(state, people),
             people.index(found.person), state.settings, shown.alternatives, searched, self._around(state),
         )  # fmt: skip
         present = PosedBody(model, found.values)
-        return tuple(
+        ranked = tuple(
             RankedPose(o.pose, o.cost, tuple(map(limb_display_name, limbs_elsewhere(present, o.body)))) for o in others
         )
+        return replace(found, searched=names, alternatives=ranked)
 
     def _around(self, state: State) -> list[Array]:
         """Return the poses of the selected person on frames around, (n_values,) each, if they are of the same body."""

@@ -184,7 +184,7 @@ async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
     await page.locator("#quick-layers").get_by_text("Contours").click()
     await page.locator("#quick-layers").get_by_text("Joints").click()
     await shows(page, f"({DRAWN}) === 0")
-    await until(lambda: set(endpoint.views[-1]["layers"]) == {"image", "distance", "epipolar", "axes"})
+    await until(lambda: set(endpoint.views[-1]["layers"]) == {"image", "distance", "alternatives", "epipolar", "axes"})
 
 
 async def test_contours_and_joints_are_drawn_in_the_persons_colour(page):

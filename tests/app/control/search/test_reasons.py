@@ -67,6 +67,7 @@ def test_a_numbered_alternative_is_taken_assessed_and_undone_at_once(doubted):
     wrong = doubted.state.poses[0]
     explained(doubted)
     best = doubted.state.reason.alternatives[0]
+    assert doubted.state.reason.searched == ("left arm",)
     assert best.nats < -6
     assert best.limbs == ("left arm",)
     with pytest.raises(TrackerError, match="expected an alternative 9 of the shown pose"):
