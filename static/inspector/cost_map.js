@@ -124,7 +124,12 @@ export function costMap({ store, send }, posing) {
     if (isChosen) ask();
     draw();
   };
-  new ResizeObserver(() => draw()).observe(element);
+  new ResizeObserver(() => {
+    const isSeen = element.getClientRects().length > 0;
+    if (isSeen && !isAsking) ask();
+    else if (!isSeen) leave();
+    draw();
+  }).observe(element);
   return { element, update, open: () => toggle(true) };
 }
 

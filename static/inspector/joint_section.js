@@ -102,6 +102,9 @@ export function jointSection(context, { posing }) {
     hint: "Angles of the selected joint (J selects the next one)",
     body,
     openMap: map.open,
-    update: (changed) => SHOWN_FACTS.some((fact) => changed.has(fact)) && show(),
+    update(changed) {
+      if (changed.has("connected")) map.update(true);
+      if (SHOWN_FACTS.some((fact) => changed.has(fact))) show();
+    },
   };
 }

@@ -77,7 +77,8 @@ class Reasons:
         """
         (self._pages.add if looks else self._pages.discard)(page)
         if not looks:
-            self._stopping.set() if not self._pages else None
+            if not self._pages:
+                self._stopping.set()
             return
         self._stopping.clear()
         self._computed = ()
