@@ -19,19 +19,13 @@ def ghost_lines(session: Session, state: State, view: View) -> list[Path]:
 
     Each has a path in each view, which may be empty: the rank of a path is that of its alternative.
     """
-    reason = state.drawn.reason
-    if (
-        reason is None
-        or reason.alternatives is None
-        or "alternatives" not in view.layers
-        or "contours" not in state.compiled
-    ):
-        return []
-    person, out = reason.person, []
+    reason, out = state.drawn.reason, list[Path]()
+    if reason is None or "alternatives" not in view.layers or "contours" not in state.compiled:
+        return out
+    person, model = reason.person, state.models[reason.person]
     if person in state.undrawn:
-        return []
-    model = state.models[person]
-    for other in reason.alternatives:
+        return out
+    for other in reason.alternatives or ():
         body, parts = PosedBody(model, other.values), _parts_of(model, other.limbs)
         for index in sorted(view.cameras):
             camera = session.cameras[index].camera.pinhole
