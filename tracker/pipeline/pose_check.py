@@ -49,15 +49,12 @@ def frames_around(frame: int, posed: Sequence[int]) -> list[range]:
         posed: frames on which everybody has a pose, ascending.
     """
     out, there = [], set(posed)
-    for beside in (
-        max((k for k in posed if k < frame), default=None),
-        min((k for k in posed if k > frame), default=None),
-    ):
-        if beside is not None:
-            step, first = frame - beside, beside
-            while abs(frame - first) < HISTORY_FRAMES * abs(step) and first - step in there:
-                first -= step
-            out.append(range(first, frame + step, step))
+    beside = [*[k for k in posed if k < frame][-1:], *[k for k in posed if k > frame][:1]]
+    for first in beside:
+        step = frame - first
+        while abs(frame - first) < HISTORY_FRAMES * abs(step) and first - step in there:
+            first -= step
+        out.append(range(first, frame + step, step))
     return out
 
 
