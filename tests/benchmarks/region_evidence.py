@@ -21,9 +21,9 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import RECORDED
+from doc_tables import table
 from numpy.typing import NDArray
 from scipy.stats import rankdata
-from sections import table
 
 from tracker.appearance.part_colors import Colors
 from tracker.appearance.region_deficit import limb_deficits
@@ -263,7 +263,7 @@ def main() -> None:
             label = folder.name if len(references) == 1 else f"{folder.name}, {person.name}"
             found[label] = cells
             print(f"{label}: {', '.join(cells)}", flush=True)
-    print(table(HEADS, found).replace("| variant |", "| recording |", 1))
+    print(table(HEADS, found, "recording"))
 
 
 if __name__ == "__main__":
