@@ -9,6 +9,7 @@ import re
 import subprocess
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
 
@@ -87,7 +88,8 @@ def add_write_option(parser: argparse.ArgumentParser) -> None:
 
 
 def check_places(paths: Sequence[Path], names: Sequence[str]) -> None:
-    """End the program unless documents hold exactly one place for each table: call it before anything is measured."""
+    """End the program unless documents hold exactly one place for each table, and note the tree: call it first."""
+    measured_tree()
     for name in names if paths else ():
         document_of(paths, name)
 
@@ -147,8 +149,9 @@ def _marker(name: str) -> str:
     return f"<!-- table: {name} -->"
 
 
+@cache
 def measured_tree() -> str:
-    """Return the commit of this tree, marked where files differ from it."""
+    """Return the commit of this tree when this was called first, marked where files differ from it."""
     command = ["git", "describe", "--always", "--dirty=, with changes", "--abbrev=8", "--exclude=*"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     if done.returncode:
