@@ -7,15 +7,15 @@ After a change that was made because of these figures, they no longer serve: rai
 """
 
 import argparse
-import shutil
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
-from acquisition import quadrille
+from acquisition import Recording, new_session, quadrille
 from doc_tables import Conditions, add_write_option, check_places, show, table
 from joint_errors import HEADS, Compared, groups, measured
 
+from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
 
@@ -53,7 +53,7 @@ CONDITIONS = Conditions(
     footage=f"simulated people in furnished rooms with noise, {N_FRAMES} frames each, four cameras with backgrounds; "
     f"seed {SEED}. The ten builds and the kinds of motion are those of the other benchmarks; rooms, noise and motions "
     "are new",
-    body="`gavrila34`, acquired from the joints of frame 0 by `quadrille acquire`",
+    body=f"`{DEFAULT_MODEL}`, acquired from the joints of frame 0 by `quadrille acquire`",
     start="pose fitted to the true joints of frame 0",
     settings="defaults, without the audit → with it",
     chosen="none",
@@ -71,8 +71,12 @@ def acquired(scene: Scene, folder: Path) -> tuple[Path, list[Path]]:
     people = [p.name for p in load_session(filmed).people]
     references = [filmed / ("truth.trc" if len(people) == 1 else f"truth_{name}.trc") for name in people]
     if not at.exists():
+        recording = Recording(
+            scene.name, sorted(filmed.glob("*.mp4")), filmed / "calibration.toml", filmed / "background",
+            dict(zip(people, references, strict=True)),
+        )  # fmt: skip
         with tempfile.TemporaryDirectory(dir=folder) as scratch:
-            made = Path(shutil.copytree(filmed, Path(scratch) / scene.name))
+            made = new_session(recording, Path(scratch))
             for name, reference in zip(people, references, strict=True):
                 quadrille("init", made, "--joints", reference, "--person", name)
             for name in people:
