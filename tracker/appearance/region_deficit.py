@@ -7,11 +7,11 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array, IntArray
+from tracker.images.background_model import MAD_TO_SIGMA
 
-_USUAL_PERCENTILE = 75.0
-"""Percentile over the run that is usual. On runs that lost a limb half of the time the median showed it as usual."""
-_QUARTILES = 1.349
-"""Distance of the quartiles of a normal distribution, standard deviations. The spread is that of a count at least."""
+_QUARTILES = (25.0, 75.0)
+"""Percentiles over the run between which half of the evidence lies. The upper one is usual: on runs that lost a limb
+half of the time the median showed it as usual."""
 
 
 def usual(evidence: Array, models: Sequence[BodyModel]) -> Array:
@@ -19,7 +19,7 @@ def usual(evidence: Array, models: Sequence[BodyModel]) -> Array:
 
     A limb that is lost during most of a run has a counterpart that is not.
     """
-    high = np.percentile(evidence, _USUAL_PERCENTILE, axis=0)
+    high = np.percentile(evidence, _QUARTILES[1], axis=0)
     return np.asarray(np.maximum(high, high[counterparts(models)]))
 
 
@@ -47,8 +47,8 @@ def elsewhere_nats(nats: Array, models: Sequence[BodyModel]) -> Array:
         models: all people.
     """
     best, both = usual(nats, models), np.concatenate([nats, nats[:, counterparts(models)]])
-    low, high = np.percentile(both, [25.0, 75.0], axis=0)
-    spread = np.maximum((high - low) / _QUARTILES, np.sqrt(np.maximum(best, 1.0)))
+    low, high = np.percentile(both, _QUARTILES, axis=0)
+    spread = np.maximum(0.5 * MAD_TO_SIGMA * (high - low), np.sqrt(np.maximum(best, 1.0)))
     return np.asarray(best * (best - 2 * nats) / (2 * spread**2))
 
 

@@ -24,7 +24,8 @@ from tracker.geometry.cameras import Camera
 SAMPLE_M = 0.07
 """Side of an independent sample on the body, metres: nearer cells show the same cloth in the same light."""
 REACH_M = 0.25
-"""How far around a part its surroundings reach, metres: a limb that is lost lies mostly that near."""
+"""How far around a part its surroundings reach, metres: a limb that is lost lies mostly that near. Regions of evidence
+reach as far around the joints, for flesh and the error of a prediction two frames ahead."""
 OCCUPIED_M = 0.12
 """Distance from the bodies up to which cells may show people, metres: hair and cloth, and the error of a pose."""
 

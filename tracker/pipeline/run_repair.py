@@ -35,14 +35,10 @@ from tracker.tracking.view_tracks import FrameTracks
 
 N_LEARNING = 60
 """Frames from which the appearance of a run is learnt, at most."""
-_MAX_FAILURES = 5
-"""Searches without success in a row after which the rest is left as it is: those contradictions are smaller."""
-
-
-_MAX_VISITS = 3
-"""Times that a frame is examined in a round: once by itself, and again where a limb beside it was found."""
-_MAX_ROUNDS = 3
-"""Times that the appearance is learnt, again only from poses that were repaired."""
+_MAX_TRIES = 3
+"""Times that the appearance is learnt, again only from poses that were repaired, and that a frame is examined in
+between: once by itself, and again where a limb beside it was found. After twice as many searches in a row that found
+nothing the other frames are not searched: their contradictions are smaller."""
 
 
 class RepairedPose(NamedTuple):
@@ -95,7 +91,7 @@ class RunRepair:
     def steps(self) -> Iterator[RepairStep]:
         """Do the work. A caller that stops asking leaves it undone."""
         n, changed = len(self._frames), list[int]()
-        for first in range(0, 2 * n * _MAX_ROUNDS, 2 * n):
+        for first in range(0, 2 * n * _MAX_TRIES, 2 * n):
             known, scores, before = self._learn(), dict[int, Array](), dict(self._bodies)
             for k in self._frames:
                 scores[k] = self._score(known, k)
@@ -157,7 +153,7 @@ class RunRepair:
             _, k, i = heappop(due)
             visits[k, i] += 1
             # Once each, as long as searches find something.
-            is_searched = visits[k, i] == 1 and failures < _MAX_FAILURES
+            is_searched = visits[k, i] == 1 and failures < 2 * _MAX_TRIES
             search = limbs_to_search(self._subjects.models[i], self._of_person(elsewhere[k], i)) if is_searched else []
             others = self._other_poses(k, i)
             apart = self._apart(k, i, others)
@@ -166,7 +162,7 @@ class RunRepair:
                 if search:
                     failures = 0 if is_moved else failures + 1
                 if is_moved:
-                    around = [n for n in self._around(k) if i in self._free(n) and visits[n, i] < _MAX_VISITS]
+                    around = [n for n in self._around(k) if i in self._free(n) and visits[n, i] < _MAX_TRIES]
                     for n in around:
                         heappush(due, (-np.inf, n, i))
             yield len(visits)
