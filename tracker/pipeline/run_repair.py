@@ -92,9 +92,10 @@ class RunRepair:
         """Do the work. A caller that stops asking leaves it undone."""
         n, changed = len(self._frames), list[int]()
         for first in range(0, 2 * n * _MAX_TRIES, 2 * n):
-            known, scores, before = self._learn(), dict[int, Array](), dict(self._bodies)
+            learnt, before = self._chosen(), dict(self._bodies)
+            known, scores = self._learn(learnt), dict[int, Array]()
             for k in self._frames:
-                scores[k] = self._score(known, k)
+                scores[k] = self._score(known, k, learnt.pop(k, None))
                 yield RepairStep(first + len(scores), first + 2 * n)
             if not self._searches:
                 break
@@ -112,16 +113,19 @@ class RunRepair:
         where = regions(cameras, self._bodies[frame])
         return self._observer.evidence(frame, where, edges=EdgeSettings(foreground=False))
 
-    def _learn(self) -> RegionModel:
+    def _chosen(self) -> dict[int, tuple[ViewEvidence, ...]]:
+        """Return the evidence of the frames to learn from."""
         at = np.unique(np.linspace(0, len(self._frames) - 1, N_LEARNING).round().astype(int))
-        some = [self._frames[i] for i in at]
-        frames = [LearningFrame(self._colors_at(k), self._bodies[k]) for k in some]
+        return {k: self._colors_at(k) for k in (self._frames[i] for i in at)}
+
+    def _learn(self, chosen: Mapping[int, tuple[ViewEvidence, ...]]) -> RegionModel:
+        frames = [LearningFrame(views, self._bodies[k]) for k, views in chosen.items()]
         return learn_regions(frames, self._observer.working_cameras, self._observer.empty_scenes())
 
-    def _score(self, known: RegionModel, frame: int) -> Array:
+    def _score(self, known: RegionModel, frame: int, views: tuple[ViewEvidence, ...] | None = None) -> Array:
         """Return the evidence of each part in each view, (V, P), nats."""
         bodies = self._bodies[frame]
-        return known.score(known.frame(self._colors_at(frame), bodies), bodies).nats
+        return known.score(known.frame(views or self._colors_at(frame), bodies), bodies).nats
 
     def _elsewhere(self, scores: Mapping[int, Array]) -> dict[int, Array]:
         """Return how much likelier each limb of all people is elsewhere on each frame, (n_limbs,), nats."""
