@@ -12,9 +12,20 @@ from app import __main__
 
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "sample_sessions").glob("*.md")])
 LINK = re.compile(r"\]\((?!https?:)([^)#\s]+)(#[^)]*)?\)")
+HEADING_LINK = re.compile(r"\]\((?!https?:)([^)#\s]*)#([^)\s]+)\)")
 FILE = re.compile(r"`((?:app|tracker|static|tests|docs|sample_sessions)/[\w./-]+)`")
 COMMAND = re.compile(r"^ {4}(?:\.venv/bin/)?(quadrille\b(?:[^\\\n]|\\\n)*)", re.MULTILINE)
 MAKE = re.compile(r"`?make ([a-z-]+)`?")
+
+
+def anchors(page):
+    """Anchors of the headings of a page: letters, digits and hyphens; equal ones are numbered from the second on."""
+    found = set()
+    for heading in re.findall(r"^#+ (.+)$", page.read_text("utf-8"), re.MULTILINE):
+        name = re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+        n = sum(re.fullmatch(rf"{re.escape(name)}(-\d+)?", other) is not None for other in found)
+        found.add(f"{name}-{n}" if n else name)
+    return found
 
 
 def words_of(path):
@@ -27,6 +38,19 @@ def words_of(path):
 def test_links_lead_somewhere(page):
     missing = [target for target, _ in LINK.findall(page.read_text("utf-8")) if not (page.parent / target).exists()]
     assert missing == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_to_headings_lead_to_one(page):
+    links = [(target or page.name, name) for target, name in HEADING_LINK.findall(page.read_text("utf-8"))]
+    missing = [link for link in links if link[0].endswith(".md") and link[1] not in anchors(page.parent / link[0])]
+    assert missing == []
+
+
+def test_anchors_are_those_that_the_host_makes(tmp_path):
+    page = tmp_path / "a.md"
+    page.write_text("# What `--paper` is\n\n## A, b & c (`x/y_z`)\n\n### Same\n\n### Same\n\n    # code\n", "utf-8")
+    assert anchors(page) == {"what---paper-is", "a-b--c-xy_z", "same", "same-1"}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)

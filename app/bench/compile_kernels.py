@@ -133,6 +133,7 @@ def _call_tracking(session: Session) -> None:
     _track(cameras, settings, crowd.models, crowd.values)
     _track(cameras, replace(settings, estimate="search"), crowd.models[:1], crowd.values[:1])
     _track([replace(c, background=None) for c in cameras], settings, crowd.models[:1], crowd.values[:1])
+    _repair(cameras, settings, crowd.models[:1], crowd.values[:1])
 
 
 def _call_others(session: Session) -> None:
@@ -185,6 +186,25 @@ def _track(
         run = TrackingRun(Observer(cameras, recording), Subjects.of(models), start, frames)
         for _ in ChamferTracker(settings).estimates(run):
             pass
+
+
+def _repair(
+    cameras: Sequence[CameraSource], settings: "TrackSettings", models: Sequence[BodyModel], poses: Sequence[Array]
+) -> None:
+    """Learn the colours of a run of one frame, and search a limb with them."""
+    from tracker.appearance.region_learning import LearningFrame, learn_regions
+    from tracker.body.limbs import limbs
+    from tracker.tracking.estimation.limb_repair import FrameEvidence, better_limbs
+    from tracker.tracking.estimation.pose_score import common_evidence
+
+    bodies = tuple(PosedBody(m, pose) for m, pose in zip(models, poses, strict=True))
+    with Recording(cameras) as recording:
+        observer = Observer(cameras, recording)
+        views = common_evidence(observer, _FRAME, [bodies], settings)
+        known = learn_regions([LearningFrame(views, bodies)], observer.working_cameras, observer.empty_scenes())
+        frame = known.frame(views, bodies)
+        known.score(frame, bodies)
+        better_limbs(FrameEvidence(views, known, frame), bodies, 0, settings, limbs(models[0])[-1:])
 
 
 if __name__ == "__main__":

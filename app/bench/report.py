@@ -20,19 +20,20 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from app.bench import acquisition_rows, contour_rows, voxel_rows
+from app.bench import acquisition_rows, audit_rows, contour_rows, voxel_rows
 from app.bench import rows as bench_rows
 from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import FRAME, read_crowd, read_frame
 from app.session.samples import sample_copy
 from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
+from tracker.session.assemble import DEFAULT_MODEL
 from tracker.simulate import Simulation, simulate
 from tracker.text_files import TextKind, read_json
 from tracker.validation import Number, check
 
 BASELINE = Path(__file__).with_name("baseline.json")
-N_ROWS = 27
+N_ROWS = 28
 """Number of rows that `measure` yields if `cma` is installed."""
 _KIND = TextKind("baseline", 1_000_000, TrackerError, "make one with --save")
 _PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")
@@ -67,6 +68,7 @@ def measure() -> Iterator[Row]:
     yield from contour_rows.pipelines(frame.with_model("gavrila34"), yardstick)
     yield bench_rows.pipeline_of_two(read_crowd(sample_copy("tango"), FRAME), yardstick)
     yield from acquisition_rows.acquisitions(frame, yardstick)
+    yield audit_rows.audited_run(frame.with_model(DEFAULT_MODEL), yardstick)
 
 
 @contextmanager

@@ -7,12 +7,18 @@ from typing import TYPE_CHECKING
 
 from app.runtime.progress import Reporter
 from tracker.compute.kernel_cache import compiled_mark
+from tracker.pipeline.run_repair import RepairStep
 from tracker.pipeline.track_session import AuditStep
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
 
 if TYPE_CHECKING:
     from tracker.initialization.first_pose import FirstPoses
     from tracker.pipeline.track_session import Step, TrackSession
+
+_PASSES = {
+    BackwardStep: "tracking back", AuditStep: "checking each camera", RepairStep: "comparing with the run's colours"
+}  # fmt: skip
+"""Passes after the first, by their steps."""
 
 
 class ChainProgress:
@@ -59,9 +65,9 @@ class ChainProgress:
             if len(run.costs_px) == 1:
                 self._count(len(run.frames), "tracking")
             self._tick()
-        elif isinstance(step, BackwardStep | AuditStep):
+        elif isinstance(step, BackwardStep | AuditStep | RepairStep):
             if step.done == 1:
-                self._count(step.total, "tracking back" if isinstance(step, BackwardStep) else "checking each camera")
+                self._count(step.total, _PASSES[type(step)])
             self._tick()
 
     def _count(self, total: int, what: str) -> None:

@@ -180,13 +180,8 @@ def reason(state: State, cameras: Sequence[str]) -> ReasonMessage:
         table, model = found.table, state.models[found.person]
         of_limbs = limbs(model)
         trunk = tuple(sorted(set(range(len(model.parts))).difference(*(x.parts.tolist() for x in of_limbs))))
-        limbs_of = (
-            LimbReason("trunk", trunk, (None,) * len(cameras)),
-            *(
-                LimbReason(limb_display_name(x.name), tuple(x.parts.tolist()), _column(table.beside, i))
-                for i, x in enumerate(of_limbs)
-            ),
-        )
+        of_body = [LimbReason(limb_display_name(x.name), tuple(x.parts.tolist())) for x in of_limbs]
+        limbs_of = (LimbReason("trunk", trunk), *of_body)
         parts = tuple(
             PartReason(
                 _column(table.below, i), _column(table.outside, i), _column(table.usual_outside, i),

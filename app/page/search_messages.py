@@ -302,14 +302,12 @@ class PartReason(Part, frozen=True):
 
 
 class LimbReason(Part, frozen=True):
-    """A limb: its parts, and what is beside it."""
+    """A limb and its parts."""
 
     name: str
     """For display: `left arm`; the trunk holds the parts of no limb."""
     parts: tuple[int, ...]
     """Indices of its parts, from the trunk outwards."""
-    beside_nats: tuple[float | None, ...]
-    """By camera, evidence for its colours where no part is, above the usual of the run; null for the trunk."""
 
 
 class GhostPose(Part, frozen=True):

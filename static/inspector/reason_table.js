@@ -117,11 +117,9 @@ export function reasonTable({ point, zoom }) {
       const head = line("th", "", cameras.map(({ name }) => name));
       head.classList.add("reason-views");
       const lines = reason.limbs.flatMap((limb) => {
-        const beside = limb.beside_nats.map((nats) => (measure.id === "colors" && nats !== null && levelOf(nats / 2, NATS) > 0 ? signed(-nats) : ""));
-        const heading = line("th", limb.name, beside);
+        const heading = line("th", limb.name, []);
         heading.classList.add("reason-limb");
-        heading.title = "Evidence for the colours of this limb where no part is, nats above the usual";
-        const isNamed = limb.parts.length > 1 || beside.some(Boolean);
+        const isNamed = limb.parts.length > 1;
         return [...(isNamed ? [heading] : []), ...limb.parts.map((part) => partRow({ reason, measure, name: person.parts[part], part, cameras }))];
       });
       table.replaceChildren(head, ...lines);

@@ -188,7 +188,7 @@
  * @typedef {{camera: number, people: [number, number, number, number][][]}} SilhouetteAxes
  * @typedef {{type: "finding", running: boolean, stage: string, share: number, notes: string[], message: string, failed:
  *   boolean, tried: number | null, camera: number | null, frame: number | null, axes: SilhouetteAxes[]}} FindingMessage
- * @typedef {{name: string, parts: number[], beside_nats: (number | null)[]}} LimbReason
+ * @typedef {{name: string, parts: number[]}} LimbReason
  * @typedef {{below_nats: (number | null)[], outside: (number | null)[], usual_outside: (number | null)[], contour_px:
  *   (number | null)[], usual_contour_px: (number | null)[], below_in_all_nats: number}} PartReason
  * @typedef {{nats: number, limbs: string[]}} GhostPose

@@ -1,4 +1,4 @@
-"""Measure what each piece of the tracker contributes (docs/accuracy.md): `python tests/benchmarks/ablation.py`.
+"""Measure what each piece of the tracker contributes (docs/decisions.md): `python tests/benchmarks/ablation.py`.
 
 Every variant tracks the same recordings from the pose fitted to the true joints of frame 0: simulated scenes that this
 script makes itself (smooth-skinned people whose bones are not the model's, clutter, noise) and, with `--data DIR`, the
@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sections import measured, put_section, table
+from doc_tables import Conditions, add_write_option, check_places, measured, show, table
 from true_starts import read_simulated, start_of
 
 from tracker.body.model import BodyModel
@@ -35,7 +35,7 @@ from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
-OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
+TABLES = ("ablation",)
 DEFAULT = TrackSettings()
 PAPER = "the paper's (`--paper`), with its body `gavrila22`"
 VARIANTS: Mapping[str, TrackSettings] = {
@@ -111,20 +111,19 @@ def measure(clip: Clip, settings: TrackSettings) -> tuple[float, int, float]:
     return errors.mpjpe_mm, errors.lost_frames, len(found) / seconds
 
 
-def section(clips: Sequence[Clip], rows: Mapping[str, Sequence[tuple[float, int, float]]]) -> str:
-    """The results as Markdown."""
-    lines = [
-        "## What each piece of the chamfer tracker contributes",
-        "",
-        "Made by `python tests/benchmarks/ablation.py`. Each cell: mean error of the 12 limb joints in mm / lost "
-        "frames (a limb joint off by more than 150 mm) / frames per second. Frames: "
-        + ", ".join(f"{c.name} {len(c.frames)}" for c in clips)
-        + ". All start from the pose fitted to the reference joints of frame 0, with the same settings but for what "
-        "the row says, and without the backward pass.",
-        "",
-    ]
-    told = {name: [f"{mm:.0f} / {lost} / {fps:.2g}" for mm, lost, fps in cells] for name, cells in rows.items()}
-    return "\n".join([*lines, table([c.name for c in clips], told)])
+def conditions(clips: Sequence[Clip]) -> Conditions:
+    """Return the conditions of the measurement."""
+    frames = ", ".join(f"{c.name} {len(c.frames)}" for c in clips)
+    return Conditions(
+        footage="simulated scenes with clutter and noise, and recordings; four cameras with backgrounds. "
+        f"Frames: {frames}",
+        body="`gavrila34` of the true height",
+        start="pose fitted to the reference joints of frame 0",
+        settings="defaults but for what the row says, without the backward pass, smoothing and audit. Each cell: mean "
+        "error of the 12 limb joints in mm / lost frames (a limb joint off by more than 150 mm) / frames per second",
+        chosen="those of evidence, fits, searches and tracking",
+        command="python tests/benchmarks/ablation.py --data DIR --write docs/decisions.md",
+    )
 
 
 def main() -> None:
@@ -135,16 +134,18 @@ def main() -> None:
     parser.add_argument(
         "--only", nargs="+", default=[*VARIANTS], choices=[*VARIANTS], help="variants to print; the table stays"
     )
-    parser.add_argument("--out", type=Path, default=OUT)
+    add_write_option(parser)
     words = parser.parse_args()
+    check_places(words.write, TABLES)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         clips = simulated(folder, words.frames) + (recorded(words.data, folder) if words.data else [])
         measure(replace(clips[0], frames=range(4)), DEFAULT)  # compiles the kernels
         variants = {name: settings for name, settings in VARIANTS.items() if name in words.only}
         rows = measured(variants, clips, measure, lambda cell: "{:.1f} mm, {} lost, {:.1f} frames/s".format(*cell))
-        if len(rows) == len(VARIANTS):
-            put_section(words.out, section(clips, rows))
+    cells = {name: [f"{mm:.0f} / {lost} / {fps:.2g}" for mm, lost, fps in row] for name, row in rows.items()}
+    to = words.write if len(rows) == len(VARIANTS) else []
+    show(to, TABLES[0], conditions(clips), table([c.name for c in clips], cells))
 
 
 if __name__ == "__main__":

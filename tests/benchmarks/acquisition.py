@@ -1,4 +1,4 @@
-"""Measure what acquired sizes change (docs/accuracy.md): `python tests/benchmarks/acquisition.py`.
+"""Measure what acquired sizes change (docs/measurements.md): `python tests/benchmarks/acquisition.py`.
 
 Ten simulated people of other builds than the model's, children and heavy people among them, are filmed by four cameras
 with noise and clutter. Each is tracked with the generic body of the height that the joints of frame 0 give, then
@@ -18,14 +18,13 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
-from sections import put_section, table
+from doc_tables import Conditions, add_write_option, check_places, show, table
 
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
 from tracker.simulate.people.population import individual
 from tracker.store.stored_poses import read_stored_poses
 
-OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
 PLAYED = {
     "child_3": ("elbow_rotation", 5),
     "child_6": ("exercise", 5),
@@ -43,7 +42,17 @@ N_FRAMES = 36
 RECORDED = {"walk": (), "balance_real": (), "fast_arms": (), "two_people": ("person1", "person2")}
 """Recordings, and the names of their people if there are several."""
 LOST_M = 0.15
+TABLES = ("acquisition",)
 HEADS = ("height off", "error, mm", "lost frames", "cost, px")
+CONDITIONS = Conditions(
+    footage=f"{N_FRAMES} frames of each simulated person (a number in a name is an age) with noise and clutter, and "
+    "the recordings; four cameras with backgrounds",
+    body="`gavrila34` of the height that the joints of frame 0 give → acquired by `quadrille acquire`",
+    start="pose fitted to the reference joints of frame 0",
+    settings="defaults",
+    chosen="those of `acquire`, such as its priors; on the recordings rules of tracking too",
+    command="python tests/benchmarks/acquisition.py --data DIR --write docs/measurements.md",
+)
 
 
 @dataclass(frozen=True)
@@ -187,23 +196,6 @@ def quadrille(*words: object) -> dict[str, Any]:
     return {} if words[0] == "new" else json.loads(done.stdout)
 
 
-def section(outcomes: Sequence[Outcome]) -> str:
-    """The results as Markdown."""
-    lines = [
-        "## What acquired sizes change",
-        "",
-        f"Made by `python tests/benchmarks/acquisition.py`. Four cameras, {N_FRAMES} frames of each simulated person "
-        "(`tracker/simulate/people/population.py`; a number in a name is an age), with noise and clutter. Each is "
-        "tracked from the joints of frame 0 with the generic body of the height that these joints give, acquired by "
-        "`quadrille acquire` without further options, and tracked again. Before → after: mean error of the 12 limb "
-        "joints, lost frames, mean cost of the tracked frames. The error of the height is that after it. "
-        "Recordings have the height of the joints instead of the stated one, so that they end beside the figures of "
-        "the first table.",
-        "",
-    ]
-    return "\n".join([*lines, table(HEADS, {o.name.replace("_", " "): o.cells for o in outcomes})])
-
-
 def chosen(words: argparse.Namespace, folder: Path) -> list[Recording]:
     """Return the people and recordings that are asked for; scenes that are not kept are made in a folder."""
     scenes = words.scenes or folder / "scenes"
@@ -215,31 +207,33 @@ def chosen(words: argparse.Namespace, folder: Path) -> list[Recording]:
 
 def run(
     description: str | None, heads: Sequence[str], measure_one: Callable[[Recording, Path], Iterable[RowT]],
-    write: Callable[[Sequence[RowT]], str],
+    name: str, conditions: Conditions,
 ) -> None:  # fmt: skip
-    """Read the options, measure the people and recordings that are asked for, and write the section of a document.
+    """Read the options, measure the people and recordings that are asked for, and show the table.
 
     Args:
         description: of the benchmark.
         heads: of the columns.
         measure_one: measures a recording in a folder, and returns a row for each person.
-        write: returns the section as Markdown.
+        name: of the table in the document.
+        conditions: of the measurement.
     """
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
     parser.add_argument("--scenes", type=Path, help="folder that keeps the simulated recordings")
     parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
-    parser.add_argument("--out", type=Path, default=OUT)
+    add_write_option(parser)
     words, rows = parser.parse_args(), list[RowT]()
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+    check_places(words.write, [name])
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
         for recording in chosen(words, folder):
             for row in measure_one(recording, folder):
                 print(f"{row.name}: {', '.join(map(' '.join, zip(heads, row.cells, strict=True)))}", flush=True)
                 rows.append(row)
-    if not words.only:
-        put_section(words.out, write(rows))
+    cells = {row.name.replace("_", " "): row.cells for row in rows}
+    show([] if words.only else words.write, name, conditions, table(heads, cells, "person"))
 
 
 if __name__ == "__main__":
-    run(__doc__, HEADS, measure, section)
+    run(__doc__, HEADS, measure, TABLES[0], CONDITIONS)

@@ -7,7 +7,7 @@ search for lost limbs. The weights are fitted to all of that. What they are wort
 fitted to the others, and on the recordings in DIR, to which nothing is fitted.
 
 It prints the weights, and those of `confidence.py`, by which statuses are given while a run goes on; they are to be
-copied into the code. It writes the tables and docs/images/reliability.svg. `--work DIR` keeps scenes, bodies and
+copied into the code. `--write` also draws docs/images/reliability.svg. `--work DIR` keeps scenes, bodies and
 features there: after a change of the tracker, remove `DIR/rows` and run it again.
 """
 
@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from acquisition import PLAYED, RECORDED, quadrille, recorded
+from doc_tables import add_write_option, check_places
 from status_model import LimbRows, Run, load_rows, save_rows
 from status_tables import write_results
 
@@ -50,6 +51,10 @@ from tracker.tracking.run_confidence import N_FEATURES
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
+TABLES = (
+    "calibrate_status groups", "calibrate_status people", "calibrate_status reliability", "calibrate_status ranking",
+    "calibrate_status attainable", "calibrate_status thresholds", "calibrate_status called lost",
+)  # fmt: skip
 FOUR, TWO, THREE = (0, 1, 2, 3), (0, 1), (0, 1, 2)
 SEVERAL_SEED, SECOND_SEED, RING_SEED = 52, 53, 51
 _N_FRAMES, _RING_FRAMES = 40, 36
@@ -316,13 +321,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, help="folder with walk, balance_real, fast_arms and two_people")
     parser.add_argument("--work", type=Path, help="folder that keeps scenes, bodies and features")
+    add_write_option(parser)
     words = parser.parse_args()
+    check_places(words.write, TABLES)
     with tempfile.TemporaryDirectory() as name:
         work = words.work or Path(name)
         workshop = Workshop(work)
         runs = [*simulated_runs(work / "scenes", workshop)]
         outside = [*recorded_runs(words.data, work / "sessions", workshop)] if words.data else []
-    write_results(runs, outside)
+    write_results(runs, outside, words.write)
 
 
 if __name__ == "__main__":

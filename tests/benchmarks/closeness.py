@@ -1,6 +1,6 @@
 """What mutual occlusion, joint refinement and the penalty on interpenetration are good for, by how near two people are.
 
-A section of docs/accuracy.md, made by `python tests/benchmarks/closeness.py`. Every variant tracks the same
+`python tests/benchmarks/closeness.py` writes a table of docs/decisions.md. Every variant tracks the same
 simulated couples (smooth-skinned people whose bones are not the model's, in a furnished room, with noise) from the
 poses fitted to the true joints of frame 0. Accuracy is the mean error of the 12 limb joints of both; a frame of a
 person is lost when one of them is off by more than 150 mm.
@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from sections import measured, put_section, table
+from doc_tables import Conditions, add_write_option, check_places, measured, show, table
 from true_starts import read_simulated
 
 from tracker.body.model import BodyModel
@@ -30,7 +30,7 @@ from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
-OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
+TABLES = ("closeness",)
 DEFAULT = TrackSettings()
 UNSEARCHED = replace(DEFAULT, recover=None)
 VARIANTS: Mapping[str, TrackSettings] = {
@@ -114,24 +114,20 @@ def _owner(joints: MarkerTable, references: Sequence[MarkerTable], frame: int) -
     return int(np.argmin(errors))
 
 
-def section(couples: Sequence[Couple], rows: Mapping[str, Sequence[Cell]]) -> str:
-    """The results as a section of Markdown."""
-    lines = [
-        "## Two people, by their distance",
-        "",
-        "Made by `python tests/benchmarks/closeness.py`. Each cell: mean error of the 12 limb joints of both in mm / "
-        "lost frames of both / frames on which somebody is nearer to the other's joints. Simulated couples, "
-        f"{len(couples[0].frames)} frames of each, their trunks' middles 1.5, 0.7, 0.45 and 0.25 m apart, and the "
-        "tango's close hold, each from the poses fitted to the true joints of frame 0. What is lost in a close hold "
-        f"depends on the last digit of the start: of the tango the mean of {STARTS['tango']} starts {APART_RAD:g} rad "
-        "apart.",
-        "",
-    ]
-    told = {
-        name: [f"{c.mpjpe_mm:.0f} / {c.lost_frames:.0f} / {c.swapped_frames:.0f}" for c in cells]
-        for name, cells in rows.items()
-    }
-    return "\n".join([*lines, table([c.name.removeprefix("couple_") for c in couples], told)])
+def conditions(couples: Sequence[Couple]) -> Conditions:
+    """Return the conditions of the measurement."""
+    return Conditions(
+        footage=f"simulated couples, {len(couples[0].frames)} frames of each, their trunks' middles 1.5, 0.7, 0.45 and "
+        "0.25 m apart, and the tango's close hold; four cameras with backgrounds",
+        body="`gavrila34` of the true heights",
+        start="poses fitted to the true joints of frame 0; of the tango the mean of "
+        f"{STARTS['tango']} starts {APART_RAD:g} rad apart, because the last digit decides what is lost there",
+        settings="defaults but for what the row says, without the backward pass, smoothing and audit. Each cell: mean "
+        "error of the 12 limb joints of both in mm / lost frames of both / frames on which somebody is nearer to the "
+        "other's joints",
+        chosen="those of people near each other",
+        command="python tests/benchmarks/closeness.py --write docs/decisions.md",
+    )
 
 
 def main() -> None:
@@ -139,8 +135,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--frames", type=int, default=30, help="frames of each scene")
     parser.add_argument("--scenes", type=Path, help="folder to keep the simulated scenes in, and to find them again")
-    parser.add_argument("--out", type=Path, default=OUT)
+    add_write_option(parser)
     words = parser.parse_args()
+    check_places(words.write, TABLES)
     with tempfile.TemporaryDirectory() as name:
         folder = words.scenes or Path(name)
         scenes = [*(f"couple_{d}" for d in DISTANCES), "tango"]
@@ -149,7 +146,12 @@ def main() -> None:
                 simulate(folder / scene, Simulation(scene, n_frames=words.frames, seed=SEED))
         couples = [read_couple(folder / scene, words.frames) for scene in scenes]
         rows = measured(VARIANTS, couples, measure, lambda cell: "{:.1f} mm, {:.1f} lost, {:.1f} swapped".format(*cell))
-        put_section(words.out, section(couples, rows))
+    cells = {
+        name: [f"{c.mpjpe_mm:.0f} / {c.lost_frames:.0f} / {c.swapped_frames:.0f}" for c in row]
+        for name, row in rows.items()
+    }
+    heads = [c.name.removeprefix("couple_") for c in couples]
+    show(words.write, TABLES[0], conditions(couples), table(heads, cells))
 
 
 if __name__ == "__main__":

@@ -1,21 +1,30 @@
-"""Measure starts with nobody's help (docs/accuracy.md): `python tests/benchmarks/from_nothing.py --data DIR`.
+"""Measure starts with nobody's help (docs/measurements.md): `python tests/benchmarks/from_nothing.py --data DIR`.
 
 The people and recordings of `acquisition.py`. No height, joint or pose is given: `track --init auto --acquire` finds
 the people, acquires their bodies and tracks them. Accuracy is the mean error of the 12 limb joints; a frame is lost
 when one of them is off by more than 150 mm.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from acquisition import Recording, new_session, percent, quadrille, run
-from sections import table
+from doc_tables import Conditions
 
 from tracker.session.session import load_session
 
+TABLES = ("from_nothing",)
 HEADS = ("error, mm", "lost frames", "frames called good", "good, yet a joint over 100 mm", "height off")
 OFF_MM = 100.0
+CONDITIONS = Conditions(
+    footage="the people and recordings of `acquisition.py`",
+    body="acquired from the footage; no height, joint or pose is given",
+    start="found by `--init auto`",
+    settings="`quadrille track --init auto --acquire`",
+    chosen="those of first poses, visual hulls and the prior on the joints; on the recordings rules of tracking too",
+    command="python tests/benchmarks/from_nothing.py --data DIR --write docs/measurements.md",
+)
 
 
 class Found(NamedTuple):
@@ -52,17 +61,5 @@ def found_people(recording: Recording, folder: Path) -> Iterator[Found]:
         )  # fmt: skip
 
 
-def section(found: Sequence[Found]) -> str:
-    """The results as Markdown."""
-    lines = [
-        "## People found with nobody's help",
-        "",
-        "Made by `python tests/benchmarks/from_nothing.py --data DIR`: the people and recordings of the table above by "
-        "`quadrille track --init auto --acquire`. No height, joint or pose is given.",
-        "",
-    ]
-    return "\n".join([*lines, table(HEADS, {f.name.replace("_", " "): f.cells for f in found})])
-
-
 if __name__ == "__main__":
-    run(__doc__, HEADS, found_people, section)
+    run(__doc__, HEADS, found_people, TABLES[0], CONDITIONS)

@@ -12,23 +12,42 @@ import argparse
 import resource
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from acquisition import RECORDED, quadrille
+from doc_tables import Conditions, add_write_option, check_places, show, table
 from scipy.stats import chi2, rankdata
-from sections import put_section, table
 
 from tracker.evaluation.references import read_joints
 from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import load_session
 from tracker.store.stored_poses import read_stored_poses
 
-OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
 OFF_MM = 100.0
-HEADS = ("mm", "frames off", "area", "flagged", "fine", "good, yet off", "covered", "processor time")
+GROUPS = (
+    "simulated, one person", "simulated, two people", "recordings, one person", "recordings, two people",
+    "found from nothing",
+)  # fmt: skip
+CONDITIONS = Conditions(
+    footage="recordings, and simulated people of another shape than the fitted body, in a furnished room with noise; "
+    "four cameras with backgrounds. People with a 2 dance or exercise at 15 to 25 frames/s",
+    body=f"`{DEFAULT_MODEL}`, acquired; after `@nothing` of people who were found",
+    start="pose fitted to the reference joints of frame 0; after `@nothing` the one that was found",
+    settings="defaults, without the audit → with it",
+    chosen="rules of tracking (recordings), the 10 mm that all views share and the 10 nats of the colours (simulated "
+    "people), the threshold of 5% and the median over the tracks",
+    command="python tests/benchmarks/joint_errors.py SESSIONS --data DIR --scenes DIR --write docs/accuracy.md "
+    "docs/measurements.md",
+)
+TABLES = ("joint_errors sums", "joint_errors")
+HEADS = (
+    "frames", "mean error, mm", "off", "area", "flagged", "flagged, yet fine", "good, yet off", "covered",
+    "processor time",
+)  # fmt: skip
 
 
 class Assessed(NamedTuple):
@@ -47,6 +66,38 @@ class Assessed(NamedTuple):
     def off(self) -> np.ndarray:
         """Whether a joint of a frame is off, (T,)."""
         return np.nanmax(self.errors_mm, axis=1) > OFF_MM
+
+
+class Compared(NamedTuple):
+    """A person tracked without the audit and with it."""
+
+    name: str
+    """Session, and person where there are several."""
+    plain: Assessed
+    audited: Assessed
+    cost: float
+    """Processor time of the run with the audit, as a multiple of that without it."""
+
+    @property
+    def session(self) -> str:
+        """Name of the session, with spaces."""
+        return self.name.split(", ")[0]
+
+    @property
+    def cells(self) -> list[str]:
+        """Cells of the table, in the order of `HEADS`."""
+        a, b = self.plain, self.audited
+        return [
+            str(len(b.off)),
+            f"{np.nanmean(a.errors_mm):.1f} → {np.nanmean(b.errors_mm):.1f}",
+            f"{a.off.sum()} → {b.off.sum()}",
+            f"{area(a.odds, a.off):.2f} → {area(b.odds, b.off):.2f}".replace("nan", "–"),
+            f"{a.flagged.sum()} → {b.flagged.sum()}",
+            f"{(a.flagged & ~a.off).sum()} → {(b.flagged & ~b.off).sum()}",
+            f"{(~a.flagged & a.off).sum()} → {(~b.flagged & b.off).sum()}",
+            f"{100 * b.covered.mean():.0f}%" if len(b.covered) else "",
+            f"x {self.cost:.1f}",
+        ]
 
 
 def processor_s() -> float:
@@ -87,8 +138,8 @@ def assessed(folder: Path, person: int, reference: Path) -> Assessed:
     )
 
 
-def measured(folder: Path, references: Sequence[Path]) -> Iterator[tuple[str, list[str]]]:
-    """Track a copy of a session without the audit and with it; yield a row for each person."""
+def measured(folder: Path, references: Sequence[Path]) -> Iterator[Compared]:
+    """Track a copy of a session without the audit and with it; yield the comparison of each person."""
     runs, seconds = [], []
     for options in (("--no-audit",), ()):
         with tempfile.TemporaryDirectory() as scratch:
@@ -97,23 +148,28 @@ def measured(folder: Path, references: Sequence[Path]) -> Iterator[tuple[str, li
             quadrille("track", at, *options)
             seconds.append(processor_s() - before)
             runs.append([assessed(at, i, path) for i, path in enumerate(references)])
-    for i, reference in enumerate(references):
-        plain, audited = (run[i] for run in runs)
-        pairs = [(plain, audited)] if len(plain.off) else []
-        for a, b in pairs:
-            yield (
-                folder.name + (f", {reference.stem}" if len(references) > 1 else ""),
-                [
-                    f"{np.nanmean(a.errors_mm):.1f} → {np.nanmean(b.errors_mm):.1f}",
-                    f"{a.off.sum()} → {b.off.sum()} of {len(b.off)}",
-                    f"{area(a.odds, a.off):.2f} → {area(b.odds, b.off):.2f}".replace("nan", "–"),
-                    f"{a.flagged.sum()} → {b.flagged.sum()}",
-                    f"{(a.flagged & ~a.off).sum()} → {(b.flagged & ~b.off).sum()}",
-                    f"{(~a.flagged & a.off).sum()} → {(~b.flagged & b.off).sum()}",
-                    f"{100 * b.covered.mean():.0f}%" if len(b.covered) else "",
-                    f"x {seconds[1] / seconds[0]:.1f}",
-                ],
-            )
+    for reference, plain, audited in zip(references, *runs, strict=True):
+        name = folder.name + (f", {reference.stem}" if len(references) > 1 else "")
+        if len(plain.off):
+            yield Compared(name.replace("_", " "), plain, audited, seconds[1] / seconds[0])
+
+
+def pooled(name: str, found: Sequence[Compared]) -> Compared:
+    """Return all frames of several people as one; limb joints that are unknown for one of them do not count."""
+
+    def together(runs: Sequence[Assessed]) -> Assessed:
+        n = max(r.errors_mm.shape[1] for r in runs)
+        errors = [np.pad(r.errors_mm, ((0, 0), (0, n - r.errors_mm.shape[1])), constant_values=np.nan) for r in runs]
+        return Assessed(np.concatenate(errors), *(np.concatenate([r[i] for r in runs]) for i in (1, 2, 3)))
+
+    plain, audited = together([c.plain for c in found]), together([c.audited for c in found])
+    return Compared(name, plain, audited, float(np.mean([c.cost for c in found])))
+
+
+def groups(found: Sequence[Compared], names: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """Return the rows of the sums. `names` has the sessions of each group by its title; empty groups are left out."""
+    members = {title: [c for c in found if c.session in sessions] for title, sessions in names.items()}
+    return {title: pooled(title, own).cells for title, own in members.items() if own}
 
 
 def references_of(name: str, data: Path, scenes: Path | None) -> list[Path]:
@@ -126,18 +182,34 @@ def references_of(name: str, data: Path, scenes: Path | None) -> list[Path]:
     return sorted((scenes / name).glob("truth*.trc")) if scenes is not None else []
 
 
-if __name__ == "__main__":
+def group_of(session: str, n_people: int) -> str:
+    """Return the group whose sums a session belongs to."""
+    if "@" in session:
+        return "found from nothing"
+    kind = "recordings" if session.replace(" ", "_") in RECORDED else "simulated"
+    return f"{kind}, {'one person' if n_people == 1 else 'two people'}"
+
+
+def main() -> None:
+    """Measure all sessions, and write both tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sessions", type=Path)
     parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
     parser.add_argument("--scenes", type=Path, help="folder of the simulated recordings")
-    parser.add_argument("--out", type=Path, default=OUT, help="document whose section is written")
+    add_write_option(parser)
     given = parser.parse_args()
-    rows: dict[str, list[str]] = {}
+    check_places(given.write, TABLES)
+    found: list[Compared] = []
+    names: dict[str, list[str]] = {title: [] for title in GROUPS}
     for folder in sorted(p for p in given.sessions.iterdir() if (p / "session.toml").exists()):
         known = references_of(folder.name, given.data, given.scenes)
-        for name, cells in measured(folder, known) if known else ():
-            rows[name] = cells
-            print(f"{name}: {' | '.join(cells)}", flush=True)
-    lines = ["## The audit, session by session", "", "Made by `python tests/benchmarks/joint_errors.py`.", ""]
-    put_section(given.out, "\n".join([*lines, table(HEADS, {k.replace("_", " "): v for k, v in rows.items()})]))
+        for compared in measured(folder, known) if known else ():
+            found.append(compared)
+            names[group_of(compared.session, len(known))].append(compared.session)
+            print(f"{compared.name}: {' | '.join(compared.cells)}", flush=True)
+    show(given.write, TABLES[0], CONDITIONS, table(HEADS, groups(found, names), "people"))
+    show(given.write, TABLES[1], CONDITIONS, table(HEADS, {c.name: c.cells for c in found}, "session"), True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,4 @@
-"""Compare predicted standard deviations with errors (docs/accuracy.md): `python tests/benchmarks/observability.py`.
+"""Compare predicted standard deviations with errors (docs/measurements.md): `python tests/benchmarks/observability.py`.
 
 The simulated people of `acquisition.py` are tracked with the generic body `gavrila22` of their height, whose angles are
 those of the true skeleton. Each tracked pose predicts the standard deviations of its degrees of freedom; the truth
@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import N_FRAMES, PLAYED
+from doc_tables import Conditions, add_write_option, check_places, show, table
 from scipy.stats import spearmanr
-from sections import put_section
 
 from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
@@ -31,7 +31,7 @@ from tracker.tracking.chamfer.tracker import ChamferTracker
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
-OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
+TABLES = ("observability", "observability reliability")
 LENGTHS_PX = (20, 40, 80, 120, 160, 240, 320)
 """Lengths of correlated errors that are tried."""
 MOST_OFF = 0.05
@@ -142,24 +142,24 @@ def reliability(found: Sample) -> list[tuple[str, float, float, int]]:
     return rows
 
 
-def section(samples: Mapping[str, Sample], noise: ContourNoise, people: Mapping[str, Sequence[Tracked]]) -> str:
-    """The results as Markdown."""
-    lines = [
-        "## Observability against real errors",
-        "",
-        "Made by `python tests/benchmarks/observability.py`. The people of the table above are tracked with the "
-        "generic body `gavrila22` of their height, from the true pose of frame 0. Each tracked pose predicts the "
-        "standard deviation of every degree of freedom from its contours (`tracker/fitting/observability.py`). "
-        "Observable means a standard deviation of at most "
-        f"{np.degrees(OBSERVABLE_RAD):.0f} degrees or {100 * OBSERVABLE_M:.0f} cm. The length of correlated errors, "
-        f"{noise.length_px:.0f} px, is calibrated on one half of the people. It is the shortest of "
-        f"{', '.join(map(str, LENGTHS_PX))} px with which at most {100 * MOST_OFF:.0f}% of the observable degrees of "
-        "freedom are off by three standard deviations. Nothing is fitted to the other half.",
-        "",
-        "| | calibrated on | checked on |",
-        "|---|---|---|",
-        "| people | " + " | ".join(", ".join(t.name.replace("_", " ") for t in p) for p in people.values()) + " |",
-    ]
+def conditions(noise: ContourNoise) -> Conditions:
+    """Return the conditions of the measurement."""
+    return Conditions(
+        footage="the simulated people of `acquisition.py`, four cameras with backgrounds",
+        body="`gavrila22` of the true height",
+        start="true pose of frame 0",
+        settings=f"defaults of the tracker. The length of correlated errors is {noise.length_px:.0f} px, the shortest "
+        f"of {', '.join(map(str, LENGTHS_PX))} px with which at most {100 * MOST_OFF:.0f}% of the observable degrees "
+        "of freedom are off by three standard deviations. Observable is a standard deviation of at most "
+        f"{np.degrees(OBSERVABLE_RAD):.0f} degrees or {100 * OBSERVABLE_M:.0f} cm",
+        chosen="that length, on the half that is calibrated on; nothing is fitted to the half that is checked",
+        command="python tests/benchmarks/observability.py --write docs/measurements.md",
+    )
+
+
+def figures(samples: Mapping[str, Sample], people: Mapping[str, Sequence[Tracked]]) -> dict[str, list[str]]:
+    """Return the rows of the first table: cells of the calibrated and the checked half."""
+    rows = {"people": [", ".join(t.name.replace("_", " ") for t in half) for half in people.values()]}
     figures = {
         "rank correlation, every angle of every frame": lambda s: f"{s.rank_correlation:.2f}",
         "the same for errors drawn from the prediction": lambda s: f"{s.ceiling:.2f}",
@@ -167,39 +167,31 @@ def section(samples: Mapping[str, Sample], noise: ContourNoise, people: Mapping[
         "observable": lambda s: f"{100 * s.observable.mean():.0f}%",
         "of these off by three standard deviations": lambda s: f"{100 * s.off:.1f}%",
     }
-    lines += [f"| {name} | {' | '.join(value(s) for s in samples.values())} |" for name, value in figures.items()]
-    lines += [
-        "",
-        "![Reliability: errors by their predicted standard deviation](images/observability.svg)",
-        "",
-        "Reliability on the people that are checked:",
-        "",
-        "| predicted, deg | RMS predicted, deg | RMS of the errors, deg | angles |",
-        "|---|---|---|---|",
-    ]
-    rows = reliability(list(samples.values())[1])
-    lines += [f"| {name} | {predicted:.1f} | {error:.1f} | {n} |" for name, predicted, error, n in rows]
-    return "\n".join(lines)
+    return rows | {name: [value(s) for s in samples.values()] for name, value in figures.items()}
 
 
 def main() -> None:
     """Measure and write the section."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=Path, help="folder of the recordings")
-    parser.add_argument("--out", type=Path, default=OUT)
+    add_write_option(parser)
     words = parser.parse_args()
+    check_places(words.write, TABLES)
     with tempfile.TemporaryDirectory() as name:
         tracked = [track(words.scenes or Path(name), person) for person in PLAYED]
     people = {"calibrated on": tracked[::2], "checked on": tracked[1::2]}
     noise = calibrated(people["calibrated on"])
     samples = {name: sample(of_them, noise) for name, of_them in people.items()}
-    text = section(samples, noise, people)
-    print(text)
-    x, errors = (np.array([row[i] for row in reliability(samples["checked on"])]) for i in (1, 2))
+    show(words.write, TABLES[0], conditions(noise), table([*people], figures(samples, people), ""))
+    rows = reliability(samples["checked on"])
+    cells = {name: [f"{predicted:.1f}", f"{error:.1f}", str(n)] for name, predicted, error, n in rows}
+    heads = ("RMS predicted, deg", "RMS of the errors, deg", "angles")
+    show(words.write, TABLES[1], conditions(noise), table(heads, cells, "predicted, deg"), True)
+    x, errors = (np.array([row[i] for row in rows]) for i in (1, 2))
     lines = [Line("errors", errors), Line("as predicted", x, dashed=True)]
     chart = line_chart("Errors by their predicted standard deviation", x, lines, "predicted, degrees", "RMS, degrees")
-    (words.out.parent / "images" / "observability.svg").write_text(chart, "utf-8")
-    put_section(words.out, text)
+    for path in words.write:
+        (path.parent / "images" / "observability.svg").write_text(chart, "utf-8")
 
 
 if __name__ == "__main__":

@@ -1,15 +1,14 @@
 """Measure region evidence on tracked recordings: `python tests/benchmarks/region_evidence.py SESSIONS --data DIR`.
 
 SESSIONS is a folder of sessions that are named as the recordings in DIR, or as the simulated people in `--scenes DIR`.
-A name may go on after a hyphen. Prints a table: the area under the curve of the deficit of region evidence for "a joint
-of that limb is off by more than 100 mm", beside that of the stored probability that the limb is lost; first of limbs,
-then of frames, by their worst limb. Nothing is fitted to errors. The head does not count: references differ in its
-joints.
+A name may go on after a hyphen. Prints a table: the area under the curve of how much likelier a limb is elsewhere for
+"a joint of that limb is off by more than 100 mm", beside that of the stored probability that the limb is lost; first of
+limbs, then of frames, by their worst limb. Then the limbs that are likelier elsewhere by more than `SELDOM_NATS`: those
+that are off, and the others. Nothing is fitted to errors. The head does not count: references differ in its joints.
 
 `--displaced` measures errors that the tracker does not make often enough: 7% of the limbs are put where they are on
-another frame, and refined there without the prediction. No stored probabilities belong to these poses. `--repair`
-searches the limbs whose deficit is large on all frames, and counts the frames that are off before and after. Poses are
-learnt from as they are, wrong ones included.
+another frame, and refined there without the prediction. No stored probabilities belong to these poses. Poses are learnt
+from as they are, wrong ones included.
 """
 
 import argparse
@@ -21,12 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 from acquisition import RECORDED
+from doc_tables import table
 from numpy.typing import NDArray
 from scipy.stats import rankdata
-from sections import table
 
-from tracker.appearance.part_colors import Colors
-from tracker.appearance.region_deficit import limb_deficits
+from tracker.appearance.region_deficit import elsewhere_nats, worst_parts
 from tracker.appearance.region_learning import LearningFrame, learn_regions
 from tracker.appearance.region_model import RegionModel
 from tracker.body.limbs import limbs
@@ -41,19 +39,17 @@ from tracker.session.session import Session, load_session
 from tracker.store.stored_poses import read_stored_poses
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
-from tracker.tracking.estimation.limb_repair import FrameEvidence, better_limbs, limbs_to_search
 from tracker.tracking.estimation.pose_score import common_evidence, scorer_without_prediction
 from tracker.tracking.estimation.settings import trust
+from tracker.tracking.pose_errors import SELDOM_NATS
 from tracker.tracking.view_regions import regions
 
 OFF_MM = 100.0
 N_LEARNING = 60
 DISPLACED_SHARE, SEED = 0.07, 5
-AROUND = (-3, -1, 1, 3)
-"""Frames around whose limbs the repair tries as they are."""
 HEADS = (
-    "limbs off", "area, lost", "area, deficit", "frames off", "area, lost", "area, deficit", "learn, ms", "score, ms",
-    "off after repair", "made bad", "repair, ms",
+    "limbs off", "area, lost", "area, elsewhere", "frames off", "area, lost", "area, elsewhere", "off, found",
+    "others, found", "learn, ms", "score, ms",
 )  # fmt: skip
 SETTINGS = TrackSettings()
 
@@ -97,8 +93,8 @@ class Measured(NamedTuple):
     """The region evidence of a recording."""
 
     known: RegionModel
-    deficits: Array
-    """See `limb_deficits`, (T, n_limbs)."""
+    elsewhere: Array
+    """See `elsewhere_nats`; of the worst part of each limb, (T, n_limbs)."""
     learn_ms: float
     """Processor time of learning, for each frame learnt from."""
     score_ms: float
@@ -161,40 +157,9 @@ def measure(tracked: Tracked, bodies: Sequence[Bodies], observer: Observer) -> M
     learnt = time.process_time()
     scores = [known.score(known.frame(v, b), b) for v, b in zip(views, bodies, strict=True)]
     scored = time.process_time()
-    nats, unexplained = (np.array([getattr(s, name).sum(axis=0) for s in scores]) for name in ("nats", "unexplained"))
-    deficits = limb_deficits(nats, unexplained, tracked.models)
-    return Measured(known, deficits, 1e3 * (learnt - began) / len(chosen), 1e3 * (scored - learnt) / len(views))
-
-
-def repaired(
-    tracked: Tracked, bodies: Sequence[Bodies], observer: Observer, measured: Measured
-) -> tuple[list[Bodies], float]:
-    """Return the bodies after the repair of all frames, and its processor time for each frame, ms."""
-    out, first = list[Bodies](), _first_limbs(tracked.models)
-    start = observer.evidence(tracked.frames[0], regions(observer.working_cameras, bodies[0]))
-    colors = [Colors(start, bodies[0], i).learn() for i in range(len(first))]
-    began = time.process_time()
-    for k, (frame, people) in enumerate(zip(tracked.frames, bodies, strict=True)):
-        found, searched = (
-            people,
-            {
-                i: limbs_to_search(model, measured.deficits[k, first[i] : first[i] + len(limbs(model))])
-                for i, model in enumerate(tracked.models)
-                if not tracked.is_keyframe[i, k]
-            },
-        )
-        if any(searched.values()):
-            views = common_evidence(observer, frame, [people], SETTINGS)
-            regions_there = measured.known.frame(views, people)
-        around = [bodies[k + step] for step in AROUND if 0 <= k + step < len(bodies)]
-        for i, of_person in searched.items():
-            if of_person:
-                evidence = FrameEvidence(views, measured.known, regions_there, colors[i])
-                others = [b[i].values for b in around]
-                better = better_limbs(evidence, people, i, SETTINGS, of_person, others)
-                found = with_body(found, i, PosedBody(tracked.models[i], better.pose))
-        out.append(found)
-    return out, 1e3 * (time.process_time() - began) / len(bodies)
+    of_parts = elsewhere_nats(np.array([score.nats.sum(axis=0) for score in scores]), tracked.models)
+    elsewhere = np.take_along_axis(of_parts, worst_parts(of_parts, tracked.models), axis=1)
+    return Measured(known, elsewhere, 1e3 * (learnt - began) / len(chosen), 1e3 * (scored - learnt) / len(views))
 
 
 def _first_limbs(models: Sequence[BodyModel]) -> list[int]:
@@ -210,30 +175,29 @@ def area(scores: Array, happened: NDArray[np.bool_]) -> str:
     return f"{(rankdata(scores)[happened].sum() - n * (n + 1) / 2) / (n * n_other):.2f}"
 
 
-def rows(tracked: Tracked, is_displaced: bool, with_repair: bool) -> Iterator[list[str]]:
+def rows(tracked: Tracked, is_displaced: bool) -> Iterator[list[str]]:
     """Yield the cells of each person, in the order of `HEADS`."""
     with Recording(tracked.session.cameras) as recording:
         observer = Observer(tracked.session.cameras, recording)
         bodies = displaced(tracked, observer) if is_displaced else tracked.bodies
         measured = measure(tracked, bodies, observer)
-        after, repair_ms = repaired(tracked, bodies, observer, measured) if with_repair else (bodies, 0.0)
     for i, first in enumerate(_first_limbs(tracked.models)):
         names = [x.name for x in limbs(tracked.models[i])]
         error = tracked.errors_mm(bodies, i)
         lost = np.zeros_like(error) if is_displaced else tracked.lost[i]
-        deficit = measured.deficits[:, first : first + len(names)]
+        elsewhere = measured.elsewhere[:, first : first + len(names)]
         use = np.isfinite(error) & np.isfinite(lost) & (np.array(names) != "head") & ~tracked.is_keyframe[i][:, None]
-        chosen, off = use.any(axis=1), error > OFF_MM
-        lost_of_frame, deficit_of_frame, off_frame, off_after = (
-            np.where(use, of_limb, -np.inf).max(axis=1)[chosen]
-            for of_limb in (lost, deficit, off, tracked.errors_mm(after, i) > OFF_MM)
+        chosen, off, found = use.any(axis=1), error > OFF_MM, elsewhere > SELDOM_NATS
+        lost_of_frame, elsewhere_of_frame, off_frame = (
+            np.where(use, of_limb, -np.inf).max(axis=1)[chosen] for of_limb in (lost, elsewhere, off)
         )
-        off_frame, off_after = off_frame > 0, off_after > 0
-        repair = [str(off_after.sum()), str((off_after & ~off_frame).sum()), f"{repair_ms:.0f}"]
+        off_frame = off_frame > 0
         yield [
-            f"{off[use].sum()} of {use.sum()}", area(lost[use], off[use]), area(deficit[use], off[use]),
-            f"{off_frame.sum()} of {len(off_frame)}", area(lost_of_frame, off_frame), area(deficit_of_frame, off_frame),
-            f"{measured.learn_ms:.1f}", f"{measured.score_ms:.1f}", *(repair if with_repair else [""] * 3),
+            f"{off[use].sum()} of {use.sum()}", area(lost[use], off[use]), area(elsewhere[use], off[use]),
+            f"{off_frame.sum()} of {len(off_frame)}", area(lost_of_frame, off_frame),
+            area(elsewhere_of_frame, off_frame), f"{(found & off & use).sum()} of {(off & use).sum()}",
+            f"{(found & ~off & use).sum()} of {(~off & use).sum()}", f"{measured.learn_ms:.1f}",
+            f"{measured.score_ms:.1f}",
         ]  # fmt: skip
 
 
@@ -245,7 +209,6 @@ def main() -> None:
     parser.add_argument("--scenes", type=Path, help="folder of simulated recordings")
     parser.add_argument("--only", nargs="+", help="names of sessions")
     parser.add_argument("--displaced", action="store_true", help="put limbs elsewhere first")
-    parser.add_argument("--repair", action="store_true", help="search limbs, and count what is off afterwards")
     words = parser.parse_args()
     found = dict[str, list[str]]()
     for folder in sorted(words.sessions.iterdir()):
@@ -259,11 +222,11 @@ def main() -> None:
             continue
         references = sorted((root / name).glob("*.trc"))
         tracked = read_tracked(folder, references)
-        for person, cells in zip(tracked.session.people, rows(tracked, words.displaced, words.repair), strict=True):
+        for person, cells in zip(tracked.session.people, rows(tracked, words.displaced), strict=True):
             label = folder.name if len(references) == 1 else f"{folder.name}, {person.name}"
             found[label] = cells
             print(f"{label}: {', '.join(cells)}", flush=True)
-    print(table(HEADS, found).replace("| variant |", "| recording |", 1))
+    print(table(HEADS, found, "recording"))
 
 
 if __name__ == "__main__":

@@ -247,5 +247,5 @@ def pooled(runs: Sequence[Run], odds: Sequence[Array], keep: Callable[[Run], boo
     """Return the probabilities of off and lost, (n, 2), and the errors, (n,), of the limbs of some runs."""
     chosen = [(r.rows, o) for r, o in zip(runs, odds, strict=True) if keep(r)]
     use = [np.isfinite(rows.error_mm) & ~rows.unseen for rows, _ in chosen]
-    probabilities = np.concatenate([probabilities(o[u]) for (_, o), u in zip(chosen, use, strict=True)])
-    return probabilities, np.concatenate([rows.error_mm[u] for (rows, _), u in zip(chosen, use, strict=True)])
+    given = np.concatenate([probabilities(o[u]) for (_, o), u in zip(chosen, use, strict=True)])
+    return given, np.concatenate([rows.error_mm[u] for (rows, _), u in zip(chosen, use, strict=True)])

@@ -1,13 +1,13 @@
-"""Write what the statuses are worth: the section of docs/accuracy.md, and the picture of the reliability."""
+"""Show what the statuses of `calibrate_status.py` are worth: its tables, and the picture of the reliability."""
 
 import itertools
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from doc_tables import Conditions, show, table
 from numpy.typing import NDArray
 from reliability_picture import Curve, reliability_svg
-from sections import put_section
 from status_model import (
     LOST_MM,
     OFF_MM,
@@ -28,7 +28,18 @@ from status_model import (
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import LOST_ODDS, OFF_ODDS
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+CONDITIONS = Conditions(
+    footage="simulated people of ten builds, couples and a crowd, with clutter and noise, and the recordings; four "
+    "cameras with backgrounds at the full frame rate, unless the row says otherwise",
+    body="`gavrila34`: generic, of the height that the joints give, and acquired from another recording of the person",
+    start="pose fitted to the true joints of frame 0",
+    settings="finished runs without the audit. The statuses of a simulated person are by weights fitted to all other "
+    "people, those of recordings by weights fitted to all simulated people",
+    chosen="both thresholds (simulated people), rules of tracking (recordings)",
+    command="python tests/benchmarks/calibrate_status.py --data DIR --write docs/accuracy.md docs/measurements.md "
+    "docs/decisions.md",
+)
+COUNTS = ("frames", "lost, flagged", "good, yet off", "flagged", "flagged, yet fine")
 EDGES = (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0)
 """Bounds of the groups of limbs whose probabilities are compared with what happened."""
 FIRST = (0.01, 0.02, 0.05, 0.1, 1.0)
@@ -41,16 +52,19 @@ KNOWN_MM = 20.0
 """Standard deviation with which the largest error of a frame would have to be known, mm."""
 FLEW_MM = 250.0
 """A limb flew off where a joint is off by more."""
-CONDITIONS = ("2 cameras", "3 cameras", "8 cameras", "half the frame rate", "no backgrounds")
+CONDITIONS_TRIED = ("2 cameras", "3 cameras", "8 cameras", "half the frame rate", "no backgrounds")
 BODIES = ("generic", "acquired")
+Judged = tuple[Run, Statuses]
+"""A run and the statuses of its frames."""
 
 
-def write_results(runs: Sequence[Run], outside: Sequence[Run]) -> None:
-    """Print the weights, and write the section and the picture.
+def write_results(runs: Sequence[Run], outside: Sequence[Run], write: Sequence[Path]) -> None:
+    """Print the weights and the tables, and write the tables and the picture.
 
     Args:
         runs: of the simulated recordings, to which the weights are fitted.
         outside: of recordings to which nothing is fitted.
+        write: documents whose tables are replaced; the picture lies beside them.
     """
     weights = fitted(runs)
     of_frame = fitted(runs, features=lambda rows: rows.frame_features)
@@ -58,89 +72,88 @@ def write_results(runs: Sequence[Run], outside: Sequence[Run]) -> None:
     print("while it goes on:", np.round(of_frame, 3).tolist())
     odds = held_out_odds(runs)
     found = [statuses(r.rows, o) for r, o in zip(runs, odds, strict=True)]
-    lines = [
-        "## Statuses",
-        "",
-        "Each frame has a status: good, doubtful or lost (`python tests/benchmarks/calibrate_status.py`). A frame is "
-        "lost when a limb joint is off by more than 150 mm, off when by more than 100 mm, and fine when not off. "
-        "Statuses are those of a finished run. Rows of simulated people are by weights fitted to all other people, "
-        "those of recordings by weights fitted to all simulated people. Each cell: lost frames that are flagged "
-        "(doubtful or lost) / good frames that are off / flagged frames that are fine.",
-        "",
-        "A limb is doubtful where it is off with a probability above 5%, and lost where it is lost with one above 25%: "
-        "to call a wrong pose good is the worse error. The goals are 95% of the lost frames flagged, 5% of the good "
-        "frames off, 40% of the flagged frames fine.",
-        "",
-        *_table(runs, found, [(r, statuses(r.rows, odds_by(weights, r.rows.features))) for r in outside]),
-        "",
-        "![Share of limbs that were off or lost, by the probability that the tracker gave](images/reliability.svg)",
-        "",
-        *_reliability_table(runs, odds),
-        "",
-        "The list of doubts begins with the likeliest. Share of frames that are off, among the first of all frames in "
-        "the order of the probability:",
-        "",
-        *_ranking_table(runs, found),
-        "",
-        "The best threshold for each group, chosen in hindsight: the least share of flagged frames that are fine while "
-        "the other two goals hold, and the share of all frames that are then flagged. *Error known*: the same if "
-        "frames were ranked by their largest true error, known with a standard deviation of 20 mm.",
-        "",
-        *_attainable_table(runs, found),
-        "",
-        "Each threshold on the probability that a limb is off, with four cameras and backgrounds. 5% is the largest of "
-        "them that meets the first two goals with both bodies:",
-        "",
-        *_threshold_table(runs, odds),
-        "",
-        "What is called lost by each threshold, and frames in which a limb flew off (a joint is off by more than 250 "
-        "mm). At 25% at least half of the frames that are called lost are off everywhere:",
-        "",
-        *_lost_table(runs, odds),
-    ]
-    put_section(DOCS / "accuracy.md", "\n".join(lines) + "\n")
-    (DOCS / "images" / "reliability.svg").write_text(reliability_svg(_curves(runs, odds)), "utf-8")
-
-
-def _table(runs: Sequence[Run], found: Sequence[Statuses], outside: Sequence[tuple[Run, Statuses]]) -> list[str]:
-    """Return the rows of Markdown: of the simulated recordings, and of those outside."""
-    lines = ["| recordings | frames | generic body | frames | acquired body |", "|---|---|---|---|---|"]
     simulated = list(zip(runs, found, strict=True))
-    alone = sorted({r.bodies[0] for r in runs if len(r.bodies) == 1})
-    for body in alone:
-        lines.append(_row(body.replace("_", " "), simulated, lambda r, b=body: r.bodies == (b,) and not r.condition))
-    for name in sorted({r.recording for r in runs if len(r.bodies) > 1}):
-        lines.append(_row(name.replace("_", " "), simulated, lambda r, n=name: r.recording == n and not r.condition))
-    for condition in CONDITIONS:
-        for several in (False, True):
-            title = f"{condition}, {'several people' if several else 'one person'}"
-            if any(r.condition == condition and (len(r.bodies) > 1) == several for r in runs):
-                lines.append(_row(title, simulated, _of(condition, several)))
-    lines.append(_row("**all with 4 cameras and backgrounds**", simulated, lambda r: not r.condition))
-    for name in dict.fromkeys(r.recording for r, _ in outside):
-        people = next(len(r.bodies) for r, _ in outside if r.recording == name)
+    recorded = [(r, statuses(r.rows, odds_by(weights, r.rows.features))) for r in outside]
+    for part, lines in {
+        "groups": _groups_table(simulated, recorded),
+        "people": _people_table(simulated, recorded),
+        "reliability": "\n".join(_reliability_table(runs, odds)),
+        "ranking": "\n".join(_ranking_table(runs, found)),
+        "attainable": "\n".join(_attainable_table(runs, found)),
+        "thresholds": "\n".join(_threshold_table(runs, odds)),
+        "called lost": "\n".join(_lost_table(runs, odds)),
+    }.items():
+        show(write, f"calibrate_status {part}", CONDITIONS, lines, is_repeated=part not in ("groups", "ranking"))
+    for path in write:
+        (path.parent / "images" / "reliability.svg").write_text(reliability_svg(_curves(runs, odds)), "utf-8")
+
+
+def _groups_table(simulated: Sequence[Judged], recorded: Sequence[Judged]) -> str:
+    """Return the sums of each condition with each body."""
+    keeps = {
+        f"4 cameras, {title}": lambda r, s=several: not r.condition and (len(r.bodies) > 1) == s
+        for title, several in (("one person", False), ("several people", True))
+    }
+    keeps |= {
+        f"{c}, {title}": _of(c, several)
+        for c in CONDITIONS_TRIED
+        for title, several in (("one person", False), ("several people", True))
+    }
+    rows = {}
+    for body in BODIES:
+        for title, keep in keeps.items():
+            if any(keep(r) for r, _ in simulated):
+                rows[f"{body}: {title}"] = _sums(simulated, body, keep)
+        if recorded:
+            rows[f"{body}: recordings"] = _sums(recorded, body, lambda _: True)
+    return table(COUNTS, rows, "body and footage")
+
+
+def _people_table(simulated: Sequence[Judged], recorded: Sequence[Judged]) -> str:
+    """Return what each person, couple and recording reaches with four cameras and backgrounds, with both bodies."""
+    rows = {}
+    for body in sorted({r.bodies[0] for r, _ in simulated if len(r.bodies) == 1}):
+        rows[body.replace("_", " ")] = _both(simulated, lambda r, b=body: r.bodies == (b,) and not r.condition)
+    for name in sorted({r.recording for r, _ in simulated if len(r.bodies) > 1}):
+        rows[name.replace("_", " ")] = _both(simulated, lambda r, n=name: r.recording == n and not r.condition)
+    for name in dict.fromkeys(r.recording for r, _ in recorded):
+        people = next(len(r.bodies) for r, _ in recorded if r.recording == name)
         for person in range(people):
             title = f"`{name}`" + (f", person {person + 1}" if people > 1 else "")
-            lines.append(_row(title, outside, lambda r, n=name: r.recording == n, person))
-    if outside:
-        lines.append(_row("**all recordings**", outside, lambda _: True))
-    return lines
+            rows[title] = _both(recorded, lambda r, n=name: r.recording == n, person if people > 1 else None)
+    heads = [f"{body}: {count}" for body in BODIES for count in ("good, yet off", "flagged, yet fine")]
+    return table(heads, rows, "footage")
+
+
+def _both(found: Sequence[Judged], keep: Callable[[Run], bool], person: int | None = None) -> list[str]:
+    """Return the shares of good frames that are off and of flagged frames that are fine, with each body."""
+    cells = []
+    for body in BODIES:
+        c = _counts(found, body, keep, person)
+        cells += [_of_all(c.good_off, c.good), _of_all(c.flagged_fine, c.flagged)]
+    return cells
+
+
+def _sums(found: Sequence[Judged], body: str, keep: Callable[[Run], bool]) -> list[str]:
+    """Return the cells of `COUNTS`."""
+    c = _counts(found, body, keep)
+    flagged = f"{c.flagged / c.frames:.0%}"
+    shares = _share(c.lost_flagged, c.lost), _share(c.good_off, c.good), flagged, _share(c.flagged_fine, c.flagged)
+    return [str(c.frames), *shares]
+
+
+def _counts(found: Sequence[Judged], body: str, keep: Callable[[Run], bool], person: int | None = None) -> Counts:
+    """Count the frames of the runs that are kept, of one person or of all; limbs were searched."""
+    own = [s for r, s in found if r.searched and r.body == body and keep(r)]
+    return summed(s.counts(None if person is None else s.person == person) for s in own)
+
+
+def _of_all(part: int, whole: int) -> str:
+    return f"{part} of {whole}" if whole else "none"
 
 
 def _of(condition: str, several: bool) -> Callable[[Run], bool]:
     return lambda r: r.condition == condition and (len(r.bodies) > 1) == several
-
-
-def _row(
-    title: str, found: Sequence[tuple[Run, Statuses]], keep: Callable[[Run], bool], person: int | None = None
-) -> str:
-    """Return a row of Markdown: of runs that are kept, with both bodies; of one person or of all."""
-    cells = [title]
-    for body in BODIES:
-        own = [s for r, s in found if r.searched and r.body == body and keep(r)]
-        counts = summed(s.counts(None if person is None else s.person == person) for s in own)
-        cells += [str(counts.frames), _cell(counts)]
-    return f"| {' | '.join(cells)} |"
 
 
 def _cell(c: Counts) -> str:
@@ -187,7 +200,7 @@ def _attainable_table(runs: Sequence[Run], found: Sequence[Statuses]) -> list[st
         f"4 cameras, {title}": lambda r, s=several: not r.condition and (len(r.bodies) > 1) == s
         for title, several in (("one person", False), ("several people", True))
     }
-    groups |= {c: lambda r, c=c: r.condition == c for c in CONDITIONS}
+    groups |= {c: lambda r, c=c: r.condition == c for c in CONDITIONS_TRIED}
     for title, keep in groups.items():
         cells = []
         for body in BODIES:

@@ -1,6 +1,6 @@
 """Compare the cost of tracked poses with that of poses refined from the truth: is the search at fault, or the cost?
 
-A section of docs/accuracy.md, made by `python tests/benchmarks/true_pose_costs.py --data DIR`. Simulated people dance,
+`python tests/benchmarks/true_pose_costs.py --data DIR` writes a table of docs/decisions.md. Simulated people dance,
 and the recordings in DIR are added. Each is tracked with the generic body of the height that the true joints give, from
 the pose fitted to those of frame 0. On every frame the pose fitted to the true joints is refined twice on the same
 evidence. Where this pose costs less than the tracked one, the search has missed it. The cost is that of contours, joint
@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from acquisition import quadrille, recorded
 from calibrate_status import SECOND, SECOND_SEED
-from sections import put_section, table
+from doc_tables import Conditions, add_write_option, check_places, show, table
 
 from tracker.acquisition.from_joints import height_from_joints
 from tracker.body.model import BodyModel, PosedBody
@@ -40,7 +40,7 @@ from tracker.tracking.estimation.settings import trust
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 
-OUT = Path(__file__).resolve().parents[2] / "docs" / "accuracy.md"
+TABLES = ("true_pose_costs",)
 HEADS = (
     "frames",
     "at most that cost",
@@ -172,19 +172,16 @@ def cells(results: Sequence[FrameResult]) -> list[str]:
     ]  # fmt: skip
 
 
-def section(rows: dict[str, list[str]]) -> str:
-    """The results as Markdown."""
-    lines = [
-        "## Costs of tracked and true poses",
-        "",
-        "Made by `python tests/benchmarks/true_pose_costs.py`. Each recording is tracked with the generic body of the "
-        "height that the true joints give. On each frame the pose fitted to the true joints is refined on the same "
-        "evidence. Shares of the frames whose tracked pose costs at most what this pose does. Of the others, those "
-        "are counted where a barrier lies between the two poses; on the rest both lie in one valley. Errors are those "
-        "of the 12 limb joints.",
-        "",
-    ]
-    return "\n".join([*lines, table(HEADS, rows).replace("| variant |", "| recording |", 1)])
+CONDITIONS = Conditions(
+    footage="dances of simulated people, and recordings; four cameras with backgrounds",
+    body="`gavrila34` of the height that the true joints give",
+    start="pose fitted to the true joints of frame 0",
+    settings="defaults with the backward pass, without smoothing and audit. The shares are those of frames whose "
+    "tracked pose costs at most what the pose refined from the truth does. Of the other frames, those are counted "
+    "where a barrier lies between the two poses; on the rest both lie in one valley",
+    chosen="those of searches",
+    command="python tests/benchmarks/true_pose_costs.py --data DIR --write docs/decisions.md",
+)
 
 
 def main() -> None:
@@ -193,8 +190,9 @@ def main() -> None:
     parser.add_argument("--data", type=Path, help="folder with walk and fast_arms")
     parser.add_argument("--work", type=Path, help="folder that keeps the sessions")
     parser.add_argument("--only", nargs="+", help="people and recordings to print; the table stays")
-    parser.add_argument("--out", type=Path, default=OUT)
+    add_write_option(parser)
     words = parser.parse_args()
+    check_places(words.write, TABLES)
     with tempfile.TemporaryDirectory() as name:
         rows = dict[str, list[str]]()
         for dancer in dancers(words.work or Path(name), words.data):
@@ -202,8 +200,7 @@ def main() -> None:
                 continue
             rows[dancer.name] = cells(measure(dancer, TrackSettings()))
             print(f"{dancer.name}: {', '.join(map(' '.join, zip(HEADS, rows[dancer.name], strict=True)))}", flush=True)
-        if not words.only:
-            put_section(words.out, section(rows))
+    show([] if words.only else words.write, TABLES[0], CONDITIONS, table(HEADS, rows, "recording"))
 
 
 if __name__ == "__main__":

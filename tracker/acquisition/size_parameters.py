@@ -34,11 +34,12 @@ DIFFERENCE = 1e-4
 below the spread of people. Halved and doubled: those of `gavrila34` change by 2e-5 at most."""
 _EXPONENT_LIMITS, _TAPER_LIMIT = (0.15, 1.0), 0.8
 """Limits of shapes: convex, with finite derivatives."""
-_LIMB_JOINTS, _LIMB_PARTS = ("shoulder", "elbow", "hip", "knee"), ("upper_arm", "forearm", "thigh", "calf")
+_LIMB_JOINTS, _LIMB_PARTS = ("shoulder", "elbow", "hip", "knee", "ankle"), ("upper_arm", "forearm", "thigh", "calf")
 _OWN_PRIORS = {
     **{f"{joint}.joint_{a}": "limb_joint" for joint in _LIMB_JOINTS for a in "xyz"},
     **{f"{part}.side_{a}": "limb_side" for part in _LIMB_PARTS for a in "xy"},
     "calf.free_end": "sole",
+    "foot.free_end": "end",
 }
 """Parameters whose standard deviation is not that of their kind."""
 

@@ -2,5 +2,5 @@
 
 The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use `part_colors.Colors`
 and the `limb_score.LimbScorer` that it makes; `region_learning.learn_regions`, the `region_model.RegionModel` that it
-returns, `region_limb_scorer.RegionLimbScorer` and `region_deficit.limb_deficits`.
+returns, `region_limb_scorer.RegionLimbScorer` and `region_deficit.elsewhere_nats`.
 """

@@ -7,11 +7,11 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array, IntArray
+from tracker.images.background_model import MAD_TO_SIGMA
 
-_USUAL_PERCENTILE = 75.0
-"""Percentile over the run that is usual. On runs that lost a limb half of the time the median showed it as usual."""
-UNEXPLAINED_SHARE = 0.5
-"""Weight of evidence that no part covers: parts may lie beside each other, and both would explain it."""
+_QUARTILES = (25.0, 75.0)
+"""Percentiles over the run between which half of the evidence lies. The upper one is usual: on runs that lost a limb
+half of the time the median showed it as usual."""
 
 
 def usual(evidence: Array, models: Sequence[BodyModel]) -> Array:
@@ -19,7 +19,7 @@ def usual(evidence: Array, models: Sequence[BodyModel]) -> Array:
 
     A limb that is lost during most of a run has a counterpart that is not.
     """
-    high = np.percentile(evidence, _USUAL_PERCENTILE, axis=0)
+    high = np.percentile(evidence, _QUARTILES[1], axis=0)
     return np.asarray(np.maximum(high, high[counterparts(models)]))
 
 
@@ -35,22 +35,46 @@ def part_deficits(nats: Array, models: Sequence[BodyModel]) -> Array:
     return usual(nats, models) - nats
 
 
-def limb_deficits(nats: Array, unexplained: Array, models: Sequence[BodyModel]) -> Array:
-    """Return the deficit of each limb on each frame, (T, n_limbs), nats.
+def elsewhere_nats(nats: Array, models: Sequence[BodyModel]) -> Array:
+    """Return how much likelier each part is elsewhere than where it is drawn, (T, P), nats.
 
-    It is the deficit of its worst part, and some of the evidence that is unexplained beyond the median of the run.
+    Where a part is, its evidence on a frame is normal around its usual, as widely as over the run. Elsewhere it is
+    normal around 0, as widely. This is the log ratio of both. A part that looks like its surroundings, and one that is
+    often hidden, therefore say little.
 
     Args:
         nats: see `part_deficits`.
-        unexplained: `RegionScore.unexplained` of each frame, summed over the views, (T, n_limbs).
         models: all people.
     """
-    parts, columns, first = part_deficits(nats, models), list[Array](), 0
+    best, both = usual(nats, models), np.concatenate([nats, nats[:, counterparts(models)]])
+    low, high = np.percentile(both, _QUARTILES, axis=0)
+    spread = np.maximum(0.5 * MAD_TO_SIGMA * (high - low), np.sqrt(np.maximum(best, 1.0)))
+    return np.asarray(best * (best - 2 * nats) / (2 * spread**2))
+
+
+def worst_parts(elsewhere: Array, models: Sequence[BodyModel]) -> IntArray:
+    """Return the index of the part of each limb of all people that is likeliest elsewhere, (T, n_limbs).
+
+    Args:
+        elsewhere: see `elsewhere_nats`, (T, P).
+        models: all people.
+    """
+    columns, first = list[IntArray](), 0
     for model in models:
-        columns += [parts[:, first + limb.parts].max(axis=1) for limb in limbs(model)]
+        columns += [first + limb.parts[elsewhere[:, first + limb.parts].argmax(axis=1)] for limb in limbs(model)]
         first += len(model.parts)
-    more = unexplained - np.median(unexplained, axis=0)
-    return np.stack(columns, axis=1) + UNEXPLAINED_SHARE * more
+    return np.stack(columns, axis=1)
+
+
+def worst_views(nats: Array, models: Sequence[BodyModel]) -> IntArray:
+    """Return the index of the view in which each part lacks most of its usual evidence there, (T, P).
+
+    Args:
+        nats: evidence in each view, (T, V, P).
+        models: all people.
+    """
+    lacks = np.stack([part_deficits(of_view, models) for of_view in nats.transpose(1, 0, 2)])
+    return np.asarray(lacks.argmax(axis=0))
 
 
 def counterparts(models: Sequence[BodyModel]) -> IntArray:

@@ -139,45 +139,6 @@ def add_score(
 
 
 @njit(**NO_REFCOUNT)
-def add_unexplained(
-    colors: Image, labels: NDArray[np.uint8], background: FloatArray, tables: RegionTables, axes: Array,
-    parts: IntArray, limbs: IntArray, nats: Array,
-) -> None:  # fmt: skip
-    """Add the evidence for each limb, (n_limbs,), nats, in cells near it that no body covers.
-
-    Args:
-        colors: of the cells.
-        labels: see `Canvas`.
-        background: log density of each cell as background.
-        tables: of the view.
-        axes: ends of the axis of each part of a limb, its reach, and the share of a cell in a sample there; u0, v0, u1,
-            v1, cells, and `share` over its squared nearness, (n, 6).
-        parts: index of each of these parts, (n,).
-        limbs: index of the limb of each, in order, (n,).
-        nats: added to.
-    """
-    height, width = labels.shape
-    for i in range(axes.shape[0]):
-        u0, v0, u1, v1, reach, weight = axes[i]
-        limb, p = limbs[i], parts[i]
-        du, dv = u1 - u0, v1 - v0
-        square = du * du + dv * dv + 1e-9
-        top, bottom = max(0.0, np.floor(min(v0, v1) - reach)), min(height - 1.0, np.ceil(max(v0, v1) + reach))
-        left, right = max(0.0, np.floor(min(u0, u1) - reach)), min(width - 1.0, np.ceil(max(u0, u1) + reach))
-        if top > bottom or left > right:
-            continue
-        for v in range(int(top), int(bottom) + 1):
-            for u in range(int(left), int(right) + 1):
-                if labels[v, u]:
-                    continue
-                along = min(1.0, max(0.0, ((u - u0) * du + (v - v0) * dv) / square))
-                if (u - u0 - along * du) ** 2 + (v - v0 - along * dv) ** 2 < reach * reach:
-                    t = tables.trust[p, ratio_bin(tables, p, bin_of(colors, v, u), background[v, u])]
-                    if t > 0.0:
-                        nats[limb] += weight * t
-
-
-@njit(**NO_REFCOUNT)
 def fill_limb_images(
     colors: Image, share: float, background: FloatArray, tables: RegionTables, parts: IntArray, images: LimbImages
 ) -> None:

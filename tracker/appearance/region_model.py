@@ -15,18 +15,17 @@ import numpy as np
 from tracker.appearance.background_density import BackgroundDensity
 from tracker.appearance.part_drawing import Canvas, draw_bodies, grown
 from tracker.appearance.region_cells import CellView, cells_of
-from tracker.appearance.region_kernels import RegionTables, add_score, add_unexplained
-from tracker.body.limbs import limbs
+from tracker.appearance.region_kernels import RegionTables, add_score
 from tracker.body.model import BodyModel, PosedBody
-from tracker.contours.occluding_contours import part_poses
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.arrays import Array, FloatArray, IntArray
-from tracker.geometry.cameras import NEAR_PLANE_M, Camera
+from tracker.geometry.arrays import Array, FloatArray
+from tracker.geometry.cameras import Camera
 
 SAMPLE_M = 0.07
 """Side of an independent sample on the body, metres: nearer cells show the same cloth in the same light."""
 REACH_M = 0.25
-"""How far around a part its surroundings reach, metres: a limb that is lost lies mostly that near."""
+"""How far around a part its surroundings reach, metres: a limb that is lost lies mostly that near. Regions of evidence
+reach as far around the joints, for flesh and the error of a prediction two frames ahead."""
 OCCUPIED_M = 0.12
 """Distance from the bodies up to which cells may show people, metres: hair and cloth, and the error of a pose."""
 
@@ -41,14 +40,12 @@ class RegionFrame(NamedTuple):
 
 
 class RegionScore(NamedTuple):
-    """Region evidence of posed bodies on a frame. Parts and limbs are counted through all bodies."""
+    """Region evidence of posed bodies on a frame. Parts are counted through all bodies."""
 
     nats: Array
     """Evidence for each part in each view, (V, P), nats."""
     samples: Array
     """Independent samples of each part that each view shows, (V, P)."""
-    unexplained: Array
-    """Evidence for the parts of each limb in cells near it that no body covers, (V, n_limbs), nats."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,29 +79,14 @@ class RegionModel:
 
     def score(self, frame: RegionFrame, bodies: Sequence[PosedBody]) -> RegionScore:
         """Return the evidence of each part in each view, for bodies of the models that were learnt."""
-        drawn = self._draw(frame, bodies)
-        unexplained = np.zeros((len(frame.views), sum(len(limbs(m)) for m in self.models)))
-        ends, parts, of_limb = _limb_axes(bodies)
-        for i, (view, canvas) in enumerate(zip(frame.views, drawn, strict=True)):
-            if view is None or canvas is None:
-                continue
-            depths, share = view.camera.depths(ends), sample_share(view.camera)
-            shown = depths.min(axis=1) > NEAR_PLANE_M
-            depth, px = depths[shown].mean(axis=1), view.camera.project(ends[shown]).reshape(-1, 4)
-            reach, weight = REACH_M * view.camera.K[0, 0] / depth, share * depth**2
-            axes = np.concatenate([px, reach[:, None], weight[:, None]], axis=1)
-            add_unexplained(
-                view.colors, canvas.labels, frame.background[i], self.tables.of_view(i), axes, parts[shown],
-                of_limb[shown], unexplained[i],
-            )  # fmt: skip
-        return RegionScore(*self._parts(frame, drawn), unexplained)
+        return RegionScore(*self._parts(frame, self._draw(frame, bodies)))
 
     @staticmethod
     def _draw(frame: RegionFrame, bodies: Sequence[PosedBody]) -> list[Canvas | None]:
         return [None if view is None else draw_bodies(bodies, view) for view in frame.views]
 
     def _parts(self, frame: RegionFrame, drawn: Sequence[Canvas | None]) -> tuple[Array, Array]:
-        """Return the first two fields of a score."""
+        """Return the fields of a score."""
         nats, samples = np.zeros((2, len(frame.views), self.tables.trust.shape[1]))
         for i, (view, canvas) in enumerate(zip(frame.views, drawn, strict=True)):
             if view is not None and canvas is not None:
@@ -122,20 +104,3 @@ def background_of(known: BackgroundDensity, view: CellView, canvas: Canvas) -> F
 def sample_share(camera: Camera) -> float:
     """Return the share of a cell in an independent sample at a depth of 1 m, per m^2."""
     return float(1 / (camera.K[0, 0] * camera.K[1, 1] * SAMPLE_M**2))
-
-
-def _limb_axes(bodies: Sequence[PosedBody]) -> tuple[Array, IntArray, IntArray]:
-    """Return the ends of the axes of all parts of limbs in the world, (n, 2, 3), their parts and limbs, (n,) each."""
-    ends, parts, of_limb, first, n = [], [], [], 0, 0
-    for body in bodies:
-        model, Ts = body.model, part_poses([body])
-        for limb in limbs(model):
-            for p in limb.parts:
-                half = np.array([0.0, 0.0, model.shapes[p].half_axes[2]])
-                both = model.centers_part[p] + np.array([-half, half])
-                ends.append(both @ Ts[p, :3, :3].T + Ts[p, :3, 3])
-                parts.append(first + int(p))
-                of_limb.append(n)
-            n += 1
-        first += len(model.parts)
-    return np.array(ends), np.array(parts), np.array(of_limb)

@@ -43,7 +43,7 @@ JOINT_M = 0.005
 millimetres."""
 OTHER_BODY_M = 0.015
 """Standard deviation of a known joint of a body of other sizes, metres: joints of people and those of the built-in body
-differ by 1 to 4 cm (docs/accuracy.md, Joint centres)."""
+differ by 1 to 4 cm (docs/decisions.md, Offsets of joint centres)."""
 CLOSE_ENOUGH = 1e-3
 """Step below which a pose that is shown or filtered is final, rad or m: no joint moves by more than a millimetre."""
 

@@ -34,7 +34,7 @@ class ContourNoise:
     """Standard deviation across the contour, working px."""
     length_px: float = 120.0
     """Length of contour along which the error is the same, working px: edges of clothes and wrong shapes are. It is
-    calibrated on five simulated people, and checked on five others (docs/accuracy.md)."""
+    calibrated on five simulated people, and checked on five others (docs/measurements.md)."""
     joint_share: float = 0.012
     """Standard deviation of the place of a joint on its parent along each axis, fraction of the body height, as in
     `acquisition.size_parameters.SizePriors`; of the root, in its own part. 0 if the body is exactly that of the

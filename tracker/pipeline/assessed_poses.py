@@ -9,9 +9,10 @@ from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.consensus import Consensus
 from tracker.geometry.arrays import Array
+from tracker.pipeline.run_repair import RepairedPose
 from tracker.store.records import PoseRecord
 from tracker.tracking.confidence import classify_limbs, is_uncertainty, probabilities, uncertain, worst
-from tracker.tracking.pose_errors import limb_odds, point_covariances
+from tracker.tracking.pose_errors import elsewhere_odds, limb_odds, point_covariances
 from tracker.tracking.run_confidence import log_odds
 from tracker.tracking.view_tracks import FrameTracks
 
@@ -30,11 +31,12 @@ def assessed_by_features(model: BodyModel, pose: PoseRecord, features: Array, is
 
 def assessed_by_tracks(
     model: BodyModel, pose: PoseRecord, found: Consensus, tracks: FrameTracks, is_ambiguous: bool,
-    features: Array | None = None,
+    features: Array | None = None, repaired: RepairedPose | None = None,
 ) -> PoseRecord:  # fmt: skip
     """Return a pose with the errors of its points, and the status that follows from them.
 
-    Near the start, where tracks have had no time to come apart, the features of its limbs count, too.
+    Near the start, tracks have had no time to come apart. There, the features of its limbs count where the colours of
+    the run are not known.
 
     Args:
         model: the body.
@@ -43,26 +45,32 @@ def assessed_by_tracks(
         tracks: the tracks.
         is_ambiguous: whether other poses are about as good.
         features: of its limbs, as above; None where they are not known.
+        repaired: how well it agrees with the colours of the run; None where that is not known.
     """
     errors = point_covariances(found.covariances)
     # For each limb the view without which it is farthest away.
     of_limbs = [found.distances_m[:, np.isin(model.point_parts, x.parts)].max(axis=1) for x in limbs(model)]
-    without = [tracks.without[int(distances.argmax())] for distances in of_limbs]
+    reasons = [f" without {tracks.without[int(distances.argmax())]}" for distances in of_limbs]
     odds = limb_odds(model, errors)
-    if features is not None and not tracks.has_history:
+    if repaired is not None:
+        by_colors = elsewhere_odds(repaired.elsewhere)
+        for i in np.flatnonzero(by_colors[:, 0] > odds[:, 0]):
+            reasons[i] = f": {repaired.against[i]}"
+        odds = np.maximum(odds, by_colors)
+    elif features is not None and not tracks.has_history:
         odds = np.maximum(odds, log_odds(features))
-    return _classified(model, replace(pose, errors=errors), odds, without, is_ambiguous)
+    return _classified(model, replace(pose, errors=errors), odds, reasons, is_ambiguous)
 
 
 def _classified(
-    model: BodyModel, pose: PoseRecord, odds: Array, without: Sequence[str], is_ambiguous: bool
+    model: BodyModel, pose: PoseRecord, odds: Array, reasons: Sequence[str], is_ambiguous: bool
 ) -> PoseRecord:
     """Return a pose with the status that follows from the log odds that its limbs are off and lost, (n_limbs, 2)."""
     status = classify_limbs(odds)
     if is_ambiguous:
         status = worst([status, "doubtful"])
     remarks, worst_limb = [r for r in pose.remark.split(", ") if r and not is_uncertainty(r)], int(odds[:, 1].argmax())
-    if status != "good" and (without[worst_limb] or not remarks):
-        remarks = [uncertain(limbs(model)[worst_limb].name, without[worst_limb]), *remarks]
+    if status != "good" and (reasons[worst_limb] or not remarks):
+        remarks = [uncertain(limbs(model)[worst_limb].name, reasons[worst_limb]), *remarks]
     lost = tuple(map(float, probabilities(odds[:, 1])))
     return replace(pose, status=status, limbs_lost=lost, remark=", ".join(remarks))

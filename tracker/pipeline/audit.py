@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tracker.body.model import PosedBody
 from tracker.compute.progress import Report, unreported
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
@@ -16,11 +17,14 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
 from tracker.pipeline.assessed_poses import assessed_by_tracks
 from tracker.pipeline.methods import make_tracker
+from tracker.pipeline.run_repair import RepairedPose, RunRepair
 from tracker.pipeline.track_session import outward
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
+from tracker.tracking.estimation.settings import EstimationSettings
+from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackerSettings, TrackingRun
 from tracker.tracking.view_tracks import FrameTracks, left_out, tracks_without_views
@@ -40,7 +44,7 @@ class AuditPlan:
     settings: TrackerSettings
     """Of the tracker."""
     takes_consensus: bool = False
-    """Whether the consensus of the tracks takes the place of the poses; else they stay as they are."""
+    """Whether the consensus of the tracks takes the place of the poses, and limbs are searched; else they stay."""
 
 
 def audit_poses(
@@ -84,30 +88,69 @@ def audit_poses(
             done += frame not in tracks
             tracks.setdefault(frame, found)
             report("checking each camera", done / total)
+    poses = {i: _agreed(session, plan, i, own, tracks) for i, own in zip(plan.people, records, strict=True)}
+    repaired = _repaired(session, store, observer, plan, poses, tracks, report)
     return [
-        row
-        for person, own in zip(plan.people, records, strict=True)
+        _row(session, store, person, frame, own[frame], tracks[frame][person], repaired.get(person, {}).get(frame))
+        for person, own in poses.items()
         for frame in sorted(tracks)
-        if (row := _row(session, store, plan, person, frame, own[frame], tracks[frame][person])) is not None
+        if not own[frame].keyframe
     ]
 
 
+def _agreed(
+    session: Session, plan: AuditPlan, person: int, records: Mapping[int, PoseRecord],
+    tracks: Mapping[int, Mapping[int, FrameTracks]],
+) -> dict[int, PoseRecord]:  # fmt: skip
+    """Return the poses of a person that are assessed, by frame: as they are stored, or the consensus of the tracks."""
+    model, out = session.people[person].model, {}
+    for frame, of_people in tracks.items():
+        record, own = records[frame], of_people[person]
+        if plan.takes_consensus and not record.keyframe:
+            trust = np.vstack([np.ones(own.trust.shape[1]), own.trust])
+            record = replace(record, values=consensus(model, record.values, own.poses, trust).pose)
+        out[frame] = record
+    return out
+
+
+def _repaired(
+    session: Session, store: AnnotationStore, observer: Observer, plan: AuditPlan,
+    records: Mapping[int, Mapping[int, PoseRecord]], tracks: Mapping[int, Mapping[int, FrameTracks]], report: Report,
+) -> Mapping[int, Mapping[int, RepairedPose]]:  # fmt: skip
+    """Compare the poses with the colours of the whole run; repair them where the consensus takes their place."""
+    models, frames = [p.model for p in session.people], sorted(tracks)
+    if len(frames) <= HISTORY_FRAMES or not isinstance(plan.settings, EstimationSettings):
+        return {}  # A few frames show nothing that is usual.
+    others = _others(session, store, plan.people, frames)
+    stay = {
+        k: {**others.get(k, {}), **{i: own[k].values for i, own in records.items() if own[k].keyframe}} for k in frames
+    }
+    subjects = Subjects.of(models, plan.people, None, stay)
+    in_order = [records[i] for i in plan.people]
+    bodies = {
+        k: tuple(map(PosedBody, models, _poses(session, plan.people, in_order, k, others.get(k, {})))) for k in frames
+    }
+    by_person = {i: {k: tracks[k][i] for k in frames} for i in plan.people}
+    repair = RunRepair(observer, subjects, plan.settings, bodies, by_person, searches=plan.takes_consensus)
+    found: Mapping[int, Mapping[int, RepairedPose]] = {}
+    for step in repair.steps():
+        report("comparing with the colours of the run", step.done / step.total)
+        found = step.found or found
+    return found
+
+
 def _row(
-    session: Session, store: AnnotationStore, plan: AuditPlan, person: int, frame: int, record: PoseRecord,
-    tracks: FrameTracks,
-) -> PoseChange | None:  # fmt: skip
-    """Return the row of a pose with its assessment, and its alternatives as they are; None for a keyframe."""
-    if record.keyframe:
-        return None
-    model, n_limbs = session.people[person].model, tracks.trust.shape[1]
-    if plan.takes_consensus:
-        found = consensus(model, record.values, tracks.poses, np.vstack([np.ones(n_limbs), tracks.trust]))
-        record = replace(record, values=found.pose)
-    else:
-        found = agreement(model, record.values, tracks.poses, tracks.trust)
-    name = session.people[person].name
+    session: Session, store: AnnotationStore, person: int, frame: int, record: PoseRecord, tracks: FrameTracks,
+    repaired: RepairedPose | None,
+) -> PoseChange:  # fmt: skip
+    """Return the row of a pose with its assessment, and its alternatives as they are."""
+    name, model = session.people[person].name, session.people[person].model
+    trust = tracks.trust
+    if repaired is not None:
+        record, trust = replace(record, values=repaired.pose), trust * repaired.trust
+    found = agreement(model, record.values, tracks.poses, trust)
     alternatives = tuple(store.alternatives(name, frame))
-    assessed = assessed_by_tracks(model, record, found, tracks, len(alternatives) > 0)
+    assessed = assessed_by_tracks(model, record, found, tracks, len(alternatives) > 0, None, repaired)
     return PoseChange(name, frame, assessed, alternatives)
 
 

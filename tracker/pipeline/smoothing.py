@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.errors import DamagedStoreError
-from tracker.fitting.consensus import Consensus, consensus
+from tracker.fitting.consensus import Consensus, agreement, consensus
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
 from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks
+from tracker.pipeline.run_repair import RepairedPose
 from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.confidence import (
     PoseQuality,
@@ -37,7 +38,9 @@ class TrackedRows:
         self._covariances: dict[int, NDArray[np.float32]] = {}  # upper triangle: half of the memory
         self._features: dict[int, NDArray[np.float32]] = {}  # of frames whose limbs were assessed
         self._unseen = set[int]()  # frames on which no edge is near the body
-        self._tracks: dict[int, FrameTracks] = {}
+        self.tracks: dict[int, FrameTracks] = {}
+        """By frame, the poses by tracks without a view each."""
+        self._repaired: Mapping[int, RepairedPose] = {}
 
     def add(self, change: PoseChange, covariance: Array, quality: PoseQuality | None) -> None:
         """Add a row, or replace that of the same frame.
@@ -59,12 +62,11 @@ class TrackedRows:
 
     def add_tracks(self, frame: int, tracks: FrameTracks) -> None:
         """Add the poses of a frame by tracks without a view each."""
-        self._tracks[frame] = tracks
+        self.tracks[frame] = tracks
 
-    @property
-    def has_tracks(self) -> bool:
-        """Whether there are poses by tracks without a view each."""
-        return len(self._tracks) > 0
+    def add_repaired(self, poses: Mapping[int, RepairedPose]) -> None:
+        """Add the poses by frame after their repair."""
+        self._repaired = poses
 
     def record(self) -> dict[str, list[str]]:
         """Return covariances and features by frame as texts, for a run that is resumed later."""
@@ -102,8 +104,12 @@ class TrackedRows:
             smooth: whether the poses are smoothed.
         """
         model, active = subjects.models[person], subjects.active_dofs[person]
-        agreed = {f: self._consensus(model, f, active) for f in self._changes.keys() & self._tracks.keys()}
-        tracked, self._changes = self._changes, self._with_poses({f: c.pose for f, c in agreed.items()})
+        agreed = {f: self.consensus(model, f, active) for f in self._changes.keys() & self.tracks.keys()}
+        for frame in agreed.keys() & self._repaired.keys():
+            tracks, repaired = self.tracks[frame], self._repaired[frame]
+            trust = tracks.trust * repaired.trust
+            agreed[frame] = agreement(model, repaired.pose, tracks.poses, trust)
+        tracked, self._changes = self._changes, self._with_poses(model, agreed)
         smoothed = self.smoothed(subjects, person, fps) if smooth else [*self._changes.values()]
         self._changes = tracked
         features = self.run_features(model, smoothed)
@@ -112,27 +118,32 @@ class TrackedRows:
             assert change.pose is not None
             pose, frame, is_ambiguous = change.pose, change.frame, len(change.alternatives) > 0
             if frame in agreed and frame not in self._unseen:
-                tracks, own = self._tracks[frame], features.get(frame)
-                pose = assessed_by_tracks(model, pose, agreed[frame], tracks, is_ambiguous, own)
+                tracks, own = self.tracks[frame], features.get(frame)
+                pose = assessed_by_tracks(
+                    model, pose, agreed[frame], tracks, is_ambiguous, own, self._repaired.get(frame)
+                )
             elif frame in features:
                 pose = assessed_by_features(model, pose, features[frame], is_ambiguous)
             out.append(replace(change, pose=pose))
         return out
 
-    def _consensus(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Consensus:
+    def consensus(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Consensus:
         """Return the consensus of the tracked pose of a frame and of those by tracks without a view each."""
-        pose, tracks = self._changes[frame].pose, self._tracks[frame]
+        pose, tracks = self._changes[frame].pose, self.tracks[frame]
         assert pose is not None
         lost = np.array(pose.limbs_lost) if pose.limbs_lost else np.zeros(tracks.trust.shape[1])
         return consensus(model, pose.values, tracks.poses, np.vstack([1 - lost, tracks.trust]), active)
 
-    def _with_poses(self, poses: Mapping[int, Array]) -> dict[int, PoseChange]:
-        """Return the rows with other poses, (n_values,) each, on some frames."""
+    def _with_poses(self, model: BodyModel, agreed: Mapping[int, Consensus]) -> dict[int, PoseChange]:
+        """Return the rows with the consensus of the tracks, and what of it is lost, on some frames."""
         out = dict(self._changes)
-        for frame, values in poses.items():
+        for frame, found in agreed.items():
             change = out[frame]
             assert change.pose is not None
-            out[frame] = replace(change, pose=replace(change.pose, values=values))
+            pose = replace(change.pose, values=found.pose)
+            if frame in self._repaired and frame not in self._unseen:
+                pose = assessed_by_tracks(model, pose, found, self.tracks[frame], False)
+            out[frame] = replace(change, pose=pose)
         return out
 
     def run_features(self, model: BodyModel, smoothed: Sequence[PoseChange]) -> dict[int, Array]:

@@ -5,13 +5,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
+from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
+from tracker.pipeline.run_repair import RepairStep, RunRepair
 from tracker.pipeline.smoothing import TrackedRows
 from tracker.pipeline.tracked_changes import StoredPerson, tracked_changes
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
+from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import Tracker, TrackingRun
@@ -36,9 +39,9 @@ class AuditStep(NamedTuple):
     total: int
 
 
-Step = PoseEstimate | BackwardStep | AuditStep | SmoothedRows
-"""A step of a run: a tracked frame of the first pass, a visit to a frame of the second, a frame of the audit, or all
-smoothed poses."""
+Step = PoseEstimate | BackwardStep | AuditStep | RepairStep | SmoothedRows
+"""A step of a run: a tracked frame of the first pass, a visit to a frame of the second, a frame of the audit or of the
+repair, or all smoothed poses."""
 
 
 class PoseWriter(Protocol):
@@ -139,10 +142,10 @@ def _with_starts(legs: Sequence[Leg]) -> Subjects:
 class TrackSession:
     """One run of a tracker and its results so far. It has one leg, or two that go out from a start.
 
-    `first_pass`, `backward_pass`, `audit` and `smoothing` do the work in this order. Another thread than the one that
-    reads results may drain them. Each step is handed to `take` before the next one is asked for: its caller holds
-    whatever lock guards the results and the writer. A run stops where its steps are no longer asked for, and goes on
-    where they are again.
+    `first_pass`, `backward_pass`, `audit`, `repair` and `smoothing` do the work in this order. Another thread than the
+    one that reads results may drain them. Each step is handed to `take` before the next one is asked for: its caller
+    holds whatever lock guards the results and the writer. A run stops where its steps are no longer asked for, and goes
+    on where they are again.
     """
 
     def __init__(
@@ -207,10 +210,11 @@ class TrackSession:
         return next((a, b) for a, b in known if min(a, b) <= frame <= max(a, b))
 
     def steps(self) -> Iterator[Step]:
-        """Run both passes, audit and smooth the poses."""
+        """Run both passes, audit, repair and smooth the poses."""
         yield from self.first_pass()
         yield from self.backward_pass()
         yield from self.audit()
+        yield from self.repair()
         yield from self.smoothing()
 
     def first_pass(self) -> Iterator[PoseEstimate]:
@@ -242,10 +246,26 @@ class TrackSession:
                 done += 1
                 yield AuditStep(frame, tracks, done, total)
 
+    def repair(self) -> Iterator[RepairStep]:
+        """Compare the consensus of the tracks with the colours of the whole run, and search limbs; see `run_repair`."""
+        settings, subjects = self.tracker.settings, self._held
+        frames = [k for leg in self.legs for k in leg.whole if all(k in r.tracks for r in self._rows.values())]
+        if not frames or not isinstance(settings, EstimationSettings):
+            return
+        bodies = {}
+        for k in frames:
+            poses = [*self.tracked[k].poses]
+            for i, rows in self._rows.items():
+                if i not in subjects.keyframes_at(k):
+                    poses[i] = rows.consensus(subjects.models[i], k, subjects.active_dofs[i]).pose
+            bodies[k] = tuple(PosedBody(m, pose) for m, pose in zip(subjects.models, poses, strict=True))
+        tracks = {i: rows.tracks for i, rows in self._rows.items()}
+        yield from RunRepair(self.observer, subjects, settings, bodies, tracks).steps()
+
     def smoothing(self) -> Iterator[SmoothedRows]:
         """Take the consensus of all tracks, smooth it and assess it, as a single step: as a whole or not at all."""
         smooth = self.tracker.settings.smooth
-        if smooth or any(rows.has_tracks for rows in self._rows.values()):
+        if smooth or any(rows.tracks for rows in self._rows.values()):
             held, fps = self._held, self.legs[0].run.fps
             found = (rows.finished(held, person, fps, smooth) for person, rows in self._rows.items())
             yield SmoothedRows(tuple(change for changes in found for change in changes))
@@ -265,6 +285,10 @@ class TrackSession:
         if isinstance(step, AuditStep):
             for person, tracks in step.tracks.items():
                 self._rows[person].add_tracks(step.frame, tracks)
+            return
+        if isinstance(step, RepairStep):
+            for person, poses in (step.found or {}).items():
+                self._rows[person].add_repaired(poses)
             return
         self._waiting += self._rows_of([step], self.subjects.tracked)
         self._n_waiting += 1

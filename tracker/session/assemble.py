@@ -34,7 +34,7 @@ from tracker.validation import same_form
 
 T = TypeVar("T")
 
-DEFAULT_MODEL = "gavrila34"
+DEFAULT_MODEL = "gavrila38"
 VIDEO_SUFFIXES = (".mp4", ".mov", ".mkv", ".avi", ".webm")
 """By which files of a folder are taken for videos."""
 

@@ -386,9 +386,9 @@ def reason(found: PoseQuality) -> str:
     return uncertain(found.limbs[int(found.log_odds.argmax())].name)
 
 
-def uncertain(limb: str, without: str = "") -> str:
-    """Return the reason against a pose of which the limb of a name may be off: it is elsewhere without some view."""
-    return f"{limb_display_name(limb)}{_UNCERTAIN}" + (f" without {without}" if without else "")
+def uncertain(limb: str, reason: str = "") -> str:
+    """Return the remark that the limb of a name may be off, with the reason, such as ` without LEFT`."""
+    return f"{limb_display_name(limb)}{_UNCERTAIN}{reason}"
 
 
 def is_uncertainty(reason: str) -> bool:

@@ -14,6 +14,10 @@ from tracker.tracking.run_confidence import RUN_MODEL
 
 SHARED_M = 0.010
 """Standard deviation along each axis of the error that all views share, metres."""
+SELDOM_NATS = 10.0
+"""How much likelier the colours of the run must find a limb elsewhere until it is off as likely as not, nats. Of 1,000
+simulated limbs in their place, none had more; of 20 that were put elsewhere, all had
+(`tests/benchmarks/region_evidence.py --displaced`)."""
 _OFF_M = 0.10
 """A limb is off where one of its joints is farther from its true place, metres."""
 
@@ -35,6 +39,15 @@ def limb_odds(model: BodyModel, covariances: Array) -> Array:
     sigmas = np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 3)
     worst = np.array([sigmas[np.isin(model.point_parts, limb.parts)].max() for limb in limbs(model)])
     return np.asarray(logit(beyond(_OFF_M, worst))[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
+
+
+def elsewhere_odds(nats: Array) -> Array:
+    """Return the log odds that each limb is off and lost, (n_limbs, 2), by the colours of the run.
+
+    Args:
+        nats: how much likelier each limb is elsewhere, (n_limbs,); see `region_deficit.elsewhere_nats`.
+    """
+    return np.asarray((nats - SELDOM_NATS)[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
 
 
 def beyond(radius_m: float, sigma_m: Array) -> Array:

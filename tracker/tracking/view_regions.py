@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tracker.appearance.region_model import REACH_M
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import Contour
@@ -14,19 +15,17 @@ from tracker.geometry.cameras import NEAR_PLANE_M, Camera, Region
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.images.working_view import region_around
 
-_MARGIN_M = 0.25
-"""Margin around the joints: flesh and the error of a prediction two frames ahead."""
 _MIN_MARGIN_M = 0.19
 """A region chosen ahead is used if at least this margin is left when the frame is predicted again."""
 
 
-def regions(cameras: Sequence[Camera], bodies: Sequence[PosedBody], margin_m: float = _MARGIN_M) -> list[Region | None]:
+def regions(cameras: Sequence[Camera], bodies: Sequence[PosedBody], margin_m: float = REACH_M) -> list[Region | None]:
     """Return the region around all bodies in each view; None for the whole image."""
     points = np.concatenate([b.points_world for b in bodies])
     out: list[Region | None] = []
     for camera in cameras:
         depths = camera.depths(points)
-        if depths.min() < 2 * _MARGIN_M:  # too near for its contour to lie around the joints' images
+        if depths.min() < 2 * REACH_M:  # too near for its contour to lie around the joints' images
             out.append(None)
             continue
         margin = margin_m * camera.K[0, 0] / float(np.median(depths))

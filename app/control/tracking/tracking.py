@@ -19,6 +19,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.pipeline.methods import make_tracker
+from tracker.pipeline.run_repair import RepairStep
 from tracker.pipeline.track_session import AuditStep, Leg, SmoothedRows, Step, TrackSession, outward
 from tracker.pipeline.tracked_changes import StoredPerson
 from tracker.store.records import PoseChange
@@ -269,7 +270,7 @@ class Tracking:
                 run.session.take(step)
                 if isinstance(step, SmoothedRows):
                     self._show_finished(run)
-                elif isinstance(step, AuditStep):
+                elif isinstance(step, AuditStep | RepairStep):
                     track = replace(self._session_state.state.track, stage="audit", done=step.done, total=step.total)
                     self._session_state.set(track=replace(track, running=run.job.running))
                 elif isinstance(step, BackwardStep):

@@ -105,7 +105,7 @@ def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
         *bench_rows.crowds(read_crowd(SAMPLE.with_name("tango"), 25), Yardstick()),
     ]
     names = [r.name for r in rows]
-    assert len(set(names)) == len(names) == report.N_ROWS - 4  # all but the pipelines
+    assert len(set(names)) == len(names) == report.N_ROWS - 5  # all but the pipelines and the audited run
     assert {r.ratio for r in rows} == {2.0}
     assert all(r.must is not None and r.aim < r.must for r in rows if r.aim is not None)
 

@@ -4,6 +4,7 @@ from bodies import MODELS, with_center
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tracker.body.limbs import limbs
 from tracker.body.model import parts_of
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
@@ -226,6 +227,41 @@ def test_gavrila34_joints_turn_the_way_their_names_say(joint, degrees, moving, w
         np.testing.assert_array_equal(
             at(model, set_deg(model, **{joint: degrees}), "left_wrist"), at(model, model.neutral(), "left_wrist")
         )
+
+
+def test_gavrila38_is_gavrila34_with_feet():
+    model, plain = MODELS["gavrila38"], MODELS["gavrila34"]
+    assert model.n_dofs == 38
+    assert set(model.dof_names) - set(plain.dof_names) == {
+        f"{side}_ankle.{name}" for side in ("left", "right") for name in ("flexion", "inversion")
+    }
+    assert sorted(d for g in model.search_groups for d in g.dofs) == sorted(model.dof_names)
+    assert [x.name for x in limbs(model)] == ["head", "left_forearm", "right_forearm", "left_foot", "right_foot"]
+    assert [len(x.parts) for x in limbs(model)] == [1, 3, 3, 3, 3]
+    values = np.random.default_rng(0).normal(0, 0.3, plain.n_dofs)
+    posed = model.neutral()
+    posed[[model.dof_names.index(n) for n in plain.dof_names]] = values
+    for name in plain.point_names:
+        np.testing.assert_allclose(at(model, posed, name), at(plain, values, name), atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize(("side", "inwards"), [("left", -1.0), ("right", 1.0)])
+def test_gavrila38_feet_turn_the_way_their_names_say(side, inwards):
+    model = MODELS["gavrila38"]
+    foot = model.part_index[f"{side}_foot"]
+
+    def turned(**angles):
+        values = set_deg(model, **{f"{side}_ankle__{name}": angle for name, angle in angles.items()})
+        R = model.kinematics(values).Ts_world_part[foot, :3, :3]
+        return at(model, values, f"{side}_toe") - at(model, values, f"{side}_ankle"), -R[:, 2]
+
+    toe, sole = turned()
+    assert toe[0] > 0.1 * model.height_m
+    raised, _ = turned(flexion=20)  # dorsiflexion
+    assert raised[2] - toe[2] > 0.03 * model.height_m
+    adducted, inverted = turned(inversion=25)  # the sole looks inwards, and the toes point inwards
+    assert (inverted - sole)[1] * inwards > 0.2
+    assert (adducted - toe)[1] * inwards > 0.02 * model.height_m
 
 
 @pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])

@@ -6,7 +6,7 @@ from tracker.body.dimensions import dimensions_of, stature_m, with_dimensions, w
 from tracker.formats.model_toml import load_model
 
 
-@pytest.mark.parametrize("name", ["gavrila22", "gavrila22_cones", "gavrila34", "knossow54"])
+@pytest.mark.parametrize("name", ["gavrila22", "gavrila22_cones", "gavrila34", "gavrila38", "knossow54"])
 def test_a_preset_is_as_tall_as_its_height(name):
     assert stature_m(load_model(name, 1.6)) == pytest.approx(1.6, rel=0.01)
 

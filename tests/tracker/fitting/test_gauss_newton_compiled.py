@@ -55,7 +55,7 @@ def assert_same(found, expected):
     np.testing.assert_allclose(found.hessian, expected.hessian, rtol=1e-5, atol=1e-5 * abs(expected.hessian).max())
 
 
-@pytest.fixture(scope="module", params=["gavrila22", "gavrila34"])
+@pytest.fixture(scope="module", params=["gavrila22", "gavrila38"])
 def staged(request):
     return Staged(load_model(request.param), 4)
 

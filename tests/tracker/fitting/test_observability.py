@@ -153,7 +153,7 @@ def test_finite_where_a_part_surrounds_the_camera():
 
 @pytest.mark.slow
 def test_predicted_and_real_errors_of_a_person_that_nothing_was_fitted_to(tmp_path):
-    """One of the people that docs/accuracy.md checks; `tests/benchmarks/observability.py` has all of them."""
+    """One of the people that docs/measurements.md checks; `tests/benchmarks/observability.py` has all of them."""
     session = simulate(tmp_path / "s", Simulation("exercise", n_frames=36, seed=9, person="broad_man"))
     model = session.people[0].model
     truth = read_pose_table(tmp_path / "s" / "truth.csv").values_for(model)

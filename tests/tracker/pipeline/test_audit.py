@@ -12,6 +12,7 @@ from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline import track_session
 from tracker.pipeline.assessed_poses import assessed_by_tracks
 from tracker.pipeline.methods import METHODS
+from tracker.pipeline.run_repair import RepairedPose, RunRepair
 from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.pipeline.track_session import AuditStep
 from tracker.session.session import load_session
@@ -66,6 +67,7 @@ def audited(monkeypatch):
             yield frame, {0: FrameTracks(poses, np.ones((4, 4)), ("FRONT", "RIGHT", "BACK", "LEFT"))}
 
     monkeypatch.setattr(track_session, "tracks_without_views", tracks)
+    monkeypatch.setattr(RunRepair, "steps", lambda repair: iter(()))
     return runs
 
 
@@ -147,8 +149,11 @@ def test_a_short_run_has_no_tracks_with_a_history(session, store, audited):
     assert store.pose("person", WRONG).values[0] == 0.5
 
 
-@pytest.mark.parametrize(("has_history", "status"), [(False, "lost"), (True, "good")])
-def test_near_the_start_the_features_of_a_limb_count_as_well(has_history, status):
+@pytest.mark.parametrize(
+    ("has_history", "elsewhere_nats", "status"),
+    [(False, None, "lost"), (True, None, "good"), (False, 2.0, "good"), (True, 8.0, "doubtful"), (True, 20.0, "lost")],
+)
+def test_near_the_start_features_count_where_the_colors_of_the_run_are_unknown(has_history, elsewhere_nats, status):
     model = load_model("gavrila22")
     pose, n = model.neutral(), len(limbs(model))
     tracks = FrameTracks(np.array([pose] * 3), np.ones((3, n)), ("a", "b", "c"), has_history)
@@ -156,4 +161,14 @@ def test_near_the_start_the_features_of_a_limb_count_as_well(has_history, status
     features[1] = [3, 1, -2, 0, 1, 0, 0, 0]  # of a limb that is lost
     record = PoseRecord(pose, ("tracked",) * len(pose), 1)
     found = agreement(model, pose, tracks.poses, tracks.trust)
-    assert assessed_by_tracks(model, record, found, tracks, False, features).status == status
+    repaired = None
+    if elsewhere_nats is not None:
+        repaired = RepairedPose(
+            pose,
+            np.ones((3, n), np.bool_),
+            np.array([-5.0, elsewhere_nats, *[-5.0] * (n - 2)]),
+            ("hand elsewhere in A",) * n,
+        )
+    assessed = assessed_by_tracks(model, record, found, tracks, False, features, repaired)
+    assert assessed.status == status
+    assert assessed.remark.endswith(": hand elsewhere in A") is (repaired is not None and status != "good")

@@ -65,7 +65,7 @@ def test_videos_go_to_the_cameras_of_their_name(room):
     session = new(room)
     assert [(c.camera.name, c.footage.name) for c in session.cameras] == [("front", "front.mp4"), ("left", "left.mp4")]
     assert (session.fps, session.n_frames, session.up) == (30.0, 9, "z")
-    assert [(p.name, p.model.name, p.model.height_m) for p in session.people] == [("person", "gavrila34", 1.75)]
+    assert [(p.name, p.model.name, p.model.height_m) for p in session.people] == [("person", "gavrila38", 1.75)]
     with Recording(load_session(room / "s").cameras) as recording:
         assert len(recording.read(8)) == 2
 

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tracker.appearance.region_deficit import UNEXPLAINED_SHARE
 from tracker.appearance.region_model import RegionModel
 from tracker.body.limbs import Limb, limbs
 from tracker.body.model import BodyModel, PosedBody
@@ -19,9 +18,8 @@ from tracker.tracking.estimation.settings import EstimationSettings
 
 
 def limbs_in_doubt(model: BodyModel, table: PartTable) -> list[Limb]:
-    """Return the limbs of a pose to search by its table, largest deficit first; see `region_deficit.limb_deficits`."""
-    of_parts = [float(table.below_in_all[limb.parts].max()) for limb in limbs(model)]
-    return limbs_to_search(model, np.array(of_parts) + UNEXPLAINED_SHARE * table.beside.sum(axis=0))
+    """Return the limbs of a pose to search by its table, the likeliest elsewhere first."""
+    return limbs_to_search(model, np.array([table.elsewhere[limb.parts].max() for limb in limbs(model)]))
 
 
 def alternative_poses(

@@ -28,10 +28,6 @@ from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, Esti
 MIN_GAIN_NATS = 2 * CLEAR_NATS
 """Smallest gain for which a tracked pose is replaced, nats: the other is then 400 times more likely."""
 
-SEARCHED_NATS = 10.0
-"""Deficit from which a limb is searched, nats. 90% of the limbs that are off by more than 100 mm have more, and 32% of
-the others (tests/benchmarks/region_evidence.py, pooled over its three kinds of poses)."""
-
 
 class FrameEvidence(NamedTuple):
     """The evidence of a frame on which poses are compared."""
@@ -50,11 +46,17 @@ class Repair(NamedTuple):
     """The best pose of a person on a frame."""
 
     pose: Array
-    """Pose, (n_values,): the tracked one unless another is better by `MIN_GAIN_NATS`."""
+    """Pose, (n_values,): the tracked one unless a limb is better elsewhere by `MIN_GAIN_NATS`."""
     gain: float
-    """How much less the best pose costs than the tracked one, nats, at least 0."""
+    """How much less the best pose costs than the refined one with all limbs where they were tracked, nats, at least
+    0."""
     alternatives: tuple[Hypothesis, ...]
     """Poses about as good as the best, with a limb elsewhere, cheapest first."""
+
+    @property
+    def is_better(self) -> bool:
+        """Whether a limb is better elsewhere."""
+        return self.gain > MIN_GAIN_NATS
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +102,16 @@ class RegionScorer(PoseScorer):
         return with_body(self.bodies, self.person, PosedBody(self.bodies[self.person].model, pose))
 
 
-def limbs_to_search(model: BodyModel, deficits: Array) -> list[Limb]:
-    """Return the limbs of several parts whose deficits, (n_limbs,), nats, are large, largest first; see
-    `region_deficit.limb_deficits`."""
+def limbs_to_search(model: BodyModel, elsewhere: Array) -> list[Limb]:
+    """Return the limbs of several parts that are clearly likelier elsewhere, (n_limbs,), nats, the likeliest first; see
+    `region_deficit.elsewhere_nats`."""
     of_body = limbs(model)
-    return [of_body[i] for i in np.argsort(-deficits) if deficits[i] > SEARCHED_NATS and len(of_body[i].parts) > 1]
+    return [of_body[i] for i in np.argsort(-elsewhere) if elsewhere[i] > CLEAR_NATS and len(of_body[i].parts) > 1]
 
 
 def better_limbs(
     evidence: FrameEvidence, bodies: Bodies, person: int, settings: EstimationSettings, searched: Sequence[Limb],
-    others: Sequence[Array] = (),
+    others: Sequence[Array] = (), tried: Sequence[Limb] = (),
 ) -> Repair:  # fmt: skip
     """Refine the pose of a person without the prediction, and search limbs.
 
@@ -120,15 +122,18 @@ def better_limbs(
         settings: of the tracker.
         searched: the limbs to search, likeliest lost first; see `limbs_to_search`.
         others: poses whose limbs are tried as they are, such as those of the frames around, (n_values,) each.
+        tried: limbs that are only tried where others have them.
     """
     model, tracked = bodies[person].model, bodies[person].values
     plain = scorer_without_prediction(evidence.views, bodies, person, settings, evidence.part_colors)
     scorer = _with_regions(plain, evidence, bodies, person)
     fit = solver_of(model)(model, tracked, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
-    before = float(scorer.costs_with_priors(model, tracked[None])[0])
-    best, *rest = search_limbs(model, searched, scorer.scored(model, fit), others, scorer)
-    gain = max(0.0, before - best.cost)
-    return Repair(best.pose if gain > MIN_GAIN_NATS else tracked, gain, tuple(rest))
+    start = scorer.scored(model, fit)
+    unproposed = [x for x in tried if all(x is not s for s in searched)]
+    best, *rest = search_limbs(model, searched, start, others, scorer, unproposed)
+    gain = start.cost - best.cost
+    is_better = gain > MIN_GAIN_NATS
+    return Repair(best.pose if is_better else tracked, gain, tuple(rest) if is_better else (best, *rest))
 
 
 def _with_regions(

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from tracker.appearance.part_drawing import draw_bodies
 from tracker.appearance.region_cells import cells_of
-from tracker.appearance.region_deficit import UNEXPLAINED_SHARE
+from tracker.appearance.region_deficit import elsewhere_nats
 from tracker.appearance.region_learning import LearningFrame, learn_regions
 from tracker.appearance.region_model import RegionModel, RegionScore
-from tracker.body.limbs import Limb, display_name, limb_display_name, limbs
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.limbs import display_name
+from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.progress import Report, unreported
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, with_colors_only
@@ -50,8 +50,8 @@ class PartTable(NamedTuple):
     """Evidence of the colours below the usual of as many samples, (V, n_parts), nats; negative where it is above."""
     below_in_all: Array
     """Evidence of the colours in all views below the usual, (n_parts,), nats. A part that is hidden lacks it, too."""
-    beside: Array
-    """Evidence beside each limb that no part explains, above its median over the run, (V, n_limbs), nats."""
+    elsewhere: Array
+    """How much likelier each part is elsewhere, (n_parts,), nats; see `region_deficit.elsewhere_nats`."""
     outside: Array
     """Share of the part outside the silhouette, (V, n_parts)."""
     usual_outside: Array
@@ -82,9 +82,7 @@ class RunEvidence:
     rates: Array
     """Median evidence of each part, (V, P), nats per sample; NaN where no frame shows it."""
     nats: Array
-    """Median evidence of each part in all views, (P,), nats."""
-    beside: Array
-    """Median of the evidence beside each limb, (V, n_limbs), nats."""
+    """Evidence of each part in all views on each frame that was learnt from, (T, P), nats."""
     outside: Array
     """Median share of each part outside the silhouette, (V, P)."""
     contour_px: Array
@@ -98,11 +96,11 @@ class RunEvidence:
             np.where(is_shown, cells, np.nan)
             for cells in (self.rates * score.samples - score.nats, seen.outside, seen.contour_px)
         )
-        parts, of_limbs = _slices(self.known.models, person)
+        parts, total = parts_of(self.known.models, person), score.nats.sum(axis=0)
+        elsewhere = elsewhere_nats(np.vstack([self.nats, total]), self.known.models)[-1]
         return PartTable(
-            below[:, parts], (self.nats - score.nats.sum(axis=0))[parts],
-            (score.unexplained - self.beside)[:, of_limbs], outside[:, parts], self.outside[:, parts],
-            contour_px[:, parts], self.contour_px[:, parts],
+            below[:, parts], (np.median(self.nats, axis=0) - total)[parts], elsewhere[parts], outside[:, parts],
+            self.outside[:, parts], contour_px[:, parts], self.contour_px[:, parts],
         )  # fmt: skip
 
 
@@ -138,8 +136,8 @@ def learn_run(observer: Observer, frames: Sequence[tuple[int, Bodies]], report: 
     outside, contour_px = (
         np.where(is_shown, [getattr(s, name) for s in seen], np.nan) for name in ("outside", "contour_px")
     )
-    beside = np.array([s.unexplained for s in scores])
-    return RunEvidence(known, *map(_medians, (rates, nats.sum(axis=1), beside, outside, contour_px)))
+    medians = [_medians(cells) for cells in (rates, outside, contour_px)]
+    return RunEvidence(known, medians[0], nats.sum(axis=1), *medians[1:])
 
 
 def contradiction(model: BodyModel, table: PartTable, thetas_px: Array, views: Sequence[str]) -> Contradiction | None:
@@ -153,13 +151,8 @@ def contradiction(model: BodyModel, table: PartTable, thetas_px: Array, views: S
         thetas_px: outlier distance of each view, (V,), px of the footage.
         views: names of the views.
     """
-    names, of_body = [display_name(p.name) for p in model.parts], limbs(model)
-    below, beside = np.nan_to_num(table.below), UNEXPLAINED_SHARE * np.nan_to_num(table.beside)
-    if max(below.max(), beside.max()) > MIN_GAIN_NATS:
-        if beside.max() > below.max():
-            view, at = _largest(beside)
-            limb = of_body[at]
-            return Contradiction(_last_part(limb), view, _beside(limb, views[view]))
+    names, below = [display_name(p.name) for p in model.parts], np.nan_to_num(table.below)
+    if below.max() > MIN_GAIN_NATS:
         view, part = _largest(below)
         return Contradiction(part, view, f"{names[part]}: {_off(table, view, part)} in {views[view]}")
     hidden = np.where(np.isnan(table.below).all(axis=0), table.below_in_all, 0.0)
@@ -186,14 +179,6 @@ def _off(table: PartTable, view: int, part: int) -> str:
     if not outside - table.usual_outside[view, part] > 0.1:  # also where one is unknown
         return "its colours are not there"
     return "outside the person" if outside > 0.5 else f"{outside:.0%} outside the person"
-
-
-def _beside(limb: Limb, view: str) -> str:
-    return f"{limb_display_name(limb.name)}: its colours are where no part is in {view}"
-
-
-def _last_part(limb: Limb) -> int:
-    return int(limb.parts[-1])
 
 
 def _largest(cells: Array) -> tuple[int, int]:
@@ -230,10 +215,3 @@ def _medians(rows: Array) -> Array:
         if np.isfinite(column).any():
             out[at] = np.median(column[np.isfinite(column)])
     return out
-
-
-def _slices(models: Sequence[BodyModel], person: int) -> tuple[slice, slice]:
-    """Return the parts and the limbs of one person among those of all."""
-    counts = [(len(m.parts), len(limbs(m))) for m in models]
-    first = [sum(c[i] for c in counts[:person]) for i in (0, 1)]
-    return tuple(slice(f, f + n) for f, n in zip(first, counts[person], strict=True))  # type: ignore[return-value]

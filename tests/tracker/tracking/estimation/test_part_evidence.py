@@ -5,25 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tracker.body.limbs import limbs
 from tracker.formats.model_toml import load_model
 from tracker.tracking.estimation.alternative_poses import limbs_in_doubt
 from tracker.tracking.estimation.part_evidence import PartTable, contradiction, with_colors_only
 
 MODEL = load_model("gavrila34")
 PARTS = [p.name for p in MODEL.parts]
-LIMBS = [x.name for x in limbs(MODEL)]
 VIEWS = ("FRONT", "LEFT")
 THETAS_PX = np.array([20.0, 20.0])
-CALF, ARM = PARTS.index("left_calf"), LIMBS.index("right_forearm")
+CALF = PARTS.index("left_calf")
 
 
 def table(**cells):
     """An unobtrusive table, with cells by name, view and column."""
     n = len(PARTS)
-    usual = PartTable(
-        np.zeros((2, n)), np.zeros(n), np.zeros((2, len(LIMBS))), *(np.full((2, n), x) for x in (0.05, 0.05, 2.0, 2.0))
-    )
+    usual = PartTable(np.zeros((2, n)), np.zeros(n), np.zeros(n), *(np.full((2, n), x) for x in (0.05, 0.05, 2.0, 2.0)))
     for name, (at, value) in cells.items():
         getattr(usual, name)[at] = value
     return usual
@@ -59,11 +55,6 @@ def test_a_part_that_usually_lies_outside_is_not_called_so():
     assert said(found)[2] == "left calf: its colours are not there in LEFT"
 
 
-def test_colours_beside_a_limb_name_the_limb():
-    found = table(below=((1, CALF), 7.0), beside=((0, ARM), 20.0))
-    assert said(found) == ("right_forearm", 0, "right arm: its colours are where no part is in FRONT")
-
-
 def test_a_part_that_no_view_shows_is_missed_in_all():
     hidden = table(below=((slice(None), CALF), np.nan), below_in_all=(CALF, 12.0))
     assert said(hidden) == ("left_calf", None, "left calf: hidden in all views, which usually show it")
@@ -76,10 +67,10 @@ def test_contours_count_where_colours_say_nothing():
     assert said(table(contour_px=((0, CALF), 11.0))) is None
 
 
-def test_limbs_that_lack_their_colours_are_searched():
-    found = table(below_in_all=(CALF, 11.0), beside=((0, ARM), 30.0))
+def test_limbs_that_are_likelier_elsewhere_are_searched():
+    found = table(elsewhere=([CALF, PARTS.index("right_forearm")], (4.0, 9.0)))
     assert [x.name for x in limbs_in_doubt(MODEL, found)] == ["right_forearm", "left_calf"]
-    assert limbs_in_doubt(MODEL, table(below_in_all=(CALF, 9.0))) == []
+    assert limbs_in_doubt(MODEL, table(elsewhere=(CALF, 2.9))) == []
 
 
 def test_a_view_with_colours_alone_keeps_its_region(film_view):

@@ -1,0 +1,110 @@
+"""Measure what to expect on footage that no setting was chosen on: `python tests/benchmarks/unseen_people.py`.
+
+It films simulated people in motions and rooms that no other benchmark has, by a seed that none of them uses. Each body
+is acquired from the joints of frame 0. Then all are tracked without the audit and with it, as by `joint_errors.py`.
+After a change that was made because of these figures, they no longer serve: raise `SEED` and measure again.
+`--work DIR` keeps scenes and sessions.
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+from acquisition import Recording, new_session, quadrille
+from doc_tables import Conditions, add_write_option, check_places, show, table
+from joint_errors import HEADS, Compared, groups, measured
+
+from tracker.session.assemble import DEFAULT_MODEL
+from tracker.session.session import load_session
+from tracker.simulate import Simulation, simulate
+
+TABLES = ("unseen_people",)
+SEED = 1301
+"""Of rooms, motions and noise. Not used anywhere else."""
+N_FRAMES = 36
+
+
+class Scene(NamedTuple):
+    """A recording that no other benchmark has."""
+
+    motion: str
+    """One of `scenes.SCENES`."""
+    person: str = ""
+    """One of `population.POPULATION`; the usual adults of the scene if empty."""
+    fps: float = 25.0
+    """Frame rate, 1/s."""
+
+    @property
+    def name(self) -> str:
+        """Name of the folder, and of the row."""
+        return "_".join(word for word in (self.person, self.motion) if word)
+
+
+SCENES = (
+    Scene("exercise", "child_10"),
+    Scene("dance", "heavy_woman"),
+    Scene("dance", "tall_thin_man", fps=15.0),
+    Scene("reach_and_cross", "heavy_man"),
+    Scene("leaving"),
+    Scene("couple_near"),
+)
+CONDITIONS = Conditions(
+    footage=f"simulated people in furnished rooms with noise, {N_FRAMES} frames each, four cameras with backgrounds; "
+    f"seed {SEED}. The ten builds and the kinds of motion are those of the other benchmarks; rooms, noise and motions "
+    "are new",
+    body=f"`{DEFAULT_MODEL}`, acquired from the joints of frame 0 by `quadrille acquire`",
+    start="pose fitted to the true joints of frame 0",
+    settings="defaults, without the audit → with it",
+    chosen="none",
+    command="python tests/benchmarks/unseen_people.py --write docs/accuracy.md",
+)
+
+
+def acquired(scene: Scene, folder: Path) -> tuple[Path, list[Path]]:
+    """Film a scene and acquire its people, unless that is done already; return the session and its references."""
+    scenes, sessions = folder / "scenes", folder / "sessions"
+    filmed, at = scenes / scene.name, sessions / scene.name
+    sessions.mkdir(parents=True, exist_ok=True)
+    if not filmed.exists():
+        simulate(filmed, Simulation(scene.motion, 4, N_FRAMES, SEED, fps=scene.fps, person=scene.person))
+    people = [p.name for p in load_session(filmed).people]
+    references = [filmed / ("truth.trc" if len(people) == 1 else f"truth_{name}.trc") for name in people]
+    if not at.exists():
+        recording = Recording(
+            scene.name, sorted(filmed.glob("*.mp4")), filmed / "calibration.toml", filmed / "background",
+            dict(zip(people, references, strict=True)),
+        )  # fmt: skip
+        with tempfile.TemporaryDirectory(dir=folder) as scratch:
+            made = new_session(recording, Path(scratch))
+            for name, reference in zip(people, references, strict=True):
+                quadrille("init", made, "--joints", reference, "--person", name)
+            for name in people:
+                quadrille("acquire", made, "--person", name)
+            made.rename(at)
+    return at, references
+
+
+def main() -> None:
+    """Measure all scenes, and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--work", type=Path, help="folder that keeps scenes and sessions")
+    parser.add_argument("--only", nargs="+", choices=[s.name for s in SCENES], help="scenes to print, not to write")
+    add_write_option(parser)
+    given = parser.parse_args()
+    check_places(given.write, TABLES)
+    found: list[Compared] = []
+    with tempfile.TemporaryDirectory() as scratch:
+        for scene in (s for s in SCENES if s.name in (given.only or [s.name])):
+            for compared in measured(*acquired(scene, given.work or Path(scratch))):
+                found.append(compared)
+                print(f"{compared.name}: {' | '.join(compared.cells)}", flush=True)
+    alone = [s.name.replace("_", " ") for s in SCENES if "couple" not in s.motion]
+    together = [s.name.replace("_", " ") for s in SCENES if "couple" in s.motion]
+    rows = groups(found, {"**one person**": alone, "**two people**": together})
+    rows |= {c.name: c.cells for c in found}
+    show([] if given.only else given.write, TABLES[0], CONDITIONS, table(HEADS, rows, "people"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""Repair of a run whose tracks all have a leg elsewhere on some frames."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from region_scenes import CAMERAS, N_FRAMES, Walk, limb_of
+from staging import SUIT
+
+from tracker.body.limbs import limbs
+from tracker.fitting.hypothesis import SAME_POSE_M
+from tracker.pipeline.run_repair import RunRepair
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.subjects import Subjects
+from tracker.tracking.view_tracks import FrameTracks
+
+
+class Filmed:
+    """Gives the evidence of a walk, as an observer does."""
+
+    working_cameras = CAMERAS
+
+    def __init__(self, walk):
+        self.walk, self.cameras = walk, [SimpleNamespace(camera=SimpleNamespace(name=n)) for n in ("LEFT", "RIGHT")]
+
+    def empty_scenes(self):
+        return (None,) * len(CAMERAS)
+
+    def evidence(self, frame, regions, *args, **kwargs):
+        return self.walk.views[frame]
+
+
+@pytest.fixture(scope="module")
+def walk(gavrila):
+    return Walk(gavrila, SUIT)
+
+
+def repaired(walk, keyframes=()):
+    """The steps of a repair whose tracks agree with one another on the wrong leg."""
+    n_limbs = len(limbs(walk.model))
+    tracks = {
+        k: FrameTracks(np.array([b.values] * 3), np.ones((3, n_limbs)), ("A", "B", "C"))
+        for k, (b,) in enumerate(walk.tracked)
+    }
+    subjects = Subjects.of([walk.model], keyframes={k: {0: walk.tracked[k][0].values} for k in keyframes})
+    bodies = {k: tuple(b) for k, b in enumerate(walk.tracked)}
+    return list(RunRepair(Filmed(walk), subjects, TrackSettings(), bodies, {0: tracks}).steps())
+
+
+def off_m(walk, k, pose):
+    points = np.isin(walk.model.point_parts, limb_of(walk.model, "right_calf").parts)
+    return np.linalg.norm(walk.model.points_world(pose) - walk.true[k][0].points_world, axis=1)[points].max()
+
+
+@pytest.mark.slow
+def test_a_leg_is_found_that_all_tracks_have_elsewhere(walk):
+    *before, last = repaired(walk)
+    leg = [x.name for x in limbs(walk.model)].index("right_calf")
+    assert all(step.found is None and 0 < step.done <= step.total for step in before)
+    assert last.done == last.total
+    found = last.found[0]
+    assert sorted(found) == list(range(N_FRAMES))
+    for k, is_wrong in enumerate(walk.wrong):
+        pose, trust, elsewhere, against = found[k]
+        assert elsewhere[leg] < 5
+        assert len(against) == len(elsewhere)
+        if is_wrong:
+            assert off_m(walk, k, walk.tracked[k][0].values) > 2 * SAME_POSE_M > 1.5 * off_m(walk, k, pose)
+            assert not trust[:, leg].any()  # all tracks are refuted, in the leg alone
+            assert trust.sum() == trust.size - len(trust)
+        else:
+            assert np.array_equal(pose, walk.tracked[k][0].values)
+            assert trust.all()
+
+
+@pytest.mark.slow
+def test_a_keyframe_stays_and_is_doubted(walk):
+    frame = int(np.flatnonzero(walk.wrong)[0])
+    found = repaired(walk, [frame])[-1].found[0]
+    leg = [x.name for x in limbs(walk.model)].index("right_calf")
+    assert np.array_equal(found[frame].pose, walk.tracked[frame][0].values)
+    assert found[frame].elsewhere[leg] > 10
+    assert found[frame].against[leg].startswith("right calf elsewhere in ")
