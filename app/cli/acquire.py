@@ -117,14 +117,15 @@ def acquire(
 
     Returns:
         `person`; `frames` and `views` that were used; `cost_before_px`, `cost_after_px`; `height_m`; `sizes`, a list
-        of `name`, `before_m`, `after_m` and `sigma_m` (NaN without a known uncertainty); `model`, the body as TOML;
+        of `name`, `before_m`, `after_m` and `sigma_m` (NaN without a known uncertainty); `segments`, a list
+        of `name`, `length_m` and `sigma_m` of the lengths between limb joints in the poses; `model`, the body as TOML;
         `evaluations` of the fit to contours; `voxels`, None or the `height_m` of the body that was fitted to voxels,
         and `overlap_before` and `overlap_after` of its hull with that of the footage, 0 to 1.
 
     Raises:
         TrackerError: the person has no pose on these frames, or the views show nothing of them.
     """
-    from tracker.acquisition.size_report import size_changes
+    from tracker.acquisition.size_report import acquired_segments, size_changes
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
     from tracker.formats.model_toml import format_model
@@ -156,6 +157,7 @@ def acquire(
         "cost_after_px": found.cost_after_px,
         "height_m": found.body.height_m,
         "sizes": [c._asdict() for c in changes],
+        "segments": [s._asdict() for s in acquired_segments(found)],
         "model": format_model(found.body),
         "evaluations": found.fit.n_evaluations,
         "voxels": None if found.voxels is None else {

@@ -8,7 +8,7 @@ from tracker.acquisition.frame_choice import choose_frames
 from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
 from tracker.acquisition.size_fit import Round, SightedPerson, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.acquisition.size_report import size_changes
+from tracker.acquisition.size_report import acquired_segments, size_changes
 from tracker.body.dimensions import PartDimensions, dimensions_of, stature_m, with_dimensions
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
@@ -156,6 +156,19 @@ def test_sizes_are_reported_with_their_uncertainty(acquisition):
     assert 0 < thigh.sigma_m < 0.2 * thigh.after_m
     changes = [abs(np.log(r.after_m / r.before_m)) for r in listed]
     assert changes == sorted(changes, reverse=True)
+
+
+@pytest.mark.slow
+def test_segments_are_those_of_the_poses_with_their_uncertainty(acquisition):
+    segments = {s.name: s for s in acquired_segments(acquisition)}
+    rows = {r.name: r for r in size_changes(acquisition)}
+    for name in ("upper arm", "forearm", "thigh", "calf"):  # rigid, so that any pose shows them
+        assert segments[name].length_m == pytest.approx(rows[f"{name}, length"].after_m, rel=0.02)
+        assert segments[name].sigma_m == pytest.approx(rows[f"{name}, length"].sigma_m, rel=0.1)
+    places = np.array([PosedBody(acquisition.body, p).joint_centers_world for p in acquisition.poses])
+    shoulders = [acquisition.body.point_names.index(f"{side}_shoulder") for side in ("left", "right")]
+    widths = np.linalg.norm(places[:, shoulders[0]] - places[:, shoulders[1]], axis=1)
+    assert segments["shoulder width"].length_m == pytest.approx(np.median(widths))
 
 
 def test_a_body_where_nobody_is_gets_no_sizes():
