@@ -9,10 +9,16 @@ from tracker.acquisition.from_contours import Acquisition
 from tracker.acquisition.segment_lengths import segment_lengths
 from tracker.acquisition.size_fit import SizeFit
 from tracker.acquisition.size_parameters import DIFFERENCE, SizeParameters
-from tracker.body.dimensions import dimensions_of, mirror_part, with_height_of_stature
+from tracker.body.dimensions import dimensions_of, main_axis, mirror_part, with_height_of_stature
 from tracker.body.limbs import display_name
 from tracker.body.model import BodyModel, PosedBody
 from tracker.formats.joint_maps import LIMB_JOINTS
+
+SWINGING = ("shoulder", "elbow", "hip", "knee")
+"""Joints whose centres are sought by the motion of the limbs below them."""
+OBSERVABLE_SWING_RAD = float(np.radians(30.0))
+"""Smallest swing that shows the centre of a joint. Functional methods lose it below: S. J. Piazza et al. 2001 (J.
+Biomech. 34:967) on the hip with less motion, R. M. Ehrig et al. 2006 (J. Biomech. 39:2798) on any ball joint."""
 
 
 class SizeChange(NamedTuple):
@@ -24,6 +30,20 @@ class SizeChange(NamedTuple):
     after_m: float
     sigma_m: float
     """Standard deviation of the size after the acquisition, metres."""
+
+
+class JointSwing(NamedTuple):
+    """How far a limb turns about a joint."""
+
+    name: str
+    """One of `SWINGING`; left and right are one."""
+    swing_rad: float
+    """Largest angle between two directions of the limb, seen from the part above the joint, of either side, rad."""
+
+    @property
+    def is_observable(self) -> bool:
+        """Whether the limb turns far enough to show the centre of the joint."""
+        return self.swing_rad >= OBSERVABLE_SWING_RAD
 
 
 class SegmentLength(NamedTuple):
@@ -40,7 +60,7 @@ class SegmentLength(NamedTuple):
 def size_changes(acquisition: Acquisition) -> list[SizeChange]:
     """List all sizes, those that changed most, by share, first. One side stands for both if they are coupled."""
     parameters, fit = acquisition.parameters, acquisition.fit
-    before = _measured(parameters, parameters.body(np.zeros_like(fit.sizes)))
+    before = _measured(parameters, acquisition.before or parameters.base)
     after = _with_sigmas(parameters, fit, lambda body: _measured(parameters, body))
     rows = [SizeChange(n, before[n], *own) for n, own in after.items()]
     return sorted(rows, key=lambda r: -abs(np.log(r.after_m / r.before_m)))
@@ -60,6 +80,35 @@ def acquired_segments(acquisition: Acquisition) -> list[SegmentLength]:
         return segment_lengths({n: places[:, i] for i, n in enumerate(body.point_names)})
 
     return [SegmentLength(n, *own) for n, own in _with_sigmas(acquisition.parameters, fit, measure).items()]
+
+
+def joint_swings(acquisition: Acquisition) -> list[JointSwing]:
+    """List how far the limbs turn about each pair of joints in the poses of the acquisition.
+
+    Contours show the centre of a joint by the motion of a limb about it alone. A turn of the limb about its own axis
+    shows it neither.
+    """
+    model, poses = acquisition.body, acquisition.poses
+    Rs = np.array([model.kinematics(p).Ts_world_part[:, :3, :3] for p in poses])
+    largest: dict[str, float] = {}
+    for i, joint in enumerate(model.joints):
+        name = joint.name.removeprefix("left_").removeprefix("right_")
+        if name not in SWINGING or not joint.parent:
+            continue
+        axes = np.einsum("tji,tj->ti", Rs[:, model.part_index[joint.parent]], Rs[:, i, :, main_axis(model, i)])
+        swing = float(np.arccos(np.clip(axes @ axes.T, -1, 1)).max())
+        largest[name] = max(swing, largest.get(name, 0.0))
+    return [JointSwing(n, swing) for n, swing in largest.items()]
+
+
+def unobservable_joints(acquisition: Acquisition) -> list[str]:
+    """Say which joint centres the poses of an acquisition do not show; nothing where joints were given."""
+    swings = [] if acquisition.joints_are_given else joint_swings(acquisition)
+    return [
+        f"{s.name} centre not observable: it turned by {np.degrees(s.swing_rad):.0f} degrees"
+        for s in swings
+        if not s.is_observable
+    ]
 
 
 def _with_sigmas(
