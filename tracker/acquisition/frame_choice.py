@@ -40,7 +40,7 @@ def choose_frames(
         fixed: frames that are used in any case.
     """
     information = {k: _information(parameters, cameras, b, person) for k, b in bodies.items()}
-    known = parameters.precision + sum(information[k] for k in fixed)
+    known = np.diag(1 / parameters.sigmas**2) + sum(information[k] for k in fixed)
     chosen = list(fixed)
     while len(chosen) < min(n_frames, len(bodies)):
         gains = {k: float(np.linalg.slogdet(known + f)[1]) for k, f in information.items() if k not in chosen}

@@ -20,6 +20,7 @@ from tracker.acquisition.from_voxels import (
 )
 from tracker.acquisition.size_fit import SightedPerson, SizeFit, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
+from tracker.acquisition.typical_body import typical_body
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, stages, unreported
 from tracker.contours import occluding_contours
@@ -30,7 +31,6 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock
 from tracker.fitting.retarget import retarget_pose
-from tracker.formats.model_toml import PRESETS, has_preset_proportions, load_model
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.forward_pass import update_static_edges
@@ -117,7 +117,7 @@ def acquire_from_contours(
     if not bodies:
         raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
     present = next(iter(bodies.values()))[person].model
-    parameters = SizeParameters(_typical(present), settings.coupled, settings.priors)
+    parameters = SizeParameters(typical_body(present), settings.coupled, settings.priors)
     names = ("choosing frames", "reading contours", "fitting sizes to voxels", "fitting sizes")
     choosing, reading, measuring, fitting = stages(report, *names)
     choosing(0.0)
@@ -159,18 +159,6 @@ def acquire_from_contours(
         found.body, tuple(frames), found.poses, float(np.mean(before)), float(np.mean(after)), parameters, found,
         voxels=by_voxels, joints_are_given=any(k in placed for k in frames), before=present,
     )  # fmt: skip
-
-
-def _typical(body: BodyModel) -> BodyModel:
-    """Return the body of the same preset and height, on which the priors are centred whatever its sizes are.
-
-    A body of no preset stays as it is: what is typical for it is not known.
-    """
-    if body.name not in PRESETS or has_preset_proportions(body):
-        return body
-    preset = load_model(body.name, body.height_m)
-    same = preset.dof_names == body.dof_names and list(preset.part_index) == list(body.part_index)
-    return preset if same else body
 
 
 def _with_body(bodies: tuple[PosedBody, ...], person: int, body: BodyModel) -> tuple[PosedBody, ...]:

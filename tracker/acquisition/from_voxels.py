@@ -142,14 +142,14 @@ def _step(
     Returns:
         The step of the sizes, (n_sizes,), that of each pose, (n_dofs,), and the covariance, (n_sizes, n_sizes).
     """
-    n, precision = len(sizes), parameters.precision
-    H, g, eliminated = precision.copy(), -precision @ sizes, list[Array]()
+    n, precision = len(sizes), 1 / parameters.sigmas**2
+    H, g, eliminated = np.diag(precision), -precision * sizes, list[Array]()
     for f in frames:
         solved = np.linalg.solve(f.hessian[n:, n:], np.column_stack([f.hessian[n:, :n], -f.gradient[n:]]))
         H += f.hessian[:n, :n] - f.hessian[:n, n:] @ solved[:, :n]
         g -= f.gradient[:n] + f.hessian[:n, n:] @ solved[:, n]
         eliminated.append(np.asarray(solved, dtype=np.float64))
-    step, covariance = np.zeros(n), np.linalg.inv(precision)
+    step, covariance = np.zeros(n), np.diag(1 / precision)
     own = np.asarray(np.linalg.inv(H[np.ix_(free, free)]), dtype=np.float64)
     step[free], covariance[np.ix_(free, free)] = own @ g[free], own
     return step, [s[:, n] - s[:, :n] @ step for s in eliminated], covariance

@@ -37,9 +37,6 @@ from tracker.fitting.gauss_newton import (
 from tracker.fitting.pins import PinBlock
 from tracker.geometry.arrays import Array, IntArray
 
-_TOLERANCE = 1e-4
-"""Smallest relative decrease of the cost for another iteration."""
-
 
 class SightedPerson(NamedTuple):
     """A person on one frame, with the evidence of the views."""
@@ -98,6 +95,8 @@ class SizeFitSettings:
     """Standard deviation of the initial angles, rad."""
     trust_m: float = 0.1
     """Standard deviation of the initial position, metres."""
+    tolerance: float = 1e-4
+    """Smallest relative decrease of the cost for another iteration."""
     frame_correlation: float = 0.3
     """Correlation between frames of the mean error of a part's contours: clothes and wrong shapes stay the same. It is
     0.22 to 0.65 on seven simulated people, 0.29 in the median. It widens the covariance of the sizes."""
@@ -157,7 +156,7 @@ def fit_sizes_to_contours(
     """
     n = len(parameters.names)
     if start is None:
-        start = SizeStart(np.zeros(n), np.linalg.inv(parameters.precision), {})
+        start = SizeStart(np.zeros(n), np.diag(parameters.sigmas**2), {})
     sizes, poses, covariance = start.sizes, [start.poses.get(f.frame, f.pose) for f in frames], start.covariance
     cost, n_evaluations = np.nan, 0
     planned, done = sum(step.iterations for step in settings.rounds), 0
@@ -168,18 +167,18 @@ def fit_sizes_to_contours(
         )
         for i in range(step.iterations):
             report((done + i) / planned)
-            if not problem.advance():
+            if not problem.advance(settings.tolerance):
                 break
         done += step.iterations
         sizes, poses, cost, hessian = problem.sizes, problem.poses, problem.cost, problem.hessian
         n_evaluations += problem.n_evaluations
         if step is settings.rounds[-1]:
-            covariance = _covariance(hessian, parameters.precision, len(frames), settings.frame_correlation)
+            covariance = _covariance(hessian, parameters.sigmas, len(frames), settings.frame_correlation)
     body = with_height_of_stature(parameters.body(sizes), parameters.base)
     return SizeFit(sizes, body, tuple(poses), cost, covariance, n_evaluations)
 
 
-def _covariance(hessian: Array, precision: Array, n_frames: int, correlation: float) -> Array:
+def _covariance(hessian: Array, sigmas: Array, n_frames: int, correlation: float) -> Array:
     """Return the covariance of the sizes, whatever the poses are, (n_sizes, n_sizes).
 
     Frames whose errors are alike count as n / (1 + (n - 1) correlation) independent ones, the design effect of samples
@@ -188,11 +187,11 @@ def _covariance(hessian: Array, precision: Array, n_frames: int, correlation: fl
 
     Args:
         hessian: of the cost, by the sizes and then the degrees of freedom of each frame.
-        precision: of the prior of the sizes, which the Hessian contains.
+        sigmas: standard deviations of the sizes in the prior, which the Hessian contains, (n_sizes,).
         n_frames: number of frames.
         correlation: of the errors of two frames.
     """
-    n = len(precision)
+    n, precision = len(sigmas), np.diag(1 / sigmas**2)
     of_frames = hessian[:n, :n] - hessian[:n, n:] @ np.linalg.solve(hessian[n:, n:], hessian[n:, :n]) - precision
     design_effect = 1 + (n_frames - 1) * correlation
     return np.asarray(np.linalg.inv(precision + of_frames / design_effect), dtype=np.float64)
@@ -243,8 +242,8 @@ class _Problem:
         """Second derivative of the cost there, by the sizes and then the degrees of freedom of each frame."""
         return self._here.hessian
 
-    def advance(self) -> bool:
-        """Move one step; return whether another one is worth it."""
+    def advance(self, tolerance: float) -> bool:
+        """Move one step; return whether another one is worth it: the cost decreased by more than this share."""
         here = self._here
         active = self._active(here.gradient)
         g, H = here.gradient[active], here.hessian[np.ix_(active, active)]
@@ -260,7 +259,7 @@ class _Problem:
             self._damping = max(10 * self._damping, DAMPING.least_again)
         self.sizes, self.poses, self._here = sizes, poses, there
         self._damping = max(DAMPING.least, self._damping / 10)
-        return here.cost - there.cost > _TOLERANCE * here.cost
+        return here.cost - there.cost > tolerance * here.cost
 
     def _moved(self, step: Array) -> tuple[Array, list[Array]]:
         model, n = self._parameters.base, len(self.sizes)
@@ -289,11 +288,11 @@ class _Problem:
             lambda i: self._linearize_frame(i, _Resized(body, by_sizes, surfaces.get(self._others[i])), poses[i]),
             range(len(poses)),
         )
-        prior = self._parameters.precision @ sizes
+        prior = sizes / self._parameters.sigmas**2
         cost, gradient = 0.5 * float(prior @ sizes), np.zeros(n + m * len(poses))
         hessian = np.zeros((len(gradient), len(gradient)))
         gradient[:n] = prior
-        hessian[:n, :n] = self._parameters.precision
+        hessian[:n, :n] = np.diag(1 / self._parameters.sigmas**2)
         for i, found in enumerate(own):
             at = np.concatenate([np.arange(n), n + m * i + np.arange(m)])
             cost += found.cost

@@ -2,10 +2,11 @@
 
 All parameters are 0 for the body that they belong to. Scales are logarithms, so that no size can become negative.
 
-The prior describes how people differ from a body of their height, so that this body has typical proportions. Lengths: the segments of the ANSUR II survey (Gordon
-et al. 2014) differ from those of people of equal stature by 3 to 5%. Girths: its breadths and depths differ by 7 to
-15%, mostly together (`build`). Places: the centre of a joint is known to 1 to 2 cm from the skin around it (Leardini et
-al. 1999 for the hip). Shapes: GD96 Sect. 3 lists no ranges; ours are those of the built-in bodies' parts.
+The prior describes how people differ from a body of typical proportions for their height (`typical_body`). Lengths: the
+segments of the ANSUR II survey (Gordon et al. 2014) differ from those of people of equal stature by 3 to 5%. Girths:
+its breadths and depths differ by 7 to 15%, mostly together (`build`). Places: the centre of a joint is known to 1 to 2
+cm from the skin around it (Leardini et al. 1999 for the hip). Shapes: GD96 Sect. 3 lists no ranges; ours are those of
+the built-in bodies' parts.
 """
 
 from dataclasses import dataclass, replace
@@ -49,9 +50,6 @@ class SizePriors:
 
     height: float = 0.15
     """Of the logarithm of the body's height."""
-    stature: float = 0.015
-    """Of the logarithm of the stature that lengths and joints add up to, in proportion to the height. Shoes and hair
-    add 2 to 3 cm."""
     build: float = 0.15
     """Of the logarithm of all girths together."""
     length: float = 0.05
@@ -128,18 +126,9 @@ class SizeParameters:
 
     @cached_property
     def sigmas(self) -> Array:
-        """Standard deviation of each parameter by itself in the prior, (n_sizes,); see `precision` for all together."""
+        """Standard deviation of each parameter in the prior, (n_sizes,)."""
         sideless = [n.removeprefix("left_").removeprefix("right_") for n in self.names]
         return np.array([getattr(self.priors, _OWN_PRIORS.get(n) or kind_of(n)) for n in sideless])
-
-    @cached_property
-    def precision(self) -> Array:
-        """Inverse covariance of the parameters in the prior, (n_sizes, n_sizes).
-
-        All lengths are shares of one stature, so that a longer leg makes a shorter trunk or head more likely.
-        """
-        by_proportions = self._stature_by_sizes() - self.of_kinds("height")
-        return np.diag(1 / self.sigmas**2) + np.outer(by_proportions, by_proportions) / self.priors.stature**2
 
     def of_kinds(self, *kinds: str) -> NDArray[np.bool_]:
         """Return which parameters are of some kinds, the names of `SizePriors`, (n_sizes,)."""
@@ -209,23 +198,6 @@ class SizeParameters:
             scaled(base.landmarks, length[carriers], length_by[carriers]),
         ]
         return SizeArrays(*(f[0] for f in found)), SizeArrays(*(f[1] for f in found))
-
-    def _stature_by_sizes(self) -> Array:
-        """Return the derivative of the logarithm of the stature at zero, (n_sizes,).
-
-        In the zero pose all parts are upright, so that their places and half-axes along z add up.
-        """
-        here, by = self._both(np.zeros(len(self.names)))
-        z, z_by = np.zeros(len(here.joints)), np.zeros((len(here.joints), len(self.names)))
-        for i, parent in enumerate(self.base.parents):
-            if parent >= 0:
-                z[i], z_by[i] = z[parent] + here.joints[i, 2], z_by[parent] + by.joints[i, 2]
-        z, z_by = z + here.centers[:, 2], z_by + by.centers[:, 2]
-        top, bottom = np.argmax(z + here.half_axes[:, 2]), np.argmin(z - here.half_axes[:, 2])
-        extent = z[top] + here.half_axes[top, 2] - z[bottom] + here.half_axes[bottom, 2]
-        return np.asarray(
-            (z_by[top] + by.half_axes[top, 2] - z_by[bottom] + by.half_axes[bottom, 2]) / extent, dtype=np.float64
-        )
 
     @cached_property
     def _base(self) -> SizeArrays:

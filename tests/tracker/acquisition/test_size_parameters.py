@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tracker.acquisition.size_parameters import SizeArrays, SizeParameters, SizePriors
-from tracker.body.dimensions import dimensions_of, stature_m
+from tracker.body.dimensions import dimensions_of
 from tracker.formats.model_toml import PRESETS, format_model, load_model, parse_model
 
 each_model = pytest.mark.parametrize("name", PRESETS)
@@ -27,24 +27,6 @@ def test_the_anatomical_prior_is_tighter_for_limbs_and_soles(coupled):
     # They are free in the same rounds as the others of their kind.
     assert parameters.of_kinds("joint")[parameters.names.index(f"{side}hip.joint_y")]
     assert parameters.of_kinds("side")[parameters.names.index(f"{side}calf.side_y")]
-
-
-@each_model
-def test_a_prior_of_a_known_stature_correlates_the_lengths_that_add_up_to_it(name):
-    priors = SizePriors(height=0.02)
-    parameters = SizeParameters(load_model(name, 1.7), priors=priors)
-    covariance = np.linalg.inv(parameters.precision)
-    here, step = stature_m(parameters.base), 1e-4
-    moved = [stature_m(parameters.body(step * unit)) for unit in np.eye(len(parameters.names))]
-    by_sizes = np.log(np.array(moved) / here) / step
-    np.testing.assert_allclose(parameters._stature_by_sizes(), by_sizes, atol=0.01)
-    spread = np.sqrt(by_sizes @ covariance @ by_sizes)
-    assert spread < np.hypot(priors.height, priors.stature) < np.sqrt(by_sizes**2 @ parameters.sigmas**2)
-    legs, calves = (parameters.names.index(f"{part}.length") for part in ("thigh", "calf"))
-    assert covariance[legs, calves] < 0
-    arm, height = parameters.names.index("forearm.length"), parameters.names.index("height")
-    assert covariance[arm, arm] == pytest.approx(priors.length**2)
-    assert covariance[height, height] == pytest.approx(priors.height**2, rel=0.5)
 
 
 @each_model
