@@ -167,7 +167,7 @@ def fit_sizes_to_contours(
         )
         for i in range(step.iterations):
             report((done + i) / planned)
-            if not problem.advance(settings.tolerance):
+            if not problem.advance():
                 break
         done += step.iterations
         sizes, poses, cost, hessian = problem.sizes, problem.poses, problem.cost, problem.hessian
@@ -220,6 +220,7 @@ class _Problem:
     ) -> None:
         """Begin at sizes, (n_sizes,), and at the poses of the frames."""
         self._parameters, self._frames, self._step = parameters, frames, step
+        self._tolerance = settings.tolerance
         self._free = parameters.of_kinds(*step.kinds)
         self._residuals = map_parallel(lambda f: _residuals(f, settings, step), frames)
         self._others = [tuple(b.model for k, b in enumerate(f.bodies) if k != f.person) for f in frames]
@@ -242,8 +243,8 @@ class _Problem:
         """Second derivative of the cost there, by the sizes and then the degrees of freedom of each frame."""
         return self._here.hessian
 
-    def advance(self, tolerance: float) -> bool:
-        """Move one step; return whether another one is worth it: the cost decreased by more than this share."""
+    def advance(self) -> bool:
+        """Move one step; return whether another one is worth it."""
         here = self._here
         active = self._active(here.gradient)
         g, H = here.gradient[active], here.hessian[np.ix_(active, active)]
@@ -259,7 +260,7 @@ class _Problem:
             self._damping = max(10 * self._damping, DAMPING.least_again)
         self.sizes, self.poses, self._here = sizes, poses, there
         self._damping = max(DAMPING.least, self._damping / 10)
-        return here.cost - there.cost > tolerance * here.cost
+        return here.cost - there.cost > self._tolerance * here.cost
 
     def _moved(self, step: Array) -> tuple[Array, list[Array]]:
         model, n = self._parameters.base, len(self.sizes)

@@ -32,7 +32,7 @@ def placed(run, session):
 def quick(monkeypatch):
     """A fit of one step in each round."""
     advance = size_fit._Problem.advance
-    monkeypatch.setattr(size_fit._Problem, "advance", lambda problem, tolerance: advance(problem, tolerance) and False)
+    monkeypatch.setattr(size_fit._Problem, "advance", lambda problem: advance(problem) and False)
 
 
 def files_of(session):
