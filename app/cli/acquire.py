@@ -117,14 +117,18 @@ def acquire(
 
     Returns:
         `person`; `frames` and `views` that were used; `cost_before_px`, `cost_after_px`; `height_m`; `sizes`, a list
-        of `name`, `before_m`, `after_m` and `sigma_m` (NaN without a known uncertainty); `model`, the body as TOML;
-        `evaluations` of the fit to contours; `voxels`, None or the `height_m` of the body that was fitted to voxels,
-        and `overlap_before` and `overlap_after` of its hull with that of the footage, 0 to 1.
+        of `name`, `before_m`, `after_m` and `sigma_m` (NaN without a known uncertainty); `segments`, a list
+        of `name`, `length_m` and `sigma_m` of the lengths between limb joints in the poses; `swings_deg`, how far the
+        limbs turn about each pair of joints; `notes` on joints whose centres this does not show; `model`, the body as
+        TOML; `evaluations` of the fit to contours; `voxels`, None or the `height_m` of the body that was fitted to
+        voxels, and `overlap_before` and `overlap_after` of its hull with that of the footage, 0 to 1.
 
     Raises:
         TrackerError: the person has no pose on these frames, or the views show nothing of them.
     """
-    from tracker.acquisition.size_report import size_changes
+    import numpy as np
+
+    from tracker.acquisition.size_report import acquired_segments, joint_swings, size_changes, unobservable_joints
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
     from tracker.formats.model_toml import format_model
@@ -156,6 +160,9 @@ def acquire(
         "cost_after_px": found.cost_after_px,
         "height_m": found.body.height_m,
         "sizes": [c._asdict() for c in changes],
+        "segments": [s._asdict() for s in acquired_segments(found)],
+        "swings_deg": {s.name: float(np.degrees(s.swing_rad)) for s in joint_swings(found)},
+        "notes": unobservable_joints(found),
         "model": format_model(found.body),
         "evaluations": found.fit.n_evaluations,
         "voxels": None if found.voxels is None else {
@@ -193,6 +200,7 @@ def _format(found: dict[str, Any], arguments: AcquireArguments) -> str:
     for row in found["sizes"][:_SHOWN]:
         sizes_m = [row[k] for k in ("before_m", "after_m", "sigma_m")[: 2 if arguments.paper else 3]]
         lines.append(f"  {row['name']:<34}" + " ".join(f"{size_m * 100:6.1f}" for size_m in sizes_m))
+    lines += found["notes"]
     if arguments.dry_run:
         lines.append("nothing was stored (--dry-run)")
     else:

@@ -18,11 +18,11 @@ from tracker.contours.occluding_contours import Contour
 from tracker.contours.pieces import PIECE_PX
 from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
+from tracker.fitting.retarget import retarget_pose
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, FloatArray, IntArray, Mask
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.images.edge_segments import accept_segments
-from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Person, Session
 from tracker.tracking.contour.fit_steps import residual_segments
 

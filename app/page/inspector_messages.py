@@ -302,7 +302,7 @@ class AcquisitionMessage(Message, frozen=True, tag="acquisition"):
     share: float
     """Share of the work that is done, 0 to 1."""
     message: str
-    """Why there is no result, or empty."""
+    """Why there is no result, or what a result does not show; else empty."""
     result: AcquisitionResult | None
 
 

@@ -163,7 +163,7 @@ class AcquisitionState:
     share: float = 0.0
     """Share of the work that is done, 0 to 1."""
     message: str = ""
-    """Why there is no result, or empty."""
+    """Why there is no result, or what a result does not show; else empty."""
     frames: tuple[int, ...] = ()
     """Frames that the sizes were fitted to; empty without a result."""
     cost_before_px: float = 0.0

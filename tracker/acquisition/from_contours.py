@@ -20,6 +20,7 @@ from tracker.acquisition.from_voxels import (
 )
 from tracker.acquisition.size_fit import SightedPerson, SizeFit, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
+from tracker.acquisition.typical_body import typical_body
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, stages, unreported
 from tracker.contours import occluding_contours
@@ -29,6 +30,7 @@ from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock
+from tracker.fitting.retarget import retarget_pose
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.forward_pass import update_static_edges
@@ -72,12 +74,16 @@ class Acquisition(NamedTuple):
     cost_after_px: float
     """The same with the acquired body and its poses, px."""
     parameters: SizeParameters
-    """The sizes that were fitted, relative to the body before."""
+    """The sizes that were fitted, relative to a body of typical proportions."""
     fit: SizeFit
     views: tuple[str, ...] = ()
     """Names of the views that it was fitted to; all of them if empty."""
     voxels: VoxelSizes | None = None
     """The fit to voxels before, if there was one."""
+    joints_are_given: bool = False
+    """Whether known or placed joints held the fit, or joints were left as they are."""
+    before: BodyModel | None = None
+    """The body before; None if it is that of the parameters."""
 
     @property
     def is_better(self) -> bool:
@@ -110,7 +116,8 @@ def acquire_from_contours(
     """
     if not bodies:
         raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
-    parameters = SizeParameters(next(iter(bodies.values()))[person].model, settings.coupled, settings.priors)
+    present = next(iter(bodies.values()))[person].model
+    parameters = SizeParameters(typical_body(present), settings.coupled, settings.priors)
     names = ("choosing frames", "reading contours", "fitting sizes to voxels", "fitting sizes")
     choosing, reading, measuring, fitting = stages(report, *names)
     choosing(0.0)
@@ -119,9 +126,8 @@ def acquire_from_contours(
     source = sorted(bodies) if few or not placed else sorted(k for k in bodies if k in placed)
     fixed = sorted(k for k in placed if k in bodies) if few else []
     candidates = _spread(source, settings.candidates, keep=fixed)
-    frames = choose_frames(
-        parameters, observer.working_cameras, {k: bodies[k] for k in candidates}, person, settings.n_frames, fixed
-    )
+    typical = {k: _with_body(bodies[k], person, parameters.base) for k in candidates}
+    frames = choose_frames(parameters, observer.working_cameras, typical, person, settings.n_frames, fixed)
     reading(0.0)
     static_edges = learn_static_edges(observer, {k: bodies[k] for k in candidates})
     sighted, observed, before = [], [], []
@@ -130,13 +136,13 @@ def acquire_from_contours(
         observed.append(views)
         before.append(cost_px(views, bodies[k]))
         sighted.append(
-            SightedPerson(k, own_views(views, bodies[k], person), bodies[k], person, placed.get(k), seen.get(k))
+            SightedPerson(k, own_views(views, bodies[k], person), typical[k], person, placed.get(k), seen.get(k))
         )
         reading((i + 1) / len(frames))
     by_voxels, fit = None, settings.fit
     if settings.voxels is not None:
         fit = replace(fit, rounds=fit.rounds[1:])
-        people = {k: (bodies[k][person], *bodies[k][:person], *bodies[k][person + 1 :]) for k in frames}
+        people = {k: (typical[k][person], *typical[k][:person], *typical[k][person + 1 :]) for k in frames}
         by_voxels = _fit_to_voxels(observer, parameters, people, settings.voxels, measuring)
     if not any(len(v.points_px) for s in sighted for v in s.views):
         raise TrackerError(
@@ -151,8 +157,15 @@ def acquire_from_contours(
     report("done", 1.0)
     return Acquisition(
         found.body, tuple(frames), found.poses, float(np.mean(before)), float(np.mean(after)), parameters, found,
-        voxels=by_voxels,
+        voxels=by_voxels, joints_are_given=any(k in placed for k in frames), before=present,
     )  # fmt: skip
+
+
+def _with_body(bodies: tuple[PosedBody, ...], person: int, body: BodyModel) -> tuple[PosedBody, ...]:
+    """Return the people on a frame, one of them in another body with the joints in place."""
+    own = bodies[person]
+    moved = PosedBody(body, retarget_pose(own.values, own.model, body))
+    return (*bodies[:person], moved, *bodies[person + 1 :])
 
 
 def _fit_to_voxels(

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.acquisition.segment_lengths import segment_lengths
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import Remedy, TrackerError
 from tracker.fitting.gauss_newton import JOINT_M, PointTargets, fit_to_points
@@ -12,15 +13,6 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 
-_LENGTHS: Mapping[str, Sequence[tuple[Sequence[str], Sequence[str]]]] = {
-    **{
-        f"{a}-{b}": [([f"left_{a}"], [f"left_{b}"]), ([f"right_{a}"], [f"right_{b}"])]
-        for a, b in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
-    },
-    **{f"{g} width": [([f"left_{g}"], [f"right_{g}"])] for g in ("shoulder", "hip")},
-    "trunk": [(["left_shoulder", "right_shoulder"], ["left_hip", "right_hip"])],
-}
-"""Pairs of ends, the middles of some joints, whose distance is a length; left and right are one."""
 _CREDIBLE = (0.6, 1.6)
 """A measured segment outside this range of the model's length is an error in the joints."""
 _MISFIT = 3.0
@@ -63,13 +55,14 @@ def height_from_joints(model: BodyModel, joints: MarkerTable) -> float:
     """
     own = model.named_points_world(model.neutral())
     measured = {n: joints.points[:, i] for i, n in enumerate(joints.names)}
-    logs = {n: np.log(_length(measured, n, pairs) / _length(own, n, pairs)) for n, pairs in _LENGTHS.items()}
+    of_body = segment_lengths(own)
+    logs = {n: np.log(length_m / of_body[n]) for n, length_m in segment_lengths(measured).items()}
     middle = float(np.median(list(logs.values())))
     for name, log in logs.items():
         ratio = float(np.exp(log - middle))
         if not _CREDIBLE[0] <= ratio <= _CREDIBLE[1]:
             raise TrackerError(
-                f"fitting sizes: {name} came out {ratio:.2f} times as long as in a body of these joints' size; "
+                f"fitting sizes: the {name} came out {ratio:.2f} times as long as in a body of these joints' size; "
                 f"expected {_CREDIBLE[0]} to {_CREDIBLE[1]}",
                 Remedy("check_joint_map"),
             )
@@ -91,16 +84,3 @@ def pose_at_joints(model: BodyModel, joints: MarkerTable, frames: Sequence[int])
     most = _MISFIT * float(np.median(list(misfits.values()) or [0.0]))
     usual = [k for k, misfit in misfits.items() if misfit <= most]
     return JointFrames({k: (PosedBody(model, poses[k]),) for k in usual}, {k: placed[k] for k in usual})
-
-
-def _length(places: Mapping[str, Array], name: str, pairs: Sequence[tuple[Sequence[str], Sequence[str]]]) -> float:
-    """Return the median length between pairs of ends, each the middle of some joints, over frames and sides, metres."""
-    missing = [j for pair in pairs for end in pair for j in end if j not in places]
-    if missing:
-        raise TrackerError(f"fitting sizes needs the joint '{missing[0]}', found {', '.join(places)}")
-    gaps = [np.mean([places[j] for j in a], axis=0) - np.mean([places[j] for j in b], axis=0) for a, b in pairs]
-    lengths = np.linalg.norm(np.concatenate([np.atleast_2d(g) for g in gaps]), axis=1)
-    known = lengths[np.isfinite(lengths)]
-    if not len(known):
-        raise TrackerError(f"fitting sizes needs a frame in which both ends of {name} are known, found none")
-    return float(np.median(known))

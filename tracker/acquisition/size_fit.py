@@ -37,9 +37,6 @@ from tracker.fitting.gauss_newton import (
 from tracker.fitting.pins import PinBlock
 from tracker.geometry.arrays import Array, IntArray
 
-_TOLERANCE = 1e-4
-"""Smallest relative decrease of the cost for another iteration."""
-
 
 class SightedPerson(NamedTuple):
     """A person on one frame, with the evidence of the views."""
@@ -98,6 +95,11 @@ class SizeFitSettings:
     """Standard deviation of the initial angles, rad."""
     trust_m: float = 0.1
     """Standard deviation of the initial position, metres."""
+    tolerance: float = 1e-4
+    """Smallest relative decrease of the cost for another iteration."""
+    frame_correlation: float = 0.3
+    """Correlation between frames of the mean error of a part's contours: clothes and wrong shapes stay the same. It is
+    0.22 to 0.65 on seven simulated people, 0.29 in the median. It widens the covariance of the sizes."""
 
 
 class SizeStart(NamedTuple):
@@ -171,9 +173,28 @@ def fit_sizes_to_contours(
         sizes, poses, cost, hessian = problem.sizes, problem.poses, problem.cost, problem.hessian
         n_evaluations += problem.n_evaluations
         if step is settings.rounds[-1]:
-            covariance = np.asarray(np.linalg.inv(hessian)[:n, :n], dtype=np.float64)
+            covariance = _covariance(hessian, parameters.sigmas, len(frames), settings.frame_correlation)
     body = with_height_of_stature(parameters.body(sizes), parameters.base)
     return SizeFit(sizes, body, tuple(poses), cost, covariance, n_evaluations)
+
+
+def _covariance(hessian: Array, sigmas: Array, n_frames: int, correlation: float) -> Array:
+    """Return the covariance of the sizes, whatever the poses are, (n_sizes, n_sizes).
+
+    Frames whose errors are alike count as n / (1 + (n - 1) correlation) independent ones, the design effect of samples
+    in clusters (L. Kish, Survey Sampling, 1965). Along a contour errors are correlated over 7 px on simulated people,
+    so that `MatchSettings.information_per_px` counts each contour with care already.
+
+    Args:
+        hessian: of the cost, by the sizes and then the degrees of freedom of each frame.
+        sigmas: standard deviations of the sizes in the prior, which the Hessian contains, (n_sizes,).
+        n_frames: number of frames.
+        correlation: of the errors of two frames.
+    """
+    n, precision = len(sigmas), np.diag(1 / sigmas**2)
+    of_frames = hessian[:n, :n] - hessian[:n, n:] @ np.linalg.solve(hessian[n:, n:], hessian[n:, :n]) - precision
+    design_effect = 1 + (n_frames - 1) * correlation
+    return np.asarray(np.linalg.inv(precision + of_frames / design_effect), dtype=np.float64)
 
 
 class _Resized(NamedTuple):
@@ -199,6 +220,7 @@ class _Problem:
     ) -> None:
         """Begin at sizes, (n_sizes,), and at the poses of the frames."""
         self._parameters, self._frames, self._step = parameters, frames, step
+        self._tolerance = settings.tolerance
         self._free = parameters.of_kinds(*step.kinds)
         self._residuals = map_parallel(lambda f: _residuals(f, settings, step), frames)
         self._others = [tuple(b.model for k, b in enumerate(f.bodies) if k != f.person) for f in frames]
@@ -238,7 +260,7 @@ class _Problem:
             self._damping = max(10 * self._damping, DAMPING.least_again)
         self.sizes, self.poses, self._here = sizes, poses, there
         self._damping = max(DAMPING.least, self._damping / 10)
-        return here.cost - there.cost > _TOLERANCE * here.cost
+        return here.cost - there.cost > self._tolerance * here.cost
 
     def _moved(self, step: Array) -> tuple[Array, list[Array]]:
         model, n = self._parameters.base, len(self.sizes)

@@ -2,10 +2,11 @@
 
 All parameters are 0 for the body that they belong to. Scales are logarithms, so that no size can become negative.
 
-The prior describes how people differ from a body of their height. Lengths: the segments of the ANSUR II survey (Gordon
-et al. 2014) differ from those of people of equal stature by 3 to 5%. Girths: its breadths and depths differ by 7 to
-15%, mostly together (`build`). Places: the centre of a joint is known to 1 to 2 cm from the skin around it (Leardini et
-al. 1999 for the hip). Shapes: GD96 Sect. 3 lists no ranges; ours are those of the built-in bodies' parts.
+The prior describes how people differ from a body of typical proportions for their height (`typical_body`). Lengths: the
+segments of the ANSUR II survey (Gordon et al. 2014) differ from those of people of equal stature by 3 to 5%. Girths:
+its breadths and depths differ by 7 to 15%, mostly together (`build`). Places: the centre of a joint is known to 1 to 2
+cm from the skin around it (Leardini et al. 1999 for the hip). Shapes: GD96 Sect. 3 lists no ranges; ours are those of
+the built-in bodies' parts.
 """
 
 from dataclasses import dataclass, replace

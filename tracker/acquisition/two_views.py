@@ -100,7 +100,9 @@ def acquire_from_two_views(
     report("done", 1.0)
     n = len(found.sizes)
     fit = SizeFit(found.sizes, body, (sighted.pose,), found.chamfer_after_m, np.full((n, n), np.nan))
-    return Acquisition(body, (frame,), fit.poses, before, after, parameters, fit, names)
+    return Acquisition(
+        body, (frame,), fit.poses, before, after, parameters, fit, names, joints_are_given=True
+    )  # fmt: skip
 
 
 def choose_views(

@@ -8,9 +8,9 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import Remedy, SessionError
+from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
 from tracker.motion.interpolation import interpolate_pose
-from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Person, Session
 from tracker.store.stored_poses import StoredPose, read_stored_poses
 

@@ -2,6 +2,6 @@
 
 The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use `gauss_newton`
 (`solve`, `fit_to_points` and the plain blocks), `gauss_newton_compiled.solver_of`, `hypothesis`, `limb_exchange`,
-`contour_residuals`, `interpenetration` and `pins`. `observability`, `observability_reasons` and `added_camera` say how
-well views constrain a pose.
+`contour_residuals`, `interpenetration`, `pins` and `retarget`. `observability`, `observability_reasons` and
+`added_camera` say how well views constrain a pose.
 """

@@ -9,6 +9,7 @@ import numpy as np
 
 from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, acquire_from_contours
 from tracker.acquisition.from_joints import place_joints
+from tracker.acquisition.size_report import unobservable_joints
 from tracker.acquisition.two_views import TwoViewSettings, acquire_from_two_views
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, part_of, unreported
@@ -16,12 +17,12 @@ from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock, pin_block
+from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.initialization.first_pose import HEIGHT_SIGMA
 from tracker.pipeline.seen_points import seen_points
-from tracker.posing.retarget import retarget_pose
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import SEEN, Change, PoseChange, PoseRecord
@@ -41,8 +42,6 @@ _MOST_TRACKED = 90
 """Largest number of frames that are tracked for an acquisition where too few poses are stored."""
 _ENOUGH = 0.5
 """Share of these frames with good poses above which another round would show little more."""
-_TRACKING = 0.4
-"""Share of the work up to the end of that tracking."""
 MEASURED = "is_measured"
 """Key of a pose's settings: the height of its body was measured in the silhouettes."""
 
@@ -93,7 +92,8 @@ def acquire_body(
     rounds = settings.rounds if isinstance(settings, AcquisitionSettings) else 1
     body = session.people[person].model
     for number in range(rounds):
-        begin, between, end = number / rounds, (number + _TRACKING) / rounds, (number + 1) / rounds
+        begin, end = number / rounds, (number + 1) / rounds
+        between = (begin + end) / 2  # tracking takes about half of a round
         tracked = _tracked_with(body, session, observer, person, frames, known, part_of(report, begin, between))
         found = _acquire(observer, tracked, settings, part_of(report, between, end))
         body = found.body
@@ -255,7 +255,9 @@ def acquisition_sentence(acquired: Acquisition) -> str:
     if not acquired.is_better:
         return f"sizes not applied: the body would fit the contours worse ({costs})"
     frames = ", ".join(map(str, acquired.frames))
-    return f"sizes from frames {frames}: {acquired.body.height_m:.2f} m tall, {costs}"
+    return "; ".join(
+        [f"sizes from frames {frames}: {acquired.body.height_m:.2f} m tall, {costs}", *unobservable_joints(acquired)]
+    )
 
 
 def _pose_in(body: BodyModel, stored: StoredPose, known: Array | None) -> Array:

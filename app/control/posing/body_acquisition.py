@@ -10,7 +10,7 @@ from app.remedies import page_text
 from app.state.people import AcquiredSize, AcquisitionState, SizeDraft
 from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings, SizeMethod
 from tracker.acquisition.from_voxels import VoxelSizeSettings
-from tracker.acquisition.size_report import size_changes
+from tracker.acquisition.size_report import size_changes, unobservable_joints
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.pipeline.body_acquisition import acquire_body
@@ -108,9 +108,15 @@ class BodyAcquisition:
                 return
             session_state.set(
                 acquisition=AcquisitionState(
-                    person=person, frames=found.frames, cost_before_px=found.cost_before_px,
+                    person=person, message=_notes(found), frames=found.frames, cost_before_px=found.cost_before_px,
                     cost_after_px=found.cost_after_px, sizes=sizes, outlines=outlines,
                 ),
                 draft=SizeDraft(person, found.body, dict(zip(found.frames, found.poses, strict=True))),
                 sizes_message="",
             )  # fmt: skip
+
+
+def _notes(found: Acquisition) -> str:
+    """Return what the footage does not show of the acquired sizes, as a sentence of the page; empty if nothing."""
+    text = "; ".join(unobservable_joints(found))
+    return f"{text[:1].upper()}{text[1:]}." if text else ""

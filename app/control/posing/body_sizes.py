@@ -12,6 +12,7 @@ from app.state.people import SizeDraft
 from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
+from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
 from tracker.pipeline.body_acquisition import (
     SIZES_EDITS,
@@ -19,7 +20,6 @@ from tracker.pipeline.body_acquisition import (
     sizes_changed,
     with_sizes_changed,
 )
-from tracker.posing.retarget import retarget_pose
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
 

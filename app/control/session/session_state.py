@@ -22,13 +22,13 @@ from tracker.compute.kernel_cache import STAGES
 from tracker.errors import SessionError, TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import value_mask, with_locked_dofs
+from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.seen_points import seen_points
 from tracker.posing.default_pose import default_pose
 from tracker.posing.grab import Constraints
-from tracker.posing.retarget import retarget_pose
 from tracker.session.locked_dofs import active_dofs
 from tracker.session.session import Session
 from tracker.tracking.chamfer.settings import pose_cost

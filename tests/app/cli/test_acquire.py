@@ -16,7 +16,7 @@ from tracker.session.session import load_session
 
 KEYS = {
     "person", "frames", "views", "cost_before_px", "cost_after_px", "height_m", "sizes", "model", "evaluations",
-    "voxels",
+    "voxels", "segments", "swings_deg", "notes",
 }  # fmt: skip
 """Those that docs/acquisition.md lists."""
 
@@ -56,6 +56,9 @@ def test_an_acquired_body_goes_to_the_next_session(run, placed, quick, tmp_path)
     assert (status, err) == (0, "")
     assert found.keys() == KEYS
     assert found["sizes"][0].keys() == {"name", "before_m", "after_m", "sigma_m"}
+    assert found["segments"][0].keys() == {"name", "length_m", "sigma_m"}
+    assert found["swings_deg"].keys() == {"shoulder", "elbow", "hip", "knee"}
+    assert found["notes"] == []  # the joints of frame 20 are known
     assert (found["person"], len(found["frames"]), found["views"]) == ("person", 2, ["FRONT", "RIGHT", "BACK", "LEFT"])
     acquired = load_session(placed).people[0].model
     assert body.read_text() == found["model"] == format_model(acquired)

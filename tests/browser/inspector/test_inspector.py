@@ -305,8 +305,10 @@ async def test_sizes_are_acquired_with_progress_and_shown_before_and_after(page,
         "sizes": [{"name": "thigh, length", "before_m": 0.4, "after_m": 0.445, "sigma_m": 0.008}],
         "front": lines, "side": lines,
     }  # fmt: skip
-    await endpoint.broadcast(work | {"running": False, "stage": "", "message": "", "result": result})
+    note = "Shoulder centre not observable: it turned by 19 degrees; hip centre not observable: it turned by 9 degrees."
+    await endpoint.broadcast(work | {"running": False, "stage": "", "message": note, "result": result})
     await page.locator(".acquisition-sizes").wait_for()
+    assert await page.locator(".acquisition-status").inner_text() == note
     assert await page.locator(".acquisition-sizes tbody tr").inner_text() == "Thigh, length\t40.0\t44.5\t0.8"
     assert "Frames 0, 7: 3.00 → 2.25 px" in await page.locator("[data-section=body] .acquisition").inner_text()
     assert (

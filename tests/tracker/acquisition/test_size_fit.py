@@ -8,11 +8,12 @@ from tracker.acquisition.frame_choice import choose_frames
 from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
 from tracker.acquisition.size_fit import Round, SightedPerson, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.acquisition.size_report import size_changes
+from tracker.acquisition.size_report import acquired_segments, joint_swings, size_changes, unobservable_joints
 from tracker.body.dimensions import PartDimensions, dimensions_of, stature_m, with_dimensions
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.gauss_newton import PointTargets
+from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import load_model
 
 CAMERAS = cameras_around(4)
@@ -74,6 +75,20 @@ def test_an_own_body_stays_as_it_is():
     found = fit_sizes_to_contours(SizeParameters(model), sighted(model, model, range(4)), SizeFitSettings())
     assert found.body.height_m == pytest.approx(1.7, rel=0.01)
     assert np.abs(thicknesses(found.body) / thicknesses(model) - 1).max() < 0.03
+
+
+def test_frames_whose_errors_are_alike_count_as_fewer():
+    model = load_model("gavrila22", 1.7)
+    parameters, frame = SizeParameters(model), sighted(model, model, [0])[0]
+    kinds = ("height", "build", "length", "girth")
+
+    def height_sigma(n_frames, correlation):
+        settings = SizeFitSettings(rounds=(Round(kinds, 1.0, 0),), frame_correlation=correlation)
+        return np.sqrt(fit_sizes_to_contours(parameters, [frame] * n_frames, settings).covariance[0, 0])
+
+    alone = height_sigma(1, 0.3)
+    assert height_sigma(4, 1.0) == pytest.approx(alone, rel=1e-6)
+    assert height_sigma(4, 0.0) < height_sigma(4, 0.3) < alone
 
 
 def test_what_is_not_seen_stays_as_uncertain_as_before():
@@ -156,6 +171,54 @@ def test_sizes_are_reported_with_their_uncertainty(acquisition):
     assert 0 < thigh.sigma_m < 0.2 * thigh.after_m
     changes = [abs(np.log(r.after_m / r.before_m)) for r in listed]
     assert changes == sorted(changes, reverse=True)
+
+
+@pytest.mark.slow
+def test_segments_are_those_of_the_poses_with_their_uncertainty(acquisition):
+    segments = {s.name: s for s in acquired_segments(acquisition)}
+    rows = {r.name: r for r in size_changes(acquisition)}
+    for name in ("upper arm", "forearm", "thigh", "calf"):  # rigid, so that any pose shows them
+        assert segments[name].length_m == pytest.approx(rows[f"{name}, length"].after_m, rel=0.02)
+        assert segments[name].sigma_m == pytest.approx(rows[f"{name}, length"].sigma_m, rel=0.1)
+    places = np.array([PosedBody(acquisition.body, p).joint_centers_world for p in acquisition.poses])
+    shoulders = [acquisition.body.point_names.index(f"{side}_shoulder") for side in ("left", "right")]
+    widths = np.linalg.norm(places[:, shoulders[0]] - places[:, shoulders[1]], axis=1)
+    assert segments["shoulder width"].length_m == pytest.approx(np.median(widths))
+
+
+def test_joints_that_hardly_turn_are_said_to_be_unobservable(acquisition):
+    model = acquisition.body
+    poses = [model.neutral() for _ in range(3)]
+    at = {n: i for i, n in enumerate(model.value_names)}
+    poses[1][at["left_shoulder.abduction"]], poses[1][at["right_shoulder.twist"]] = np.radians([19, 90])
+    poses[1][at["left_elbow.extension"]] = np.radians(31)
+    poses[1][at["right_hip.flexion"]], poses[2][at["right_hip.flexion"]] = np.radians([25, -25])
+    shown = acquisition._replace(poses=tuple(poses))
+    assert {s.name: round(np.degrees(s.swing_rad)) for s in joint_swings(shown)} == {
+        "shoulder": 19, "elbow": 31, "hip": 50, "knee": 0,
+    }  # fmt: skip
+    assert unobservable_joints(shown) == [
+        "shoulder centre not observable: it turned by 19 degrees",
+        "knee centre not observable: it turned by 0 degrees",
+    ]
+    assert unobservable_joints(shown._replace(joints_are_given=True)) == []
+
+
+@pytest.mark.slow
+def test_the_sizes_before_do_not_change_what_is_acquired(acquisition):
+    """The prior is centred on typical proportions, not on a body that was fitted or typed in before."""
+    person, model = other_body("gavrila34"), load_model("gavrila34", 1.7)
+    poses = {k: posed(person, k) for k in range(4)}
+    rng = np.random.default_rng(0)
+    starts = {k: shaken(model, p, rng, 0.05, 0.02) for k, p in poses.items()}
+    sizes = dimensions_of(model)
+    longer = {n: p._replace(length_m=1.2 * p.length_m) if "arm" in n else p for n, p in sizes.parts.items()}
+    other = with_dimensions(model, sizes._replace(parts=longer))
+    bodies = {k: (PosedBody(other, retarget_pose(p, model, other)),) for k, p in starts.items()}
+    found = acquire_from_contours(_Staged(person, poses), bodies, 0, {}, AcquisitionSettings(n_frames=3))
+    np.testing.assert_allclose(lengths(found.body), lengths(acquisition.body), rtol=0.02)
+    rows = {r.name: r for r in size_changes(found)}
+    assert rows["forearm, length"].before_m == pytest.approx(longer["left_forearm"].length_m)
 
 
 def test_a_body_where_nobody_is_gets_no_sizes():

@@ -15,6 +15,7 @@ from tracker.body.dimensions import dimensions_of, with_dimensions
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.hypothesis import Hypothesis
+from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model, load_model
 from tracker.initialization.first_pose import FirstPose, FirstPoses
 from tracker.pipeline import chain
@@ -22,7 +23,6 @@ from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, start_fr
 from tracker.pipeline.find_people import FindSettings
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.stored_run import TrackPlan
-from tracker.posing.retarget import retarget_pose
 from tracker.session.session import load_session, save_model
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord

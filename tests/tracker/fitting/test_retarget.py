@@ -5,9 +5,9 @@ import pytest
 from staging import cameras_around, posed
 
 from tracker.body.dimensions import PartDimensions, dimensions_of, with_dimensions
+from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import load_model
 from tracker.geometry.triangulation import PointObservation
-from tracker.posing.retarget import retarget_pose
 
 
 @pytest.fixture(scope="module")
