@@ -3,7 +3,6 @@
 import re
 
 import numpy as np
-import pytest
 from architecture import ROOT
 
 KEPT_IN, ALL_ROWS = "docs/accuracy.md", "docs/measurements.md"
@@ -53,20 +52,6 @@ def test_the_readme_shows_the_same_figures():
         assert numbers(rows[name]["lost frames"]) == alone_lost + acquired_lost, name
 
 
-def test_the_comparison_of_trackers_shows_the_same_figures():
-    shown = {(r["recording"], r["body"]): r["chamfer"] for r in table_with(KEPT_IN, "chamfer", "contour", "body")}
-    n_compared = 0
-    for (recording, body), cell in shown.items():
-        name, _, which = recording.partition(", ")
-        if which == "with masks":
-            continue
-        person = 1 if which == "woman" else 0
-        at = 0 if body == "by height alone" else 2
-        assert numbers(cell) == [kept()[name][at][person], kept()[name][at + 1][person]], (recording, body)
-        n_compared += 1
-    assert n_compared >= 2 * 4
-
-
 def test_starts_from_the_reference_show_the_same_figures():
     rows = table_with(KEPT_IN, "from nothing", "from the reference joints")
     for row in rows:
@@ -75,23 +60,6 @@ def test_starts_from_the_reference_show_the_same_figures():
         wanted = [kept()[name][2][person], kept()[name][3][person]]
         assert numbers(row["from the reference joints"]) == wanted, row["recording"]
     assert len(rows) == 5
-
-
-def test_people_found_show_the_same_figures():
-    """The benchmark's table, and that of the starts."""
-    made = {r["person"]: r for r in table_with(ALL_ROWS, "frames called good", "lost frames")}
-    starts = {r["recording"]: numbers(r["from nothing"]) for r in table_with(KEPT_IN, "from nothing")}
-    names = {"two_people, man": "two people, person1", "two_people, woman": "two people, person2"}
-    for recording, figures in starts.items():
-        row = made[names.get(recording, recording.replace("_", " "))]
-        assert [row["error, mm"], row["lost frames"]] == figures, recording
-
-
-@pytest.mark.parametrize(("row", "column"), [("gavrila34 of 1.75 m", 0), ("acquire (all views, six frames)", 2)])
-def test_acquisition_shows_the_same_figures(row, column):
-    rows = {r["body"]: r for r in table_with("docs/acquisition.md", "MPJPE of track", "mean cost")}
-    assert numbers(rows[row]["MPJPE of track"]) == kept()["walk"][column]
-    assert numbers(rows[row]["lost frames"])[:1] == kept()["walk"][column + 1]
 
 
 def test_means_of_simulated_people_are_those_of_their_rows():
