@@ -285,7 +285,7 @@ class InconsistentMessage(Message, frozen=True, tag="inconsistent"):
 
 
 class PartReason(Part, frozen=True):
-    """What each view shows of a part. Tuples are by camera; null where it does not show the part, or not that."""
+    """Measures of a part in each view. Tuples are by camera; null where it does not show the part, or not that."""
 
     below_nats: tuple[float | None, ...]
     """Evidence of the part's colours below the usual of the run; negative where it is above."""

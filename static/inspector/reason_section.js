@@ -117,7 +117,7 @@ function alternativeRow({ nats, limbs }, rank, take) {
 }
 
 /**
- * What was searched for alternatives, and that nothing else was found.
+ * Names the limbs that were searched for alternatives, and says that nothing else was found.
  *
  * @param {import("../model/protocol.js").ReasonMessage} reason
  */

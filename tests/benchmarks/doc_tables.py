@@ -64,7 +64,7 @@ def measured(
     measure: Callable[[Clip, Settings], Cell],
     told: Callable[[Cell], str],
 ) -> dict[str, list[Cell]]:
-    """What every variant reaches on every recording; each is printed as it comes."""
+    """Measure every variant on every recording; each is printed as it comes."""
     rows: dict[str, list[Cell]] = {}
     for variant, settings in variants.items():
         for clip in clips:

@@ -56,7 +56,7 @@ class Assessed(NamedTuple):
     errors_mm: np.ndarray
     """Of each limb joint, (T, 12); NaN where unknown."""
     odds: np.ndarray
-    """What ranks the frames: the largest probability that a limb is lost, (T,)."""
+    """Rank of the frames: the largest probability that a limb is lost, (T,)."""
     flagged: np.ndarray
     """Whether a frame is not good, (T,)."""
     covered: np.ndarray

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 from tracker.appearance.region_deficit import elsewhere_nats, worst_parts
-from tracker.appearance.region_learning import LearningFrame, learn_regions
+from tracker.appearance.region_learning import LearningFrame, learn_regions, learning_frames
 from tracker.appearance.region_model import RegionModel
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
@@ -45,7 +45,6 @@ from tracker.tracking.pose_errors import SELDOM_NATS
 from tracker.tracking.view_regions import regions
 
 OFF_MM = 100.0
-N_LEARNING = 60
 DISPLACED_SHARE, SEED = 0.07, 5
 HEADS = (
     "limbs off", "area, lost", "area, elsewhere", "frames off", "area, lost", "area, elsewhere", "off, found",
@@ -151,7 +150,7 @@ def measure(tracked: Tracked, bodies: Sequence[Bodies], observer: Observer) -> M
         observer.evidence(frame, regions(cameras, people), edges=colors_only)
         for frame, people in zip(tracked.frames, bodies, strict=True)
     ]
-    chosen = np.unique(np.linspace(0, len(views) - 1, N_LEARNING).round().astype(int))
+    chosen = learning_frames(range(len(views)))
     began = time.process_time()
     known = learn_regions([LearningFrame(views[k], bodies[k]) for k in chosen], cameras, observer.empty_scenes())
     learnt = time.process_time()

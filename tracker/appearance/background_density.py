@@ -20,7 +20,7 @@ from tracker.images.background_subtraction import MAX_HUE_SHIFT, MIN_SHADE, expo
 from tracker.images.change import NOISE_SIGMAS
 from tracker.images.color_histogram import BINS, bin_of
 
-_MIN_SEEN = 8
+MIN_SEEN = 8
 """Fewest frames in which a cell was open, for a colour of its own."""
 _MIN_NOISE = 2.0
 """Smallest standard deviation of a channel, gray levels: rounding, and the losses of a compressed video."""
@@ -126,7 +126,7 @@ def _medians(values: FloatArray, n: NDArray[np.int64], mean: FloatArray, noise: 
     """Fill the median colour and the largest spread of a channel of each cell with enough values."""
     for v in range(n.shape[0]):
         for u in range(n.shape[1]):
-            if n[v, u] < _MIN_SEEN:
+            if n[v, u] < MIN_SEEN:
                 continue
             largest = 0.0
             for c in range(3):

@@ -26,6 +26,8 @@ from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.images.color_histogram import BINS
 
+N_LEARNING = 60
+"""Frames from which the appearance of a run is learnt, at most."""
 _PRIOR_SAMPLES = 30.0
 """Weight of all views in the colours of a part, and of the whole body in its histograms of r, samples: those of a
 forearm in some five frames."""
@@ -57,6 +59,12 @@ class _Shown(NamedTuple):
     def share(self) -> float:
         """See `sample_share`."""
         return sample_share(self.cells.camera)
+
+
+def learning_frames(frames: Sequence[int]) -> list[int]:
+    """Return the frames to learn from, spread evenly over those of a run, ascending."""
+    at = np.unique(np.linspace(0, len(frames) - 1, N_LEARNING).round().astype(int))
+    return [frames[i] for i in at]
 
 
 def learn_regions(

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.appearance.region_deficit import elsewhere_nats, worst_parts, worst_views
-from tracker.appearance.region_learning import LearningFrame, learn_regions
+from tracker.appearance.region_learning import LearningFrame, learn_regions, learning_frames
 from tracker.appearance.region_model import RegionModel
 from tracker.body.limbs import Limb, display_name, limbs
 from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
 from tracker.fitting.hypothesis import SAME_POSE_M, limbs_elsewhere
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
 from tracker.tracking.estimation.limb_repair import FrameEvidence, Repair, better_limbs, limbs_to_search
 from tracker.tracking.estimation.pose_score import common_evidence
@@ -33,8 +33,6 @@ from tracker.tracking.subjects import Subjects
 from tracker.tracking.view_regions import regions
 from tracker.tracking.view_tracks import FrameTracks
 
-N_LEARNING = 60
-"""Frames from which the appearance of a run is learnt, at most."""
 _MAX_TRIES = 3
 """Times that the appearance is learnt, again only from poses that were repaired, and that a frame is examined in
 between: once by itself, and again where a limb beside it was found. After twice as many searches in a row that found
@@ -99,7 +97,7 @@ class RunRepair:
                 yield RepairStep(first + len(scores), first + 2 * n)
             if not self._searches:
                 break
-            for done in self._repair(known, self._elsewhere(scores)):
+            for done in self._repair(known, self._elsewhere(scores)[0]):
                 yield RepairStep(first + n + min(done, n), first + 2 * n)
             changed = [k for k in self._frames if self._bodies[k] is not before[k]]
             if not changed:
@@ -115,8 +113,7 @@ class RunRepair:
 
     def _chosen(self) -> dict[int, tuple[ViewEvidence, ...]]:
         """Return the evidence of the frames to learn from."""
-        at = np.unique(np.linspace(0, len(self._frames) - 1, N_LEARNING).round().astype(int))
-        return {k: self._colors_at(k) for k in (self._frames[i] for i in at)}
+        return {k: self._colors_at(k) for k in learning_frames(self._frames)}
 
     def _learn(self, chosen: Mapping[int, tuple[ViewEvidence, ...]]) -> RegionModel:
         frames = [LearningFrame(views, self._bodies[k]) for k, views in chosen.items()]
@@ -127,16 +124,17 @@ class RunRepair:
         bodies = self._bodies[frame]
         return known.score(known.frame(views or self._colors_at(frame), bodies), bodies).nats
 
-    def _elsewhere(self, scores: Mapping[int, Array]) -> dict[int, Array]:
-        """Return how much likelier each limb of all people is elsewhere on each frame, (n_limbs,), nats."""
-        found = elsewhere_nats(np.array([scores[k].sum(axis=0) for k in self._frames]), self._subjects.models)
-        of_limbs = np.take_along_axis(found, worst_parts(found, self._subjects.models), axis=1)
-        return dict(zip(self._frames, of_limbs, strict=True))
+    def _elsewhere(self, scores: Mapping[int, Array]) -> tuple[dict[int, Array], IntArray]:
+        """Return how much likelier each limb of all people is elsewhere on each frame, (n_limbs,), nats, and the part
+        of each that says so, (T, n_limbs)."""
+        models = self._subjects.models
+        found = elsewhere_nats(np.array([scores[k].sum(axis=0) for k in self._frames]), models)
+        parts = worst_parts(found, models)
+        return dict(zip(self._frames, np.take_along_axis(found, parts, axis=1), strict=True)), parts
 
-    def _against(self, scores: Mapping[int, Array]) -> dict[int, list[str]]:
+    def _against(self, scores: Mapping[int, Array], parts: IntArray) -> dict[int, list[str]]:
         """Return the part and the view that speak most against each limb of all people on each frame."""
         models, nats = self._subjects.models, np.array([scores[k] for k in self._frames])
-        parts = worst_parts(elsewhere_nats(nats.sum(axis=1), models), models)
         views = np.take_along_axis(worst_views(nats, models), parts, axis=1)
         names = [display_name(p.name) for m in models for p in m.parts]
         cameras = [c.camera.name for c in self._observer.cameras]
@@ -217,7 +215,8 @@ class RunRepair:
         return found.is_better
 
     def _results(self, scores: Mapping[int, Array]) -> dict[int, dict[int, RepairedPose]]:
-        elsewhere, against = self._elsewhere(scores), self._against(scores)
+        elsewhere, parts = self._elsewhere(scores)
+        against = self._against(scores, parts)
         out: dict[int, dict[int, RepairedPose]] = {i: {} for i in self._tracks}
         for i, of_person in self._tracks.items():
             own = slice(self._first[i], self._first[i + 1])

@@ -14,6 +14,8 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.identity import Identity
 from app.state.reason import RankedPose, Reason
 from app.state.state import State
+from tracker.appearance.background_density import MIN_SEEN
+from tracker.appearance.region_learning import learning_frames
 from tracker.body.limbs import limb_display_name
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
@@ -24,14 +26,10 @@ from tracker.tracking.estimation.frame_problem import Bodies
 from tracker.tracking.estimation.part_evidence import RunEvidence, contradiction, learn_run, read_frame
 
 _LOG = logging.getLogger(__name__)
-_N_LEARNING = 60
-"""Frames to learn from, spread over the run: as many as `tests/benchmarks/region_evidence.py` measures with."""
-_MIN_LEARNING = 8
-"""Fewest frames to learn from: a place of a view has a colour of its own from 8 open frames on."""
 _REST_S = 0.1
 """Minimum time between two reasons; the pose may change faster."""
 _AROUND = (-3, -1, 1, 3)
-"""Frames around whose limbs are tried as they are, as in `tests/benchmarks/region_evidence.py`."""
+"""Frames around whose limbs are tried as they are."""
 _GIVE_WAY_S = 0.05
 """Time between two looks at whether a drag has ended, which goes first."""
 
@@ -42,7 +40,7 @@ class _StoppedError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class _Learnt:
-    """What is usual in a run, and the poses that it was learnt from."""
+    """The usual of a run, and the poses that it was learnt from."""
 
     run: RunEvidence
     people: tuple[int, ...]
@@ -56,7 +54,7 @@ class _Learnt:
 
 
 class Reasons:
-    """Explains the newest pose while a page asks for it. What is usual is learnt once for the poses of a run."""
+    """Explains the newest pose while a page asks for it. The usual is learnt once for the poses of a run."""
 
     def __init__(self, session_state: SessionState) -> None:
         """Subscribe to the state; nothing is computed until a page asks."""
@@ -197,9 +195,9 @@ class Reasons:
         session_state = self._session_state
         poses = self._poses(people)
         if self._learnt is None or not self._learnt.holds(people, poses):
-            if len(poses) < _MIN_LEARNING:
+            if len(poses) < MIN_SEEN:
                 raise TrackerError(
-                    f"expected {_MIN_LEARNING} frames with poses or more, to learn what is usual in each view, found "
+                    f"expected {MIN_SEEN} frames with poses or more, to learn what is usual in each view, found "
                     f"{len(poses)}; track the recording first"
                 )
             models = session_state.present
@@ -216,7 +214,7 @@ class Reasons:
         saver = self._session_state.saver
         with self._session_state.lock:
             common = sorted(set.intersection(*(set(saver.index.frames(i)) for i in people)))
-        chosen = [common[i] for i in np.unique(np.linspace(0, len(common) - 1, _N_LEARNING).round().astype(int))]
+        chosen = learning_frames(common)
         found: list[dict[int, Array]] = []
         for person in people:
             rows = [r for r in saver.pose_rows(person, chosen) if saver.revisions.fits(person, r.model_revision)]

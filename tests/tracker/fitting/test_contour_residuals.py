@@ -142,8 +142,8 @@ def test_an_edge_of_somebody_elses_does_not_pull():
     assert normal(ContourResiduals(views, [right], 0, BACKWARD, 60.0), right).gradient[1] > 10
 
 
-# What the collarbones, the spine, the waist, two joints in the neck and feet do of their own the outline hardly shows.
-# Start, degrees; mean and largest distance of the joints, metres; mean angle of the parts' axes, degrees.
+# The outline hardly shows own motions of collarbones, spine, waist, feet and two joints in the neck. Start, degrees;
+# mean and largest distance of the joints, metres; mean angle of the parts' axes, degrees.
 WITHIN = {
     "gavrila34": (3.0, 0.0015, 0.004, 0.5), "gavrila38": (3.0, 0.002, 0.006, 0.8),
     "knossow54": (3.0, 0.002, 0.006, 0.8), "mikic10": (3.0, 0.0015, 0.005, 0.4),

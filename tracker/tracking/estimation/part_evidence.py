@@ -30,7 +30,7 @@ from tracker.tracking.view_regions import read_views
 
 
 class SeenFrame(NamedTuple):
-    """What the views show of posed bodies on a frame."""
+    """Measures of posed bodies in the views of a frame."""
 
     views: tuple[ViewEvidence, ...]
     """Colours alone."""
@@ -44,7 +44,7 @@ class SeenFrame(NamedTuple):
 
 
 class PartTable(NamedTuple):
-    """What each view shows of each part of one person in a pose; NaN where it does not show the part, or not that."""
+    """Measures of each part of one person in each view; NaN where the view does not show the part, or not that."""
 
     below: Array
     """Evidence of the colours below the usual of as many samples, (V, n_parts), nats; negative where it is above."""
@@ -75,7 +75,7 @@ class Contradiction(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RunEvidence:
-    """What is usual in a run: its colours, and the medians of all measures."""
+    """The usual of a run: its colours, and the medians of all measures."""
 
     known: RegionModel
     """Appearance of the people and places."""
