@@ -17,6 +17,7 @@ from tracker.store.records import (
     SOURCES,
     STATUSES,
     Alternative,
+    AssessmentChange,
     Change,
     MarkChange,
     PinChange,
@@ -28,7 +29,9 @@ from tracker.validation import MAX_FRAMES, UNPRINTABLE, Name
 _VERSION = 1
 _MAX_BYTES = 1_000_000_000
 """Size above which a file is refused before it is read: a million poses. Edits that wait are in memory."""
-_KINDS: dict[str, type[Change]] = {"pose": PoseChange, "mark": MarkChange, "pin": PinChange}
+_KINDS: dict[str, type[Change]] = {
+    "pose": PoseChange, "mark": MarkChange, "assessment": AssessmentChange, "pin": PinChange,
+}  # fmt: skip
 _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 _Line: TypeAlias = Annotated[str, Meta(pattern=rf"^[^{UNPRINTABLE}]{{0,2000}}\Z")]
@@ -46,7 +49,7 @@ class UnsavedEdit(NamedTuple):
 
 
 class _Change(msgspec.Struct):
-    kind: Literal["pose", "mark", "pin"]
+    kind: Literal["pose", "mark", "assessment", "pin"]
     of: msgspec.Raw
 
 
@@ -171,6 +174,9 @@ def _decoded(change: _Change, named: dict[int, Model], models: dict[int, BodyMod
             _require(_are_finite([pose.cost_px]), f"the pose of {where} has an impossible cost")
         if found.pose is not None:
             _require(_is_possible(found.pose), f"the pose of {where} has impossible sources, marks or costs")
+    elif isinstance(found, AssessmentChange):
+        is_possible = _are_finite(found.values) and _is_possible_assessment(found)
+        _require(is_possible, f"the assessment of {where} is impossible")
     return found
 
 
@@ -178,8 +184,15 @@ def _is_possible(pose: PoseRecord) -> bool:
     return (
         len(pose.sources) == len(pose.values)
         and set(pose.sources) <= set(SOURCES)
-        and pose.status in STATUSES
-        and _are_finite((*pose.view_costs_px, *pose.part_costs_px, *pose.limbs_lost))
+        and _are_finite((*pose.view_costs_px, *pose.part_costs_px))
+        and _is_possible_assessment(pose)
+    )
+
+
+def _is_possible_assessment(pose: PoseRecord | AssessmentChange) -> bool:
+    return (
+        pose.status in STATUSES
+        and _are_finite(pose.limbs_lost)
         and all(0 <= p <= 1 for p in pose.limbs_lost)
         and (pose.errors is None or (pose.errors.shape[1:] == (3, 3) and bool(np.isfinite(pose.errors).all())))
     )

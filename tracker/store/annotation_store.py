@@ -77,8 +77,7 @@ class AnnotationStore:
     def poses(self, person: str, frames: range) -> dict[int, PoseRecord]:
         """Return the poses of a person in a range of frames, by frame, ascending."""
         return self._records(
-            f"SELECT p.frame, {rows.RECORD_COLUMNS} {rows.CURRENT_POSES} JOIN edits e ON e.id = c.edit "
-            "LEFT JOIN program_settings t ON t.id = c.program_settings "
+            f"SELECT p.frame, {rows.RECORD_COLUMNS} {rows.CURRENT_POSES} {rows.ORIGIN} "
             "WHERE p.person = ? AND p.frame BETWEEN ? AND ? ORDER BY p.frame",
             person,
             frames,
@@ -98,7 +97,7 @@ class AnnotationStore:
             "FROM f JOIN pose_changes d ON d.id = f.change "
             "WHERE d.numbers IS f.numbers OR d.edit = f.edit OR d.numbers IS NULL) "
             f"SELECT f.frame, {rows.RECORD_COLUMNS} FROM f JOIN pose_changes c ON c.id = f.change "
-            "JOIN edits e ON e.id = c.edit LEFT JOIN program_settings t ON t.id = c.program_settings "
+            f"{rows.ORIGIN} "
             "WHERE c.numbers IS NOT f.numbers AND c.edit != f.edit AND c.numbers IS NOT NULL ORDER BY f.frame",
             person,
             frames,

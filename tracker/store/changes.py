@@ -1,4 +1,4 @@
-"""Write the changes of an edit: poses, marks of poses, pins."""
+"""Write the changes of an edit: poses, marks and assessments of poses, pins."""
 
 import json
 import sqlite3
@@ -7,7 +7,7 @@ from typing import Any
 
 from tracker.store import rows
 from tracker.store.edit_tree import show_change
-from tracker.store.records import Change, MarkChange, PinChange, PoseChange
+from tracker.store.records import AssessmentChange, Change, MarkChange, PinChange, PoseChange
 
 
 def write_changes(
@@ -30,6 +30,8 @@ def write_changes(
             _set_pin(db, edit, change)
         elif isinstance(change, MarkChange):
             _set_marks(db, edit, change)
+        elif isinstance(change, AssessmentChange):
+            _set_assessment(db, edit, change)
         elif by_program and _is_keyframe(db, change.person, change.frame):
             skipped.append((change.person, change.frame))
         else:
@@ -45,11 +47,11 @@ def _is_keyframe(db: sqlite3.Connection, person: str, frame: int) -> bool:
 
 def _set_pose(db: sqlite3.Connection, edit: int, change: PoseChange) -> None:
     pose = change.pose
-    content = (None,) * 13 if pose is None else (*rows.record_to_row(pose), _settings_record(db, pose.settings))
+    content = (None,) * 14 if pose is None else (*rows.record_to_row(pose), _settings_record(db, pose.settings))
     change_id = db.execute(
         f"INSERT INTO pose_changes (edit, previous, person, frame, {rows.WRITTEN_COLUMNS}) VALUES (?1, (SELECT "
         "change FROM poses WHERE (person, frame) = (?2, ?3)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, "
-        "?14, ?15, ?16)",
+        "?14, ?15, ?16, ?17)",
         (edit, change.person, change.frame, *content),
     ).lastrowid
     show_change(db, "pose", change_id, change_id)
@@ -68,6 +70,23 @@ def _set_marks(db: sqlite3.Connection, edit: int, change: MarkChange) -> None:
         "WHERE id = (SELECT change FROM poses WHERE (person, frame) = (?, ?))",
         (edit, change.keyframe, change.reviewed, change.person, change.frame),
     )
+    _show_copy(db, inserted)
+
+
+def _set_assessment(db: sqlite3.Connection, edit: int, change: AssessmentChange) -> None:
+    """Write the current pose again with another assessment, if it is the one that was assessed."""
+    same = rows.UNASSESSED_COLUMNS
+    inserted = db.execute(
+        f"INSERT INTO pose_changes (edit, previous, person, frame, made_in, {rows.ASSESSED_COLUMNS}, {same}) "
+        f"SELECT ?1, id, person, frame, coalesce(made_in, edit), ?5, ?6, ?7, ?8, {same} FROM pose_changes "
+        "WHERE id = (SELECT change FROM poses WHERE (person, frame) = (?2, ?3)) AND numbers = ?4",
+        (edit, change.person, change.frame, rows.values_to_blob(change.values), *rows.assessment_to_row(change)),
+    )
+    _show_copy(db, inserted)
+
+
+def _show_copy(db: sqlite3.Connection, inserted: sqlite3.Cursor) -> None:
+    """Make a copy of the current pose current, with the same alternatives."""
     if inserted.rowcount:
         copied = "rank, numbers, model_revision, cost_px"
         db.execute(

@@ -14,7 +14,8 @@ _COLUMNS = {
     "model_revisions": "id, person, toml, time",
     "program_settings": "id, settings",
     "pose_changes": "id, edit, previous, person, frame, numbers, sources, keyframe, status, cost_px, model_revision, "
-    "settings, views_px, parts_px, remark, program_settings, reviewed, limbs, errors",
+    "settings, views_px, parts_px, remark, program_settings, reviewed, limbs, errors, made_in, "
+    "trace",
     "poses": "person, frame, change",
     "alternatives": "change, rank, model_revision, numbers, cost_px",
     "pin_changes": "id, edit, previous, person, frame, point, camera, u, v",
@@ -23,8 +24,9 @@ _COLUMNS = {
 }
 """Columns of each table that its checksums cover."""
 LATER_COLUMNS: dict[int, dict[str, tuple[str, ...]]] = {
-    6: {"pose_changes": ("limbs", "errors")},
-    7: {"pose_changes": ("errors",)},
+    6: {"pose_changes": ("limbs", "errors", "made_in", "trace")},
+    7: {"pose_changes": ("errors", "made_in", "trace")},
+    8: {"pose_changes": ("made_in", "trace")},
 }
 """Columns that the tables of each older version with checksums lack."""
 OLDEST_VERSION = min(LATER_COLUMNS)

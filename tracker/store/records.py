@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from tracker.body.searches import Search
 from tracker.geometry.arrays import Array
 
 SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", "smoothed", "imported")
@@ -51,6 +52,8 @@ class PoseRecord:
     errors: Array | None = None
     """Covariance of each point of the body in the order of its `point_names`, (n_points, 3, 3), m^2; None where not
     known."""
+    trace: tuple[Search, ...] | None = None
+    """The searches of the tracker on the frame, in their order; None where they are not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +91,30 @@ class MarkChange(NamedTuple):
     """Whether a person has checked it."""
 
 
+class AssessmentChange(NamedTuple):
+    """Set what is known about the pose of a person in a frame without changing it, also of a keyframe.
+
+    Author, time and program stay those of the pose. A frame that shows another pose by now is ignored.
+    """
+
+    person: str
+    frame: int
+    values: Array
+    """The pose that was assessed, (n_values,)."""
+    status: str
+    """One of `STATUSES`."""
+    remark: str
+    limbs_lost: tuple[float, ...]
+    """See `PoseRecord.limbs_lost`."""
+    errors: Array | None
+    """See `PoseRecord.errors`."""
+
+    @classmethod
+    def of(cls, person: str, frame: int, pose: PoseRecord) -> "AssessmentChange":
+        """Return what a record says about its pose."""
+        return cls(person, frame, pose.values, pose.status, pose.remark, pose.limbs_lost, pose.errors)
+
+
 class PinChange(NamedTuple):
     """Set a pin, or clear it."""
 
@@ -109,7 +136,7 @@ class Pin(NamedTuple):
     """Original pixels."""
 
 
-Change = PoseChange | MarkChange | PinChange
+Change = PoseChange | MarkChange | AssessmentChange | PinChange
 
 
 class Committed(NamedTuple):
@@ -140,6 +167,8 @@ class FrameRow(NamedTuple):
     """Whether it has alternatives and is no keyframe."""
     limbs_lost: tuple[float, ...] = ()
     """Probability that each limb is lost, in the order of `tracker.body.limbs.limbs`; empty where not assessed."""
+    assessed_since: bool = False
+    """Whether it was assessed after it was set or marked; see `AssessmentChange`."""
 
 
 class FramePose(NamedTuple):

@@ -10,12 +10,14 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
+from tracker.body.searches import Search
 from tracker.errors import DamagedStoreError
 from tracker.geometry.arrays import Array
 from tracker.store.records import (
     SOURCES,
     STATUSES,
     Alternative,
+    AssessmentChange,
     FramePose,
     FrameRow,
     HistoryEntry,
@@ -55,6 +57,7 @@ class _Summary(msgspec.Struct):
     reviewed: _Flag | None
     others: _Flag
     limbs: bytes | None
+    assessed_since: _Flag
 
 
 class _Pose(msgspec.Struct):
@@ -74,6 +77,7 @@ class _Pose(msgspec.Struct):
     reviewed: _Flag | None
     limbs: bytes | None
     errors: bytes | None
+    trace: str | None
 
 
 class _FramePose(msgspec.Struct):
@@ -113,34 +117,38 @@ class _Revision(msgspec.Struct):
 
 CURRENT_POSES = "FROM poses p JOIN pose_changes c ON c.id = p.change"
 """The current poses: their changes `c` with their keys `p`."""
+ORIGIN = "JOIN edits e ON e.id = coalesce(c.made_in, c.edit) LEFT JOIN program_settings t ON t.id = c.program_settings"
+"""The edit `e` that made the pose of a change `c`, and the row `t` of its settings."""
 ALTERNATIVES = "FROM alternatives a JOIN pose_changes c ON c.id = a.change"
 """All alternatives `a` with the changes `c` that they belong to."""
 
 RECORD_COLUMNS = (
     "c.numbers, c.sources, c.model_revision, c.keyframe, c.status, c.cost_px, coalesce(t.settings, c.settings), "
     "e.author, e.time, e.program, c.views_px, c.parts_px, c.remark, c.reviewed, c.limbs, "
-    "c.errors"
+    "c.errors, c.trace"
 )
-"""Columns that `row_to_record` reads; `e` is the edit, `t` the row of the settings."""
+"""Columns that `row_to_record` reads; `e` and `t` are those of `ORIGIN`."""
 FRAME_ROW_COLUMNS = (
     "c.frame, c.sources, c.status, c.cost_px, c.keyframe, c.views_px, c.remark, c.reviewed, "
-    "EXISTS (SELECT 1 FROM alternatives a WHERE a.change = c.id), c.limbs"
+    "EXISTS (SELECT 1 FROM alternatives a WHERE a.change = c.id), c.limbs, c.made_in IS NOT NULL"
 )
 """Columns that `row_to_frame_row` reads."""
 FRAME_POSE_COLUMNS = "c.frame, c.numbers, c.cost_px, c.views_px, c.model_revision"
 """Columns that `row_to_frame_pose` reads."""
 WRITTEN_COLUMNS = (
     "numbers, sources, keyframe, status, cost_px, model_revision, views_px, parts_px, remark, reviewed, "
-    "limbs, errors, program_settings"
+    "limbs, errors, trace, program_settings"
 )
 """Columns that `record_to_row` fills, and `program_settings`, the id of the row of the settings."""
 ALTERNATIVE_COLUMNS = "a.numbers, a.model_revision, a.cost_px"
 """Columns that `row_to_alternative` reads; `a` is the alternative."""
-UNMARKED_COLUMNS = (
-    "numbers, sources, status, cost_px, model_revision, views_px, parts_px, remark, limbs, errors, "
-    "program_settings, settings"
-)
+_POSE_COLUMNS = "numbers, sources, cost_px, model_revision, views_px, parts_px, trace, program_settings, settings"
+ASSESSED_COLUMNS = "status, remark, limbs, errors"
+"""Columns that an assessment of a pose fills; see `assessment_to_row`."""
+UNMARKED_COLUMNS = f"{_POSE_COLUMNS}, {ASSESSED_COLUMNS}"
 """Columns that marking a pose copies unchanged."""
+UNASSESSED_COLUMNS = f"{_POSE_COLUMNS}, keyframe, reviewed"
+"""Columns that assessing a pose copies unchanged."""
 
 
 def is_readable(numbers: Any, sources: Any) -> bool:
@@ -175,6 +183,7 @@ def row_to_record(row: Sequence[Any], where: object) -> PoseRecord:
         check(decoded_json(found.settings, where), dict[str, Any], f"{where}, settings", DamagedStoreError),
         found.author, found.time, found.program, _costs(found.view_costs_px, where), _costs(found.part_costs_px, where),
         found.remark or "", bool(found.reviewed), _numbers(found.limbs, where), _covariances(found.errors, where),
+        _trace(found.trace, where),
     )  # fmt: skip
 
 
@@ -185,7 +194,7 @@ def row_to_frame_row(row: Sequence[Any], where: object) -> FrameRow:
         found.frame, SOURCES[min(_known(found.sources, where))], found.status, found.cost_px,
         bool(found.keyframe), _costs(found.view_costs_px, where), found.remark or "",
         bool(found.keyframe or found.reviewed), bool(found.others and not found.keyframe),
-        _numbers(found.limbs, where),
+        _numbers(found.limbs, where), bool(found.assessed_since),
     )  # fmt: skip
 
 
@@ -255,7 +264,7 @@ def _known(blob: bytes, where: object) -> bytes:
 def alternative_to_row(pose: Alternative) -> tuple[Any, ...]:
     """Convert an alternative to values of the columns numbers, model_revision and cost_px."""
     assert np.all(np.isfinite(pose.values))
-    return np.asarray(pose.values, dtype="<f8").tobytes(), pose.model_revision, pose.cost_px
+    return values_to_blob(pose.values), pose.model_revision, pose.cost_px
 
 
 def record_to_row(pose: PoseRecord) -> tuple[Any, ...]:
@@ -264,7 +273,7 @@ def record_to_row(pose: PoseRecord) -> tuple[Any, ...]:
     assert np.all(np.isfinite(pose.values))
     assert pose.status in STATUSES, pose.status
     return (
-        np.asarray(pose.values, dtype="<f8").tobytes(),
+        values_to_blob(pose.values),
         bytes(SOURCES.index(s) for s in pose.sources),
         pose.keyframe,
         pose.status,
@@ -275,8 +284,31 @@ def record_to_row(pose: PoseRecord) -> tuple[Any, ...]:
         pose.remark,
         pose.reviewed,
         _blob(pose.limbs_lost),
-        None if pose.errors is None else pose.errors[(..., *np.triu_indices(3))].astype("<f4").tobytes(),
+        _triangles(pose.errors),
+        None if pose.trace is None else json.dumps(pose.trace, separators=(",", ":")),
     )
+
+
+def assessment_to_row(assessed: AssessmentChange) -> tuple[Any, ...]:
+    """Convert an assessment to values of `ASSESSED_COLUMNS`."""
+    assert assessed.status in STATUSES, assessed.status
+    return assessed.status, assessed.remark, _blob(assessed.limbs_lost), _triangles(assessed.errors)
+
+
+def values_to_blob(values: Array) -> bytes:
+    """Encode the values of a pose."""
+    return np.asarray(values, dtype="<f8").tobytes()
+
+
+def _trace(text: str | None, where: object) -> tuple[Search, ...] | None:
+    if text is None:
+        return None
+    found = check(decoded_json(text, where), list[Search], f"{where}, searches", DamagedStoreError)
+    return tuple(found)
+
+
+def _triangles(errors: Array | None) -> bytes | None:
+    return None if errors is None else errors[(..., *np.triu_indices(3))].astype("<f4").tobytes()
 
 
 def _array(blob: bytes, where: object) -> Array:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from tracker.store import checksums
 
-VERSION = 8
+VERSION = 9
 """Version of the store; older ones are upgraded, newer ones are refused."""
 
 _SCHEMA = """
@@ -46,7 +46,9 @@ CREATE TABLE pose_changes (
     program_settings INTEGER REFERENCES program_settings,
     reviewed INTEGER,                                            -- NULL: written before version 4, not reviewed
     limbs BLOB,                                                  -- like views_px: probability that a limb is lost
-    errors BLOB                                                  -- little-endian float32: upper triangles, m^2
+    errors BLOB,                                                 -- little-endian float32: upper triangles, m^2
+    made_in INTEGER REFERENCES edits,                            -- of a pose that was only assessed: who made it
+    trace TEXT                                                   -- searches on the frame; NULL: not known
 );
 CREATE INDEX pose_changes_edit ON pose_changes (edit);
 CREATE TABLE poses (
@@ -97,6 +99,10 @@ _UPGRADES = {
     ),
     6: ("ALTER TABLE pose_changes ADD COLUMN limbs BLOB",),
     7: ("ALTER TABLE pose_changes ADD COLUMN errors BLOB",),
+    8: (
+        "ALTER TABLE pose_changes ADD COLUMN made_in INTEGER REFERENCES edits",
+        "ALTER TABLE pose_changes ADD COLUMN trace TEXT",
+    ),
 }
 """Statements that upgrade a store from each older version to the next."""
 STATEMENTS = (*_SCHEMA.split(";\n"), *checksums.ADDED, *(text for texts in _UPGRADES.values() for text in texts))
@@ -104,12 +110,13 @@ STATEMENTS = (*_SCHEMA.split(";\n"), *checksums.ADDED, *(text for texts in _UPGR
 _FORMER_SETTINGS = "told"
 """Name of the table and the column of settings in stores of versions 3 to 5."""
 _RENAMED_SETTINGS = f"{_FORMER_SETTINGS} AS program_settings"
+_SINCE_6 = checksums.LATER_COLUMNS[6]["pose_changes"]
 _MISSING_COLUMNS = {
-    1: ("views_px", "parts_px", "remark", "program_settings", "reviewed", "limbs", "errors"),
-    2: ("program_settings", "reviewed", "limbs", "errors"),
-    3: (_RENAMED_SETTINGS, "reviewed", "limbs", "errors"),
-    4: (_RENAMED_SETTINGS, "limbs", "errors"),
-    5: (_RENAMED_SETTINGS, "limbs", "errors"),
+    1: ("views_px", "parts_px", "remark", "program_settings", "reviewed", *_SINCE_6),
+    2: ("program_settings", "reviewed", *_SINCE_6),
+    3: (_RENAMED_SETTINGS, "reviewed", *_SINCE_6),
+    4: (_RENAMED_SETTINGS, *_SINCE_6),
+    5: (_RENAMED_SETTINGS, *_SINCE_6),
     **{version: later["pose_changes"] for version, later in checksums.LATER_COLUMNS.items()},
 }
 """Columns of `pose_changes` that each older version lacks or names differently. A store opened read only is read

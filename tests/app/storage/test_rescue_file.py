@@ -12,10 +12,11 @@ from mutation import mutate_tree
 
 from app.storage import rescue
 from app.storage.rescue_file import Model, Rescue, UnsavedEdit, read_rescue, write_rescue
+from tracker.body.searches import Search
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, load_model
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, MarkChange, PinChange, PoseChange, PoseRecord
+from tracker.store.records import Alternative, AssessmentChange, MarkChange, PinChange, PoseChange, PoseRecord
 
 MODEL = load_model("gavrila22")
 N_VALUES = len(MODEL.value_names)
@@ -33,11 +34,13 @@ def written(tmp_path, store):
     pose = PoseRecord(
         np.linspace(0, 1, n), ("manual",) * n, 3, keyframe=True, cost_px=1.5, settings={"seen": seen},
         view_costs_px=(1.0, None), part_costs_px=(0.5,), limbs_lost=(0.25,),
+        trace=(Search("limbs", ("left_arm",), 4.0, None, False),),
     )  # fmt: skip
     changes = [
         PoseChange("ann", 4, pose, (Alternative(pose.values + 1, 3, 2.0),)),
         PoseChange("ann", 5, None),
         MarkChange("ann", 4, keyframe=True, reviewed=False),
+        AssessmentChange("ann", 4, pose.values, "lost", "left arm uncertain", (0.5,), np.array([np.eye(3)])),
         PinChange("ann", 4, "head", "front", (10.5, 3.25)),
         PinChange("ann", 4, "left_wrist", "front", None),
     ]
@@ -58,7 +61,9 @@ def test_it_is_read_as_it_was_written(tmp_path, store):
     assert (edit.label, edit.by_program, found.edits[1].amend) == ("drag head", False, 1)
     np.testing.assert_array_equal(edit.changes[0].pose.values, np.linspace(0, 1, N_VALUES))
     assert edit.changes[0].pose.view_costs_px == (1.0, None)
-    assert edit.changes[3] == PinChange("ann", 4, "head", "front", (10.5, 3.25))
+    assert edit.changes[0].pose.trace == (Search("limbs", ("left_arm",), 4.0, None, False),)
+    np.testing.assert_array_equal(edit.changes[3].errors, [np.eye(3)])
+    assert edit.changes[4] == PinChange("ann", 4, "head", "front", (10.5, 3.25))
 
 
 @pytest.mark.parametrize(
@@ -86,7 +91,14 @@ def with_change(index, **changes):
 
 def with_camera(name):
     def change(data):
-        data["edits"][0]["changes"][3]["of"][3] = name
+        data["edits"][0]["changes"][4]["of"][3] = name
+
+    return change
+
+
+def with_assessed_status(status):
+    def change(data):
+        data["edits"][0]["changes"][3]["of"][3] = status
 
     return change
 
@@ -108,6 +120,7 @@ def with_camera(name):
         (with_change(0, frame=2**70), "expected a frame from 0 to"),
         (with_change(0, person="bob"), "has a body that the file lacks"),
         (with_camera("a\x1b[2J"), "Expected `str` matching"),
+        (with_assessed_status("fine"), "the assessment of 'ann' in frame 4 is impossible"),
         (lambda data: data["models"].update({"3": {"person": "ann", "toml": "x = 1"}}), "revision 3"),
         (lambda data: data["edits"][0].update(amend=2**70), "amend"),
         (lambda data: data["edits"][0].update(label="\x9b2J"), "label"),

@@ -11,7 +11,16 @@ import pytest
 
 from tracker.errors import SessionError
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, FrameRow, MarkChange, Pin, PinChange, PoseChange, PoseRecord
+from tracker.store.records import (
+    Alternative,
+    AssessmentChange,
+    FrameRow,
+    MarkChange,
+    Pin,
+    PinChange,
+    PoseChange,
+    PoseRecord,
+)
 
 
 @pytest.fixture
@@ -460,3 +469,46 @@ def test_not_a_store(path):
 def test_missing(path):
     with pytest.raises(SessionError, match="not found"):
         AnnotationStore(path, read_only=True)
+
+
+def assessment(x, status="doubtful"):
+    errors = np.array([np.eye(3), 2 * np.eye(3)])
+    return AssessmentChange("ann", 3, pose(x).values, status, "left arm uncertain", (0.5, 0.25), errors)
+
+
+def test_a_program_assesses_a_keyframe_and_changes_nothing_else(store):
+    keyframe = put(3, 1.0, keyframe=True, cost_px=0.5, settings={"seen": {}}, view_costs_px=(0.5, None))
+    pin = PinChange("ann", 3, "left_wrist", "front", (1.0, 2.0))
+    store.commit("pose", [replace(keyframe, alternatives=(Alternative(pose(2.0).values, 1, 0.6),)), pin], author="eve")
+    before = store.pose("ann", 3)
+    edit = store.commit("track", [put(4, 9.0)], author="adam", by_program=True).edit
+    assert store.amend(edit, [assessment(1.0, "lost"), assessment(1.0)], by_program=True) == ()
+    after = store.pose("ann", 3)
+    assert (after.status, after.remark, after.limbs_lost) == ("doubtful", "left arm uncertain", (0.5, 0.25))
+    np.testing.assert_array_equal(after.errors, assessment(1.0).errors)
+    np.testing.assert_array_equal(after.values, before.values)
+    for name in (
+        "sources", "model_revision", "keyframe", "reviewed", "cost_px", "settings", "view_costs_px", "author", "time",
+        "program",
+    ):  # fmt: skip
+        assert getattr(after, name) == getattr(before, name), name
+    assert len(store.pins("ann", 3)) == len(store.alternatives("ann", 3)) == 1
+    (row, _) = store.frames("ann")
+    assert (row.status, row.keyframe, row.assessed_since) == ("doubtful", True, True)
+    assert store.former_poses("ann", range(10)) == {}
+    store.undo()
+    assert (store.pose("ann", 3).status, store.frames("ann")[0].assessed_since) == ("", False)
+    store.redo()
+    assert store.pose("ann", 3).status == "doubtful"
+
+
+def test_an_assessment_ends_with_the_pose_and_with_a_mark(store):
+    store.commit("pose", [put(3, 1.0, keyframe=True)])
+    store.commit("audit", [assessment(1.0)], by_program=True)
+    store.commit("mark", [MarkChange("ann", 3, keyframe=True, reviewed=True)])
+    assert [(r.status, r.assessed_since) for r in store.frames("ann")] == [("doubtful", False)]
+    store.commit("drag", [put(3, 1.5, keyframe=True)])
+    store.commit("audit", [assessment(1.0), assessment(1.0)._replace(frame=8)], by_program=True)
+    found = store.pose("ann", 3)
+    assert (found.values[0], found.status, found.errors) == (1.5, "", None)
+    assert [r.frame for r in store.frames("ann")] == [3]

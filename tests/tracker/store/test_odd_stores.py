@@ -73,9 +73,7 @@ def test_foreign_definitions_are_refused(path, foreign, read_only):
     assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    "script", ["store_version_1.sql", "store_version_3.sql", "store_version_6.sql", "store_version_7.sql"]
-)
+@pytest.mark.parametrize("script", [f"store_version_{version}.sql" for version in (1, 3, 6, 7, 8)])
 def test_foreign_definitions_in_an_older_store(tmp_path, script):
     path = tmp_path / "annotations.sqlite"
     with closing(sqlite3.connect(path)) as db:

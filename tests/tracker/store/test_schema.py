@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tracker.body.searches import Search
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.store import schema
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.backups import backups_of
-from tracker.store.records import Alternative, MarkChange, Pin, PoseChange, PoseRecord
+from tracker.store.records import Alternative, AssessmentChange, MarkChange, Pin, PoseChange, PoseRecord
 from tracker.store.schema import VERSION
 
 
@@ -79,6 +80,38 @@ def version_6(path):
 def version_7(path):
     """A store as its version 7 was written, with limbs: a keyframe and two tracked frames."""
     return written(path, "store_version_7.sql")
+
+
+@pytest.fixture
+def version_8(path):
+    """A store as its version 8 was written, with errors: a keyframe and two tracked frames."""
+    return written(path, "store_version_8.sql")
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_in_version_8_searches_were_not_kept_and_nothing_was_assessed_later(version_8, read_only):
+    before = version_8.read_bytes()
+    store = AnnotationStore(version_8, read_only=read_only)
+    assert [(r.frame, r.status, r.assessed_since) for r in store.frames("ann")] == [
+        (1, "", False), (2, "lost", False), (3, "doubtful", False),
+    ]  # fmt: skip
+    found = [store.pose("ann", k) for k in (1, 2, 3)]
+    assert [(f.trace, f.author) for f in found] == [(None, "eve")] * 3
+    np.testing.assert_array_equal(found[1].errors, [[[4, 1, 0], [1, 5, 2], [0, 2, 6]]])
+    store.close()
+    assert (version_8.read_bytes() == before) == read_only
+
+
+def test_a_store_of_version_8_takes_searches_and_assessments_and_is_still_checked(version_8):
+    store = AnnotationStore(version_8)
+    trace = (Search("limbs", ("left_arm",), 41.0, 12.5, True), Search("samples", (), 12.5, None, False))
+    store.commit("track", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("tracked",) * 2, 1, trace=trace))])
+    keyframe = store.pose("ann", 1)
+    store.commit("audit", [AssessmentChange("ann", 1, keyframe.values, "good", "", (), None)], by_program=True)
+    store.close()
+    again = AnnotationStore(version_8)
+    assert again.pose("ann", 4).trace == trace
+    assert again.pose("ann", 1).status == "good"
 
 
 @pytest.mark.parametrize("read_only", [False, True])
