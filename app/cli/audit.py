@@ -35,8 +35,9 @@ class AuditArguments:
 def command(arguments: Annotated[AuditArguments, tyro.conf.arg(name="")]) -> None:
     """Assess stored poses: track once more without each camera in turn, and compare.
 
-    Writes expected errors, statuses and reasons as one entry of the history; keyframes stay. Poses may come from
-    anywhere: tracked, interpolated or imported. Ctrl+C stops it and changes nothing; the page undoes it.
+    Writes expected errors, statuses and reasons as one entry of the history. Poses may come from anywhere: tracked,
+    interpolated, imported or set by hand; keyframes stay as they are. Ctrl+C stops it and changes nothing; the page
+    undoes it.
     """
     at = load_target(arguments.session, arguments.person, several=True)
     frames = parse_frames(arguments.frames, at.session)
@@ -62,6 +63,7 @@ def audit(at: Target, frames: range, takes_consensus: bool, progress: Reporter) 
     from tracker.session.lock import SessionLock
     from tracker.session.relink import require_files
     from tracker.store.annotation_store import AnnotationStore
+    from tracker.store.records import PoseChange
     from tracker.tracking.chamfer.settings import TrackSettings
     from tracker.tracking.run_confidence import probability_off
 
@@ -84,7 +86,8 @@ def audit(at: Target, frames: range, takes_consensus: bool, progress: Reporter) 
             store.commit(f"audit frames {rows[0].frame}:{rows[-1].frame + 1}", rows, by_program=True)
     out: dict[str, Any] = {}
     for name in (session.people[i].name for i in people):
-        own = [(r.frame, r.pose) for r in rows if r.person == name and r.pose is not None]
+        changes = [(r.frame, r.pose if isinstance(r, PoseChange) else r) for r in rows if r.person == name]
+        own = [(frame, assessed) for frame, assessed in changes if assessed is not None]
         off = {frame: float(probability_off(np.array(pose.limbs_lost)).max()) for frame, pose in own}
         doubts = [
             {"frame": frame, "status": pose.status, "probability_off": off[frame], "reason": pose.remark}
@@ -99,7 +102,7 @@ def _format(found: dict[str, Any]) -> str:
     lines = []
     for name, person in found.items():
         counts = [f"{n} {status}" for status in ("good", "doubtful", "lost") if (n := person["statuses"].get(status))]
-        lines.append(f"{name}: {', '.join(counts) or 'keyframes alone, which stay'}")
+        lines.append(f"{name}: {', '.join(counts) or 'nothing is known of these keyframes'}")
         doubts = person["doubts"]
         lines += [
             f"  frame {d['frame']}: {d['reason']}, {100 * d['probability_off']:.0f}% chance that it is off"

@@ -324,6 +324,7 @@ def inconsistent(state: State) -> search_messages.InconsistentMessage:
                 search_messages.RaisedViewCost(view.camera, round(view.cost_px, 2), round(view.usual_px, 2))
                 for view in doubt.views
             ),
+            doubt.reason,
         )
         for doubt in state.keyframe_doubts
     )  # fmt: skip

@@ -263,7 +263,7 @@ class RaisedViewCost(Part, frozen=True):
 
 
 class KeyframeDoubt(Part, frozen=True):
-    """A keyframe that its neighbours or views contradict."""
+    """A keyframe that its neighbours or views contradict, or tracks that have not seen it."""
 
     person: int
     frame: int
@@ -273,6 +273,8 @@ class KeyframeDoubt(Part, frozen=True):
     """Name of the farthest point, for display; empty if they agree."""
     views: tuple[RaisedViewCost, ...]
     """Most raised first."""
+    reason: str
+    """Why a run or an audit finds it doubtful or lost; empty if none does."""
 
 
 class InconsistentMessage(Message, frozen=True, tag="inconsistent"):

@@ -94,7 +94,7 @@ class DepthNote:
 
 
 class KeyframeDoubt(NamedTuple):
-    """A keyframe that its neighbours or views contradict."""
+    """A keyframe that its neighbours or views contradict, or tracks that have not seen it."""
 
     person: int
     """Index of the person."""
@@ -105,6 +105,8 @@ class KeyframeDoubt(NamedTuple):
     """Name of the farthest point, for display; empty if they agree."""
     views: tuple[RaisedView, ...]
     """Views whose cost is raised, most raised first."""
+    reason: str = ""
+    """Why a program that assessed it finds it doubtful or lost; empty if none does."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,11 @@ import { px } from "../widgets/text.js";
  * @param {import("./protocol.js").SessionMessage} session
  * @returns {string[]}
  */
-export function contradictions({ distance_cm, point, views }, { cameras }) {
+export function contradictions({ distance_cm, point, views, reason }, { cameras }) {
   return [
     ...(distance_cm === null ? [] : [`with its neighbours: ${point} ${distance_cm.toFixed(0)} cm off`]),
     ...views.map(({ camera, cost_px, usual_px }) => `with ${cameras[camera].name}: ${px(cost_px)}, usually ${px(usual_px)}`),
+    ...(reason ? [`with the footage: ${reason}`] : []),
   ];
 }
 

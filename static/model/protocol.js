@@ -136,8 +136,8 @@
  * @typedef {{type: "timeline", person: number | null, cells: Record<string, Cell | null>, replace: boolean}}
  *   TimelineMessage
  * @typedef {{camera: number, cost_px: number, usual_px: number}} RaisedViewCost
- * @typedef {{person: number, frame: number, distance_cm: number | null, point: string, views: RaisedViewCost[]}}
- *   KeyframeDoubt
+ * @typedef {{person: number, frame: number, distance_cm: number | null, point: string, views: RaisedViewCost[], reason:
+ *   string}} KeyframeDoubt
  * @typedef {{type: "inconsistent", frames: number[], keyframes: KeyframeDoubt[]}} InconsistentMessage
  * @typedef {{frame: number, method: string, other_method: string, cost_px: number | null, other_cost_px: number | null,
  *   status: string, other_status: string, apart_mm: number, farthest_mm: number, farthest: string}} ComparedPose

@@ -76,7 +76,7 @@ function isDoubt({ sources, statuses, marks }, frame) {
  * @returns {Doubt[]}
  */
 function doubtsOf(cells, person, session, keyframes) {
-  const found = keyframes.map((keyframe) => ofKeyframe(keyframe));
+  const found = keyframes.map((keyframe) => ofKeyframe(keyframe, cells, session));
   /** @type {Map<string, Doubt>} the last entry of each cause */
   const open = new Map();
   for (let frame = 0; frame < cells.frames; frame += 1) {
@@ -104,11 +104,16 @@ function doubtsOf(cells, person, session, keyframes) {
 
 /**
  * @param {KeyframeDoubt} keyframe
+ * @param {Cells} cells of its person
+ * @param {import("../model/protocol.js").SessionMessage} session
  * @returns {Doubt}
  */
-function ofKeyframe(keyframe) {
+function ofKeyframe(keyframe, cells, session) {
   const { person, frame } = keyframe;
-  return { person, first: frame, last: frame, spans: [], worst: frame, status: "keyframe", limbs: [], limb: null, keyframe, severity: Infinity };
+  const cell = keyframe.reason ? cells.get(frame) : null;
+  const limbs = cell ? doubtfulLimbs(cell, session.people[person], session) : [];
+  const limb = limbOf(limbs, person, session);
+  return { person, first: frame, last: frame, spans: [], worst: frame, status: "keyframe", limbs, limb, keyframe, severity: Infinity };
 }
 
 /**

@@ -117,7 +117,7 @@ def read_motion(
         session: the session; other programs may have it open.
         chosen: indices of the people to export. Of several, those without a pose are left out.
         frames: by default from the first to the last pose of these people.
-        skip_lost: treat poses whose status is lost as missing.
+        skip_lost: treat poses whose status is lost as missing, but for keyframes.
 
     Raises:
         SessionError: nobody has a pose in these frames.
@@ -126,9 +126,9 @@ def read_motion(
     people, n_lost = [], 0
     for index, person in enumerate(session.people):
         stored = read_stored_poses(session.annotations_path, person.name, person.model, within)
-        lost = [frame for frame, pose in stored.items() if pose.record.status == "lost"]
+        lost = {f for f, pose in stored.items() if pose.record.status == "lost" and not pose.record.keyframe}
         n_lost += len(lost) * (index in chosen)
-        poses = {f: p for f, p in stored.items() if not skip_lost or p.record.status != "lost"}
+        poses = {f: p for f, p in stored.items() if not skip_lost or f not in lost}
         people.append(PersonMotion(index, person, poses))
     having = tuple(i for i in chosen if people[i].poses)
     if not having:

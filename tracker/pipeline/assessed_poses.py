@@ -7,10 +7,10 @@ import numpy as np
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
-from tracker.fitting.consensus import Consensus
+from tracker.fitting.consensus import Consensus, agreement
 from tracker.geometry.arrays import Array
 from tracker.pipeline.run_repair import RepairedPose
-from tracker.store.records import PoseRecord
+from tracker.store.records import AssessmentChange, PoseRecord
 from tracker.tracking.confidence import classify_limbs, is_uncertainty, probabilities, uncertain, worst
 from tracker.tracking.pose_errors import elsewhere_odds, limb_odds, point_covariances
 from tracker.tracking.run_confidence import log_odds
@@ -60,6 +60,33 @@ def assessed_by_tracks(
     elif features is not None and not tracks.has_history:
         odds = np.maximum(odds, log_odds(features))
     return _classified(model, replace(pose, errors=errors), odds, reasons, is_ambiguous)
+
+
+def assessed_keyframe(
+    model: BodyModel, person: str, frame: int, keyframe: PoseRecord, tracks: FrameTracks,
+    repaired: RepairedPose | None = None,
+) -> AssessmentChange | None:  # fmt: skip
+    """Return what is known about a keyframe, by the same evidence as of other poses.
+
+    A person has chosen among alternatives, so that they do not make it doubtful.
+
+    Args:
+        model: the body.
+        person: name.
+        frame: its number.
+        keyframe: the pose.
+        tracks: without a view each, which have not seen it.
+        repaired: how well it agrees with the colours of the run; None where that is not known.
+
+    Returns:
+        None where only tracks that went out from the keyframe are known: they agree with it in any case.
+    """
+    if repaired is None and not tracks.has_history:
+        return None
+    trust = tracks.trust if repaired is None else tracks.trust * repaired.trust
+    found = agreement(model, keyframe.values, tracks.poses, trust)
+    plain = replace(keyframe, remark="")
+    return AssessmentChange.of(person, frame, assessed_by_tracks(model, plain, found, tracks, False, None, repaired))
 
 
 def _classified(

@@ -15,14 +15,14 @@ from tracker.evidence.observer import Observer
 from tracker.fitting.consensus import agreement, consensus
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
-from tracker.pipeline.assessed_poses import assessed_by_tracks
+from tracker.pipeline.assessed_poses import assessed_by_tracks, assessed_keyframe
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.run_repair import RepairedPose, RunRepair
 from tracker.pipeline.track_session import outward
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.subjects import Subjects
@@ -49,10 +49,10 @@ class AuditPlan:
 
 def audit_poses(
     session: Session, store: AnnotationStore, observer: Observer, plan: AuditPlan, report: Report = unreported
-) -> list[PoseChange]:
+) -> list[PoseChange | AssessmentChange]:
     """Assess the stored poses of people; return their rows with errors, statuses and reasons. Nothing is stored.
 
-    Keyframes are compared with, but are not changed. Frames on which somebody has no pose are left out.
+    Keyframes are assessed, but are not changed. Frames on which somebody has no pose are left out.
 
     Args:
         session: the session.
@@ -90,12 +90,12 @@ def audit_poses(
             report("checking each camera", done / total)
     poses = {i: _agreed(session, plan, i, own, tracks) for i, own in zip(plan.people, records, strict=True)}
     repaired = _repaired(session, store, observer, plan, poses, tracks, report)
-    return [
+    rows = [
         _row(session, store, person, frame, own[frame], tracks[frame][person], repaired.get(person, {}).get(frame))
         for person, own in poses.items()
         for frame in sorted(tracks)
-        if not own[frame].keyframe
     ]
+    return [row for row in rows if row is not None]
 
 
 def _agreed(
@@ -142,9 +142,12 @@ def _repaired(
 def _row(
     session: Session, store: AnnotationStore, person: int, frame: int, record: PoseRecord, tracks: FrameTracks,
     repaired: RepairedPose | None,
-) -> PoseChange:  # fmt: skip
-    """Return the row of a pose with its assessment, and its alternatives as they are."""
+) -> PoseChange | AssessmentChange | None:  # fmt: skip
+    """Return the row of a pose with its assessment, and its alternatives as they are; of a keyframe the assessment
+    alone, or None where nothing is known about it."""
     name, model = session.people[person].name, session.people[person].model
+    if record.keyframe:
+        return assessed_keyframe(model, name, frame, record, tracks, repaired)
     trust = tracks.trust
     if repaired is not None:
         record, trust = replace(record, values=repaired.pose), trust * repaired.trust

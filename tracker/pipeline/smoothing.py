@@ -17,9 +17,9 @@ from tracker.fitting.consensus import Consensus, agreement, consensus
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
-from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks
+from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks, assessed_keyframe
 from tracker.pipeline.run_repair import RepairedPose
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import (
     PoseQuality,
     frame_features,
@@ -126,6 +126,23 @@ class TrackedRows:
                 pose = assessed_by_features(model, pose, features[frame], is_ambiguous)
             out.append(replace(change, pose=pose))
         return out
+
+    def assessed_keyframes(self, model: BodyModel, name: str, keyframes: Mapping[int, Array]) -> list[AssessmentChange]:
+        """Return what is known about the keyframes of a person by now.
+
+        Args:
+            model: the body.
+            name: of the person.
+            keyframes: by frame, their poses, (n_values,).
+        """
+        found = (
+            assessed_keyframe(
+                model, name, k, PoseRecord(pose, ("manual",) * len(pose), 0), self.tracks[k], self._repaired.get(k)
+            )
+            for k, pose in sorted(keyframes.items())
+            if k in self.tracks
+        )
+        return [change for change in found if change is not None]
 
     def consensus(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Consensus:
         """Return the consensus of the tracked pose of a frame and of those by tracks without a view each."""

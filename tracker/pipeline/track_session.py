@@ -11,7 +11,7 @@ from tracker.pipeline.run_repair import RepairStep, RunRepair
 from tracker.pipeline.smoothing import TrackedRows
 from tracker.pipeline.tracked_changes import StoredPerson, tracked_changes
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange
+from tracker.store.records import AssessmentChange, PoseChange
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
 from tracker.tracking.estimation.settings import EstimationSettings
@@ -26,6 +26,8 @@ class SmoothedRows(NamedTuple):
 
     changes: tuple[PoseChange, ...]
     """The rows of all people, which take the place of those with tracked poses."""
+    keyframes: tuple[AssessmentChange, ...] = ()
+    """The assessment of their keyframes, which stay."""
 
 
 class AuditStep(NamedTuple):
@@ -44,11 +46,15 @@ Step = PoseEstimate | BackwardStep | AuditStep | RepairStep | SmoothedRows
 repair, or all smoothed poses."""
 
 
+RunChange = PoseChange | AssessmentChange
+"""A change by a run: a pose, or what is known about a keyframe."""
+
+
 class PoseWriter(Protocol):
     """Stores the poses of a run."""
 
-    def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
-        """Write poses, but leave keyframes as they are.
+    def write(self, label: str, changes: Sequence[RunChange], edit: int | None) -> int | None:
+        """Write poses, but leave keyframes as they are, and assessments.
 
         Args:
             label: of the entry of the history.
@@ -73,7 +79,7 @@ class StoreWriter:
         self._store, self._views = store, views
         self._n_used = sum(v is not None for v in views)
 
-    def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int:
+    def write(self, label: str, changes: Sequence[RunChange], edit: int | None) -> int:
         """See `PoseWriter.write`.
 
         Raises:
@@ -86,8 +92,10 @@ class StoreWriter:
         self._store.amend(edit, changes, by_program=True)
         return edit
 
-    def _with_all_views(self, change: PoseChange) -> PoseChange:
+    def _with_all_views(self, change: RunChange) -> RunChange:
         """Return a row whose costs by view are those of all cameras; a row that was read from the store has them."""
+        if isinstance(change, AssessmentChange):
+            return change
         pose = change.pose
         if pose is None or len(pose.view_costs_px) != self._n_used:
             return change
@@ -268,8 +276,17 @@ class TrackSession:
         if smooth or any(rows.tracks for rows in self._rows.values()):
             held, fps = self._held, self.legs[0].run.fps
             found = (rows.finished(held, person, fps, smooth) for person, rows in self._rows.items())
-            yield SmoothedRows(tuple(change for changes in found for change in changes))
+            assessed = (self._assessed_keyframes(person) for person in self._rows)
+            yield SmoothedRows(
+                tuple(change for changes in found for change in changes),
+                tuple(change for changes in assessed for change in changes),
+            )
         self.finished = True
+
+    def _assessed_keyframes(self, person: int) -> list[AssessmentChange]:
+        keyframes = {k: own[person] for k, own in self.subjects.keyframes.items() if person in own}
+        name = self._stored[person].name
+        return self._rows[person].assessed_keyframes(self.subjects.models[person], name, keyframes)
 
     def take(self, step: Step) -> None:
         """Keep the results of a step.
@@ -339,9 +356,10 @@ class TrackSession:
         self.save()
         for i, person in enumerate(self._stored):
             statuses = {c.frame: c.pose.status for c in step.changes if c.person == person.name and c.pose is not None}
+            statuses |= {c.frame: c.status for c in step.keyframes if c.person == person.name}
             for frame in statuses.keys() & self.tracked.keys():
                 self.tracked[frame] = self.tracked[frame].with_status(i, status_named(statuses[frame]))
-        self._write(step.changes)
+        self._write([*step.changes, *step.keyframes])
         self.finished = True
 
     def _rows_of(self, found: Sequence[PoseEstimate], people: Sequence[int]) -> list[PoseChange]:
@@ -356,6 +374,6 @@ class TrackSession:
                 changes += rows
         return changes
 
-    def _write(self, changes: Sequence[PoseChange]) -> None:
+    def _write(self, changes: Sequence[RunChange]) -> None:
         if changes:
             self._edit = self._writer.write(self.label, changes, self._edit)

@@ -110,13 +110,13 @@ STATEMENTS = (*_SCHEMA.split(";\n"), *checksums.ADDED, *(text for texts in _UPGR
 _FORMER_SETTINGS = "told"
 """Name of the table and the column of settings in stores of versions 3 to 5."""
 _RENAMED_SETTINGS = f"{_FORMER_SETTINGS} AS program_settings"
-_SINCE_6 = checksums.LATER_COLUMNS[6]["pose_changes"]
+_SINCE_CHECKSUMS = checksums.LATER_COLUMNS[checksums.OLDEST_VERSION]["pose_changes"]
 _MISSING_COLUMNS = {
-    1: ("views_px", "parts_px", "remark", "program_settings", "reviewed", *_SINCE_6),
-    2: ("program_settings", "reviewed", *_SINCE_6),
-    3: (_RENAMED_SETTINGS, "reviewed", *_SINCE_6),
-    4: (_RENAMED_SETTINGS, *_SINCE_6),
-    5: (_RENAMED_SETTINGS, *_SINCE_6),
+    1: ("views_px", "parts_px", "remark", "program_settings", "reviewed", *_SINCE_CHECKSUMS),
+    2: ("program_settings", "reviewed", *_SINCE_CHECKSUMS),
+    3: (_RENAMED_SETTINGS, "reviewed", *_SINCE_CHECKSUMS),
+    4: (_RENAMED_SETTINGS, *_SINCE_CHECKSUMS),
+    5: (_RENAMED_SETTINGS, *_SINCE_CHECKSUMS),
     **{version: later["pose_changes"] for version, later in checksums.LATER_COLUMNS.items()},
 }
 """Columns of `pose_changes` that each older version lacks or names differently. A store opened read only is read

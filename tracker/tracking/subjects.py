@@ -1,7 +1,7 @@
 """The people of a tracking run: their bodies, whom to track, what may move, and keyframes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,3 +46,8 @@ class Subjects:
     def keyframes_at(self, frame: int) -> Mapping[int, Array]:
         """Return the keyframes of a frame by person."""
         return self.keyframes.get(frame, {})
+
+    def without_keyframes(self) -> "Subjects":
+        """Return the same without keyframes of the people who are tracked."""
+        others = {k: {p: v for p, v in own.items() if p not in self.tracked} for k, own in self.keyframes.items()}
+        return replace(self, keyframes=others)

@@ -55,6 +55,9 @@ class TrackingRun:
     regions: Callable[[int], Sequence[Region | None]] | None = None
     """Returns regions of the views of a frame that other runs over the same frames use, too. They are used where they
     hold the prediction."""
+    estimates_keyframes: bool = False
+    """Whether tracked people are also estimated on their keyframes, from the frames before. Tracking goes on from the
+    keyframe all the same."""
 
     def __post_init__(self) -> None:
         """Check the poses: from one that is no number, none of the frames after it would be."""

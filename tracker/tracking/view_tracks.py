@@ -48,6 +48,8 @@ def tracks_without_views(
 ) -> Iterator[tuple[int, dict[int, FrameTracks]]]:
     """Track all frames of a run without each view in turn, side by side.
 
+    The tracks have not seen the keyframes that they are compared with, but go on from them.
+
     Args:
         tracker: the method.
         run: the frames in their order, and the poses to begin with.
@@ -71,7 +73,10 @@ def tracks_without_views(
     names = [c.camera.name for c in run.observer.cameras]
     without = tuple(", ".join(n for i, n in enumerate(names) if i not in views) for views in groups)
     observers = shared_observers(run.observer, groups)
-    runs = [replace(run, observer=o, regions=around(views)) for o, views in zip(observers, groups, strict=True)]
+    runs = [
+        replace(run, observer=o, regions=around(views), estimates_keyframes=True)
+        for o, views in zip(observers, groups, strict=True)
+    ]
     ways = [tracker.estimates(own) for own in runs]
     # One after the other: a thread for each track was no faster, since they share the interpreter.
     for n_before, frame in enumerate(run.frames if ways else ()):

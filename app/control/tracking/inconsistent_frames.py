@@ -105,7 +105,8 @@ class InconsistentFrames:
         doubted |= {d.frame: d for d in self._doubts(person, rows, summaries) if d.frame in judged}
 
     def _doubts(self, person: int, rows: Sequence[FramePose], summaries: Sequence[FrameRow]) -> Iterable[KeyframeDoubt]:
-        """Yield the keyframes among some frames that their neighbours or views contradict, but for confirmed ones."""
+        """Yield the keyframes among some frames that their neighbours, views or later assessments contradict, but for
+        confirmed ones."""
         saver, session = self._session_state.saver, self._session_state.session
         confirmed = saver.setting(_CONFIRMED, {}).get(session.people[person].name, {})
         keyframes = {r.frame: r for r in summaries if r.keyframe}
@@ -117,10 +118,13 @@ class InconsistentFrames:
                 continue
             gap, body = gaps.get(row.frame), saver.revisions.body(row.model_revision)
             others = [r.view_costs_px for r in undoubted if abs(r.frame - row.frame) <= session.fps]
-            views = raised_views(keyframes[row.frame].view_costs_px, others)
-            if gap is not None or views:
+            summary = keyframes[row.frame]
+            views = raised_views(summary.view_costs_px, others)
+            is_off = summary.assessed_since and summary.status in ("doubtful", "lost")
+            reason = (summary.remark or summary.status) if is_off else ""
+            if gap is not None or views or reason:
                 point = "" if gap is None else display_name(body.point_names[gap.point])
-                yield KeyframeDoubt(person, row.frame, None if gap is None else gap.distance_m, point, views)
+                yield KeyframeDoubt(person, row.frame, None if gap is None else gap.distance_m, point, views, reason)
 
     def _publish(self) -> None:
         """Put the result into the state."""

@@ -12,7 +12,7 @@ from app.state.state import State
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.pipeline.pose_check import PoseInRun, checked_pose, frames_around
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 
 _LOG = logging.getLogger(__name__)
 _GIVE_WAY_S = 0.05
@@ -117,7 +117,7 @@ class PoseChecks:
                 return
             last = next((e.edit for e in saver.history(1) if not e.undone), None)
             amend = stored.edit if stored.edit is not None and stored.edit == last else None
-            row = PoseChange(change.person, change.frame, found, saver.alternatives(person, change.frame))
+            row = AssessmentChange.of(change.person, change.frame, found)
             saver.write(f"assess the pose, frame {change.frame}", [row], amend, by_program=False)
             if session_state.state.frame == change.frame:
                 session_state.show_frame(change.frame)

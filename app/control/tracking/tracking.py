@@ -20,9 +20,8 @@ from tracker.evidence.observer import Observer
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.run_repair import RepairStep
-from tracker.pipeline.track_session import AuditStep, Leg, SmoothedRows, Step, TrackSession, outward
+from tracker.pipeline.track_session import AuditStep, Leg, RunChange, SmoothedRows, Step, TrackSession, outward
 from tracker.pipeline.tracked_changes import StoredPerson
-from tracker.store.records import PoseChange
 from tracker.tracking import confidence
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
@@ -54,7 +53,7 @@ class _SaverWriter:
         """Add to an entry of the history, or make one at the first write if `edit` is None."""
         self._session_state, self._first_edit = session_state, edit
 
-    def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
+    def write(self, label: str, changes: Sequence[RunChange], edit: int | None) -> int | None:
         """See `PoseWriter.write`. Poses that cannot be written wait in the saver's queue."""
         self._session_state.last_save = time.monotonic()
         amended = self._first_edit if edit is None else edit

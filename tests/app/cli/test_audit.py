@@ -1,5 +1,6 @@
 """`quadrille audit`: statuses, errors and reasons of stored poses; its JSON, and what it refuses."""
 
+import csv
 import json
 from contextlib import closing
 
@@ -9,7 +10,7 @@ from command_line import SAMPLE, assert_refused, stored
 
 from tracker.pipeline import audit
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import Alternative, MarkChange, PoseChange
+from tracker.store.records import Alternative, MarkChange, PinChange, PoseChange
 from tracker.tracking.view_tracks import FrameTracks
 
 FRAMES, APART = range(20, 26), 23
@@ -59,6 +60,36 @@ def test_poses_are_assessed_but_stay(run, posed, tracks):
     assert {after[k].status for k in FRAMES if k != APART} == {"good"}
     for k in FRAMES:
         np.testing.assert_array_equal(after[k].values, before[k].values)
+
+
+def test_a_keyframe_is_assessed_and_stays(run, posed, tracks):
+    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+        store.commit("keyframes", [MarkChange("person", k, True, True) for k in (APART, 24)], author="eve")
+        store.commit("pin", [PinChange("person", APART, "left_wrist", "FRONT", (10.0, 20.0))])
+    before = stored(posed)
+    status, out, _ = run("audit", posed, "--json")
+    assert status == 0
+    (doubt,) = json.loads(out)["person"]["doubts"]
+    assert (doubt["frame"], doubt["reason"]) == (APART, "left arm uncertain without RIGHT")
+    after = stored(posed)
+    assert [(after[k].keyframe, after[k].status) for k in (APART, 24)] == [(True, doubt["status"]), (True, "good")]
+    assert after[APART].errors.shape[1:] == (3, 3)
+    np.testing.assert_array_equal(after[APART].values, before[APART].values)
+    for name in ("sources", "settings", "author", "time", "reviewed"):
+        assert getattr(after[APART], name) == getattr(before[APART], name), name
+    status, out, _ = run("evaluate", posed, "--reference", SAMPLE / "truth.trc", "--json")
+    (told,) = [f for f in json.loads(out)["per_frame"] if f["frame"] == APART]
+    assert (told["status"], told["reason"]) == ("keyframe", doubt["reason"])
+    assert told["probability_off"] == pytest.approx(doubt["probability_off"], abs=0.01)
+    table = posed / "poses.csv"
+    assert run("export", posed, "--format", "csv", "--out", table)[0] == 0
+    (row,) = [r for r in csv.DictReader(table.open()) if r["frame"] == str(APART)]
+    assert (row["status"], row["keyframe"]) == (doubt["status"], "true")
+    assert float(next(value for name, value in row.items() if "left_wrist" in name and "error" in name)) > 0
+    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+        assert len(store.pins("person", APART)) == 1
+        store.undo()
+        assert (store.pose("person", APART).status, store.pose("person", APART).errors) == ("", None)
 
 
 @pytest.mark.slow

@@ -51,11 +51,11 @@ async def test_doubts_are_listed_by_severity_and_vanish_when_they_are_resolved(p
     await page.locator("#notices .notice", has_text="no doubtful or lost frame left").wait_for()
 
 
-async def replace_doubts(page, endpoint, doubts):
+async def replace_doubts(page, endpoint, doubts, **marks):
     """Let the page know these doubts alone: probabilities of the limbs by frame."""
     rest = endpoint.cell(31) | {"status": "good", "limbs_lost": [], "remark": "", "reviewed": False, "keyframe": False}
     cells = {str(k): rest for k in range(10, 120)} | {
-        str(k): rest | {"status": "doubtful", "limbs_lost": limbs} for k, limbs in doubts.items()
+        str(k): rest | {"status": "doubtful", "limbs_lost": limbs} | marks for k, limbs in doubts.items()
     }
     await endpoint.broadcast({"type": "timeline", "person": None, "cells": cells, "replace": True})
     await shows(page, f"quadrille.state.timeline[{max(doubts)}]?.status === 'doubtful'")
@@ -122,8 +122,24 @@ async def test_going_to_a_doubt_selects_the_limb_and_zooms_the_views_that_show_i
 
 KEYFRAME = {
     "person": 0, "frame": 40, "distance_cm": 26.9, "point": "l wrist",
-    "views": [{"camera": 2, "cost_px": 5.1, "usual_px": 2.0}],
+    "views": [{"camera": 2, "cost_px": 5.1, "usual_px": 2.0}], "reason": "",
 }  # fmt: skip
+
+
+async def test_an_assessed_keyframe_is_listed_with_the_limb_in_doubt(page, endpoint):
+    await replace_doubts(page, endpoint, {40: [0.0, 0.9, 0.0, 0.0, 0.0]}, reviewed=True, keyframe=True)
+    await page.keyboard.press("Shift+L")
+    assert await rows_of(page) == []
+    doubt = KEYFRAME | {"distance_cm": None, "point": "", "views": [], "reason": "right arm uncertain without LEFT"}
+    await endpoint.broadcast({"type": "inconsistent", "frames": [], "keyframes": [doubt]})
+    await shows(page, f"{ROWS}.length === 1")
+    told = "disagrees with the footage: right arm uncertain without LEFT"
+    assert await rows_of(page) == [["keyframe", told, "frame 40"]]
+    await page.locator("#doubt-list .doubt").click()
+    await shows(page, "quadrille.state.shown.frame === 40 && quadrille.state.state.point === 'r_wrist'")
+    assert told in await page.locator("#frame-card").inner_text()
+    await page.keyboard.press("Alt+Enter")
+    await until(lambda: endpoint.heard("confirm_keyframe"))
 
 
 async def test_a_keyframe_in_doubt_comes_first_and_takes_its_neighbours(page, endpoint):

@@ -1,6 +1,7 @@
 """Files of an export, read by other programs."""
 
 import csv
+from contextlib import closing
 from dataclasses import replace
 
 import bvhio
@@ -24,7 +25,7 @@ from tracker.geometry import rigid
 from tracker.geometry.ground_plane import GroundPlane
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.records import MarkChange, PoseChange, PoseRecord
 
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """From a world in which z points up."""
@@ -276,6 +277,14 @@ def test_lost_poses_are_left_out_on_request_and_nobody_is_refused(couple):
     with pytest.raises(SessionError, match="expected poses of 'bob' in frames 0:1, found none"):
         read_motion(session, (1,), range(1))
     assert read_motion(session, (0, 1), range(1)).chosen == (0,)
+
+
+def test_a_keyframe_is_never_left_out_as_lost(couple):
+    session, _ = couple
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        store.commit("mark", [MarkChange("bob", 5, keyframe=True, reviewed=True)])
+    motion = read_motion(session, (0, 1), skip_lost=True)
+    assert (5 in motion.people[1].poses, motion.n_lost) == (True, 0)
 
 
 def test_poses_of_another_body_are_tabled_but_give_no_skeleton(tmp_path):

@@ -12,7 +12,7 @@ from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline import track_session
 from tracker.pipeline.assessed_poses import assessed_by_tracks
 from tracker.pipeline.methods import METHODS
-from tracker.pipeline.run_repair import RepairedPose, RunRepair
+from tracker.pipeline.run_repair import RepairedPose, RepairStep, RunRepair
 from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.pipeline.track_session import AuditStep
 from tracker.session.session import load_session
@@ -56,7 +56,10 @@ class Stands:
 
 @pytest.fixture
 def audited(monkeypatch):
-    """The runs of the audit: frames and poses to begin with. The tracks agree, but on one frame."""
+    """The runs of the audit: frames and poses to begin with. The tracks agree, but on one frame.
+
+    Their first frame has no history.
+    """
     runs = []
 
     def tracks(tracker, run, known):
@@ -64,7 +67,8 @@ def audited(monkeypatch):
         for frame in run.frames:
             poses = np.array([run.subjects.models[0].neutral()] * 4)
             poses[:, 0] = [0.2, -0.2, 0.2, -0.2] if frame == APART else 0.0
-            yield frame, {0: FrameTracks(poses, np.ones((4, 4)), ("FRONT", "RIGHT", "BACK", "LEFT"))}
+            has_history = frame != run.frames[0]
+            yield frame, {0: FrameTracks(poses, np.ones((4, 4)), ("FRONT", "RIGHT", "BACK", "LEFT"), has_history)}
 
     monkeypatch.setattr(track_session, "tracks_without_views", tracks)
     monkeypatch.setattr(RunRepair, "steps", lambda repair: iter(()))
@@ -115,6 +119,69 @@ def test_the_consensus_is_stored_with_its_errors_and_status(session, store, audi
     assert found[0].values[0] == 0.0
     assert run.status_counts()[0]["lost"] == 1
     assert store.undo() == f"track frames 0:{N}"
+
+
+@pytest.fixture
+def keyframe(session, store):
+    """A keyframe, the person half a metre aside of all tracks, by somebody."""
+    first = store.pose("person", 0)
+    values = np.array(first.values)
+    values[0] = 0.5
+    record = replace(first, values=values, remark="by hand")
+    store.commit("drag", [PoseChange("person", WRONG, record)], author="eve")
+    return store.pose("person", WRONG)
+
+
+def test_a_keyframe_is_assessed_by_tracks_and_stays(session, store, audited, keyframe):
+    run = track(session, store)
+    found = store.pose("person", WRONG)
+    assert (found.status, found.remark) == ("lost", "left arm uncertain without FRONT")
+    assert len(found.limbs_lost) == 4
+    assert np.sqrt(np.trace(found.errors, axis1=1, axis2=2)).min() == pytest.approx(0.5, rel=0.05)
+    np.testing.assert_array_equal(found.values, keyframe.values)
+    for name in ("keyframe", "sources", "settings", "author", "time", "model_revision", "reviewed", "cost_px"):
+        assert getattr(found, name) == getattr(keyframe, name), name
+    assert run.status_counts()[0]["lost"] == 2
+    row = next(r for r in store.frames("person") if r.frame == WRONG)
+    assert (row.assessed_since, row.keyframe) == (True, True)
+    store.undo()  # the run and its assessment
+    again = store.pose("person", WRONG)
+    assert (again.status, again.remark, again.errors) == ("", "by hand", None)
+
+
+def test_a_keyframe_that_was_changed_during_the_run_keeps_no_assessment_of_the_pose_before(
+    session, store, audited, keyframe
+):
+    edited = replace(keyframe, values=keyframe.values + 0.1)
+
+    def edit(step):
+        if isinstance(step, AuditStep) and step.done == N:
+            store.amend(store.history(1)[0].edit, [PoseChange("person", WRONG, edited)])
+
+    track(session, store, stop=edit)
+    found = store.pose("person", WRONG)
+    np.testing.assert_array_equal(found.values, edited.values)
+    assert found.status == ""
+
+
+def test_the_keyframe_that_a_run_goes_out_from_is_assessed_by_the_colors_of_the_run_alone(
+    session, store, audited, monkeypatch
+):
+    """Tracks agree with it in any case: they went out from it."""
+    track(session, store)
+    assert store.pose("person", 0).status == ""
+    store.undo()
+    n = len(limbs(session.people[0].model))
+
+    def steps(repair):
+        pose = session.people[0].model.neutral()
+        yield RepairStep(1, 1, {0: {0: RepairedPose(pose, np.ones((4, n), np.bool_), np.full(n, 20.0), ("arm",) * n)}})
+
+    monkeypatch.setattr(RunRepair, "steps", steps)
+    track(session, store)
+    found = store.pose("person", 0)
+    assert (found.status, found.remark) == ("lost", "left arm uncertain: arm")
+    assert found.values[0] == 0.0
 
 
 def test_it_can_be_left_out(session, store, audited):

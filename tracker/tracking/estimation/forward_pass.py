@@ -44,7 +44,7 @@ def track_forward(
         The poses of each frame.
     """
     observer, subjects, frames, models = run.observer, run.subjects, run.frames, run.subjects.models
-    several = len(models) > 1
+    several, held = len(models) > 1, subjects.without_keyframes() if run.estimates_keyframes else subjects
     memories = [
         PersonMemory(m, start, active, alone=not several)
         for m, start, active in zip(models, run.start, subjects.active_dofs, strict=True)
@@ -54,7 +54,7 @@ def track_forward(
     cameras, chosen = observer.working_cameras, _Regions(run, edges.whole_images)
 
     def placed(frame: int, predict: _Predict) -> Bodies:
-        return _placed(subjects, memories, frame, lambda m: predict(m, settings.predict))
+        return _placed(held, memories, frame, lambda m: predict(m, settings.predict))
 
     def observe(
         frame: int, bodies: Bodies, where: Sequence[Region | None]
@@ -71,7 +71,8 @@ def track_forward(
             elif several and all(len(m.history) > 1 for m in memories):
                 chosen.look_ahead(frame, placed(frame, PersonMemory.predict_before_last))
             observer.prefetch(frame, chosen.ahead or None, learns_static, edges)
-        keyframes, predicted = subjects.keyframes_at(frame), placed(frame, PersonMemory.predict)
+        keyframes, fixed = subjects.keyframes_at(frame), held.keyframes_at(frame)
+        predicted = placed(frame, PersonMemory.predict)
         where = chosen.around(predicted)
         following = frames[i + 1 : i + 2]
         for k in following if chosen.is_ahead else ():
@@ -86,16 +87,19 @@ def track_forward(
             settled = settle_starts(begun, memories, subjects.tracked, settings)
             for p, body in settled.items():
                 memories[p] = PersonMemory(models[p], body.values, subjects.active_dofs[p], alone=not several)
-            if not settled.keys() <= keyframes.keys():
-                predicted = tuple(b if p in keyframes else settled.get(p, b) for p, b in enumerate(predicted))
+            if not settled.keys() <= fixed.keys():
+                predicted = tuple(b if p in fixed else settled.get(p, b) for p, b in enumerate(predicted))
                 contours, views = observe(frame, predicted, chosen.new(predicted))
         for k in () if chosen.is_ahead else following:  # for one person later: this frame has kept all cores busy
             observer.prefetch(k)
         estimator = make_estimator(views, memories, predicted, settings, contours)
-        estimates = estimator.estimate([p for p in subjects.tracked if p not in keyframes])
-        statuses: list[Status] = [estimates[p].status if p in estimates else "good" for p in range(len(models))]
+        estimates = estimator.estimate([p for p in subjects.tracked if p not in fixed])
+        statuses: list[Status] = [
+            estimates[p].status if p in estimates and p not in keyframes else "good" for p in range(len(models))
+        ]
+        learnt = _learnt(estimator.bodies, {p: v for p, v in keyframes.items() if p not in fixed})
         # If a frame contradicts its keyframe, colours are learnt from the settled pose.
-        learnt = tuple(settled.get(p, b) if p in keyframes else b for p, b in enumerate(estimator.bodies))
+        learnt = tuple(settled.get(p, b) if p in keyframes else b for p, b in enumerate(learnt))
         _remember(memories, estimator, learnt, statuses, keyframes)
         cost_of = chamfer_cost(views, estimator.bodies, settings)
         if static_edges is not None:
@@ -141,6 +145,11 @@ def _placed(
     keyframes = subjects.keyframes_at(frame)
     poses = [keyframes.get(p, predict(m) if p in subjects.tracked else m.history[-1]) for p, m in enumerate(memories)]
     return tuple(PosedBody(m, v) for m, v in zip(subjects.models, poses, strict=True))
+
+
+def _learnt(bodies: Bodies, keyframes: Mapping[int, Array]) -> Bodies:
+    """Return all people, some of them in their keyframes."""
+    return tuple(PosedBody(b.model, keyframes[p]) if p in keyframes else b for p, b in enumerate(bodies))
 
 
 def make_estimate(

@@ -8,7 +8,7 @@ from gestures import wait_for
 
 from app.control.tracking import inconsistent_frames
 from app.page import messages
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.records import AssessmentChange, MarkChange, PoseChange, PoseRecord
 
 KEY = 10
 
@@ -74,6 +74,33 @@ def test_a_view_contradicts_a_keyframe_until_it_is_confirmed_or_changed(steady, 
     assert controller.state.undo == undo
     again = opened()  # a restart
     assert checked(again).keyframes == ()
+
+
+def test_an_assessment_makes_a_keyframe_doubted_until_it_is_confirmed_marked_or_undone(steady):
+    controller, place = steady
+    values, saver = place(KEY, keyframe=True), controller._session_state.saver
+
+    def write(change):
+        saver.write("audit", [change], None, by_program=True)
+        controller._session_state.refresh_saving()
+
+    write(AssessmentChange("person", KEY, values, "lost", "left arm uncertain without FRONT", (0.9,) * 5, None))
+    wait_for(lambda: checked(controller).keyframes)
+    (doubt,) = checked(controller).keyframes
+    assert (doubt.reason, doubt.distance_cm, doubt.views) == ("left arm uncertain without FRONT", None, ())
+    assert saver.index.timeline(0, None)[KEY]["status"] == "lost"
+    controller.history.undo()
+    wait_for(lambda: not checked(controller).keyframes)
+    controller.history.redo()
+    wait_for(lambda: checked(controller).keyframes)
+    write(MarkChange("person", KEY, keyframe=True, reviewed=True))  # the person confirms it
+    wait_for(lambda: not checked(controller).keyframes)
+    write(AssessmentChange("person", KEY, values, "doubtful", "", (0.3,) * 5, None))
+    wait_for(lambda: [d.reason for d in checked(controller).keyframes] == ["doubtful"])
+    controller.inconsistent_frames.confirm(0, KEY)
+    assert checked(controller).keyframes == ()
+    write(AssessmentChange("person", KEY, values, "lost", "", (0.9,) * 5, None))  # audited again: the same pose
+    assert checked(controller).keyframes == ()
 
 
 def test_a_confirmed_keyframe_is_judged_again_when_its_pose_changes(steady):
