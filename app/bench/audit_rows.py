@@ -8,9 +8,8 @@ from app.bench.sample_frames import BenchFrame, pose_at
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.pipeline.methods import make_tracker
-from tracker.pipeline.track_session import Leg, TrackSession
+from tracker.pipeline.track_session import Leg, RunChange, TrackSession
 from tracker.pipeline.tracked_changes import StoredPerson
-from tracker.store.records import PoseChange
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
@@ -23,7 +22,7 @@ _MUST = 4.0
 class _Nowhere:
     """Takes poses, and stores nothing."""
 
-    def write(self, label: str, changes: Sequence[PoseChange], edit: int | None) -> int | None:
+    def write(self, label: str, changes: Sequence[RunChange], edit: int | None) -> int | None:
         """See `PoseWriter.write`."""
         return edit
 

@@ -9,7 +9,7 @@ from app.control.tracking import track_settings
 from app.drawing import dof_labels
 from app.page import inspector_messages as wire
 from app.page.message_types import Message
-from app.page.search_messages import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage
+from app.page.search_messages import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.people import AcquisitionState
@@ -18,6 +18,7 @@ from app.state.run_choices import RunChoices
 from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
 from tracker.body.limbs import limb_display_name, limbs
+from tracker.body.searches import Search, SearchKind
 from tracker.formats.model_toml import PRESETS
 from tracker.geometry.arrays import Array
 from tracker.pipeline.methods import METHODS
@@ -55,7 +56,7 @@ def _ingredients(state: State) -> tuple[Identity, ...]:
     made_from = (
         state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
-        state.finding, state.reasons, state.reason, state.cost_map,
+        state.finding, state.reasons, state.reason, state.frame, state.people[state.person].trace, state.cost_map,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
 
@@ -198,7 +199,28 @@ def reason(state: State, cameras: Sequence[str]) -> ReasonMessage:
         None if worst is None else worst.view, limbs_of, parts, notes,
         () if found is None else found.searched,
         () if found is None else tuple(GhostPose(round(o.nats, 1), o.limbs) for o in found.alternatives or ()),
+        tried(state.people[state.person].trace),
     )  # fmt: skip
+
+
+_SEARCHES: dict[SearchKind, str] = {
+    "limbs": "{}",
+    "exchange": "{} exchanged",
+    "body": "whole body",
+    "samples": "samples around the pose",
+    "path": "pose tracked backward",
+    "repair": "{}, by colours of the run",
+}
+"""Words of each kind of search, with the names of its limbs."""
+
+
+def tried(trace: Sequence[Search] | None) -> tuple[TriedSearch, ...] | None:
+    """Describe the searches of the tracker on a frame."""
+    if trace is None:
+        return None
+    names = [" and ".join(map(limb_display_name, x.limbs)) for x in trace]
+    words = [_SEARCHES[x.kind].format(own) for x, own in zip(trace, names, strict=True)]
+    return tuple(TriedSearch(w, x.before_nats, x.after_nats, x.taken) for w, x in zip(words, trace, strict=True))
 
 
 def cost_map(state: State) -> tuple[CostMapMessage, ...]:

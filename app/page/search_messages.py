@@ -321,6 +321,19 @@ class GhostPose(Part, frozen=True):
     """Limbs that are elsewhere, for display."""
 
 
+class TriedSearch(Part, frozen=True):
+    """A search of the tracker on the frame."""
+
+    what: str
+    """Its words: `left arm` for a search of that limb."""
+    before_nats: float
+    """Cost before it, up to a constant of its own."""
+    after_nats: float | None
+    """Cost of the best other pose; null where none was about as good."""
+    taken: bool
+    """Whether that pose took the place of the one before."""
+
+
 class ReasonMessage(Message, frozen=True, tag="reason"):
     """Why the pose of the selected person is in doubt, for pages that ask."""
 
@@ -349,6 +362,8 @@ class ReasonMessage(Message, frozen=True, tag="reason"):
     """Limbs that were searched for alternatives, for display."""
     alternatives: tuple[GhostPose, ...]
     """Poses within 6 nats of the best, cheapest first. The overlay draws them in this order."""
+    tried: tuple[TriedSearch, ...] | None
+    """The searches of the tracker on the frame in their order, from the store; null where they are not known."""
 
 
 class CostMapMessage(Message, frozen=True, tag="cost_map"):

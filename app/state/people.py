@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel
+from tracker.body.searches import Search
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.motion.keyframe_doubts import RaisedView
@@ -38,6 +39,8 @@ class ShownPose:
     """Positions of points that the user has just placed in a view, to be stored with the pose."""
     errors: Array | None = None
     """Covariance of each point of a stored pose, (n_points, 3, 3), m^2; None where not known, as after an edit."""
+    trace: tuple[Search, ...] | None = None
+    """The tracker's searches on the frame; None where they are not known, as after an edit."""
 
     @property
     def expected_errors_m(self) -> Array:

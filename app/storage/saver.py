@@ -99,6 +99,7 @@ class Saver:
             revision=record.model_revision,
             alternatives=() if record.keyframe else tuple(a.values for a in self.alternatives(person, frame)),
             errors=record.errors,
+            trace=record.trace,
         )
 
     def record(self, person: int, frame: int) -> PoseRecord | None:

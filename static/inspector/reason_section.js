@@ -4,6 +4,7 @@ import { alternativesOf } from "../model/selectors.js";
 import { capital } from "../widgets/text.js";
 import { MEASURES, reasonTable } from "./reason_table.js";
 import { textButton } from "./rows.js";
+import { triedTable } from "./tried_table.js";
 
 /** @typedef {import("./reason_table.js").Measure} Measure */
 
@@ -42,7 +43,8 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
   const others = Object.assign(document.createElement("ol"), { className: "reason-others" });
   others.setAttribute("aria-label", "Alternative poses");
   let listed = "";
-  body.append(sentence, stage, work, others, message, again, choice, table.element, notes);
+  const tried = triedTable();
+  body.append(sentence, stage, work, others, message, again, choice, table.element, notes, tried.element);
 
   let isAsking = false;
   const ask = () => {
@@ -84,6 +86,7 @@ export function reasonSection({ store, send }, { grid }, { posing }) {
     }
     notes.textContent = isKnown ? [searchedText(reason), ...reason.notes].filter(Boolean).join(" ") : "";
     notes.hidden = !notes.textContent;
+    tried.show(state?.source ? (reason?.tried ?? null) : undefined);
     table.element.classList.toggle("is-former", !isKnown);
     if (isKnown && person && session) table.show({ reason, measure, person, cameras: session.cameras });
     else if (!hasWork) table.clear();

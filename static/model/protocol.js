@@ -192,9 +192,10 @@
  * @typedef {{below_nats: (number | null)[], outside: (number | null)[], usual_outside: (number | null)[], contour_px:
  *   (number | null)[], usual_contour_px: (number | null)[], below_in_all_nats: number}} PartReason
  * @typedef {{nats: number, limbs: string[]}} GhostPose
+ * @typedef {{what: string, before_nats: number, after_nats: number | null, taken: boolean}} TriedSearch
  * @typedef {{type: "reason", frame: number, person: number, running: boolean, stage: string, share: number, message:
  *   string, sentence: string, part: number | null, camera: number | null, limbs: LimbReason[], parts: PartReason[],
- *   notes: string[], searched: string[], alternatives: GhostPose[]}} ReasonMessage
+ *   notes: string[], searched: string[], alternatives: GhostPose[], tried: TriedSearch[] | null}} ReasonMessage
  * @typedef {{type: "cost_map", person: number, dofs: [number, number], current: [number, number], across: number[], up:
  *   number[], nats: number[][]}} CostMapMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:

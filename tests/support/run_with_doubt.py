@@ -3,6 +3,7 @@
 import numpy as np
 
 from tracker.body.limbs import limbs
+from tracker.body.searches import Search
 from tracker.formats.model_toml import format_model
 from tracker.formats.pose_csv import read_pose_table
 from tracker.session.session import load_session
@@ -24,7 +25,7 @@ def store_run(folder):
     revision = store.add_model_revision("person", format_model(model))
     changes = []
     for frame, values in enumerate(truth):
-        pose = PoseRecord(values, ("tracked",) * len(values), revision, status="good", cost_px=1.0)
+        pose = PoseRecord(values, ("tracked",) * len(values), revision, status="good", cost_px=1.0, trace=())
         changes.append(PoseChange("person", frame, pose))
     step = np.where(limbs(model)[arm].dofs, 0.9, 0.0)
     wrong = model.clip(model.retract(truth[WRONG_FRAME], step))
@@ -32,6 +33,10 @@ def store_run(folder):
     pose = PoseRecord(
         wrong, ("tracked",) * len(wrong), revision, status="lost", cost_px=2.0, limbs_lost=lost,
         remark="left arm uncertain",
+        trace=(
+            Search("limbs", (DOUBTED,), 41.2, 12.4, True),
+            Search("repair", (DOUBTED, "left_calf"), -320.1, None, False),
+        ),
     )  # fmt: skip
     alternative = Alternative(truth[WRONG_FRAME], revision, 2.5)
     changes[WRONG_FRAME] = PoseChange("person", WRONG_FRAME, pose, (alternative,))

@@ -37,7 +37,7 @@ def search_around(
         priors = [PersonPrior(b.model, b.values) for b in everybody]
         problem = FrameProblem(read_views(observer, frame, everybody), priors, wide)
         memory = PersonMemory(body.model, body.values, alone=alone)
-        before, body = body, search_start(problem, 0, everybody, memory, _N_DRAWS)
+        before, (body, _) = body, search_start(problem, 0, everybody, memory, _N_DRAWS)
         if distance_m(before, body) < SAME_POSE_M:
             break
     return body

@@ -62,6 +62,13 @@ def assessed_by_tracks(
     return _classified(model, replace(pose, errors=errors), odds, reasons, is_ambiguous)
 
 
+def with_repair(pose: PoseRecord, repaired: RepairedPose) -> PoseRecord:
+    """Return a pose with the searches of the repair in place of those of an earlier one."""
+    if not repaired.trace:
+        return pose
+    return replace(pose, trace=(*(x for x in pose.trace or () if x.kind != "repair"), *repaired.trace))
+
+
 def assessed_keyframe(
     model: BodyModel, person: str, frame: int, keyframe: PoseRecord, tracks: FrameTracks,
     repaired: RepairedPose | None = None,

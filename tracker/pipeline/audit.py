@@ -15,7 +15,7 @@ from tracker.evidence.observer import Observer
 from tracker.fitting.consensus import agreement, consensus
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
-from tracker.pipeline.assessed_poses import assessed_by_tracks, assessed_keyframe
+from tracker.pipeline.assessed_poses import assessed_by_tracks, assessed_keyframe, with_repair
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.run_repair import RepairedPose, RunRepair
 from tracker.pipeline.track_session import outward
@@ -150,7 +150,7 @@ def _row(
         return assessed_keyframe(model, name, frame, record, tracks, repaired)
     trust = tracks.trust
     if repaired is not None:
-        record, trust = replace(record, values=repaired.pose), trust * repaired.trust
+        record, trust = with_repair(replace(record, values=repaired.pose), repaired), trust * repaired.trust
     found = agreement(model, record.values, tracks.poses, trust)
     alternatives = tuple(store.alternatives(name, frame))
     assessed = assessed_by_tracks(model, record, found, tracks, len(alternatives) > 0, None, repaired)

@@ -21,6 +21,7 @@ from tracker.appearance.region_learning import LearningFrame, learn_regions, lea
 from tracker.appearance.region_model import RegionModel
 from tracker.body.limbs import Limb, display_name, limbs
 from tracker.body.model import PosedBody
+from tracker.body.searches import Search
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
 from tracker.fitting.hypothesis import SAME_POSE_M, limbs_elsewhere
@@ -50,6 +51,8 @@ class RepairedPose(NamedTuple):
     """How much likelier each limb is elsewhere by the colours of the run, (n_limbs,), nats; see `elsewhere_nats`."""
     against: tuple[str, ...] = ()
     """For each limb, the part and the view that speak most against it, for people to read."""
+    trace: tuple[Search, ...] = ()
+    """The searches of the repair: those that were taken, and the last one."""
 
 
 class RepairStep(NamedTuple):
@@ -85,6 +88,7 @@ class RunRepair:
         self._frames = sorted(bodies)
         self._first = np.cumsum([0, *(len(limbs(m)) for m in subjects.models)])
         self._found: dict[tuple[int, int], Repair] = {}
+        self._traces: dict[tuple[int, int], tuple[Search, ...]] = {}
 
     def steps(self) -> Iterator[RepairStep]:
         """Do the work. A caller that stops asking leaves it undone."""
@@ -210,6 +214,8 @@ class RunRepair:
         evidence = FrameEvidence(views, known, known.frame(views, bodies), colors)
         found = better_limbs(evidence, bodies, person, self._settings, search, others, apart)
         self._found[frame, person] = found
+        taken = (entry for entry in self._traces.get((frame, person), ()) if entry.taken)
+        self._traces[frame, person] = (*taken, found.entry)
         if found.is_better:
             self._bodies[frame] = with_body(bodies, person, PosedBody(model, found.pose))
         return found.is_better
@@ -222,7 +228,8 @@ class RunRepair:
             own = slice(self._first[i], self._first[i + 1])
             for k, tracks in of_person.items():
                 trust, pose = self._trusted(k, i, tracks), self._bodies[k][i].values
-                out[i][k] = RepairedPose(pose, trust, elsewhere[k][own], tuple(against[k][own]))
+                trace = self._traces.get((k, i), ())
+                out[i][k] = RepairedPose(pose, trust, elsewhere[k][own], tuple(against[k][own]), trace)
         return out
 
     def _trusted(self, frame: int, person: int, tracks: FrameTracks) -> NDArray[np.bool_]:

@@ -17,7 +17,7 @@ from tracker.fitting.consensus import Consensus, agreement, consensus
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
-from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks, assessed_keyframe
+from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks, assessed_keyframe, with_repair
 from tracker.pipeline.run_repair import RepairedPose
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import (
@@ -119,6 +119,8 @@ class TrackedRows:
             pose, frame, is_ambiguous = change.pose, change.frame, len(change.alternatives) > 0
             if frame in agreed and frame not in self._unseen:
                 tracks, own = self.tracks[frame], features.get(frame)
+                if frame in self._repaired:
+                    pose = with_repair(pose, self._repaired[frame])
                 pose = assessed_by_tracks(
                     model, pose, agreed[frame], tracks, is_ambiguous, own, self._repaired.get(frame)
                 )

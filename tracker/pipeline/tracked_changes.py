@@ -59,6 +59,7 @@ def tracked_changes(
                 part_costs_px=tuple(_number(c) for c in found.part_costs_px[i]),
                 remark=found.notes[i],
                 limbs_lost=_limbs_lost(found.qualities[i]),
+                trace=found.traces[i] if found.traces else None,
             ),
             tuple(Alternative(o.values, stored[i].revision, _number(o.cost_px)) for o in found.alternatives[i]),
         )

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from tracker.body.searches import Search
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import PoseQuality, Status
 
@@ -53,6 +54,8 @@ class PoseEstimate(NamedTuple):
     """Name of the tracking method, such as `chamfer`."""
     normal_matrices: tuple[NormalMatrix | None, ...] = ()
     """How well the contours determine each pose; None or empty where the method does not say."""
+    traces: tuple[tuple[Search, ...] | None, ...] = ()
+    """The searches on the frame in their order; None or empty where they are not known."""
 
 
 class TrackedFrame(NamedTuple):

@@ -336,7 +336,9 @@ class Tracking:
                 people.append(ShownPose(shown.values, None, revision=self._session_state.state.revisions[i]))
             else:
                 part_costs_px = tuple(finite_or_none(c) for c in found.part_costs_px[i])
-                people.append(ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], part_costs_px))
+                trace = found.traces[i] if found.traces else None
+                shown = ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], part_costs_px)
+                people.append(replace(shown, trace=trace))
         models, revisions = self._session_state.bodies(people)
         return {
             "frame": found.frame,

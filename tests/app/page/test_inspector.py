@@ -1,8 +1,10 @@
 """What the inspector shows and changes: settings, the 3-D view and body sizes, by messages of a page."""
 
 import json
+from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
 from app.control.tracking import track_settings
@@ -10,7 +12,9 @@ from app.page.commands import dispatch
 from app.page.inspector_feed import InspectorFeed
 from app.page.message_parsing import MessageError, parse
 from tracker.body.dimensions import dimensions_of
+from tracker.body.searches import Search
 from tracker.errors import TrackerError
+from tracker.store.records import PoseChange, PoseRecord
 
 
 @pytest.fixture
@@ -193,3 +197,29 @@ def test_wrong_sizes_are_refused_in_a_sentence_and_limits_are_those_that_are_che
     page.send("body_sizes", action="discard", person=0)
     for height_m in sizes.height_limits_m:
         page.send("body_sizes", action="height", person=0, height_m=height_m)
+
+
+def test_the_searches_on_a_frame_are_shown_from_the_store(page):
+    """In words; of a pose of an earlier version they are not known."""
+    controller = page.controller
+    state, saver = controller.state, controller._session_state.saver
+    values = np.array(state.people[0].values)
+    record = PoseRecord(values, ("tracked",) * len(values), saver.revisions.current(0))
+    trace = (
+        Search("limbs", ("left_forearm", "right_calf"), 41.0, 12.0, True),
+        Search("samples", (), 12.0, 11.5, False),
+        Search("repair", ("left_calf",), -8.0, None, False),
+    )
+    for frame, known in ((state.frame, trace), (state.frame + 1, ())):
+        saver.write("track", [PoseChange("person", frame, replace(record, trace=known))], None, by_program=True)
+    saver.write("track", [PoseChange("person", state.frame + 2, record)], None, by_program=True)
+    found = []
+    for frame in range(state.frame, state.frame + 3):
+        controller._session_state.show_frame(frame)
+        found.append(page.updates()["reason"].tried)
+    assert [(x.what, x.before_nats, x.after_nats, x.taken) for x in found[0]] == [
+        ("left arm and right leg", 41.0, 12.0, True),
+        ("samples around the pose", 12.0, 11.5, False),
+        ("left leg, by colours of the run", -8.0, None, False),
+    ]
+    assert found[1:] == [(), None]

@@ -45,6 +45,12 @@ async def test_a_doubt_leads_to_its_reason_and_to_a_good_pose(live):
     assert reason["sentence"] in await live.locator("#frame-remark").inner_text()
     assert reason["sentence"] in await card.inner_text()
 
+    rows = await live.locator(".tried-table tr").all_inner_texts()
+    assert [row.split("\t") for row in rows[1:]] == [
+        ["Left arm", "41 → 12", "taken"],
+        ["Left arm and left leg, by colours of the run", "−320", "none as good"],
+    ]
+
     camera = reason["camera"]
     await live.keyboard.press("0")  # whole images
     await shows(live, "quadrille.state.views.every(({ zoom }) => zoom === 1)")
@@ -65,6 +71,15 @@ async def test_a_doubt_leads_to_its_reason_and_to_a_good_pose(live):
     assert await live.locator("#doubts-empty").is_visible()
     await live.keyboard.press("Control+z")  # one entry of the history
     await shows(live, "quadrille.state.state.status === 'lost'")
+
+
+async def test_where_nothing_was_searched_a_sentence_says_so(live):
+    await live.locator("#frame").fill("10")
+    await live.keyboard.press("Enter")
+    await shows(live, "quadrille.state.shown.frame === 10 && quadrille.state.reason.tried?.length === 0")
+    tried = live.locator(".tried")
+    assert "Nothing: the pose" in await tried.inner_text()
+    assert not await tried.locator("table").is_visible()
 
 
 async def test_the_switch_hides_the_ghosts_of_all_alternatives(live):

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from tracker.body.limbs import limbs
+from tracker.body.searches import Search
 from tracker.fitting.consensus import agreement
 from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline import track_session
-from tracker.pipeline.assessed_poses import assessed_by_tracks
+from tracker.pipeline.assessed_poses import assessed_by_tracks, with_repair
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.run_repair import RepairedPose, RepairStep, RunRepair
 from tracker.pipeline.stored_run import TrackPlan, stored_run
@@ -182,6 +183,38 @@ def test_the_keyframe_that_a_run_goes_out_from_is_assessed_by_the_colors_of_the_
     found = store.pose("person", 0)
     assert (found.status, found.remark) == ("lost", "left arm uncertain: arm")
     assert found.values[0] == 0.0
+
+
+def test_the_searches_of_the_repair_follow_those_of_the_tracker_and_replace_those_of_an_earlier_one(session):
+    first, earlier, later = (
+        Search(kind, ("left_forearm",), before, None, False)
+        for kind, before in (("limbs", 5.0), ("repair", 4.0), ("repair", 3.0))
+    )
+    model = session.people[0].model
+    pose, n = model.neutral(), len(limbs(model))
+    repaired = RepairedPose(pose, np.ones((3, n), np.bool_), np.zeros(n), ("",) * n, (later,))
+    for trace, expected in (((first, earlier), (first, later)), ((), (later,)), (None, (later,))):
+        assert with_repair(PoseRecord(pose, ("tracked",) * len(pose), 1, trace=trace), repaired).trace == expected
+    unknown = PoseRecord(pose, ("tracked",) * len(pose), 1)
+    assert with_repair(unknown, repaired._replace(trace=())).trace is None
+
+
+def test_the_searches_of_a_run_are_stored(session, store, audited, monkeypatch):
+    n, entry = len(limbs(session.people[0].model)), Search("repair", ("left_forearm",), 9.0, 2.0, True)
+    estimates = Stands.estimates
+
+    def steps(repair):
+        pose = session.people[0].model.neutral()
+        repaired = RepairedPose(pose, np.ones((4, n), np.bool_), np.zeros(n), ("",) * n, (entry,))
+        yield RepairStep(1, 1, {0: {WRONG: repaired}})
+
+    tracked = Search("limbs", ("right_calf",), 4.0, None, False)
+    monkeypatch.setattr(RunRepair, "steps", steps)
+    monkeypatch.setattr(
+        Stands, "estimates", lambda self, run: (e._replace(traces=((tracked,),)) for e in estimates(self, run))
+    )
+    track(session, store)
+    assert [store.pose("person", k).trace for k in (0, 1, WRONG)] == [None, (tracked,), (tracked, entry)]
 
 
 def test_it_can_be_left_out(session, store, audited):

@@ -40,7 +40,7 @@ class ChamferEstimator(FrameEstimator):
         blocks = [residuals, *problem.priors(person, bodies)]
         body = PosedBody(bodies[person].model, pose)
         fit = problem.solve(person, pose, blocks, max_iterations=0)
-        return PersonFit(residuals, with_body(bodies, person, body), fit, body, evaluations=evaluations)
+        return PersonFit(residuals, with_body(bodies, person, body), fit, body, evaluations=evaluations, trace=None)
 
     def _search(self, person: int, start: Array, how: SearchSettings) -> tuple[int, Array]:
         """Search one person from a pose, (n_values,), best first; return the number of poses scored and the best."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.model import PosedBody
+from tracker.body.searches import Search
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import covariance
 from tracker.fitting.hypothesis import Hypothesis, limbs_elsewhere
@@ -36,6 +37,12 @@ class PersonEstimate(NamedTuple):
     first."""
     normal_matrix: NormalMatrix | None = None
     """How well the contours determine the pose, if the method says."""
+    trace: tuple[Search, ...] | None = ()
+    """See `PersonFit.trace`."""
+
+    def after(self, searches: tuple[Search, ...]) -> "PersonEstimate":
+        """Return the estimate with searches before its own."""
+        return self._replace(trace=(*searches, *(self.trace or ())))
 
     def in_doubt(self, note: str, alternatives: Sequence[tuple[Array, ...]]) -> "PersonEstimate":
         """Return the estimate with more alternatives, at most doubtful."""
@@ -90,6 +97,7 @@ def finalize(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFi
     out = PersonEstimate(
         confidence.classify(quality), ", ".join(found.notes) or confidence.reason(quality),
         _part_costs_px(problem, costs), covariance(model, found.fit), found.evaluations, quality,
+        trace=found.trace,
     )  # fmt: skip
     if not found.alternatives:
         return out

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import PosedBody
+from tracker.body.searches import Search
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
@@ -181,9 +182,9 @@ class _PathSelection:
         out = []
         for i, chosen in enumerate(viterbi_path(points, costs, *ends)):
             if chosen == 1:
-                out.append(self._merged(i, self._backward[i], f"tracked back from frame {self._after[0].frame}"))
+                out.append(self._merged(i, 1, self._backward[i], f"tracked back from frame {self._after[0].frame}"))
             elif chosen > 1:
-                out.append(self._merged(i, self._estimate(i, chosen), "taken over from neighbouring frames"))
+                out.append(self._merged(i, chosen, self._estimate(i, chosen), "taken over from neighbouring frames"))
         return tuple(out)
 
     def _candidates_of(self, *passes: TrackedFrame) -> Candidates:
@@ -224,12 +225,15 @@ class _PathSelection:
         ]
         return make_estimate(self._forward[i].frame, chamfer_cost(views, bodies, settings), bodies, estimates, settings)
 
-    def _merged(self, i: int, estimate: PoseEstimate, note: str) -> PoseEstimate:
-        """Return an estimate with a note on the person, and the former statuses of the others."""
+    def _merged(self, i: int, chosen: int, estimate: PoseEstimate, note: str) -> PoseEstimate:
+        """Return an estimate with a note on the person, the entry of the choice, and the others' former statuses."""
         person, statuses, notes = self._person, list(self._forward[i].statuses), list(estimate.notes)
         statuses[person] = estimate.statuses[person]
         notes[person] = ", ".join(filter(None, (notes[person], note)))
-        return estimate._replace(statuses=tuple(statuses), notes=tuple(notes))
+        costs, traces = self._candidates[i].costs, list(estimate.traces or (None,) * len(notes))
+        entry = Search.of("path", (), costs[0], costs[chosen], True)  # the forward pass is candidate 0
+        traces[person] = (*(traces[person] or ()), entry)
+        return estimate._replace(statuses=tuple(statuses), notes=tuple(notes), traces=tuple(traces))
 
     def _colors(self, frame: TrackedFrame) -> Colors:
         """Return the colours under the person on a frame on which they were not lost."""

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 
 from tracker.body.model import BodyModel
+from tracker.body.searches import Search
 from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton import PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solver_of
@@ -28,8 +29,8 @@ _SCALE = 2.0
 
 def search_along_covariance(
     model: BodyModel, found: Hypothesis, scorer: PoseScorer, sigma: Array, draw: int = 0
-) -> Hypothesis:
-    """Refine poses sampled around a pose, and return the cheapest.
+) -> tuple[Hypothesis, Search]:
+    """Refine poses sampled around a pose, and return the cheapest and the entry of the search.
 
     Poses are compared without the prediction, since what it says has led to a doubtful pose.
 
@@ -57,7 +58,8 @@ def search_along_covariance(
     here, *others = scorer.each(refined, [found.pose, *_samples(model, found.pose, scorer, own, draw)])
     cheapest = min(others, key=lambda x: x.cost)
     best = cheapest if cheapest.cost < here.cost - CLEAR_NATS else here
-    return scorer.scored(model, solver_of(model)(model, best.pose, scorer.blocks, scorer.active_dofs, 0))
+    entry = Search.of("samples", (), here.cost, cheapest.cost, best is cheapest)
+    return scorer.scored(model, solver_of(model)(model, best.pose, scorer.blocks, scorer.active_dofs, 0)), entry
 
 
 def _blocks(scorer: PoseScorer, held: PosePrior) -> list[ResidualBlock]:

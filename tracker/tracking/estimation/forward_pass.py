@@ -18,7 +18,7 @@ from tracker.tracking.estimation.assessment import PersonEstimate
 from tracker.tracking.estimation.frame_estimator import FrameEstimator
 from tracker.tracking.estimation.frame_problem import Bodies
 from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
-from tracker.tracking.estimation.start_pose import StartFrame, settle_starts
+from tracker.tracking.estimation.start_pose import SearchedStart, StartFrame, settle_starts
 from tracker.tracking.person_memory import PersonMemory
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
@@ -79,12 +79,13 @@ def track_forward(
             chosen.look_ahead(k, placed(k, PersonMemory.predict_two_ahead))
             observer.prefetch(k, chosen.ahead, learns_static, edges)
         contours, views = observe(frame, predicted, where)
-        settled: Mapping[int, PosedBody] = {}
+        starts, settled = dict[int, SearchedStart](), dict[int, PosedBody]()
         if i == 0 and not lead_in:
             begun = StartFrame(
                 predicted, contours, views, lambda bodies: observe(frames[0], bodies, chosen.new(bodies))[1]
             )
-            settled = settle_starts(begun, memories, subjects.tracked, settings)
+            starts = settle_starts(begun, memories, subjects.tracked, settings)
+            settled = {p: s.body for p, s in starts.items() if s.taken}
             for p, body in settled.items():
                 memories[p] = PersonMemory(models[p], body.values, subjects.active_dofs[p], alone=not several)
             if not settled.keys() <= fixed.keys():
@@ -107,6 +108,7 @@ def track_forward(
             update_static_edges(static_edges, views, there.predicted_pieces_px)
         if i >= lead_in:
             found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in range(len(models))]
+            found = [e.after(starts[p].trace) if p in starts else e for p, e in enumerate(found)]
             yield make_estimate(frame, cost_of, estimator.bodies, found, settings)
 
 
@@ -177,7 +179,7 @@ def make_estimate(
         frame, tuple(b.values for b in bodies), cost.total_px, cost.view_costs_px, sum(e.evaluations for e in people),
         tuple(e.status for e in people), tuple(e.note for e in people), tuple(e.part_costs_px for e in people),
         tuple(e.covariance for e in people), tuple(e.quality for e in people), alternatives, settings.method,
-        tuple(e.normal_matrix for e in people),
+        tuple(e.normal_matrix for e in people), tuple(e.trace for e in people),
     )  # fmt: skip
 
 

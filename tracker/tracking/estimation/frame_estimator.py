@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from tracker.appearance.part_colors import Colors
 from tracker.body.limbs import Limb, limb_display_name
 from tracker.body.model import PosedBody
+from tracker.body.searches import Search
 from tracker.compute.threads import map_parallel
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
@@ -28,7 +29,7 @@ from tracker.tracking.estimation.frame_problem import (
     with_body,
 )
 from tracker.tracking.estimation.identity_swaps import identity_swaps
-from tracker.tracking.estimation.limb_recovery import search_limbs
+from tracker.tracking.estimation.limb_recovery import search_entry, search_limbs
 from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
@@ -173,27 +174,32 @@ class FrameEstimator:
             residuals, priors, Colors(own, *problem.around(person, bodies)), memory.part_colors,
             recover, memory.active_dofs,
         )  # fmt: skip
-        notes, evaluations = list[str](), 0
+        notes, trace, evaluations = list[str](), list[Search](), 0
         searched = self._search_body(person, fit, scorer) if quality.is_body_lost else None
         if searched is not None:
-            evaluations, fit = searched
+            evaluations, fit, entry = searched
             notes.append("body searched")
+            trace.append(entry)
         others = (memory.history[-1], problem.people[person].predicted)
         start = scorer.scored(model, fit)
         best, *alternatives = search_limbs(model, limbs, start, others, scorer)
+        if limbs:
+            trace.append(search_entry("limbs", limbs, start, [best, *alternatives]))
         moved, relocated = (limbs_elsewhere(start.body, best.body, m) for m in (SETTLED_M, SAME_POSE_M))
         for limb in limbs:
             memory.record_search(limb, quality, limb.name in moved)
             if limb.name in relocated:
                 notes.append(f"{limb_display_name(limb.name)} relocated")
         if samples:
-            sampled = search_along_covariance(model, best, scorer, problem.sigma(person))
+            sampled, entry = search_along_covariance(model, best, scorer, problem.sigma(person))
             memory.record_sampling(distance_m(sampled.body, best.body) > SETTLED_M)
             best = sampled
+            trace.append(entry)
         assert best.fit is not None
         return found._replace(
-            fit=best.fit, body=best.body, evaluations=evaluations, notes=tuple(notes), alternatives=tuple(alternatives)
-        )
+            fit=best.fit, body=best.body, evaluations=evaluations, notes=tuple(notes), trace=tuple(trace),
+            alternatives=tuple(alternatives),
+        )  # fmt: skip
 
     def search_body(self, person: int, start: Array) -> tuple[int, Array] | None:
         """Search a lost person from a pose, (n_values,); methods that search whole bodies override it.
@@ -204,15 +210,17 @@ class FrameEstimator:
         del person, start
         return None
 
-    def _search_body(self, person: int, fit: Fit, scorer: PoseScorer) -> tuple[int, Fit] | None:
-        """Search from the prediction and from the last good pose; return the evaluations and the best refined fit."""
-        memory, predicted, best, evaluations = self._memories[person], self.problem.people[person].predicted, fit, 0
+    def _search_body(self, person: int, fit: Fit, scorer: PoseScorer) -> tuple[int, Fit, Search] | None:
+        """Search from the prediction and from the last good pose; return the evaluations, the best refined fit, and the
+        entry of the search."""
+        memory, predicted, evaluations = self._memories[person], self.problem.people[person].predicted, 0
+        tried = list[Fit]()
         for start in (predicted, memory.last_good):
             found = self.search_body(person, with_locked_dofs(memory.model, start, predicted, memory.active_dofs))
             if found is None:
                 return None
             evaluations += found[0]
-            refined = self.problem.solve(person, found[1], scorer.blocks, MAX_ITERATIONS, MIN_DECREASE)
-            if scorer.cost(refined) < scorer.cost(best):
-                best = refined
-        return evaluations, best
+            tried.append(self.problem.solve(person, found[1], scorer.blocks, MAX_ITERATIONS, MIN_DECREASE))
+        other = min(tried, key=scorer.cost)
+        before, after = scorer.cost(fit), scorer.cost(other)
+        return evaluations, other if after < before else fit, Search.of("body", (), before, after, after < before)

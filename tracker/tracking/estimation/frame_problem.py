@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel, PosedBody
+from tracker.body.searches import Search
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals, PartCosts
@@ -77,6 +78,8 @@ class PersonFit(NamedTuple):
     """Notes for people to read on how the person was found."""
     alternatives: tuple[Hypothesis, ...] = ()
     """Poses that are about as good, best first."""
+    trace: tuple[Search, ...] | None = ()
+    """The searches that led to it; None where they are not known."""
     is_predicted: bool = True
     """Whether the prediction is a term of the fit."""
 

@@ -15,6 +15,7 @@ import numpy as np
 from tracker.body.kinematics import chain_poses
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
+from tracker.body.searches import Search, SearchKind
 from tracker.compute.jit import njit
 from tracker.compute.threads import N_HELPERS, kernel_pool
 from tracker.fitting.contour_residuals import MIN_DECREASE
@@ -60,6 +61,21 @@ def search_limbs(
     best = beam[0] if beam[0].cost < start.cost - CLEAR_NATS else start
     rest = [x for x in (*beam, start) if x is not best and x.cost < best.cost + CLEAR_NATS]
     return [best, *distinct([replace(best, cost=-np.inf), *rest], settings.beam_width)[1:]]
+
+
+def search_entry(kind: SearchKind, searched: Sequence[Limb], start: Hypothesis, found: Sequence[Hypothesis]) -> Search:
+    """Return the entry of a search of limbs.
+
+    Args:
+        kind: of the search.
+        searched: the limbs.
+        start: the pose before it.
+        found: what `search_limbs` returned.
+    """
+    best, *rest = found
+    taken = best is not start
+    after = best.cost if taken else min((x.cost for x in rest if x is not start), default=None)
+    return Search.of(kind, tuple(x.name for x in searched), start.cost, after, taken)
 
 
 def _search_limb(

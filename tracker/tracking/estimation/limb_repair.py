@@ -15,13 +15,14 @@ from tracker.appearance.region_limb_scorer import RegionLimbScorer
 from tracker.appearance.region_model import RegionFrame, RegionModel
 from tracker.body.limbs import Limb, limbs
 from tracker.body.model import BodyModel, PosedBody
+from tracker.body.searches import Search
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
-from tracker.tracking.estimation.limb_recovery import search_limbs
+from tracker.tracking.estimation.limb_recovery import search_entry, search_limbs
 from tracker.tracking.estimation.pose_score import PoseScorer, scorer_without_prediction
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, EstimationSettings
 
@@ -52,6 +53,8 @@ class Repair(NamedTuple):
     0."""
     alternatives: tuple[Hypothesis, ...]
     """Poses about as good as the best, with a limb elsewhere, cheapest first."""
+    entry: Search
+    """Of the search."""
 
     @property
     def is_better(self) -> bool:
@@ -133,7 +136,8 @@ def better_limbs(
     best, *rest = search_limbs(model, searched, start, others, scorer, unproposed)
     gain = start.cost - best.cost
     is_better = gain > MIN_GAIN_NATS
-    return Repair(best.pose if is_better else tracked, gain, tuple(rest) if is_better else (best, *rest))
+    entry = search_entry("repair", [*searched, *unproposed], start, [best, *rest])._replace(taken=is_better)
+    return Repair(best.pose if is_better else tracked, gain, tuple(rest) if is_better else (best, *rest), entry)
 
 
 def _with_regions(

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from tracker.appearance.part_colors import Colors
 from tracker.body.model import PosedBody
+from tracker.body.searches import Search
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import ResidualBlock
@@ -21,7 +22,7 @@ from tracker.tracking.estimation.assessment import PersonEstimate, estimate_at
 from tracker.tracking.estimation.covariance_search import search_along_covariance
 from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, PersonPrior, with_body
 from tracker.tracking.estimation.incremental_fit import fit_by_chains
-from tracker.tracking.estimation.limb_recovery import search_limbs
+from tracker.tracking.estimation.limb_recovery import search_entry, search_limbs
 from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, EstimationSettings
 from tracker.tracking.person_memory import PersonMemory
@@ -44,9 +45,20 @@ class StartFrame(NamedTuple):
     """Returns the evidence around other poses."""
 
 
+class SearchedStart(NamedTuple):
+    """A start pose that was searched."""
+
+    body: PosedBody
+    """The person in the pose that was found."""
+    trace: tuple[Search, ...]
+    """The searches of the last round."""
+    taken: bool
+    """Whether it replaces the start."""
+
+
 def settle_starts(
     frame: StartFrame, memories: Sequence[PersonMemory], people: Sequence[int], settings: EstimationSettings
-) -> dict[int, PosedBody]:
+) -> dict[int, SearchedStart]:
     """Search the start poses that the first frame contradicts.
 
     The start of a single person is searched where a limb is worth a search, and that of one of several where a limb is
@@ -60,7 +72,7 @@ def settle_starts(
         settings: of the tracker.
 
     Returns:
-        By person the poses that replace the start; nobody whose start fits the frame, or whose search fails.
+        By person what was found; nobody whose start fits the frame.
     """
     if not settings.settles_start:
         return {}
@@ -73,15 +85,21 @@ def settle_starts(
     doubted = [p for p, e in before.items() if _contradiction(e) >= least]
     if not doubted or not any(len(v.points_px) for v in first.views):
         return {}
-    wide, bodies = roughly_known(settings), start
+    wide, bodies, traces = roughly_known(settings), start, dict[int, tuple[Search, ...]]()
     for _ in range(MAX_ROUNDS):
         problem, last = FrameProblem(observe(bodies), known, wide), bodies
         for person in doubted:
-            bodies = with_body(bodies, person, search_start(problem, person, bodies, memories[person]))
+            body, traces[person] = search_start(problem, person, bodies, memories[person])
+            bodies = with_body(bodies, person, body)
         if all(distance_m(a, b) < SAME_POSE_M for a, b in zip(last, bodies, strict=True)):
             break
     found = FrameProblem(observe(bodies), known, wide)
-    return {p: bodies[p] for p in doubted if _contradiction(estimate_at(found, p, bodies)) <= _contradiction(before[p])}
+    out = {}
+    for p in doubted:
+        is_better = _contradiction(estimate_at(found, p, bodies)) <= _contradiction(before[p])
+        trace = traces[p] if is_better else tuple(entry._replace(taken=False) for entry in traces[p])
+        out[p] = SearchedStart(bodies[p], trace, is_better)
+    return out
 
 
 def _contradiction(estimate: PersonEstimate) -> int:
@@ -100,8 +118,8 @@ def roughly_known(settings: EstimationSettings) -> EstimationSettings:
 
 def search_start(
     problem: FrameProblem, person: int, bodies: Bodies, memory: PersonMemory, n_draws: int = 0
-) -> PosedBody:
-    """Refine the pose of one person, search around it, and return the person in the cheapest pose.
+) -> tuple[PosedBody, tuple[Search, ...]]:
+    """Refine the pose of one person, search around it, and return the person in the cheapest pose, and the searches.
 
     Args:
         problem: of the frame, see `roughly_known`.
@@ -122,11 +140,15 @@ def search_start(
         fit = min(fit, last.fit, key=lambda f: f.cost)
     colors = Colors(own, *problem.around(person, bodies))
     scorer = PoseScorer.of(residuals, priors, colors, None, recover, memory.active_dofs)
-    best = scorer.scored(model, fit)
+    best, trace = scorer.scored(model, fit), list[Search]()
     for pair in paired_limbs(memory.limbs):
-        best, *_ = search_limbs(model, pair, best, (start,), scorer)
-        swapped = problem.solve(person, exchanged(best.body, pair), scorer.blocks, MAX_ITERATIONS)
-        best = min(best, scorer.scored(model, swapped), key=lambda h: h.cost)
+        before, (best, *rest) = best, search_limbs(model, pair, best, (start,), scorer)
+        trace.append(search_entry("limbs", pair, before, [best, *rest]))
+        swapped = scorer.scored(model, problem.solve(person, exchanged(best.body, pair), scorer.blocks, MAX_ITERATIONS))
+        is_better, names = swapped.cost < best.cost, tuple(limb.name for limb in pair)
+        trace.append(Search.of("exchange", names, best.cost, swapped.cost, is_better))
+        best = swapped if is_better else best
     for draw in range(n_draws):
-        best = search_along_covariance(model, best, scorer, problem.sigma(person), draw)
-    return best.body
+        best, entry = search_along_covariance(model, best, scorer, problem.sigma(person), draw)
+        trace.append(entry)
+    return best.body, tuple(trace)

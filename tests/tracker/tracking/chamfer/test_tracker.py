@@ -258,6 +258,10 @@ def test_what_the_prediction_refused_is_looked_at_again(gavrila):
         track(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(5), TrackSettings())
     )
     assert found[3].notes == ("left arm relocated",)
+    assert found[1].traces == ((),)
+    entry = found[3].traces[0][0]
+    assert (entry.kind, entry.limbs, entry.taken) == ("limbs", ("left_forearm",), True)
+    assert entry.after_nats < entry.before_nats - 3
     for estimate, values in zip(found, truth, strict=True):
         assert off_m(gavrila, estimate.poses[0], values).max() < 0.02
 
@@ -267,6 +271,8 @@ def test_a_body_that_is_elsewhere_is_searched(gavrila):
     truth[2, 1] += 0.6
     *_, last = track(filmed([[PosedBody(gavrila, v)] for v in truth]), [gavrila], truth[:1], range(3), TrackSettings())
     assert "body searched" in last.notes[0]
+    entry = next(x for x in last.traces[0] if x.kind == "body")
+    assert entry.taken == (entry.after_nats < entry.before_nats)
     assert last.evaluations > 100
     if off_m(gavrila, last.poses[0], truth[2]).max() > 0.1:  # so far it is beyond the reach of the search
         assert last.statuses[0] != "good"

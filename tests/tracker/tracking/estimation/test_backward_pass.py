@@ -87,6 +87,9 @@ def test_what_was_right_on_one_frame_is_carried_to_those_that_both_passes_lost(s
         assert off_m(model, estimate.poses[0], truth[estimate.frame]) < 0.03
         assert estimate.statuses == ("good",)
         assert estimate.notes == ("taken over from neighbouring frames",)
+        ((entry,),) = estimate.traces
+        assert (entry.kind, entry.taken) == ("path", True)
+        assert entry.after_nats < entry.before_nats
         assert estimate.covariances[0].any()
         assert estimate.qualities[0] is not None
 

@@ -47,7 +47,7 @@ class Staged:
         self.here = self.scorer.scored(model, fit)
 
     def search(self):
-        return search_along_covariance(self.model, self.here, self.scorer, self.sigma)
+        return search_along_covariance(self.model, self.here, self.scorer, self.sigma)[0]
 
     def contour_cost(self, fit):
         return float(self.scorer.residuals.costs(fit.pose[None])[0])

@@ -46,6 +46,8 @@ def test_a_wrong_leg_is_found(walk):
     assert off_m(walk, 5, walk.tracked[5][0].values) > 2 * SAME_POSE_M
     found = repaired(walk, 5, tuple(walk.tracked[5]))
     assert found.gain > 5 * MIN_GAIN_NATS
+    assert (found.entry.kind, found.entry.limbs, found.entry.taken) == ("repair", ("right_calf",), True)
+    assert found.entry.before_nats - found.entry.after_nats == pytest.approx(found.gain, abs=0.11)
     assert off_m(walk, 5, found.pose) < SAME_POSE_M
 
 
@@ -54,6 +56,7 @@ def test_a_right_pose_stays(walk):
     tracked = PosedBody(walk.model, walk.model.retract(walk.true[3][0].values, np.full(walk.model.n_dofs, 0.002)))
     found = repaired(walk, 3, (tracked,))
     assert found.gain < MIN_GAIN_NATS
+    assert not found.entry.taken
     assert np.array_equal(found.pose, tracked.values)
 
 

@@ -53,7 +53,10 @@ def settle(model, start, views, memory=None, **changes):
     frame = StartFrame(bodies, contours, views, lambda _: views)
     memories = [memory or PersonMemory(model, start)]
     found = settle_starts(frame, memories, [0], replace(TrackSettings(), **changes))
-    return found[0].values if found else None
+    for start in found.values():
+        assert [entry.kind for entry in start.trace] == ["limbs", "exchange"] * (len(start.trace) // 2) != []
+        assert start.taken or not any(entry.taken for entry in start.trace)
+    return found[0].body.values if found and found[0].taken else None
 
 
 def off_m(model, pose, truth):
@@ -111,7 +114,7 @@ NOTHING, SUSPECT, MISSING = (
 def test_whose_start_is_searched(gavrila, truth, views, monkeypatch, n_people, quality, searched):
     bodies, asked = (PosedBody(gavrila, truth),) * n_people, []
     monkeypatch.setattr(start_pose, "estimate_at", lambda *_: SimpleNamespace(quality=quality))
-    monkeypatch.setattr(start_pose, "search_start", lambda _, person, at, __: asked.append(person) or at[person])
+    monkeypatch.setattr(start_pose, "search_start", lambda _, person, at, __: asked.append(person) or (at[person], ()))
     contours = [occluding_contours.trace(bodies, v.camera) for v in views]
     memories = [PersonMemory(gavrila, truth) for _ in bodies]
     settle_starts(StartFrame(bodies, contours, views, lambda _: views), memories, range(n_people), TrackSettings())
