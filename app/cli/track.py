@@ -8,7 +8,6 @@ import tyro
 
 from app.cli.arguments import Names, OptionalName, OptionalNumber, OptionalRange, OptionalWhole, SessionArg
 from app.cli.target import check_stride, load_target, parse_frames
-from app.cli.track_report import format_summary, summarize
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
@@ -89,6 +88,7 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
 
     Ctrl+C stops it and keeps the poses found so far; run it again to resume.
     """
+    from app.cli.track_report import format_summary
     from tracker.pipeline.chain import ChainPlan
     from tracker.pipeline.find_people import FindSettings
     from tracker.pipeline.stored_run import TrackPlan
@@ -162,7 +162,7 @@ def track(session: "Session", plan: "ChainPlan", progress: Reporter) -> dict[str
     Raises:
         SessionError: a person has no pose at or before the first frame.
     """
-    from app.cli.chain_progress import ChainProgress
+    from app.cli.track_report import ChainProgress, summarize
     from tracker.pipeline.chain import open_stored_session, run_chain
 
     is_stopped = False

@@ -113,6 +113,20 @@ def with_dimensions(model: BodyModel, sizes: BodyDimensions) -> BodyModel:
     )
 
 
+def with_sizes_of(model: BodyModel, source: BodyModel) -> BodyModel:
+    """Return a body with the height of another, and with the sizes of its parts as far as they correspond.
+
+    Parts correspond if they have the same name and the same joints and landmarks at their ends: a rigid trunk has none
+    of the lengths of one that bends. The others keep their proportions.
+    """
+    base = model.with_height(source.height_m)
+    own, other = dimensions_of(base), dimensions_of(source)
+    same = [n for n in own.parts.keys() & other.parts.keys() if {*_points_on(base, n)} == {*_points_on(source, n)}]
+    parts = {**own.parts, **{name: other.parts[name] for name in same}}
+    widths = {name: other.widths_m.get(name, width_m) for name, width_m in own.widths_m.items()}
+    return with_dimensions(base, BodyDimensions(source.height_m, parts, widths))
+
+
 def stature_m(model: BodyModel) -> float:
     """Return the vertical extent of a body that stands straight, from crown to sole, metres."""
     Ts = model.kinematics(model.neutral()).Ts_world_part
@@ -179,17 +193,21 @@ def _check(what: str, size_m: float, height_m: float) -> None:
         )
 
 
+def _points_on(model: BodyModel, part: str) -> dict[str, Array]:
+    """Return where joints and landmarks lie on a part, by name, in its frame, fractions of height."""
+    on_it: Sequence[Joint | Landmark] = [
+        *(j for j in model.joints if j.parent == part),
+        *(m for m in model.landmarks if m.part == part),
+    ]
+    return {x.name: np.array(x.position) for x in on_it}
+
+
 def _ends(model: BodyModel, part: int) -> Array:
     """Collect the points on a part in its frame, (n, 3), fractions of height: its joint, further joints, landmarks.
 
     A left and right pair counts as its midpoint, because the distance of the pair is a width and not a length.
     """
-    name = model.parts[part].name
-    on_it: Sequence[Joint | Landmark] = [
-        *(j for j in model.joints if j.parent == name),
-        *(m for m in model.landmarks if m.part == name),
-    ]
-    places = {x.name: np.array(x.position) for x in on_it}
+    places = _points_on(model, model.parts[part].name)
     return np.array([np.zeros(3), *((p + places.get(mirror_part(n) or n, p)) / 2 for n, p in places.items())])
 
 

@@ -1,4 +1,4 @@
-"""Retarget a pose to a body of other sizes: the joints keep their positions in space as far as the bones allow."""
+"""Retarget a pose to another body: the joints keep their positions in space as far as the bones allow."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ def retarget_pose(
     cameras: Sequence[Camera] = (),
     active_dofs: NDArray[np.bool_] | None = None,
 ) -> Array:
-    """Fit a pose of one body to its joints in another of the same degrees of freedom, and to its pins.
+    """Fit a pose of one body to its joints in another, and to its pins. Joints that one of them lacks stay neutral.
 
     Args:
         pose: the pose, (n_values,).
@@ -37,11 +37,21 @@ def retarget_pose(
     if source is target:
         return pose
     points = np.array([i for i, n in enumerate(target.point_names) if n in source.point_names], dtype=np.int64)
+    start = _values_by_name(pose, source, target)
     places = source.points_world(pose)[[source.point_names.index(target.point_names[i]) for i in points]]
     blocks: list[ResidualBlock] = [
         PointTargets(points, places, np.full(len(points), 1 / JOINT_M)),
-        PosePrior(pose, np.full(target.n_dofs, 1 / UNKNOWN)),
+        PosePrior(start, np.full(target.n_dofs, 1 / UNKNOWN)),
     ]
     if pins:
         blocks.append(pin_block(target, cameras, pins))
-    return solve(target, pose, blocks, active_dofs).pose
+    return solve(target, start, blocks, active_dofs).pose
+
+
+def _values_by_name(pose: Array, source: BodyModel, target: BodyModel) -> Array:
+    """Return a pose of another body, (n_values,), with the values that both bodies name, and neutral ones."""
+    if source.value_names == target.value_names:
+        return pose
+    known = dict(zip(source.value_names, pose, strict=True))
+    neutral = zip(target.value_names, target.neutral(), strict=True)
+    return target.clip(np.array([known.get(name, value) for name, value in neutral]))

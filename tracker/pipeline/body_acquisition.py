@@ -1,6 +1,6 @@
 """Acquire a person's body from the stored poses of a session, and make it the person's present body."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -162,11 +162,11 @@ def posed_frames(session: Session, person: int, frames: Sequence[int], start: in
 
 def store_body(
     session: Session, store: AnnotationStore, person: int, body: BodyModel, poses: Mapping[int, Array], label: str,
-    start: int | None = None,
+    starts: Collection[int] = (),
 ) -> Session:  # fmt: skip
     """Make a body the present one of a person: a new model revision, and keyframes fitted to it, as one undoable edit.
 
-    Other stored poses keep the body that they were made with until they are tracked again, but for that of the start.
+    Other stored poses keep the body that they were made with until they are tracked again, but for those of starts.
 
     Args:
         session: the session, which this process has locked.
@@ -175,21 +175,20 @@ def store_body(
         body: the new body.
         poses: by frame, poses of the new body; they replace those of keyframes. Other keyframes are retargeted.
         label: of the entry of the history.
-        start: frame that a run goes out from.
+        starts: frames that a run may go out from.
     """
     name, model = session.people[person].name, session.people[person].model
     before = store.add_model_revision(name, format_model(model))
     changed = save_model(session, person, body)
     revision = store.add_model_revision(name, format_model(body))
     stored = read_stored_poses(session.annotations_path, name, model)
-    fitting = {k: s for k, s in stored.items() if len(s.record.values) == len(body.value_names)}
     changes: list[Change] = [
-        PoseChange(name, k, refitted_record(s.record, _pose_in(body, s, poses.get(k)), revision))
-        for k, s in fitting.items()
+        PoseChange(name, k, refitted_record(s, body, _pose_in(body, s, poses.get(k)), revision))
+        for k, s in stored.items()
         if s.record.keyframe
     ]
-    if start in fitting and not fitting[start].record.keyframe:
-        changes.append(PoseChange(name, start, resized_start(fitting[start], body, revision)))
+    others = [k for k in starts if k in stored and not stored[k].record.keyframe]
+    changes += [PoseChange(name, k, resized_start(stored[k], body, revision)) for k in others]
     edit = store.commit(label, changes).edit
     store.set_setting(SIZES_EDITS, with_sizes_changed(store.setting(SIZES_EDITS, {}), edit, [(name, before, revision)]))
     return changed
@@ -221,19 +220,23 @@ def sizes_changed(edits: Mapping[str, Any], edit: int) -> list[tuple[str, int, i
     return [(str(name), int(before), int(after)) for name, before, after in rows]
 
 
-def refitted_record(record: PoseRecord, pose: Array, revision: int) -> PoseRecord:
-    """Return the record of a keyframe in another body of the same degrees of freedom.
+def refitted_record(keyframe: StoredPose, body: BodyModel, pose: Array, revision: int) -> PoseRecord:
+    """Return the record of a keyframe in another body.
 
     Args:
-        record: the keyframe.
-        pose: its pose in the other body, (n_values,).
+        keyframe: the keyframe.
+        body: the other body.
+        pose: the pose in it, (n_values,).
         revision: of the other body.
     """
+    record = keyframe.record
     kept = {k: v for k, v in record.settings.items() if k in ("joints", SEEN)}
+    what = "sizes" if keyframe.body.model.value_names == body.value_names else "joints"
     return replace(
-        record, values=pose, model_revision=revision, status="", cost_px=None,
+        record, values=pose, sources=_sources_in(body, keyframe), model_revision=revision, status="", cost_px=None,
         settings={"method": "refit", "model_revision": record.model_revision, **kept}, view_costs_px=(),
-        part_costs_px=(), limbs_lost=(), errors=None, remark="refitted to other sizes",
+        part_costs_px=(), limbs_lost=(), errors=None, trace=None,
+        remark=f"refitted to other {what}",
     )  # fmt: skip
 
 
@@ -246,7 +249,16 @@ def resized_start(start: StoredPose, body: BodyModel, revision: int) -> PoseReco
         revision: of that body.
     """
     pose = retarget_pose(start.body.values, start.body.model, body)
-    return replace(start.record, values=pose, model_revision=revision, cost_px=None, view_costs_px=(), part_costs_px=())
+    return replace(
+        start.record, values=pose, sources=_sources_in(body, start), model_revision=revision, cost_px=None,
+        view_costs_px=(), part_costs_px=(), errors=None,
+    )  # fmt: skip
+
+
+def _sources_in(body: BodyModel, stored: StoredPose) -> tuple[str, ...]:
+    """Return the source of each value of a pose in another body; values that only that body has are fitted."""
+    known = dict(zip(stored.body.model.value_names, stored.record.sources, strict=True))
+    return tuple(known.get(name, "fitted") for name in body.value_names)
 
 
 def acquisition_sentence(acquired: Acquisition) -> str:

@@ -25,7 +25,7 @@ from tracker.session.relink import require_files
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 
-_FOLLOWED = ("tracked", "interpolated")
+FOLLOWED = ("tracked", "interpolated")
 """Sources of poses that follow from those of other frames, so that no run starts from them."""
 _FINDING = 0.5
 """Share of the work before tracking that ends with the first poses, where sizes are acquired after them."""
@@ -155,7 +155,7 @@ def start_frame(people: Sequence[Mapping[int, str]], frames: Sequence[int]) -> i
     placed = [k for k in frames if all(k in own for own in people)]
     if not placed:
         raise TrackerError("expected a frame on which all people have a pose, found none", Remedy("common_start"))
-    return min(placed, key=lambda k: (sum(own[k] in _FOLLOWED for own in people), k))
+    return min(placed, key=lambda k: (sum(own[k] in FOLLOWED for own in people), k))
 
 
 class StoredSession:
@@ -189,7 +189,7 @@ class StoredSession:
         """See `OpenSession.store_body`."""
         label = f"acquire sizes of {self.session.people[person].name}"
         poses = dict(zip(acquired.frames, acquired.poses, strict=True))
-        self.session = store_body(self.session, self._store, person, acquired.body, poses, label, start)
+        self.session = store_body(self.session, self._store, person, acquired.body, poses, label, [start])
         self.is_changed = True
 
     def is_interrupted(self, plan: TrackPlan) -> bool:

@@ -10,7 +10,7 @@ from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.state.people import SizeDraft
 from tracker.body.dimensions import BodyDimensions, PartDimensions, dimensions_of, mirror_part, scaled, with_dimensions
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
@@ -22,6 +22,7 @@ from tracker.pipeline.body_acquisition import (
 )
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
+from tracker.store.stored_poses import StoredPose
 
 
 class _Refitted(NamedTuple):
@@ -218,7 +219,8 @@ class BodySizeEditing:
             values = known.get(row.frame)
             if values is None:
                 values = retarget_pose(record.values, was, becomes, pins, cameras, session_state.active_dofs(person))
-            changes.append(PoseChange(name, row.frame, refitted_record(record, values, revision)))
+            stored = StoredPose(PosedBody(was, record.values), record)
+            changes.append(PoseChange(name, row.frame, refitted_record(stored, becomes, values, revision)))
             moved = becomes.points_world(values) - was.points_world(record.values)
             off_m.append(float(np.linalg.norm(moved, axis=1).mean()))
         return _Refitted(changes, float(np.mean(off_m)) if off_m else 0.0)
