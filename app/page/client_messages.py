@@ -14,6 +14,7 @@ from app.drawing.curves import CurveGroup
 from app.page.inspector_messages import (
     AcquireSizes,
     ApplySizes,
+    ChangeBody,
     CoupleSides,
     DraftSizes,
     FindPeople,
@@ -243,8 +244,8 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     TakeCandidate, ShowLandscape, SetLandscapeDof, ShowCostMap, SetCostMapPlace, AskReason,
     StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
     FollowTracking,
-    SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, DraftSizes,
-    AcquireSizes, FindPeople,
+    SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
+    DraftSizes, AcquireSizes, FindPeople,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

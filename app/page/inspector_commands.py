@@ -52,6 +52,12 @@ def _width(controller: Controller, _: int, message: wire.SetGirdleWidth) -> None
     controller.body_sizes.set_width(message.person, message.girdle, message.width_m)
 
 
+def _change_body(controller: Controller, _: int, message: wire.ChangeBody) -> None:
+    if message.to not in PRESETS:
+        raise MessageError(f"one of {', '.join(PRESETS)} as 'to'", quoted(message.to))
+    controller.body_sizes.change_body(message.person, message.to)
+
+
 def _draft(controller: Controller, _: int, message: wire.DraftSizes) -> None:
     if message.action == "discard":
         controller.body_sizes.discard()
@@ -82,6 +88,7 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.SetGirdleWidth: _width,
     wire.CoupleSides: lambda controller, _, m: controller.body_sizes.couple(m.on),
     wire.ApplySizes: lambda controller, _, m: controller.body_sizes.apply(m.person, m.refit),
+    wire.ChangeBody: _change_body,
     wire.DraftSizes: _draft,
     wire.AcquireSizes: _acquire,
     wire.FindPeople: _find_people,

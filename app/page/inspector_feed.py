@@ -125,6 +125,8 @@ def body_sizes(controller: Controller, state: State) -> wire.BodySizesMessage:
     parts = (wire.PartSizes(name, p.length_m, *p.girths_m) for name, p in sizes.parts.items())
     return wire.BodySizesMessage(
         person=person,
+        body=controller.session.people[person].model.name,
+        bodies=PRESETS,
         height_m=sizes.height_m,
         parts=tuple(parts),
         widths=tuple(wire.GirdleWidth(name, width_m) for name, width_m in sizes.widths_m.items()),

@@ -104,6 +104,15 @@ class ApplySizes(Command, frozen=True, tag="body_sizes"):
     """Whether keyframes are fitted to the new body; otherwise they keep the sizes that they were made with."""
 
 
+class ChangeBody(Command, frozen=True, tag="body_sizes"):
+    """Move a person to another body, with the sizes that both have, as one entry of the history."""
+
+    action: Literal["body"]
+    person: Index
+    to: Name
+    """One of `bodies`."""
+
+
 class DraftSizes(Command, frozen=True, tag="body_sizes"):
     """Discard the edited sizes, or edit those that the person had before the present ones."""
 
@@ -244,6 +253,10 @@ class BodySizesMessage(Message, frozen=True, tag="body_sizes"):
     """Body sizes of the person worked on: those being edited, otherwise the present ones."""
 
     person: int
+    body: str
+    """Name of the body."""
+    bodies: tuple[str, ...]
+    """Names of the built-in bodies."""
     height_m: float
     parts: tuple[PartSizes, ...]
     widths: tuple[GirdleWidth, ...]

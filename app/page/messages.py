@@ -96,7 +96,7 @@ def state(session: Session, state: State) -> wire.StateMessage:
         is_checked=(state.person, state.frame) in state.checked,
         part_costs_px=shown.part_costs_px,
         expected_errors_m=tuple(shown.expected_errors_m.round(4).tolist()),
-        dofs=tuple(dof_labels.shown(session.people[state.person].model, shown.values)),
+        dofs=tuple(dof_labels.shown(state.models[state.person], shown.values)),
         locked=tuple(sorted(state.locked[state.person])),
         other_sizes=state.revisions[state.person] != state.present[state.person],
         job=_job(state.search),

@@ -29,6 +29,7 @@ from app.state.page_view import View
 from app.state.state import State
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.session.session import Session
 
 _LOG = logging.getLogger(__name__)
 _READABLE_S = 0.2
@@ -183,12 +184,16 @@ class PageConnection:
     # --- controller to page ------------------------------------------------------------------------------------
 
     async def _send_all(self, notices: Sequence[str]) -> None:
+        names = _value_names(self._controller.session)
         await self._send(messages.session(self._controller.session))
         for notice in notices:
             await self._send(NoticeMessage("info", notice))
         while True:
             await self._changed.wait()
             self._changed.clear()
+            if _value_names(self._controller.session) != names:  # a person has other joints: everything is sent again
+                await self._socket.close(code=aiohttp.WSCloseCode.SERVICE_RESTART)
+                return
             state, sent = self._controller.state, self._sent
             self._sent, began = state, self._loop.time()
             with_figures = self._figures_are_due(state)
@@ -385,3 +390,8 @@ def _drawn(state: State) -> tuple[object, ...]:
 def _pins(state: State) -> object:
     """Return what the drawing of pins depends on: the joint worked on has lines and a triangulated point."""
     return (state.pins, state.person, state.point) if any(state.pins) else None
+
+
+def _value_names(session: Session) -> list[tuple[str, ...]]:
+    """Return the names of the values of each person's poses, with which a page is told joints, parts and limbs."""
+    return [p.model.value_names for p in session.people]

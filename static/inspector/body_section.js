@@ -28,6 +28,7 @@ export class BodySection {
   #send;
   #refuse;
   #person = document.createElement("p");
+  #model;
   #height;
   #alike;
   #table = document.createElement("div");
@@ -49,6 +50,14 @@ export class BodySection {
     this.#send = send;
     this.#refuse = (/** @type {string} */ text) => notify({ type: "notice", level: "info", text });
     this.#person.className = "person-name";
+    this.#model = choiceRow({
+      label: "Body",
+      title:
+        "Joints and parts of the person, such as feet. Sizes that both bodies have stay, and keyframes are fitted. " +
+        "Tracked poses keep the former body until tracked again. Can be undone",
+      options: /** @type {[string, string][]} */ ([]),
+      change: (to) => this.#edit({ action: "body", to }),
+    });
     this.#height = numberRow({
       label: "Height",
       title: "Body height; all other sizes scale with it",
@@ -92,7 +101,7 @@ export class BodySection {
     const foot = document.createElement("div");
     foot.className = "section-foot";
     foot.append(this.#keyframes.element, this.#note, buttons);
-    this.body.append(this.#person, this.#height.element, this.#alike.element, this.#acquisition.element, this.#table, foot);
+    this.body.append(this.#person, this.#model.element, this.#height.element, this.#alike.element, this.#acquisition.element, this.#table, foot);
   }
 
   /** @param {Set<keyof import("../model/store.js").Facts>} changed */
@@ -115,6 +124,11 @@ export class BodySection {
     if (!sizes || !state || !person) return;
     this.#person.textContent = person.name;
     this.#person.style.setProperty("--person", person.color);
+    // A body of the session's own is listed, too.
+    const names = sizes.bodies.includes(sizes.body) ? sizes.bodies : [sizes.body, ...sizes.bodies];
+    const listed = [...this.#model.select.options].map(({ value }) => value);
+    if (listed.join() !== names.join()) this.#model.fill(names.map((name) => [name, name]));
+    this.#model.show(sizes.body);
     this.#height.limits(100 * sizes.height_limits_m[0], 100 * sizes.height_limits_m[1]);
     this.#height.show(tenths(100 * sizes.height_m));
     this.#alike.show(sizes.sides_alike);

@@ -86,6 +86,7 @@
  * @typedef {{type: "body_sizes", action: "width", person: number, girdle: string, width_m: number}} SetGirdleWidth
  * @typedef {{type: "body_sizes", action: "couple", on: boolean}} CoupleSides
  * @typedef {{type: "body_sizes", action: "apply", person: number, refit: boolean}} ApplySizes
+ * @typedef {{type: "body_sizes", action: "body", person: number, to: string}} ChangeBody
  * @typedef {{type: "body_sizes", action: "discard" | "previous", person: number}} DraftSizes
  * @typedef {{type: "acquire", action: "start" | "stop", person: number, method?: "contours" | "voxels"}} AcquireSizes
  * @typedef {{type: "find_people", action: "start" | "stop"}} FindPeople
@@ -176,9 +177,9 @@
  *   string[]}} View3dMessage
  * @typedef {{name: string, length_m: number, half_depth_m: number, half_width_m: number}} PartSizes
  * @typedef {{name: string, width_m: number}} GirdleWidth
- * @typedef {{type: "body_sizes", person: number, height_m: number, parts: PartSizes[], widths: GirdleWidth[],
- *   sides_alike: boolean, edited: boolean, has_former: boolean, outcome: string, height_limits_m: [number, number],
- *   size_limits_m: [number, number]}} BodySizesMessage
+ * @typedef {{type: "body_sizes", person: number, body: string, bodies: string[], height_m: number, parts: PartSizes[],
+ *   widths: GirdleWidth[], sides_alike: boolean, edited: boolean, has_former: boolean, outcome: string,
+ *   height_limits_m: [number, number], size_limits_m: [number, number]}} BodySizesMessage
  * @typedef {{name: string, before_m: number, after_m: number, sigma_m: number}} AcquiredSizeRow
  * @typedef {{before: [number, number, number, number][], after: [number, number, number, number][]}} OutlinePair
  * @typedef {{frames: number[], cost_before_px: number, cost_after_px: number, sizes: AcquiredSizeRow[], size_px:
@@ -232,8 +233,8 @@
  *   SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape |
  *   SetLandscapeDof | ShowCostMap | SetCostMapPlace | AskReason | StartTracking | ControlTracking | EditRange |
  *   CompareRange | StopRange | ToggleMark | ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d | SetHeight
- *   | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | DraftSizes | AcquireSizes | FindPeople | EditFloor |
- *   MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ *   | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | ChangeBody | DraftSizes | AcquireSizes | FindPeople |
+ *   EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
  *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | ReasonMessage | CostMapMessage}

@@ -86,7 +86,8 @@ VIEW_3D = {
     "ghost": False, "voxels": False, "character": "", "trail_points": [], "trail_frames": 25,
 }  # fmt: skip
 BODY_SIZES = {
-    "type": "body_sizes", "person": 0, "height_m": 1.7, "sides_alike": True, "edited": False, "has_former": False,
+    "type": "body_sizes", "person": 0, "body": "gavrila34", "bodies": ["gavrila34", "gavrila38"], "height_m": 1.7,
+    "sides_alike": True, "edited": False, "has_former": False,
     "outcome": "", "height_limits_m": [0.3, 3.0], "size_limits_m": [0.005, 1.19],
     "parts": [
         {"name": name, "length_m": 0.3, "half_depth_m": 0.05, "half_width_m": 0.06}

@@ -25,7 +25,7 @@ from tracker.initialization.first_pose import HEIGHT_SIGMA
 from tracker.pipeline.seen_points import seen_points
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import SEEN, Change, PoseChange, PoseRecord
+from tracker.store.records import SEEN, SOURCES, Change, PoseChange, PoseRecord
 from tracker.store.stored_poses import StoredPose, read_stored_poses
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.chamfer.tracker import ChamferTracker
@@ -256,9 +256,10 @@ def resized_start(start: StoredPose, body: BodyModel, revision: int) -> PoseReco
 
 
 def _sources_in(body: BodyModel, stored: StoredPose) -> tuple[str, ...]:
-    """Return the source of each value of a pose in another body; values that only that body has are fitted."""
+    """Return the source of each value of a pose in another body; values that only that body has are fitted at most."""
     known = dict(zip(stored.body.model.value_names, stored.record.sources, strict=True))
-    return tuple(known.get(name, "fitted") for name in body.value_names)
+    least = max("fitted", *stored.record.sources, key=SOURCES.index)
+    return tuple(known.get(name, least) for name in body.value_names)
 
 
 def acquisition_sentence(acquired: Acquisition) -> str:

@@ -5,14 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.dimensions import with_sizes_of
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model
 from tracker.pipeline.body_acquisition import store_body
 from tracker.pipeline.chain import FOLLOWED
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.stored_poses import StoredPose, read_stored_poses
+from tracker.store.stored_poses import read_stored_poses
 
 
 class ChangedBody(NamedTuple):
@@ -44,19 +44,33 @@ def change_body(session: Session, store: AnnotationStore, person: int, name: str
     Raises:
         TrackerError: there is no such body, the person has it, or the session cannot be written.
     """
-    who, preset = session.people[person], load_model(name)
-    if preset.name == who.model.name:
-        raise TrackerError(f"expected another body of {who.name}, found {preset.name} again; name another one")
-    body = with_sizes_of(preset, who.model)
+    who, body = session.people[person], moved_body(session, person, name)
     stored = read_stored_poses(session.annotations_path, who.name, who.model)
     moved = {k: s for k, s in stored.items() if s.record.keyframe or s.source not in FOLLOWED}
     changed = store_body(session, store, person, body, {}, f"body of {who.name}: {body.name}", moved)
     after = read_stored_poses(session.annotations_path, who.name, body)
-    off_m = [_off_m(before, after[k]) for k, before in moved.items()]
+    off_m = [joints_off_m(before.body, after[k].body) for k, before in moved.items()]
     return ChangedBody(changed, body, len(moved), float(np.mean(off_m or [0.0])), len(stored) - len(moved))
 
 
-def _off_m(before: StoredPose, after: StoredPose) -> float:
-    """Return the mean distance of the joints that both bodies have, metres."""
-    one, other = before.body.named_points_world, after.body.named_points_world
+def moved_body(session: Session, person: int, name: str) -> BodyModel:
+    """Return another body in the sizes of a person, as far as their parts correspond.
+
+    Args:
+        session: the session.
+        person: index of the person.
+        name: of a preset, or path of a body model.
+
+    Raises:
+        TrackerError: there is no such body, or the person has it.
+    """
+    who, preset = session.people[person], load_model(name)
+    if preset.name == who.model.name:
+        raise TrackerError(f"expected another body of {who.name}, found {preset.name} again; name another one")
+    return with_sizes_of(preset, who.model)
+
+
+def joints_off_m(before: PosedBody, after: PosedBody) -> float:
+    """Return the mean distance of the joints that two bodies have, metres."""
+    one, other = before.named_points_world, after.named_points_world
     return float(np.mean([np.linalg.norm(one[name] - other[name]) for name in one.keys() & other.keys()]))

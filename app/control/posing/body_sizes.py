@@ -17,9 +17,13 @@ from tracker.geometry.arrays import Array
 from tracker.pipeline.body_acquisition import (
     SIZES_EDITS,
     refitted_record,
+    resized_start,
     sizes_changed,
     with_sizes_changed,
 )
+from tracker.pipeline.body_change import joints_off_m, moved_body
+from tracker.pipeline.chain import FOLLOWED
+from tracker.session.locked_dofs import load_locks
 from tracker.session.session import save_model
 from tracker.store.records import Change, PoseChange
 from tracker.store.stored_poses import StoredPose
@@ -144,15 +148,53 @@ class BodySizeEditing:
             edit = session_state.saver.write(
                 f"sizes of {name}{outcome}", refitted.changes, None, by_program=False, even_empty=True
             )
-            if edit is not None and session_state.saver.error is None:
-                saver = session_state.saver
-                changed = [(name, before, saver.revisions.current(person))]
-                saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, changed))
+            self._note_edit(person, edit, before)
             off = f", joints {refitted.off_m * 1000:.0f} mm off on average" if n else ""
             message = f"Applied{outcome}{off}." + ("" if same or not refit else self._rest(person))
             self._runs.clear()
             session_state.show_frame(session_state.state.frame, draft=None, sizes_message=message)
             session_state.refresh_saving()
+
+    def change_body(self, person: int, to: str) -> None:
+        """Move a person to another preset: a new revision and one entry of the history; see `pipeline.body_change`.
+
+        Raises:
+            TrackerError: the person has this body, or the change cannot be written.
+        """
+        with self._activities.editing():
+            session_state, name = self._session_state, self._session_state.session.people[person].name
+            before, body = session_state.saver.revisions.current(person), moved_body(session_state.session, person, to)
+            session_state.set_body_models(save_model(session_state.session, person, body))
+            self._follow_joints()
+            refitted = self._refit(person, {}, with_found=True)
+            edit = session_state.saver.write(
+                f"body of {name}: {body.name}", refitted.changes, None, by_program=False, even_empty=True
+            )
+            self._note_edit(person, edit, before)
+            n = len(refitted.changes)
+            message = f"{name} has the body {body.name}, {n} pose{'' if n == 1 else 's'} refitted."
+            n_kept = len(session_state.saver.index.frames(person)) - n
+            if n_kept:
+                message += f" {n_kept} tracked pose{' keeps' if n_kept == 1 else 's keep'} the former body and "
+                message += f"{'is' if n_kept == 1 else 'are'} not shown until tracked again."
+            self._runs.clear()
+            session_state.show_frame(session_state.state.frame, draft=None, sizes_message=message)
+            session_state.refresh_saving()
+
+    def _note_edit(self, person: int, edit: int | None, before: int) -> None:
+        """Note that an entry of the history has changed the body of a person from a revision to the present one."""
+        saver, name = self._session_state.saver, self._session_state.session.people[person].name
+        if edit is not None and saver.error is None:
+            changed = [(name, before, saver.revisions.current(person))]
+            saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, changed))
+
+    def _follow_joints(self) -> None:
+        """Select, hold and lock nothing that the present bodies lack."""
+        session_state = self._session_state
+        state, people = session_state.state, session_state.session.people
+        point = state.point if state.point in people[state.person].model.point_names else None
+        held = frozenset(h for h in state.held if h.point in people[h.person].model.point_names)
+        session_state.set(point=point, held=held, locked=load_locks(people, session_state.saver.setting))
 
     def follow(self) -> None:
         """Restore the bodies that belong to the present entry of the history, after a move.
@@ -177,6 +219,7 @@ class BodySizeEditing:
         model = session_state.saver.revisions.body(revision)
         if model is not session_state.present[person]:
             session_state.set_body_models(save_model(session_state.session, person, model))
+            self._follow_joints()
         self._runs.clear()
         session_state.set(draft=None, sizes_message="")
 
@@ -195,9 +238,14 @@ class BodySizeEditing:
         n = sum(not row.keyframe for row in rows)
         return f" {n} other pose{' keeps' if n == 1 else 's keep'} the earlier sizes until tracked again." if n else ""
 
-    def _refit(self, person: int, known: Mapping[int, Array]) -> _Refitted:
-        """Return the keyframes of a person that were made with another body, in the known poses of the present one, by
-        frame, or else retargeted to it."""
+    def _refit(self, person: int, known: Mapping[int, Array], with_found: bool = False) -> _Refitted:
+        """Return the keyframes of a person that were made with another body, in the present one.
+
+        Args:
+            person: index of the person.
+            known: by frame, poses of the present body, (n_values,); other keyframes are retargeted.
+            with_found: whether other poses that a run may go out from are retargeted, too.
+        """
         session_state, saver = self._session_state, self._session_state.saver
         cameras = [c.camera for c in session_state.session.cameras]
         becomes, revision, name = (
@@ -208,19 +256,18 @@ class BodySizeEditing:
         changes: list[Change] = []
         off_m: list[float] = []
         for row in saver.rows(person, range(session_state.session.n_frames)):
-            record = saver.record(person, row.frame) if row.keyframe else None
-            if (
-                record is None
-                or record.model_revision == revision
-                or not saver.revisions.fits(person, record.model_revision)
-            ):
+            is_refitted = row.keyframe or (with_found and row.source not in FOLLOWED)
+            record = saver.record(person, row.frame) if is_refitted else None
+            if record is None or record.model_revision == revision:
                 continue
             was, pins = saver.revisions.body(record.model_revision), saver.pins(person, row.frame)
+            stored = StoredPose(PosedBody(was, record.values), record)
             values = known.get(row.frame)
             if values is None:
                 values = retarget_pose(record.values, was, becomes, pins, cameras, session_state.active_dofs(person))
-            stored = StoredPose(PosedBody(was, record.values), record)
-            changes.append(PoseChange(name, row.frame, refitted_record(stored, becomes, values, revision)))
-            moved = becomes.points_world(values) - was.points_world(record.values)
-            off_m.append(float(np.linalg.norm(moved, axis=1).mean()))
+            if row.keyframe:
+                changes.append(PoseChange(name, row.frame, refitted_record(stored, becomes, values, revision)))
+            else:
+                changes.append(PoseChange(name, row.frame, resized_start(stored, becomes, revision)))
+            off_m.append(joints_off_m(stored.body, PosedBody(becomes, values)))
         return _Refitted(changes, float(np.mean(off_m)) if off_m else 0.0)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from gestures import drag
 
 from app.control.tracking import track_settings
 from app.page.commands import dispatch
@@ -184,6 +185,39 @@ WRONG = {
     "sizes that person had before": {"action": "previous"},
     "other sizes of person": {"action": "apply", "refit": False},
 }
+
+
+def test_a_person_moves_to_another_body_and_back(page):
+    """Locks, the selected joint and keyframes follow; the next message names the body."""
+    controller = page.controller
+    drag(controller, "left_wrist", (6.0, -9.0))
+    before, frame = controller.state.people[0].values, controller.state.frame
+    wrist = controller.models[0].named_points_world(before)["left_wrist"]
+    sizes = page.updates()["body_sizes"]
+    assert (sizes.body, "gavrila38" in sizes.bodies) == ("gavrila22", True)
+    elbow = controller.models[0].dof_names.index("right_elbow.extension")
+    page.send("pose", action="lock", frame=frame, person=0, dofs=[elbow], locked=True)
+    page.send("body_sizes", action="body", person=0, to="gavrila38")
+    told = page.updates()["body_sizes"]
+    assert told.body == "gavrila38"
+    assert "left_foot" in [part.name for part in told.parts]
+    assert told.outcome.startswith("person has the body gavrila38, 1 pose refitted.")
+    (model,) = controller.models
+    body = model.named_points_world(controller.state.people[0].values)
+    assert np.linalg.norm(body["left_wrist"] - wrist) < 0.03
+    assert [model.dof_names[i] for i in controller.state.locked[0]] == ["right_elbow.extension"]
+    record = controller._session_state.saver.record(0, frame)
+    assert (record.keyframe, len(record.values)) == (True, len(model.value_names))
+    page.send("select", person=0, point="left_toe")
+    controller.history.undo()
+    assert (page.updates()["body_sizes"].body, controller.state.point) == ("gavrila22", None)
+    np.testing.assert_array_equal(controller.state.people[0].values, before)
+    names = controller.models[0].dof_names
+    assert [names[i] for i in controller.state.locked[0]] == ["right_elbow.extension"]
+    with pytest.raises(TrackerError, match="found gavrila22 again"):
+        page.send("body_sizes", action="body", person=0, to="gavrila22")
+    with pytest.raises(MessageError, match="expected one of gavrila22"):
+        page.send("body_sizes", action="body", person=0, to="/etc/passwd")
 
 
 def test_wrong_sizes_are_refused_in_a_sentence_and_limits_are_those_that_are_checked(page):

@@ -415,3 +415,15 @@ async def test_a_view_that_is_not_understood_is_a_notice(controller, caplog):
 def size_of(picture):
     height, width = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_UNCHANGED).shape[:2]
     return width, height
+
+
+async def test_a_page_connects_again_where_a_person_gets_other_joints(controller):
+    async with visiting(controller) as page:
+        assert len((await page.hear("session"))["people"][0]["parts"]) == 10
+        await page.hear("state")
+        await page.send("body_sizes", action="body", person=0, to="gavrila38")
+        with pytest.raises(AssertionError, match="CLOSE"):
+            await page.hear("session")
+    async with visiting(controller) as page:
+        assert len((await page.hear("session"))["people"][0]["parts"]) == 16
+        assert len((await page.hear("state"))["dofs"]) == 38

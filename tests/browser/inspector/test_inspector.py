@@ -116,6 +116,19 @@ async def test_sizes_are_entered_in_centimetres_then_applied(page, endpoint):
     assert endpoint.received[-1] == {"type": "body_sizes", "person": 0, "action": "apply", "refit": False}
 
 
+async def test_another_body_is_chosen(page, endpoint):
+    await opened(page, "body")
+    choice = row(page, "Body").locator("select")
+    assert await choice.input_value() == "gavrila34"
+    await choice.select_option("gavrila38")
+    await until(lambda: endpoint.heard("body_sizes"))
+    assert endpoint.received == [{"type": "body_sizes", "person": 0, "action": "body", "to": "gavrila38"}]
+    endpoint.body_sizes |= {"body": "mine"}  # of a file of the session's own
+    await endpoint.broadcast(endpoint.body_sizes)
+    await shows(page, "quadrille.state.bodySizes.body === 'mine'")
+    assert await choice.input_value() == "mine"
+
+
 async def test_the_3d_view_is_chosen(page, endpoint):
     await opened(page, "view")
     await row(page, "Floor grid").locator("input").uncheck()
