@@ -44,7 +44,7 @@ def test_the_search_ends_where_nothing_moves(monkeypatch, steps_m, n_rounds):
 
     def searched(problem, person, bodies, memory, n_draws):
         draws.append(n_draws)
-        return PosedBody(MODEL, bodies[person].values + next(steps) * np.eye(len(MODEL.value_names))[0])
+        return PosedBody(MODEL, bodies[person].values + next(steps) * np.eye(len(MODEL.value_names))[0]), ()
 
     monkeypatch.setattr(start_search, "read_views", lambda *_: ())
     monkeypatch.setattr(start_search, "FrameProblem", lambda *_: None)
