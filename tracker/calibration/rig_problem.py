@@ -92,14 +92,14 @@ class RigProblem:
         """
         self._seen, self._parameters = seen, parameters
         self._sigmas = np.tile(sigmas, (len(corrections), 1))
-        self._free_corrections = np.zeros(self._sigmas.shape, np.bool_)
+        self._free_corrections, self._has_free_sizes = np.zeros(self._sigmas.shape, np.bool_), True
         self._views = map_parallel(lambda s: _views_of(s, corrections), seen)
         self._priors = [PosePrior.of_spreads(p.base) for p in parameters]
 
-    def with_free(self, corrections: NDArray[np.bool_]) -> "RigProblem":
-        """Return the same problem in which some corrections may change, (V, N_CORRECTIONS); at first none may."""
+    def with_free(self, corrections: NDArray[np.bool_], sizes: bool = True) -> "RigProblem":
+        """Return the same problem in which some corrections may change, (V, N_CORRECTIONS), and the sizes or not."""
         out = copy(self)
-        out._free_corrections = corrections
+        out._free_corrections, out._has_free_sizes = corrections, sizes
         return out
 
     @cached_property
@@ -133,7 +133,7 @@ class RigProblem:
 
     def free(self, state: RigState, equations: ArrowEquations) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """See `BundleProblem`."""
-        sizes = [p.of_kinds(*SIZE_KINDS) for p in self._parameters]
+        sizes = [p.of_kinds(*SIZE_KINDS) & self._has_free_sizes for p in self._parameters]
         own = np.zeros(equations.own_gradients.shape, np.bool_)
         for seen, pose, gradient, out in zip(self._seen, state.poses, equations.own_gradients, own, strict=True):
             model = self._model(seen)
