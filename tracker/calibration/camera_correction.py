@@ -59,11 +59,11 @@ def columns(camera: Camera, correction: Array, points_world: Array, px_by_point:
     return out
 
 
-def axes_of(correction: Array) -> dict[str, tuple[float, ...]]:
-    """Return a correction, (8,), in the units of people: degrees, mm, percent and ms."""
+def in_units(correction: Array) -> dict[str, list[float] | float]:
+    """Return a correction, or its standard deviations, (8,), in the units of people: degrees, mm, percent and ms."""
     return {
-        "rotation_deg": tuple(np.degrees(correction[ROTATION]).tolist()),
-        "position_mm": tuple((1000 * correction[POSITION]).tolist()),
-        "focal_percent": (float(100 * np.expm1(correction[FOCAL])),),
-        "time_ms": (float(1000 * correction[TIME]),),
+        "rotation_deg": np.degrees(correction[ROTATION]).tolist(),
+        "position_mm": (1000 * correction[POSITION]).tolist(),
+        "focal_percent": float(100 * np.expm1(correction[FOCAL])),
+        "time_ms": float(1000 * correction[TIME]),
     }

@@ -62,6 +62,32 @@ class CalibrationCheck:
         out = [sentence(by_name[name], self.since.get(name)) for name in self.named]
         return out + [f"camera {c.name} shows nobody on these frames" for c in self.cameras if not c.is_seen]
 
+    def require_applicable(self, scores: Sequence[tuple[FrameScore, FrameScore]]) -> None:
+        """Check that frames which the check did not use confirm its corrections.
+
+        Args:
+            scores: of `held_out_scores`.
+
+        Raises:
+            TrackerError: there are no such frames, most of them fit worse, or a camera moved within the recording.
+        """
+        for name, k in self.since.items():
+            raise TrackerError(
+                f"expected a camera that is off on all frames, found that {name} is off since frame {k}; make a "
+                f"session of the frames from {k} on, and correct it there"
+            )
+        if not scores:
+            raise TrackerError(
+                "expected other frames with poses to confirm the correction, found none; track more frames, or use "
+                "fewer for the check"
+            )
+        better = sum(after.cost < before.cost for before, after in scores)
+        if 2 * better <= len(scores) or sum(b.cost - a.cost for b, a in scores) <= 0:
+            raise TrackerError(
+                f"expected frames that the check did not use to fit better with the corrected cameras, found {better} "
+                f"of {len(scores)}; the calibration stays as it is"
+            )
+
 
 class PosedRecording:
     """The frames of a session with poses, and what the views show there."""
