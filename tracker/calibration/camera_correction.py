@@ -23,15 +23,19 @@ KINDS = MappingProxyType({"rotation": ROTATION, "position": POSITION, "focal": s
 
 def corrected(camera: Camera, correction: Array) -> Camera:
     """Return a camera with a correction, (8,), except that of its clock."""
-    K = camera.K.copy()
+    if not correction[:TIME].any():
+        return camera
+    K, R = camera.K.copy(), so3_exp(correction[ROTATION])
     K[:2, :2] *= np.exp(correction[FOCAL])
-    turned = transform(so3_exp(correction[ROTATION]), -so3_exp(correction[ROTATION]) @ correction[POSITION])
+    turned = transform(R, -R @ correction[POSITION])
     return replace(camera, K=K, T_world_camera=inverse(turned @ camera.T_camera_world))
 
 
 def with_step(correction: Array, step: Array) -> Array:
     """Return a correction, (8,), after a further small step, (8,), in the columns of `columns`."""
     out = correction + step
+    if not step[ROTATION].any():
+        return out
     out[ROTATION] = so3_log(so3_exp(step[ROTATION]) @ so3_exp(correction[ROTATION]))
     return out
 
