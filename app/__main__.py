@@ -29,6 +29,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
+from app.cli.calibration import check
 from app.remedies import command_line_text
 from app.runtime import process_exit
 from app.runtime.log_limit import limit_log
@@ -47,6 +48,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "acquire": acquire.command,
     "track": track.command,
     "audit": audit.command,
+    "check": check.command,
     "evaluate": evaluate.command,
     "observability": observability.command,
     "export": export.command,

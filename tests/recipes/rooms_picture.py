@@ -20,6 +20,7 @@ HOUSE = {
     ],
     "app/  the viewer": [
         ["__main__"],
+        ["cli/calibration"],
         ["cli"],
         ["bench", "server"],
         ["page", "scene3d"],
@@ -35,7 +36,8 @@ HOUSE = {
         ["experiments"],
         ["pipeline", "export"],
         ["simulate", "evaluation", "posing"],
-        ["acquisition", "initialization"],
+        ["initialization", "calibration"],
+        ["acquisition"],
         ["tracking/chamfer, tracking/contour, tracking/voxel"],
         ["tracking/estimation"],
         ["tracking", "initialization/generators"],

@@ -31,6 +31,7 @@ ROOMS = [
     "tracker.tracking.contour",
     "tracker.tracking.voxel",
     "tracker.acquisition",
+    "tracker.calibration",
     "tracker.initialization.generators",
     "tracker.initialization",
     "tracker.posing",
@@ -60,6 +61,7 @@ ROOMS = [
     "app.server",
     "app.bench",
     "app.cli",
+    "app.cli.calibration",
     "app.__main__",
 ]
 FLOOR = {room: floor for floor, room in enumerate(ROOMS)}

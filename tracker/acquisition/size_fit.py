@@ -6,6 +6,7 @@ The unknowns are the sizes, which all frames share, and the pose of each frame. 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -24,15 +25,14 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.threads import map_parallel
 from tracker.contours.surfaces import Surfaces
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.bundle import ArrowEquations, solve_bundle
 from tracker.fitting.contour_residuals import ContourResiduals, MatchSettings
 from tracker.fitting.gauss_newton import (
-    AT_LIMIT,
-    DAMPING,
     NormalEquations,
     PointTargets,
     PosePrior,
-    damped_step,
     normal_equations,
+    pressed_against_limit,
 )
 from tracker.fitting.pins import PinBlock
 from tracker.geometry.arrays import Array, IntArray
@@ -130,12 +130,13 @@ class SizeFit(NamedTuple):
     """Number of evaluations of the residuals of all frames."""
 
 
-class _Bundle(NamedTuple):
-    """Normal equations of all unknowns: the sizes, then the degrees of freedom of each frame."""
+class _State(NamedTuple):
+    """Unknowns of the fit."""
 
-    cost: float
-    gradient: Array
-    hessian: Array
+    sizes: Array
+    """Parameters, (n_sizes,)."""
+    poses: list[Array]
+    """Of each frame, (n_values,)."""
 
 
 def fit_sizes_to_contours(
@@ -157,28 +158,31 @@ def fit_sizes_to_contours(
     n = len(parameters.names)
     if start is None:
         start = SizeStart(np.zeros(n), np.diag(parameters.sigmas**2), {})
-    sizes, poses, covariance = start.sizes, [start.poses.get(f.frame, f.pose) for f in frames], start.covariance
+    state, covariance = _State(start.sizes, [start.poses.get(f.frame, f.pose) for f in frames]), start.covariance
     cost, n_evaluations = np.nan, 0
     planned, done = sum(step.iterations for step in settings.rounds), 0
     for step in settings.rounds:
-        body = parameters.body(sizes)
-        problem = _Problem(
-            parameters, [f.moved(body, p) for f, p in zip(frames, poses, strict=True)], settings, step, sizes
-        )
-        for i in range(step.iterations):
-            report((done + i) / planned)
-            if not problem.advance():
-                break
+        body = parameters.body(state.sizes)
+        people = [f.moved(body, p) for f, p in zip(frames, state.poses, strict=True)]
+        found = solve_bundle(
+            _Problem(parameters, people, settings, step), state, step.iterations, settings.tolerance,
+            partial(_report_iteration, report, done, planned),
+        )  # fmt: skip
         done += step.iterations
-        sizes, poses, cost, hessian = problem.sizes, problem.poses, problem.cost, problem.hessian
-        n_evaluations += problem.n_evaluations
+        state, cost = found.state, found.cost
+        n_evaluations += found.evaluations
         if step is settings.rounds[-1]:
-            covariance = _covariance(hessian, parameters.sigmas, len(frames), settings.frame_correlation)
+            covariance = _covariance(found.equations, parameters.sigmas, settings.frame_correlation)
+    sizes, poses = state
     body = with_height_of_stature(parameters.body(sizes), parameters.base)
     return SizeFit(sizes, body, tuple(poses), cost, covariance, n_evaluations)
 
 
-def _covariance(hessian: Array, sigmas: Array, n_frames: int, correlation: float) -> Array:
+def _report_iteration(report: Callable[[float], None], done: int, planned: int, iteration: int) -> None:
+    report((done + iteration) / planned)
+
+
+def _covariance(equations: ArrowEquations, sigmas: Array, correlation: float) -> Array:
     """Return the covariance of the sizes, whatever the poses are, (n_sizes, n_sizes).
 
     Frames whose errors are alike count as n / (1 + (n - 1) correlation) independent ones, the design effect of samples
@@ -186,14 +190,13 @@ def _covariance(hessian: Array, sigmas: Array, n_frames: int, correlation: float
     so that `MatchSettings.information_per_px` counts each contour with care already.
 
     Args:
-        hessian: of the cost, by the sizes and then the degrees of freedom of each frame.
-        sigmas: standard deviations of the sizes in the prior, which the Hessian contains, (n_sizes,).
-        n_frames: number of frames.
+        equations: of the fit, by the sizes and the pose of each frame.
+        sigmas: standard deviations of the sizes in the prior, which the equations contain, (n_sizes,).
         correlation: of the errors of two frames.
     """
-    n, precision = len(sigmas), np.diag(1 / sigmas**2)
-    of_frames = hessian[:n, :n] - hessian[:n, n:] @ np.linalg.solve(hessian[n:, n:], hessian[n:, :n]) - precision
-    design_effect = 1 + (n_frames - 1) * correlation
+    precision = np.diag(1 / sigmas**2)
+    of_frames = equations.reduced()[1] - precision
+    design_effect = 1 + (len(equations.cross) - 1) * correlation
     return np.asarray(np.linalg.inv(precision + of_frames / design_effect), dtype=np.float64)
 
 
@@ -208,19 +211,13 @@ class _Resized(NamedTuple):
 
 
 class _Problem:
-    """The least-squares problem of one round."""
+    """The least-squares problem of one round, see `BundleProblem`: the poses are own unknowns of the frames."""
 
     def __init__(
-        self,
-        parameters: SizeParameters,
-        frames: Sequence[SightedPerson],
-        settings: SizeFitSettings,
-        step: Round,
-        sizes: Array,
+        self, parameters: SizeParameters, frames: Sequence[SightedPerson], settings: SizeFitSettings, step: Round
     ) -> None:
-        """Begin at sizes, (n_sizes,), and at the poses of the frames."""
-        self._parameters, self._frames, self._step = parameters, frames, step
-        self._tolerance = settings.tolerance
+        """Prepare the evidence around the poses of the frames."""
+        self._parameters, self._frames = parameters, frames
         self._free = parameters.of_kinds(*step.kinds)
         self._residuals = map_parallel(lambda f: _residuals(f, settings, step), frames)
         self._others = [tuple(b.model for k, b in enumerate(f.bodies) if k != f.person) for f in frames]
@@ -229,77 +226,39 @@ class _Problem:
         sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
         usual = PosePrior.of_spreads(model)
         self._priors = [[PosePrior(f.pose, 1 / sigma), usual] for f in frames]
-        self.sizes, self.poses, self._damping = sizes, [f.pose for f in frames], DAMPING.first
-        self.n_evaluations = 0
-        self._here = self._linearize(self.sizes, self.poses)
 
-    @property
-    def cost(self) -> float:
-        """Cost of the present sizes and poses."""
-        return self._here.cost
+    def moved(self, state: _State, shared: Array, own: Array) -> _State:
+        """See `BundleProblem`."""
+        model = self._parameters.base
+        moved = [model.clip(model.retract(p, s)) for p, s in zip(state.poses, own, strict=True)]
+        return _State(state.sizes + shared, moved)
 
-    @property
-    def hessian(self) -> Array:
-        """Second derivative of the cost there, by the sizes and then the degrees of freedom of each frame."""
-        return self._here.hessian
+    def free(self, state: _State, equations: ArrowEquations) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return the free sizes, and the degrees of freedom that no limit holds."""
+        model = self._parameters.base
+        own = [
+            ~pressed_against_limit(model, pose, g) for pose, g in zip(state.poses, equations.own_gradients, strict=True)
+        ]
+        return self._free, np.array(own).reshape(equations.own_gradients.shape)
 
-    def advance(self) -> bool:
-        """Move one step; return whether another one is worth it."""
-        here = self._here
-        active = self._active(here.gradient)
-        g, H = here.gradient[active], here.hessian[np.ix_(active, active)]
-        while True:
-            step = np.zeros(len(here.gradient))
-            step[active] = damped_step(H, g, self._damping * np.diag(H))
-            sizes, poses = self._moved(step)
-            there = self._linearize(sizes, poses)
-            if there.cost < here.cost:
-                break
-            if self._damping > DAMPING.most:
-                return False
-            self._damping = max(10 * self._damping, DAMPING.least_again)
-        self.sizes, self.poses, self._here = sizes, poses, there
-        self._damping = max(DAMPING.least, self._damping / 10)
-        return here.cost - there.cost > self._tolerance * here.cost
-
-    def _moved(self, step: Array) -> tuple[Array, list[Array]]:
-        model, n = self._parameters.base, len(self.sizes)
-        steps = step[n:].reshape(len(self.poses), -1)
-        moved = [model.clip(model.retract(p, s)) for p, s in zip(self.poses, steps, strict=True)]
-        return self.sizes + step[:n], moved
-
-    def _active(self, gradient: Array) -> NDArray[np.int64]:
-        """Return the unknowns that may change: free sizes, and degrees of freedom that no limit holds."""
-        model, n = self._parameters.base, len(self._free)
-        low, high = model.limits.T
-        out = [self._free]
-        for pose, g in zip(self.poses, gradient[n:].reshape(len(self.poses), -1), strict=True):
-            at = pose[model.dof_value]
-            out.append(~((at <= low + AT_LIMIT) & (g > 0)) & ~((at >= high - AT_LIMIT) & (g < 0)))
-        return np.flatnonzero(np.concatenate(out))
-
-    def _linearize(self, sizes: Array, poses: Sequence[Array]) -> _Bundle:
-        self.n_evaluations += 1
+    def linearize(self, state: _State) -> ArrowEquations:
+        """See `BundleProblem`."""
+        sizes, poses = state
         body, by_sizes = self._parameters.body(sizes), self._parameters.derivatives(sizes)
-        n, m = len(sizes), body.n_dofs
+        n = len(sizes)
         # Frames with the same people share the arrays of their shapes.
         representatives = {o: r[0] for o, r in zip(self._others, self._residuals, strict=True) if r}
         surfaces = {others: residuals.resized(body) for others, residuals in representatives.items()}
-        own = map_parallel(
+        found = map_parallel(
             lambda i: self._linearize_frame(i, _Resized(body, by_sizes, surfaces.get(self._others[i])), poses[i]),
             range(len(poses)),
         )
-        prior = sizes / self._parameters.sigmas**2
-        cost, gradient = 0.5 * float(prior @ sizes), np.zeros(n + m * len(poses))
-        hessian = np.zeros((len(gradient), len(gradient)))
-        gradient[:n] = prior
-        hessian[:n, :n] = np.diag(1 / self._parameters.sigmas**2)
-        for i, found in enumerate(own):
-            at = np.concatenate([np.arange(n), n + m * i + np.arange(m)])
-            cost += found.cost
-            gradient[at] += found.gradient
-            hessian[np.ix_(at, at)] += found.hessian
-        return _Bundle(cost, gradient, hessian)
+        out, prior = ArrowEquations.zeros(n, len(poses), body.n_dofs), sizes / self._parameters.sigmas**2
+        out.gradient[:] = prior
+        out.hessian[:] = np.diag(1 / self._parameters.sigmas**2)
+        for i, of_frame in enumerate(found):
+            out.add(i, of_frame)
+        return out._replace(cost=0.5 * float(prior @ sizes) + sum(f.cost for f in found))
 
     def _linearize_frame(self, i: int, resized: _Resized, pose: Array) -> NormalEquations:
         """Return the normal equations of a frame by the sizes, then by its pose."""

@@ -201,7 +201,7 @@ def iterate(
     yield Fit(pose, here.cost, iterations, here.hessian)
     while iterations < max_iterations:
         iterations += 1
-        active = np.flatnonzero(is_active & ~_pressed_against_limit(model, pose, here.gradient))
+        active = np.flatnonzero(is_active & ~pressed_against_limit(model, pose, here.gradient))
         if not len(active):
             yield Fit(pose, here.cost, iterations, here.hessian)
             return
@@ -355,7 +355,7 @@ def _sum(model: BodyModel, pose: Array, blocks: Sequence[ResidualBlock]) -> Norm
     return NormalEquations(cost, gradient, hessian)
 
 
-def _pressed_against_limit(model: BodyModel, pose: Array, gradient: Array) -> NDArray[np.bool_]:
+def pressed_against_limit(model: BodyModel, pose: Array, gradient: Array) -> NDArray[np.bool_]:
     """Return the degrees of freedom at a limit that descent would cross, (n_dofs,)."""
     at = pose[model.dof_value]
     low, high = model.limits[:, 0], model.limits[:, 1]

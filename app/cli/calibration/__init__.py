@@ -1,0 +1,1 @@
+"""Commands for the cameras of a recording: whether they are off, and how they are calibrated."""

@@ -1,0 +1,5 @@
+"""Is the calibration right, which camera is off, by how much: from contours of bodies and from points (GD96 Sect. 5).
+
+`tracker/calibrations` reads and writes the files of calibrations; this room judges and corrects cameras. It may import
+`acquisition` and the rooms below.
+"""

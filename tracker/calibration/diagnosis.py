@@ -1,0 +1,302 @@
+"""Find the cameras whose calibration the contours contradict, and the corrections that mend them.
+
+A correction of one kind of one camera is a fault. With poses and sizes eliminated, one of gradient b and Hessian S
+lowers the cost by 1/2 b^T S^-1 b. The best are fitted, the best of these is kept if it is worth it, and
+the evidence is selected again by the corrected cameras, until no fault is worth keeping (forward selection).
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.acquisition.size_parameters import SizeParameters
+from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, with_step
+from tracker.calibration.rig_problem import RigProblem, RigState
+from tracker.calibration.viewed_frames import ViewedFrame, seen_people
+from tracker.compute.progress import Report, unreported
+from tracker.compute.threads import one_blas_thread
+from tracker.fitting.bundle import solve_bundle
+from tracker.fitting.hypothesis import CLEAR_NATS
+from tracker.geometry.arrays import Array
+
+
+class _Prior(NamedTuple):
+    """Standard deviations of a camera's corrections."""
+
+    rotation_rad: float
+    position_m: float
+    focal: float
+    time_frames: float
+
+
+PRIOR = _Prior(rotation_rad=float(np.radians(1.0)), position_m=0.05, focal=0.01, time_frames=1.0)
+"""A tripod that is knocked, a zoom that is touched, a camera that starts a frame late. It fixes the gauge where several
+cameras are corrected; of one camera, contours say a hundred times as much."""
+WORTH_NATS = 4.0
+"""Fall of the cost, for each number that a fault corrects, from which it is taken for real. A number that fits noise
+gains half a nat, and one of 20,000 pixels is worth 4.8 nats by the Bayesian information criterion (Schwarz 1978), of as
+many as are independent some 4."""
+
+
+class _Effort(NamedTuple):
+    """Bounds of the search."""
+
+    cameras: int
+    """Most promising cameras that are fitted before a fault is taken."""
+    kinds: int
+    """Kinds of faults of each that are fitted."""
+    beginnings: int
+    """Cameras that the selection may begin with."""
+    faults: int
+    """Most faults that are taken."""
+    steps: int
+    """Gauss-Newton steps of a fit; the next goes on from there."""
+
+
+EFFORT = _Effort(cameras=2, kinds=2, beginnings=3, faults=8, steps=8)
+"""With one camera fitted, a camera opposite the one that is off was blamed on one of nine recordings."""
+
+
+def prior_sigmas(fps: float) -> Array:
+    """Return the standard deviations of a correction in its prior, (N_CORRECTIONS,), at a number of frames per
+    second."""
+    return np.array(
+        [PRIOR.rotation_rad] * 3 + [PRIOR.position_m] * 3 + [PRIOR.focal, PRIOR.time_frames / fps], dtype=np.float64
+    )
+
+
+class Fault(NamedTuple):
+    """A kind of correction of one camera."""
+
+    camera: int
+    kind: str
+    """A key of `KINDS`."""
+
+    @property
+    def columns(self) -> NDArray[np.int64]:
+        """Its places among the corrections of all cameras, one after the other."""
+        return self.camera * N_CORRECTIONS + np.arange(N_CORRECTIONS)[KINDS[self.kind]]
+
+
+class FoundFault(NamedTuple):
+    """A fault that was kept."""
+
+    fault: Fault
+    gain_nats: float
+    """Fall of the cost by it."""
+    rivals: tuple[Fault, ...]
+    """Faults that explained the contours as well when it was kept."""
+
+
+class Step(NamedTuple):
+    """The correction that a fault promises, from the linearized problem."""
+
+    correction: Array
+    """Of its camera, (N_CORRECTIONS,), with those that were kept."""
+    sigma: Array
+    """Standard deviations of the numbers that it corrects, else 0, (N_CORRECTIONS,)."""
+    gain_nats: float
+    """Fall of the cost."""
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What contours say of the cameras."""
+
+    corrections: Array
+    """That mend the cameras, (V, N_CORRECTIONS); 0 where nothing is off."""
+    covariance: Array
+    """Of those that are not 0, whatever poses and sizes are, (V * N_CORRECTIONS, V * N_CORRECTIONS)."""
+    kept: tuple[FoundFault, ...]
+    """Faults in the order in which they were kept."""
+    steps: Mapping[Fault, "Step"]
+    """Of each fault that was not kept, the correction that it would make."""
+    state: RigState
+    """Cameras, sizes and poses that fit the contours."""
+
+    @property
+    def named(self) -> tuple[int, ...]:
+        """Indices of the cameras that are off, the worst first."""
+        return tuple(dict.fromkeys(k.fault.camera for k in self.kept))
+
+    def sigmas(self, camera: int) -> Array:
+        """Return the standard deviations of the correction of a camera, (N_CORRECTIONS,)."""
+        at = slice(camera * N_CORRECTIONS, (camera + 1) * N_CORRECTIONS)
+        return np.asarray(np.sqrt(np.diag(self.covariance)[at]))
+
+
+def diagnose(
+    frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], fps: float, report: Report = unreported
+) -> Diagnosis:
+    """Find the cameras that are off.
+
+    Args:
+        frames: people on frames of diverse poses, as they were tracked with the present cameras.
+        parameters: sizes of each person's body, around the body of the frames.
+        fps: frames per second.
+        report: shows progress. An exception that it raises ends the diagnosis.
+    """
+    n_views = len(frames[0].views)
+    state = RigState(
+        np.zeros((n_views, N_CORRECTIONS)), tuple(np.zeros(len(p.names)) for p in parameters),
+        tuple(b.values for f in frames for b in f.bodies),
+    )  # fmt: skip
+    search = _Search(frames, parameters, prior_sigmas(fps))
+    report("fitting poses to the contours", 0.0)
+    start = search.fitted(state, (), accepts=False)
+    state = search.fitted(start.state, ()).state
+    best, tried = search.selected(state, (), partial(report, "judging the cameras")), set[int]()
+    # One camera that is off can look like two others that are: begin with other cameras as well.
+    while len(best.cameras) > 1 and len(tried) < EFFORT.beginnings:
+        tried |= {k.fault.camera for k in best.kept[:1]}
+        other = search.selected(state, tried, partial(report, "judging the cameras"))
+        if not other.kept:
+            break
+        tried.add(other.kept[0].fault.camera)
+        best = min(best, other, key=lambda s: search.total(start.problem, s))
+    report("done", 1.0)
+    steps = _steps(best.fit, [k.fault for k in best.kept])
+    return Diagnosis(best.fit.state.corrections, _covariance(best.fit), best.kept, steps, best.fit.state)
+
+
+class _Fitted(NamedTuple):
+    """A rig that was fitted."""
+
+    problem: RigProblem
+    state: RigState
+    cost: float
+    hessian: Array
+    """Of the shared unknowns, whatever the poses are, (n, n)."""
+    gradient: Array
+    """By them, (n,)."""
+    free: NDArray[np.bool_]
+    """Which of them were fitted, (n,)."""
+
+
+class _Selection(NamedTuple):
+    """Faults that were kept, and the rig that they give."""
+
+    kept: tuple[FoundFault, ...]
+    fit: _Fitted
+
+    @property
+    def cameras(self) -> set[int]:
+        """Indices of the cameras that are off."""
+        return {k.fault.camera for k in self.kept}
+
+
+class _Search:
+    """Fits the rig of some frames with various corrections free."""
+
+    def __init__(self, frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], sigmas: Array) -> None:
+        self._frames, self._parameters, self._sigmas = frames, parameters, sigmas
+
+    def selected(self, state: RigState, not_first: Collection[int], report: Callable[[float], None]) -> _Selection:
+        """Keep faults one by one until none is worth it; the first is not of some cameras, given by index."""
+        kept = list[FoundFault]()
+        while True:
+            report(len(kept) / EFFORT.faults)
+            chosen = [k.fault for k in kept]
+            fit = self.fitted(state, chosen)
+            found = self.best(fit, chosen, not_first if not kept else ()) if len(kept) < EFFORT.faults else None
+            if found is None:
+                return self.without_idle(fit, kept)
+            kept.append(found[0])
+            state = found[1]
+
+    def total(self, problem: RigProblem, selection: _Selection) -> float:
+        """Return the cost of a selection on the evidence of a problem, with the worth that its faults need."""
+        faults = [k.fault for k in selection.kept]
+        return self.refitted(problem, selection.fit.state, faults).cost + sum(map(_needed, faults))
+
+    def fitted(self, state: RigState, chosen: Collection[Fault], accepts: bool = True) -> _Fitted:
+        """Fit poses, sizes and chosen corrections, on the evidence that the state accepts or on all."""
+        seen = seen_people(self._frames, state if accepts else None)
+        problem = RigProblem(seen, self._parameters, self._sigmas, state.corrections)
+        return self.refitted(problem, state, chosen)
+
+    def refitted(self, problem: RigProblem, state: RigState, chosen: Collection[Fault]) -> _Fitted:
+        """Fit poses, sizes and chosen corrections on the evidence of a problem."""
+        free = np.zeros(state.corrections.size, np.bool_)
+        for h in chosen:
+            free[h.columns] = True
+        problem = problem.with_free(free.reshape(state.corrections.shape))
+        found = solve_bundle(problem, state, EFFORT.steps)
+        shared, own = problem.free(found.state, found.equations)
+        every = np.concatenate([np.ones(free.size, np.bool_), shared[free.size :]])
+        with one_blas_thread():
+            gradient, hessian = found.equations.held(every, own).reduced()
+        return _Fitted(problem, found.state, found.cost, hessian, gradient, shared)
+
+    def best(
+        self, fit: _Fitted, chosen: Collection[Fault], without: Collection[int]
+    ) -> tuple[FoundFault, RigState] | None:
+        """Fit the most promising faults; return the best with its state, or None if none is worth it.
+
+        Args:
+            fit: the rig so far.
+            chosen: faults that were kept.
+            without: indices of cameras that are not tried.
+        """
+        steps = {h: s for h, s in _steps(fit, chosen).items() if h.camera not in without}
+        promise = {h: s.gain_nats - _needed(h) for h, s in steps.items() if s.gain_nats > _needed(h)}
+        promising = sorted(promise, key=lambda h: -promise[h])
+        cameras = list(dict.fromkeys(h.camera for h in promising))[: EFFORT.cameras]
+        tried = [h for c in cameras for h in [p for p in promising if p.camera == c][: EFFORT.kinds]]
+        fits = {h: self.refitted(fit.problem, fit.state, {*chosen, h}) for h in tried}
+        worth = {h: fit.cost - found.cost - _needed(h) for h, found in fits.items()}
+        best = max(worth, key=lambda h: worth[h], default=None)
+        if best is None or worth[best] <= 0:
+            return None
+        rivals = [h for h in worth if h != best and worth[h] > worth[best] - CLEAR_NATS]
+        return FoundFault(best, fit.cost - fits[best].cost, tuple(rivals)), fits[best].state
+
+    def without_idle(self, fit: _Fitted, kept: Sequence[FoundFault]) -> _Selection:
+        """Drop faults that later ones have made superfluous; return the others with their fit."""
+        for candidate in list(kept):
+            others = [k for k in kept if k is not candidate]
+            if not any(k.fault.camera == candidate.fault.camera for k in others):
+                continue
+            state = fit.state._replace(corrections=fit.state.corrections.copy())
+            state.corrections.ravel()[candidate.fault.columns] = 0.0
+            found = self.refitted(fit.problem, state, [k.fault for k in others])
+            if found.cost - fit.cost < _needed(candidate.fault):
+                kept, fit = others, found
+        return _Selection(tuple(kept), fit)
+
+
+def _needed(fault: Fault) -> float:
+    """Return the fall of the cost from which a fault is kept, nats."""
+    return WORTH_NATS * len(fault.columns)
+
+
+def _steps(fit: _Fitted, chosen: Collection[Fault]) -> dict[Fault, Step]:
+    """Return the correction that each further fault promises."""
+    base, out = np.flatnonzero(fit.free), {}
+    H_base = fit.hessian[np.ix_(base, base)]
+    for camera, present in enumerate(fit.state.corrections):
+        for kind, own in KINDS.items():
+            h = Fault(camera, kind)
+            if h in chosen:
+                continue
+            across = fit.hessian[np.ix_(h.columns, base)]
+            solved = np.linalg.solve(H_base, np.column_stack([across.T, fit.gradient[base]]))
+            covariance = np.linalg.inv(fit.hessian[np.ix_(h.columns, h.columns)] - across @ solved[:, :-1])
+            b = fit.gradient[h.columns] - across @ solved[:, -1]
+            step, sigma = np.zeros(N_CORRECTIONS), np.zeros(N_CORRECTIONS)
+            step[own], sigma[own] = -covariance @ b, np.sqrt(np.diag(covariance))
+            out[h] = Step(with_step(present, step), sigma, 0.5 * float(b @ covariance @ b))
+    return out
+
+
+def _covariance(fit: _Fitted) -> Array:
+    """Return the covariance of the fitted corrections, whatever sizes and poses are, in the places of all."""
+    n, base = fit.state.corrections.size, np.flatnonzero(fit.free)
+    out = np.zeros((n, n))
+    at = base[base < n]
+    out[np.ix_(at, at)] = np.linalg.inv(fit.hessian[np.ix_(base, base)])[: len(at), : len(at)]
+    return out
