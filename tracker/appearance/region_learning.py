@@ -34,7 +34,7 @@ forearm in some five frames. With half and with twice as much, 27 of 37 displace
 (`tests/benchmarks/region_evidence.py --displaced`) as with this; of 1,147 others 2 and 1, with this 2."""
 _CLEAR = 1.0
 """Evidence of a sample that is clear, nats. A part whose usual evidence is less counts almost fully on all frames. With
-half and with twice as much, the same displaced limbs are found; with 0, clothes in the colours of a wall are trusted."""
+half and with twice as much, the same limbs are found; with 0, clothes in the colours of a wall are trusted."""
 
 
 class LearningFrame(NamedTuple):
