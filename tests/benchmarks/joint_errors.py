@@ -38,7 +38,7 @@ CONDITIONS = Conditions(
     body=f"`{DEFAULT_MODEL}`, acquired; after `@nothing` of people who were found",
     start="pose fitted to the reference joints of frame 0; after `@nothing` the one that was found",
     settings="defaults, without the audit → with it",
-    chosen="rules of tracking (recordings), the 10 mm that all views share and the 10 nats of the colours (simulated "
+    chosen="rules of tracking (recordings), the 6 mm that all views share and the 10 nats of the colours (simulated "
     "people), the threshold of 5% and the median over the tracks",
     command="python tests/benchmarks/joint_errors.py SESSIONS --data DIR --scenes DIR --write docs/accuracy.md "
     "docs/measurements.md",

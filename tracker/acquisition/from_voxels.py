@@ -176,7 +176,7 @@ class _Frame:
     def __init__(self, frame: SilhouettedPerson, body: BodyModel, pose: Array, settings: VoxelSizeSettings) -> None:
         self._frame, self._settings = frame, settings
         self._bodies = (PosedBody(body, pose), *frame.bodies[1:])
-        self._states = [state_of(b.model, [b.values], 1.0, settings.voxels, sure=True) for b in self._bodies]
+        self._states = [state_of(b.model, [b.values], 1.0, settings.voxels) for b in self._bodies]
 
     def linearize(self, by_sizes: SizeArrays, by_figure: FigureSizes) -> _FrameEquations:
         """Return the normal equations by the sizes and the pose, with the priors of the pose."""

@@ -8,9 +8,12 @@ from tracker.images.color_histogram import BINS
 VOLUME = (256 / BINS) ** 3
 """Volume of a bin, cubic gray levels."""
 DOUBT = 0.02
-"""Share of arbitrary pixels under a part: a colour that was never seen there is not impossible."""
+"""Share of arbitrary pixels under a part: a colour that was never seen there is not impossible. With half
+and with twice as much, region evidence finds the same limbs (`tests/benchmarks/region_evidence.py --displaced`)."""
 _SMOOTHING_BINS = 0.7
-"""Standard deviation of the Gaussian that smooths histograms, bins: light and noise move a colour to the next bin."""
+"""Standard deviation of the Gaussian that smooths histograms, bins: light and noise move a colour to the next bin.
+With half and with twice as much, region evidence finds 26 and 30 of 37 displaced limbs, with this 27, and 2, 3 and 2 of
+1,147 others."""
 
 
 def smoothed(counts: Array) -> Array:

@@ -20,7 +20,14 @@ from tracker.fitting.gauss_newton import (
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import START_VELOCITY
-from tracker.tracking.voxel.figure import N_PARTS, figure_of, part_rotations, point_shares, torso_center
+from tracker.tracking.voxel.figure import (
+    N_PARTS,
+    figure_of,
+    part_rotations,
+    point_shares,
+    torso_center,
+    with_shoulders_of,
+)
 from tracker.tracking.voxel.kalman import product
 from tracker.tracking.voxel.settings import VoxelSettings
 from tracker.tracking.voxel.state import FilterState, Layout, point_jacobians
@@ -35,9 +42,7 @@ class BodyPose(NamedTuple):
     """(n_dofs, n_dofs), rad and metres."""
 
 
-def state_of(
-    model: BodyModel, past: Sequence[Array], dt: float, settings: VoxelSettings, sure: bool = False
-) -> FilterState:
+def state_of(model: BodyModel, past: Sequence[Array], dt: float, settings: VoxelSettings) -> FilterState:
     """Return the state of a person in a pose.
 
     Args:
@@ -45,7 +50,6 @@ def state_of(
         past: poses of the last frames, (n_values,) each, the present one last.
         dt: time between them, s.
         settings: of the tracker.
-        sure: whether the pose is a keyframe, or one that was tracked before.
     """
     of = figure_of(model)
     layout = Layout(settings.sizes != "frozen", True, settings.turn_rates)
@@ -53,23 +57,21 @@ def state_of(
     rotations = part_rotations(body, of)
     center = torso_center(body, of, rotations[0])
     velocity, rates = np.zeros(3), np.zeros((N_PARTS, 3))
-    known = len(past) > 1
-    if known:
+    if len(past) > 1:
         before = PosedBody(model, past[-2])
         turned = part_rotations(before, of)
         velocity = (center - torso_center(before, of, turned[0])) / dt
         if settings.turn_rates:
             rates = rigid.so3_log(np.swapaxes(turned, 1, 2) @ rotations) / dt
-    scale = 0.3 if sure or known else 1.0
     variances = np.empty(layout.n)
-    variances[layout.turns_at] = (scale * settings.start_turn) ** 2
-    variances[layout.center_at] = (scale * settings.start_m) ** 2
+    variances[layout.turns_at] = settings.start_turn**2
+    variances[layout.center_at] = settings.start_m**2
     variances[layout.sizes_at] = settings.start_size_m**2
     variances[layout.velocity_at] = START_VELOCITY**2
     variances[layout.turn_rates_at] = START_VELOCITY**2
     return FilterState(
-        of.figure, layout, rigid.quaternion_from_matrix(rotations), of.sizes.copy(), center, velocity, rates,
-        np.diag(variances),
+        with_shoulders_of(of, body, rotations[0], center), layout, rigid.quaternion_from_matrix(rotations),
+        of.sizes.copy(), center, velocity, rates, np.diag(variances),
     )  # fmt: skip
 
 

@@ -131,6 +131,23 @@ def torso_center(body: PosedBody, of: FigureOfBody, rotation: Array) -> Array:
     return np.asarray(np.sum(found, axis=0) / 4.0)
 
 
+def with_shoulders_of(of: FigureOfBody, body: PosedBody, rotation: Array, center: Array) -> FigureJoints:
+    """Return the figure with its shoulders where a pose of the body has them.
+
+    Collarbones are no parts of a figure. They move its shoulders by more than its arms are thick, and keep them there.
+
+    Args:
+        of: the figure of the body.
+        body: in the pose.
+        rotation: of the torso in the world, (3, 3).
+        center: of the torso, (3,), metres.
+    """
+    points, shares = body.named_points_world, of.figure.parent_shares.copy()
+    for part in (upper for limb, (upper, _) in LIMBS.items() if limb.endswith("arm")):
+        shares[part] = rotation.T @ (points[ROOTS[PARTS[part]]] - center) / of.sizes[TORSO]
+    return of.figure._replace(parent_shares=shares)
+
+
 def chain_centers(figure: FigureJoints, sizes: Array, rotations: Array, center: Array) -> Array:
     """Return the centres of all parts, (10, 3), metres, by their kinematic chains (MTHC01 Eq. 3).
 

@@ -111,7 +111,7 @@ class VoxelEstimator:
         if keyframe is not None:
             past = [self._poses[p], keyframe] if self._frame is not None else [keyframe]
             self._poses[p] = keyframe
-            return state_of(model, past, dt, self._settings, sure=True)
+            return state_of(model, past, dt, self._settings)
         if p not in self._run.subjects.tracked or (self._frame is None and not self._has_motion[p]):
             return state  # the model is adjusted in the first frame with the identity as transition
         return predict(state, dt, self._settings.process)

@@ -47,6 +47,17 @@ def test_a_pose_comes_back(name):
     assert np.linalg.eigvalsh(found.covariance).min() > 0
 
 
+def test_shoulders_are_where_collarbones_have_them():
+    model = load_model("gavrila38", 1.75)
+    step = np.zeros(model.n_dofs)
+    step[list(model.dof_names).index("left_collarbone.elevation")] = -0.25
+    pose = model.retract(model.neutral(), step)
+    state, own = state_of(model, [pose], 0.1, VoxelSettings()), PosedBody(model, pose).named_points_world
+    found = joint_points(state.figure, state.sizes, state.rotations, state.centers)
+    for name in ("left_shoulder", "left_elbow", "left_wrist", "right_shoulder"):
+        np.testing.assert_allclose(found[name], own[name], atol=5e-3, err_msg=name)
+
+
 def test_velocities_follow_from_two_poses():
     model = load_model("gavrila34", 1.75)
     before = model.neutral()
