@@ -77,4 +77,5 @@ def find_change(scores: Sequence[FrameScore], camera: int, columns: Array, sigma
     gains = [0.5 * float(g @ np.linalg.solve(H + prior, g)) for g, H in zip(b, S, strict=True)]
     first = int(np.argmax(gains))
     gain = gains[first] - gains[0]
-    return Change(first, gain) if gain > CLEAR_NATS else Change(0, gain)
+    # The best of n frames gains ln n more by chance than a frame that was named before.
+    return Change(first, gain) if gain > CLEAR_NATS + np.log(len(scores)) else Change(0, gain)

@@ -1,7 +1,6 @@
 """Frames from which cameras are judged: what the views show there, and which of it the present cameras accept."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -90,21 +89,9 @@ def spread_poses(joints: Array, n: int) -> list[int]:
     """
     flat = joints.reshape(len(joints), -1)
     chosen = [int(np.argmin(np.linalg.norm(flat - flat.mean(axis=0), axis=1)))]
-    nearest = np.linalg.norm(flat - flat[chosen[0]], axis=1)
+    nearest = np.full(len(joints), np.inf)
     while len(chosen) < min(n, len(joints)):
-        chosen.append(int(np.argmax(nearest)))
         nearest = np.minimum(nearest, np.linalg.norm(flat - flat[chosen[-1]], axis=1))
+        nearest[chosen[-1]] = -1.0  # Equal poses are chosen, too, but each frame once.
+        chosen.append(int(np.argmax(nearest)))
     return sorted(chosen)
-
-
-def at_sizes(frames: Sequence[ViewedFrame], bodies: Sequence[BodyModel]) -> list[ViewedFrame]:
-    """Return frames with people in bodies of other sizes, in the same poses."""
-    return [
-        f._replace(bodies=tuple(PosedBody(model, b.values) for model, b in zip(bodies, f.bodies, strict=True)))
-        for f in frames
-    ]
-
-
-def nothing_seen(view: ViewEvidence) -> ViewEvidence:
-    """Return a view without its points, which then does not count."""
-    return replace(view, points_px=view.points_px[:0], silhouette=None)

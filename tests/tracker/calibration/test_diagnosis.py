@@ -1,0 +1,80 @@
+"""Cameras that are off are found, with a correction that mends them; healthy ones are left alone."""
+
+import numpy as np
+import pytest
+from rig_scenes import FPS, NAMES, nothing_seen, person_of, turned, viewed
+
+from tracker.acquisition.size_parameters import SizeParameters
+from tracker.calibration.camera_correction import ROTATION, TIME, with_step
+from tracker.calibration.diagnosis import diagnose
+from tracker.calibration.findings import SEEN_PX, findings, misfit, sentence
+from tracker.formats.model_toml import load_model
+
+
+def check(frames):
+    diagnosis = diagnose(frames, [SizeParameters(frames[0].bodies[0].model)], FPS)
+    return diagnosis, findings(diagnosis, frames, NAMES)
+
+
+def named(cameras):
+    return [c.name for c in cameras if c.kinds]
+
+
+def test_a_turned_camera_is_named_and_mended():
+    off = turned(0.3, -0.5, 0.4)
+    diagnosis, cameras = check(viewed({2: off}, range(3)))
+    assert named(cameras) == ["cam2"]
+    assert cameras[2].kinds == ("rotation",)
+    # The scene was filmed by the camera that stands otherwise: the correction brings the calibration there.
+    left = with_step(-off, diagnosis.corrections[2])[ROTATION]
+    assert np.degrees(np.abs(left)).max() < 0.1
+    assert cameras[2].misfit_px > 3
+    assert "camera cam2 is turned" in sentence(cameras[2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["position", "focal", "time"])
+def test_other_faults_are_named_by_their_kind(kind):
+    off = np.zeros(8)
+    off[{"position": 3, "focal": 6, "time": TIME}[kind]] = {"position": 0.04, "focal": 0.05, "time": 0.02}[kind]
+    _, cameras = check(viewed({1: off}))
+    assert named(cameras) == ["cam1"]
+    assert kind in cameras[1].kinds
+    assert cameras[1].misfit_px == pytest.approx(misfit(viewed({}), 1, off)[0], rel=0.3)
+
+
+@pytest.mark.slow
+def test_two_cameras_are_named():
+    _, cameras = check(viewed({0: turned(yaw_deg=0.8), 1: turned(pitch_deg=-0.8)}, range(4)))
+    assert set(named(cameras)) == {"cam0", "cam1"}
+
+
+def test_healthy_cameras_are_left_alone():
+    diagnosis, cameras = check(viewed({}, range(3)))
+    assert named(cameras) == []
+    assert diagnosis.kept == ()
+    assert not diagnosis.corrections.any()
+    assert all(c.misfit_px < SEEN_PX for c in cameras)
+
+
+@pytest.mark.slow
+def test_the_sizes_of_another_person_are_no_fault_of_a_camera():
+    """A generic body in the place of a person of other lengths and girths."""
+    model = load_model("gavrila34", 1.7)
+    _, cameras = check(viewed({}, range(4), model, person_of(model)))
+    assert named(cameras) == []
+
+
+@pytest.mark.slow
+def test_a_camera_that_sees_nobody_is_said_to():
+    frames = [f._replace(views=(nothing_seen(f.views[0]), *f.views[1:])) for f in viewed({}, range(3))]
+    _, cameras = check(frames)
+    assert [c.is_seen for c in cameras] == [False, True, True, True]
+    assert named(cameras) == []
+
+
+@pytest.mark.slow
+def test_a_body_that_stands_still_tells_no_time():
+    frames = [f._replace(velocities=(np.zeros_like(f.velocities[0]),)) for f in viewed({}, range(3))]
+    _, cameras = check(frames)
+    assert all(c.sigma[TIME] == pytest.approx(1 / FPS) for c in cameras)

@@ -1,0 +1,75 @@
+"""The fit of a rig: sums of a kernel against those of numpy, and the derivatives of its cost."""
+
+import numpy as np
+import pytest
+from rig_scenes import CAMERAS, viewed
+
+from tracker.acquisition.part_motions import motions_by_unknowns, rows_of_pieces
+from tracker.acquisition.size_parameters import SizeParameters
+from tracker.calibration.camera_correction import N_CORRECTIONS, columns, corrected
+from tracker.calibration.diagnosis import prior_sigmas
+from tracker.calibration.rig_kernels import N_PART
+from tracker.calibration.rig_problem import GroupSums, RigProblem, RigState, sums_of_pieces
+from tracker.calibration.viewed_frames import seen_people
+from tracker.fitting.contour_residuals import ContourResiduals
+
+CORRECTION = np.array([0.004, -0.003, 0.002, 0.01, -0.005, 0.01, 0.003, 0.0])
+
+
+@pytest.fixture(scope="module")
+def pieces():
+    """The residuals of one view under a corrected camera, with body, pose and camera."""
+    (frame,) = viewed({}, [0])
+    body, camera = frame.bodies[0], corrected(CAMERAS[0], CORRECTION)
+    residuals = ContourResiduals([frame.views[0]], frame.bodies).with_camera(camera)
+    return residuals.piece_sums(body.values)[1], body, camera
+
+
+def test_the_kernel_sums_as_numpy_does(pieces):
+    sums, body, camera = pieces
+    b, M = sums_of_pieces(sums, body.model, body.kinematics, camera, CORRECTION)
+    rows = rows_of_pieces([(camera, sums)], body.model, body.kinematics, with_shapes=False)
+    rows = rows._replace(rows=rows.rows[:, :, :N_PART])
+    of_camera = columns(camera, CORRECTION, rows.points_world, rows.px_by_point)
+    expected_b, expected_M = rows.with_columns(of_camera).sums(len(body.model.parts))
+    np.testing.assert_allclose(b, expected_b, rtol=1e-9, atol=1e-9 * np.abs(expected_b).max())
+    np.testing.assert_allclose(M, expected_M, rtol=1e-9, atol=1e-9 * np.abs(expected_M).max())
+
+
+def test_sums_are_converted_as_all_columns_at_once(pieces):
+    sums, body, camera = pieces
+    parameters, velocity = SizeParameters(body.model), np.random.default_rng(1).normal(size=body.model.n_dofs)
+    by_sizes = parameters.derivatives(np.zeros(len(parameters.names)))
+    J = motions_by_unknowns(body.model, body.kinematics, by_sizes)[:, :N_PART]
+    b, M = sums_of_pieces(sums, body.model, body.kinematics, camera, CORRECTION)
+    moving = J[:, :, -len(velocity) :] @ velocity
+    found = GroupSums.zeros(2 * N_CORRECTIONS, J.shape[2])
+    found.add_camera(1, b, M, J, moving)
+    found.add_body(b[:, :N_PART], M[:, :N_PART, :N_PART], J)
+    n_parts, n = len(J), 2 * N_CORRECTIONS + J.shape[2]
+    whole = np.zeros((n_parts, M.shape[1], n))
+    whole[:, :N_PART, 2 * N_CORRECTIONS :] = J
+    whole[:, N_PART:, N_CORRECTIONS : 2 * N_CORRECTIONS - 1] = np.eye(N_CORRECTIONS - 1)
+    whole[:, :N_PART, 2 * N_CORRECTIONS - 1] = moving
+    equations = found.equations(0.0)
+    np.testing.assert_allclose(equations.gradient, np.einsum("pik,pi->k", whole, b), atol=1e-6)
+    expected = np.sum(whole.transpose(0, 2, 1) @ M @ whole, axis=0)
+    np.testing.assert_allclose(equations.hessian, expected, atol=1e-7 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("column", [0, 1, 3, 4])
+def test_the_gradient_by_a_correction_is_the_slope_of_the_cost(column):
+    frames = viewed({1: CORRECTION}, [0, 1])
+    parameters = [SizeParameters(frames[0].bodies[0].model)]
+    state = RigState(
+        np.zeros((4, N_CORRECTIONS)), (np.zeros(len(parameters[0].names)),), tuple(f.bodies[0].values for f in frames)
+    )
+    problem = RigProblem(seen_people(frames), parameters, prior_sigmas(30.0), state.corrections)
+
+    def cost(h):
+        step = np.zeros(problem.n_shared)
+        step[N_CORRECTIONS + column] = h
+        return problem.linearize(problem.moved(state, step, np.zeros((2, parameters[0].base.n_dofs)))).cost
+
+    slope = (cost(3e-4) - cost(-3e-4)) / 6e-4
+    assert problem.linearize(state).gradient[N_CORRECTIONS + column] == pytest.approx(slope, rel=0.15)
