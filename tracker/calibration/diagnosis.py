@@ -157,7 +157,8 @@ def diagnose(
         if not other.kept:
             break
         tried.add(other.kept[0].fault.camera)
-        best = min(best, other, key=lambda s: search.total(start.problem, s))
+        # As few cameras as possible; of as many, those that explain more.
+        best = min(best, other, key=lambda s: (len(s.cameras), search.total(start.problem, s)))
     report("done", 1.0)
     steps = _steps(best.fit, [k.fault for k in best.kept])
     return Diagnosis(best.fit.state.corrections, _covariance(best.fit), best.kept, steps, best.fit.state)

@@ -78,20 +78,29 @@ def velocity(model: BodyModel, poses: Sequence[Array], fps: float) -> Array:
     return np.asarray(sum(model.difference(poses[i + 2], poses[i]) for i in range(3)) * (fps / 6))
 
 
-def spread_poses(joints: Array, n: int) -> list[int]:
+def spread_poses(joints: Array, n: int, apart_m: float = 0.0, fewest: int = 1) -> list[int]:
     """Choose frames with poses as different as possible, in order.
 
-    Each is the one farthest from those before (Gonzalez 1985), by the root mean square distance of its joints.
+    Each is the one farthest from those before (Gonzalez 1985). Two poses are as far apart as the joint that moves most.
 
     Args:
         joints: of each frame, (F, J, 3), metres.
         n: number of frames to choose.
+        apart_m: least distance between two of them, metres. Frames of one pose show the same errors of a body's shape.
+        fewest: number of frames that are chosen at any distance.
     """
+
+    def far_from(i: int) -> Array:
+        return np.asarray(np.linalg.norm(joints - joints[i], axis=2).max(axis=1))
+
     flat = joints.reshape(len(joints), -1)
     chosen = [int(np.argmin(np.linalg.norm(flat - flat.mean(axis=0), axis=1)))]
     nearest = np.full(len(joints), np.inf)
     while len(chosen) < min(n, len(joints)):
-        nearest = np.minimum(nearest, np.linalg.norm(flat - flat[chosen[-1]], axis=1))
+        nearest = np.minimum(nearest, far_from(chosen[-1]))
         nearest[chosen[-1]] = -1.0  # Equal poses are chosen, too, but each frame once.
-        chosen.append(int(np.argmax(nearest)))
+        farthest = int(np.argmax(nearest))
+        if nearest[farthest] < apart_m and len(chosen) >= fewest:
+            break
+        chosen.append(farthest)
     return sorted(chosen)

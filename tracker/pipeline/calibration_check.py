@@ -16,6 +16,7 @@ from tracker.calibration.viewed_frames import ViewedFrame, spread_poses, velocit
 from tracker.compute.progress import Report, part_of, unreported
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
+from tracker.fitting.hypothesis import SAME_POSE_M
 from tracker.geometry.arrays import Array
 from tracker.images.static_edges import StaticEdgeModel
 from tracker.session.session import Session
@@ -120,9 +121,9 @@ class PosedRecording:
         return [k for k in sorted(wanted) if all(is_credible(own, k) for own in self._stored)]
 
     def diverse(self, frames: Sequence[int], n: int) -> list[int]:
-        """Choose frames with poses as different as possible, in order."""
+        """Choose frames with poses as different as possible, in order; none of a pose that was chosen before."""
         joints = np.array([np.concatenate([s[k].body.points_world for s in self._stored]) for k in frames])
-        return [frames[i] for i in spread_poses(joints, n)]
+        return [frames[i] for i in spread_poses(joints, n, SAME_POSE_M, _FEWEST)]
 
     def seen(self, frames: Sequence[int], report: Report = unreported) -> list[ViewedFrame]:
         """Read what the views show on frames."""

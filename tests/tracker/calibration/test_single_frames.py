@@ -39,6 +39,8 @@ def test_poses_are_as_different_as_possible():
     joints[3], joints[7], joints[9] = 1.0, -1.0, [0, 2.0, 0]
     assert {3, 7, 9} < set(spread_poses(joints, 4))
     assert spread_poses(joints, 50) == [*range(12)]
+    assert len(spread_poses(joints, 50, apart_m=0.1)) == 4
+    assert len(spread_poses(joints, 50, apart_m=0.1, fewest=6)) == 6
 
 
 def test_a_velocity_is_that_of_an_even_motion():

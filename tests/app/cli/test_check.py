@@ -1,0 +1,72 @@
+"""`quadrille check`: a camera that is off is named, corrected and can be undone; what it refuses."""
+
+import json
+from contextlib import closing
+
+import numpy as np
+import pytest
+from command_line import SAMPLE, assert_refused
+
+from tracker.calibration.camera_correction import corrected
+from tracker.formats.anipose import read_calibration, write_calibration
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import MarkChange
+
+FRAMES = range(10, 34)
+
+
+@pytest.fixture
+def posed(run, session):
+    """The sample with known poses on some frames."""
+    assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "10", "--json")[0] == 0
+    assert run("track", session, "--frames", f"{FRAMES.start}:{FRAMES.stop}", "--no-audit", "--json")[0] == 0
+    return session
+
+
+def turn(session, name, yaw_deg):
+    """Turn a camera in the calibration, as if it had been knocked since."""
+    path = session / "calibration.toml"
+    off = np.radians([0, yaw_deg, 0, 0, 0, 0, 0, 0])
+    cameras = read_calibration(path)
+    assert name in [c.name for c in cameras]
+    write_calibration(path, [corrected(c, off) if c.name == name else c for c in cameras])
+
+
+@pytest.mark.slow
+def test_a_turned_camera_is_named_corrected_and_undone(run, posed):
+    status, out, _ = run("check", posed, "--json")
+    assert (status, json.loads(out)["named"]) == (0, [])
+    turn(posed, "LEFT", 1.0)
+    wrong = (posed / "calibration.toml").read_text()
+    status, out, _ = run("check", posed, "--json", "--apply", "--max-frames", "8")
+    found = json.loads(out)
+    assert (status, found["named"], found["applied"]) == (0, ["LEFT"], ["LEFT"])
+    left = next(c for c in found["cameras"] if c["name"] == "LEFT")
+    assert left["kind"] == "rotation"
+    assert left["rotation_deg"][1] == pytest.approx(-1.0, abs=0.05)
+    assert 0 < left["sigma"]["rotation_deg"][1] < 0.1
+    assert left["since_frame"] is None
+    assert found["explained"]["held_out_better"] > 0.8 * found["explained"]["held_out_frames"]
+    assert (posed / "calibration.toml").read_text() != wrong
+    with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
+        assert store.history(1)[0].label == "calibration of LEFT corrected"
+    assert json.loads(run("check", posed, "--json")[1])["named"] == []
+
+
+@pytest.mark.slow
+def test_a_healthy_calibration_stays(run, posed):
+    before = (posed / "calibration.toml").read_bytes()
+    status, out, _ = run("check", posed, "--apply", "--max-frames", "5")
+    assert (status, out) == (0, "no camera is off: the contours agree with the calibration\n")
+    assert (posed / "calibration.toml").read_bytes() == before
+
+
+def test_without_poses_it_says_what_to_do(run, session):
+    assert_refused(run("check", session), ["expected at least 3 frames with poses", "track the recording first"])
+    assert_refused(run("check", session, "--max-frames", "2"), ["--max-frames", "from 3", "found 2"])
+
+
+def test_frames_outside_of_the_poses_are_refused(run, session):
+    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+        store.commit("nothing", [MarkChange("person", 0, False, False)])
+    assert_refused(run("check", session, "--frames", "0:10"), ["expected at least 3 frames", "found 0"])

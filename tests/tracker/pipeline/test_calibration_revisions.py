@@ -1,0 +1,123 @@
+"""Revisions of the calibration: entries of the history, undone and redone, and named by poses."""
+
+import shutil
+from contextlib import closing
+
+import numpy as np
+import pytest
+from command_line import SAMPLE
+
+from tracker.calibration.camera_correction import N_CORRECTIONS
+from tracker.errors import SessionError
+from tracker.formats.anipose import read_calibration, write_calibration
+from tracker.formats.model_toml import format_model
+from tracker.pipeline.calibration_revisions import (
+    CALIBRATION_EDITS,
+    apply_check,
+    change_calibration,
+    follow_history,
+    outdated_frames,
+    present_revision,
+    revisions_of_poses,
+    with_corrections,
+)
+from tracker.session.session import load_session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
+
+
+@pytest.fixture
+def session(tmp_path):
+    return load_session(shutil.copytree(SAMPLE, tmp_path / "session"))
+
+
+@pytest.fixture
+def store(session):
+    with closing(AnnotationStore(session.annotations_path)) as opened:
+        yield opened
+
+
+def turned(session, by_rad=0.02):
+    corrections = np.zeros((len(session.cameras), N_CORRECTIONS))
+    corrections[0, 1] = by_rad
+    return with_corrections(session, corrections)
+
+
+def stands(session):
+    """Where the first camera of the file on disk looks."""
+    return read_calibration(session.folder / "calibration.toml")[0].T_world_camera
+
+
+def set_pose(session, store, frame):
+    person = session.people[0]
+    revision = store.add_model_revision(person.name, format_model(person.model))
+    values = person.model.neutral()
+    record = PoseRecord(values, ("manual",) * len(values), revision)
+    store.commit("pose", [PoseChange(person.name, frame, record)])
+
+
+def test_a_changed_calibration_follows_undo_and_redo(session, store):
+    before, after = stands(session), turned(session).cameras[0].camera.T_world_camera
+    changed = change_calibration(session, store, turned(session), "FRONT corrected")
+    np.testing.assert_allclose(stands(session), after, atol=1e-9)
+    assert store.undo() == "FRONT corrected"
+    changed = follow_history(changed, store)
+    np.testing.assert_allclose(stands(session), before, atol=1e-9)
+    store.redo()
+    changed = follow_history(changed, store)
+    np.testing.assert_allclose(changed.cameras[0].camera.T_world_camera, after, atol=1e-9)
+    np.testing.assert_allclose(stands(session), after, atol=1e-9)
+
+
+def test_poses_name_the_calibration_that_they_were_made_with(session, store):
+    name = session.people[0].name
+    set_pose(session, store, 3)
+    assert revisions_of_poses(store, name) == {}
+    changed = change_calibration(session, store, turned(session), "first")
+    set_pose(session, store, 4)
+    changed = change_calibration(changed, store, turned(changed), "second")
+    set_pose(session, store, 5)
+    assert revisions_of_poses(store, name) == {3: 1, 4: 2, 5: 3}
+    assert present_revision(store) == 3
+    assert outdated_frames(changed, store) == {name: [3, 4]}
+    store.undo()
+    store.undo()
+    assert present_revision(store) == 2
+    assert outdated_frames(changed, store) == {name: [3]}
+
+
+def test_a_change_that_was_cut_off_is_finished(session, store):
+    """The entry is stored, but the program ended before the file was written."""
+    before = (session.folder / "calibration.toml").read_text()
+    change_calibration(session, store, turned(session), "corrected")
+    after = stands(session)
+    (session.folder / "calibration.toml").write_text(before)
+    follow_history(load_session(session.folder), store)
+    np.testing.assert_allclose(stands(session), after, atol=1e-9)
+
+
+def test_an_entry_without_its_revisions_changes_nothing(session, store):
+    """The program ended between the entry and the setting."""
+    before = stands(session)
+    change_calibration(session, store, turned(session), "corrected")
+    store.set_setting(CALIBRATION_EDITS, {})
+    write_calibration(session.folder / "calibration.toml", [c.camera for c in session.cameras])
+    follow_history(load_session(session.folder), store)
+    np.testing.assert_allclose(stands(session), before, atol=1e-9)
+
+
+def test_a_calibration_that_somebody_replaced_stays(session, store):
+    change_calibration(session, store, turned(session), "corrected")
+    other = turned(session, 0.3)
+    write_calibration(session.folder / "calibration.toml", [c.camera for c in other.cameras])
+    follow_history(load_session(session.folder), store)
+    np.testing.assert_allclose(stands(session), other.cameras[0].camera.T_world_camera, atol=1e-9)
+
+
+def test_nothing_is_corrected_where_no_camera_is_named(session, store):
+    class Healthy:
+        named = ()
+
+    with pytest.raises(SessionError, match="expected a camera that is off, found none"):
+        apply_check(session, store, Healthy())
+    assert store.history() == []
