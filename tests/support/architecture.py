@@ -31,6 +31,8 @@ ROOMS = [
     "tracker.tracking.contour",
     "tracker.tracking.voxel",
     "tracker.acquisition",
+    "tracker.calibration",
+    "tracker.boards",
     "tracker.initialization.generators",
     "tracker.initialization",
     "tracker.posing",
