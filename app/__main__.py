@@ -14,6 +14,7 @@ from app.cli import (
     acquire,
     audit,
     bench,
+    calibrate,
     evaluate,
     experiment,
     export,
@@ -38,6 +39,7 @@ from tracker.errors import TrackerError
 _COMMANDS: dict[str, Callable[..., None]] = {
     "open": open_.command,
     "new": new.command,
+    "calibrate": calibrate.command,
     "info": info.command,
     "relink": relink.command,
     "index": index.command,

@@ -7,8 +7,9 @@ the pose of a board. Squared errors s, in standard deviations of a picture, coun
 
 import itertools
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,17 @@ _MEDIAN_SQUARE = 2 * np.log(2.0)
 _ROUNDS = 12
 """Most fits with noise measured again in between. It settles to 1% within three to six."""
 _SETTLED = 0.01
-"""Largest relative change of the noise at which it has settled."""
+"""Largest relative change of the noise at which it has settled: 1% of all intervals."""
 _STEPS, _ROUGH, _FINAL = 2, 1e-2, 1e-6
 """Most steps before the noise is measured again, and relative decreases of the cost at which a fit ends: before the
 noise has settled, and after."""
+_LARGE, _FALL = 0.95, 4.0
+"""Quantile of the errors that the noise begins at, and the factor by which it falls at most from fit to fit."""
+_NOT_SHOWN_PX = 1e4
+"""Error of a point that its camera does not show, px: larger than a picture."""
+_FLOOR = 1e-8
+"""Added to second derivatives by own unknowns, 1 / rad^2 or 1 / m^2: groups whose observations are all gross errors
+stay where they are."""
 _MIN_SIGMA_PX = 0.01
 """Least standard deviation of a corner or a key point, px: none is found more precisely."""
 
@@ -93,6 +101,8 @@ class RigFit(NamedTuple):
     """Projection minus observation, (N, 2), px."""
     weights: Array
     """Robust weight of each observation, 0 to 1, (N,)."""
+    common_share: float
+    """By how much errors of one view agree, at least 1; see `RigProblem.common_share`."""
 
 
 class RigProblem:
@@ -112,7 +122,11 @@ class RigProblem:
             n_groups: number of groups; each must be determined by its observations.
             sigmas_px: standard deviation of an observation in each camera, (n_cameras,), px.
         """
-        self.observations, self.prior, self.n_groups, self.sigmas_px = observations, prior, n_groups, sigmas_px
+        self.observations, self.n_groups, self.sigmas_px = observations, n_groups, sigmas_px
+        self._take_prior(prior)
+
+    def _take_prior(self, prior: Prior) -> None:
+        self.prior = prior
         self.columns = [np.flatnonzero(sigmas > 0) for sigmas in prior.sigmas]
         self.ends = np.cumsum([0, *(len(columns) for columns in self.columns)])
         self.precision = np.concatenate([s[c] ** -2.0 for s, c in zip(prior.sigmas, self.columns, strict=True)])
@@ -137,6 +151,8 @@ class RigProblem:
             at = self.observations.of_camera(i)
             by_own = None if located.by_own is None else located.by_own[at]
             cost += self._add_camera(out, i, camera, Located(located.points_world[at], by_own))
+        at = np.arange(self.n_own)
+        out.own_hessians[:, at, at] += _FLOOR
         moves = zip(self.prior.cameras, rig.cameras, self.columns, strict=True)
         offsets = np.concatenate([camera_difference(before, now)[columns] for before, now, columns in moves])
         out.gradient[:] += self.precision * offsets
@@ -146,7 +162,7 @@ class RigProblem:
     def _add_camera(self, out: ArrowEquations, index: int, camera: Camera, located: Located) -> float:
         """Add the equations of one camera; return its cost."""
         J, own, r, cost = self._scaled_rows(index, camera, located)
-        part, flat = slice(self.ends[index], self.ends[index + 1]), J.reshape(-1, J.shape[2])
+        part, flat = slice(self.ends[index], self.ends[index + 1]), J.reshape(2 * len(J), J.shape[2])
         out.gradient[part] += flat.T @ r.ravel()
         out.hessian[part, part] += flat.T @ flat
         groups, transposed = self.observations.groups[self.observations.of_camera(index)], own.swapaxes(1, 2)
@@ -192,6 +208,32 @@ class RigProblem:
         out[self.columns[camera]] = shared[self.ends[camera] : self.ends[camera + 1]]
         return out
 
+    def common_share(self, rig: Rig) -> float:
+        """Return by how much errors of one view agree, at least 1: variance of their means over that of lone errors.
+
+        A board that moves while cameras film it at slightly different times shifts all its corners together. A view
+        with such errors tells less than its number of corners promises. A view is a camera's part of a group.
+        """
+        equations, located = self.linearize(rig), self.locate(rig.own)
+        if located.by_own is None:
+            return 1.0
+        inverse = np.linalg.pinv(equations.own_hessians, hermitian=True)
+        squares, expected, lone = 0.0, 0.0, 0.0
+        for i, camera in enumerate(rig.cameras):
+            at = self.observations.of_camera(i)
+            groups = self.observations.groups[at]
+            _, own, r, _ = self._scaled_rows(i, camera, Located(located.points_world[at], located.by_own[at]))
+            sums, own_sums = np.zeros((self.n_groups, 2)), np.zeros((self.n_groups, 2, self.n_own))
+            _add(sums, groups, r[..., 0])
+            _add(own_sums, groups, own)
+            counts = np.maximum(np.bincount(groups, minlength=self.n_groups), 1)
+            weights = np.bincount(groups, np.sum(own**2, axis=(1, 2)) > 0, self.n_groups)
+            squares, lone = squares + float(np.sum(sums**2 / counts[:, None])), lone + float(np.sum(r**2))
+            leverages = np.einsum("gij,gjk,gik->g", own_sums, inverse, own_sums) / counts
+            expected += float(np.sum(2 * weights / counts - leverages))
+        variance = lone / (2 * len(self.observations.px) * self.left)
+        return max(1.0, squares / max(expected * variance, 1.0))
+
     # --- noise --------------------------------------------------------------------------------------------------
 
     def errors_px(self, rig: Rig) -> Array:
@@ -202,19 +244,28 @@ class RigProblem:
             [c.project(points[at]) - self.observations.px[at] for c, at in zip(rig.cameras, parts, strict=True)]
         )
 
+    def scaled_sigmas_px(self, rig: Rig, quantile: float) -> Array:
+        """Scale all standard deviations by one factor, so that a quantile of the errors is that of Gaussian ones."""
+        squares = self._squares_px2(rig) / self.sigmas_px[self.observations.cameras] ** 2
+        scale2 = np.quantile(squares, quantile) / (-2 * np.log(1 - quantile)) / self.left
+        return np.maximum(self.sigmas_px * np.sqrt(scale2), _MIN_SIGMA_PX)
+
     def measured_sigmas_px(self, rig: Rig) -> Array:
         """Measure the standard deviation of an observation in each camera by the median error, (n_cameras,), px.
 
         Free points can be moved onto what a single camera observes, so that its errors alone do not tell its noise. The
         ratios of the cameras' noise then stay as they are.
         """
-        squares = np.nan_to_num(np.sum(self.errors_px(rig) ** 2, axis=1), nan=np.inf)
         if self.has_common_noise:
-            scale2 = np.median(squares / self.sigmas_px[self.observations.cameras] ** 2) / _MEDIAN_SQUARE
-            return np.maximum(self.sigmas_px * np.sqrt(scale2 / self.left), _MIN_SIGMA_PX)
+            return self.scaled_sigmas_px(rig, 0.5)
+        squares = self._squares_px2(rig)
         parts = [squares[self.observations.of_camera(i)] for i in range(len(rig.cameras))]
         medians = np.array([np.median(part) if len(part) else _MEDIAN_SQUARE for part in parts])
         return np.maximum(np.sqrt(medians / _MEDIAN_SQUARE / self._left_in_cameras(rig)), _MIN_SIGMA_PX)
+
+    def _squares_px2(self, rig: Rig) -> Array:
+        """Return squared errors, (N,); a large one where a camera does not show the point."""
+        return np.nan_to_num(np.sum(self.errors_px(rig) ** 2, axis=1), nan=_NOT_SHOWN_PX**2)
 
     @property
     def left(self) -> float:
@@ -239,22 +290,47 @@ class RigProblem:
             out[i] = max(1.0, n - spent) / n
         return out
 
-    def with_sigmas(self, sigmas_px: Array) -> "RigProblem":
+    def group_costs(self, rig: Rig) -> Array:
+        """Return the robust cost of the observations of each group, (G,)."""
+        s = self._squares_px2(rig) / self.sigmas_px[self.observations.cameras] ** 2
+        robust = s / (1 + s / _OUTLIER_SIGMAS**2)
+        return 0.5 * np.bincount(self.observations.groups, robust, self.n_groups)
+
+    def with_sigmas(self, sigmas_px: Array) -> Self:
         """Return the problem with other standard deviations."""
-        out = object.__new__(type(self))
-        out.__dict__ = {**self.__dict__, "sigmas_px": sigmas_px}
+        out = copy(self)
+        out.sigmas_px = sigmas_px
+        return out
+
+    def with_prior(self, prior: Prior) -> Self:
+        """Return the problem with other knowledge of the cameras."""
+        out = copy(self)
+        out._take_prior(prior)
         return out
 
 
 def fit_rig(problem: RigProblem, rig: Rig) -> RigFit:
-    """Fit cameras and own unknowns, and measure the noise between fits until it settles."""
+    """Fit cameras and own unknowns, and measure the noise between fits until it settles.
+
+    The standard deviation begins at that of the largest errors and falls to that of the median one, so that no error of
+    the start is taken for a gross one (graduated non-convexity, Yang et al. 2020).
+    """
+    problem = problem.with_sigmas(problem.scaled_sigmas_px(rig, _LARGE))
     for _ in range(_ROUNDS):
-        sigmas = problem.measured_sigmas_px(rig)
-        is_settled = np.allclose(sigmas, problem.sigmas_px, rtol=_SETTLED)
-        problem = problem.with_sigmas(sigmas)
         rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
+        sigmas = problem.scaled_sigmas_px(rig, 0.5)
+        is_settled = np.all(sigmas > (1 - _SETTLED) * problem.sigmas_px)
+        problem = problem.with_sigmas(np.maximum(sigmas, problem.sigmas_px / _FALL))
         if is_settled:
             break
+    if not problem.has_common_noise:
+        for _ in range(_ROUNDS):
+            sigmas = problem.measured_sigmas_px(rig)
+            is_settled = np.allclose(sigmas, problem.sigmas_px, rtol=_SETTLED)
+            problem = problem.with_sigmas(sigmas)
+            if is_settled:
+                break
+            rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
     rig = solve_bundle(problem, rig, tolerance=_FINAL).state
     return _result(problem, rig)
 
@@ -265,14 +341,16 @@ def _result(problem: RigProblem, rig: Rig) -> RigFit:
     squares = np.nan_to_num(squares, nan=np.inf)
     weights, prior = _weights(squares), np.diag(problem.precision)
     data = equations._replace(hessian=equations.hessian - prior).reduced()[1]
-    precision = _information(squares, weights, problem.left) * data + prior
+    share = problem.common_share(rig)
+    information = _information(squares, weights, problem.left) / share
+    precision = information * data + prior
     # The columns have different units.
     units = 1 / np.sqrt(np.maximum(np.diag(precision), np.finfo(float).tiny))
     covariance = np.linalg.pinv(precision * np.outer(units, units), hermitian=True) * np.outer(units, units)
     at = np.concatenate([start + c for start, c in zip(column_ends(rig.cameras), problem.columns, strict=False)])
     whole = np.zeros(2 * (column_ends(rig.cameras)[-1],))
     whole[np.ix_(at, at)] = covariance
-    return RigFit(rig, problem.sigmas_px, whole, errors, weights)
+    return RigFit(rig, problem.sigmas_px, whole, errors, weights, share)
 
 
 def column_ends(cameras: Sequence[Camera]) -> list[int]:

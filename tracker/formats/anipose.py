@@ -42,6 +42,11 @@ def read_calibration(path: str | Path) -> tuple[Camera, ...]:
 
 def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
     """Write cameras, in metres. `read_calibration` reads them back to 12 digits and in the same order."""
+    write_text_atomic(Path(path), calibration_text(cameras))
+
+
+def calibration_text(cameras: Sequence[Camera]) -> str:
+    """Return the text of the calibration of a session."""
     data: dict[str, Any] = {}
     for c in cameras:
         data[c.name] = {
@@ -54,7 +59,7 @@ def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
             "fisheye": c.fisheye,
         }
     data["metadata"] = {"adjusted": False, "error": 0.0}
-    write_text_atomic(Path(path), tomli_w.dumps(data))
+    return tomli_w.dumps(data)
 
 
 def _sections(data: dict[str, Any], where: str) -> dict[str, Any]:
