@@ -1,12 +1,15 @@
 """Simulated cameras that film a board: corners with noise, partly visible, and the true cameras."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import rigs
 
+from tracker.boards.board_calibration import calibrate_rig
 from tracker.boards.board_description import Board
 from tracker.boards.board_problem import SeenCorners
+from tracker.boards.expected_error import in_pictures
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 
@@ -15,6 +18,33 @@ BOARDS = [
     Board("charuco", 4, 5, 0.054),
     Board("charuco", 8, 6, 0.1),
 ]
+
+
+class SimulatedRig(NamedTuple):
+    """What cameras have seen of a board, and the truth."""
+
+    board: Board
+    cameras: list[Camera]
+    seen: SeenCorners
+    Ts_world_board: np.ndarray
+    """Poses of the middle of the board."""
+    sigmas_px: np.ndarray
+
+
+def simulated_rig(seed, n_cameras=None, n_frames=60, fisheye=False, gross=0.01):
+    """Two to five cameras with any lenses, noise of 0.1 to 0.6 px and one of three boards."""
+    random = np.random.default_rng(seed)
+    board = BOARDS[seed % len(BOARDS)]
+    cameras = true_cameras(random, n_cameras or int(random.integers(2, 6)), fisheye)
+    Ts = board_poses(random, n_frames)
+    sigmas = random.uniform(0.1, 0.6, len(cameras))
+    return SimulatedRig(board, cameras, filmed(random, board, cameras, Ts, sigmas, gross), Ts, sigmas)
+
+
+def calibrated(rig):
+    """The calibration of a simulated rig from what it has seen."""
+    names, sizes = [c.name for c in rig.cameras], [c.size for c in rig.cameras]
+    return calibrate_rig(rig.board, rig.seen, names, sizes, [c.fisheye for c in rig.cameras])
 
 
 def true_cameras(random, n=4, fisheye=False):
@@ -87,8 +117,6 @@ def filmed(random, board, cameras, Ts_world_board, sigmas_px, gross=0.01, covere
 
 def rms_error_m(true, found, points_world):
     """RMS distance of points to where the found cameras triangulate their true pictures, after the best rigid fit."""
-    from tracker.boards.expected_error import in_pictures
-
     shown = in_pictures(true, points_world)
     triangulated = []
     for j, X in enumerate(points_world):

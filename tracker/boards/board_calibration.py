@@ -16,6 +16,7 @@ from tracker.calibration.rig_problem import column_ends
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.cameras import Camera
 
 MIN_LENS_VIEWS = 5
 """Fewest views of the board from which a lens is fitted. Each tells two of its nine numbers (Zhang 2000, Sect.
@@ -31,6 +32,8 @@ class BoardCalibration:
     """Lens of each camera as fitted to its own views."""
     held_out: IntArray
     """Frames that were held out of a first adjustment, for `held_out_px`; the second one, of `rig`, uses all."""
+    first_cameras: tuple[Camera, ...]
+    """Cameras of the first adjustment."""
     held_out_corners: SeenCorners
     """Corners on them."""
     held_out_px: Array
@@ -105,7 +108,7 @@ def calibrate_rig(
     corners, errors = held_out_errors(board, seen.in_frames(held_out), first.cameras, poses, rig.fit.sigmas_px)
     checking(1.0)
     off = np.linalg.norm(errors, axis=1)
-    return BoardCalibration(rig, tuple(lenses), held_out, corners, off, _focal_sigmas(rig))
+    return BoardCalibration(rig, tuple(lenses), held_out, first.cameras, corners, off, _focal_sigmas(rig))
 
 
 def _focal_sigmas(rig: RigCalibration) -> Array:

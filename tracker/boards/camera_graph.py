@@ -18,6 +18,9 @@ from tracker.geometry.cameras import Camera
 _CAP = 0.1
 """Largest error that counts in the choice of a relative pose, in longer sides of the picture. Lenses that are 10% off
 move points in the corners of a picture by less."""
+MIN_SHARED = 3
+"""Fewest frames that link two cameras. Of the two poses of a board that look alike, one frame cannot tell the right
+one, and two frames may disagree."""
 
 
 class Link(NamedTuple):
@@ -40,7 +43,7 @@ def link_cameras(board: Board, seen: SeenCorners, cameras: Sequence[Camera]) -> 
         `T_world_camera` of each, (4, 4), and the poses of the board in front of them.
 
     Raises:
-        CalibrationError: a camera shares no board with the others.
+        CalibrationError: a camera shares too few boards with the others.
     """
     poses = board_poses(board, seen, *cameras)
     links = {
@@ -52,14 +55,14 @@ def link_cameras(board: Board, seen: SeenCorners, cameras: Sequence[Camera]) -> 
 
 
 def _link(board: Board, seen: SeenCorners, poses: Poses, a: Camera, b: Camera, pair: tuple[int, int]) -> Link | None:
-    """Return the relative pose of two cameras that explains most of what both have seen; None if they share no board.
+    """Return the relative pose of two cameras that explains most of what both see; None if they share too few boards.
 
     Each pose of a board in one camera is combined with each in the other. The best combination carries the boards of
     all frames into the picture of the second camera with the smallest errors.
     """
     views = posed_views(board, seen)
     frames = [k for camera, k in poses if camera == pair[0] and (pair[1], k) in poses]
-    if not frames:
+    if len(frames) < MIN_SHARED:
         return None
     boards_a = [poses[pair[0], k] for k in frames]
     candidates = [
@@ -107,6 +110,7 @@ def _unlinked(reached: set[int], links: Mapping[tuple[int, int], Link], names: S
     others = " or ".join(f"'{names[i]}'" for i in sorted(reached))
     kind = "camera" if len(rest) == 1 else "cameras"
     return (
-        f"expected each camera to see the board at the same time as another one, found none with {kind} {lone}; film "
-        f"the board where {lone.replace(', ', ' or ')} and {others} see it together, also in part"
+        f"expected each camera to see the board together with another one in {MIN_SHARED} frames or more, found fewer "
+        f"with {kind} {lone}; film the board where {lone.replace(', ', ' or ')} and {others} see it together, "
+        "also in part"
     )

@@ -11,9 +11,11 @@ from tracker.geometry.arrays import Array, Image, IntArray
 
 _REFINE_STEPS = cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 0.001
 """End of the refinement: 40 steps, or a step below a thousandth of a pixel."""
-_REFINE_SHARE = 0.2
-"""Half the side of the window in which a corner is refined, as a share of the distance to the nearest corner: it holds
-edges of the corner's own squares and no marker's, which fill the middle three quarters of a square."""
+_REFINE_SHARE = 0.8
+"""Half the side of the window in which a corner is refined, as a share of the gap between corner and marker: edges of
+a marker in the window would pull the corner, by 0.3 px at twice this size (`test_corner_detection.py`)."""
+_REFINE_PX = 2, 11
+"""Least and largest half of that side, px: 5 by 5 pixels have two edges, and 23 by 23 are more than noise needs."""
 
 
 class Corners(NamedTuple):
@@ -24,7 +26,7 @@ class Corners(NamedTuple):
     px: Array
     """Original px, (n, 2)."""
     from_behind: bool
-    """Whether the picture shows the back of the board, mirrored, as of a transparent one or one printed on both sides."""
+    """Whether the picture shows the back of the board, mirrored: of a transparent one, or one printed on both sides."""
 
 
 NO_CORNERS = Corners(np.empty(0, np.int64), np.empty((0, 2)), False)
@@ -55,7 +57,7 @@ class CornerDetector:
                 found = Corners(mirrored.ids, mirrored.px * (-1, 1) + (gray.shape[1] - 1, 0), True)
         if not len(found.ids):
             return NO_CORNERS
-        return found._replace(px=_refined(gray, found.px))
+        return found._replace(px=_refined(gray, found.px, (1 - self.board.marker_share) / 2))
 
     def _charuco_corners(self, gray: NDArray[np.uint8]) -> Corners:
         assert self._charuco is not None
@@ -74,8 +76,8 @@ class CornerDetector:
         along, down = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
         if along[0] * down[1] - along[1] * down[0] < 0:
             grid = grid[:, ::-1]
-        # The inner square beside the first corner is white: the one of the board's corner is black.
-        if _brightness(gray, grid[:2, :2]) < _brightness(gray, grid[:2, 1:3]):
+        # The inner square beside the first corner is black, like that of the corner of the board.
+        if _brightness(gray, grid[:2, :2]) > _brightness(gray, grid[:2, 1:3]):
             grid = grid[::-1, ::-1]
         return Corners(np.arange(grid.shape[0] * grid.shape[1]), grid.reshape(-1, 2), False)
 
@@ -92,13 +94,13 @@ def _charuco_detector(board: Board) -> cv2.aruco.CharucoDetector:
     return detector
 
 
-def _refined(gray: NDArray[np.uint8], px: Array) -> Array:
-    """Move corners to the saddle of brightness near them."""
+def _refined(gray: NDArray[np.uint8], px: Array, gap: float) -> Array:
+    """Move corners to the saddle of brightness near them; `gap` is that before the markers, in sides of a square."""
     if len(px) < 2:
         return px
     apart = np.linalg.norm(px[:, None] - px[None], axis=2)
     nearest = float(np.median(np.sort(apart, axis=1)[:, 1]))
-    half = int(np.clip(round(_REFINE_SHARE * nearest), 2, 11))
+    half = int(np.clip(round(_REFINE_SHARE * gap * nearest), *_REFINE_PX))
     start = np.ascontiguousarray(px, np.float32).reshape(-1, 1, 2)
     found = cv2.cornerSubPix(gray, start.copy(), (half, half), (-1, -1), _REFINE_STEPS).reshape(-1, 2)
     moved = np.linalg.norm(found - px, axis=1)

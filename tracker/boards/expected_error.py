@@ -42,10 +42,11 @@ def in_pictures(cameras: Sequence[Camera], points_world: Array) -> Mask:
 
 
 def expected_error(cameras: Sequence[Camera], covariance: Array, points_world: Array) -> VolumeError:
-    """Propagate the covariance of cameras to points that they triangulate.
+    """Propagate the covariance of cameras to points that they triangulate: the points nearest to their rays.
 
-    A point moves by -(sum A^T A)^-1 sum A^T B c where the cameras are off by c; A and B are the derivatives of its
-    pictures by point and cameras. The best rigid motion is taken off, so that the covariance may have any gauge.
+    Where a camera is off by c, its ray passes a point at -A^+ B c, with A and B the derivatives of the picture by point
+    and camera. The triangulated point moves by the mean of these, weighted by what the rays determine (I - d d^T). The
+    best rigid motion of all points is taken off, so that the covariance may have any gauge.
 
     Args:
         cameras: the calibrated cameras.
@@ -61,9 +62,9 @@ def expected_error(cameras: Sequence[Camera], covariance: Array, points_world: A
     for i, camera in enumerate(cameras):
         at = shown[i]
         found = project_with_columns(camera, points[at])
-        A = found.by_point.swapaxes(1, 2)
-        normal[at] += A @ found.by_point
-        moves[at, :, ends[i] : ends[i + 1]] -= A @ found.by_camera
+        inverse = np.linalg.pinv(found.by_point)
+        normal[at] += inverse @ found.by_point
+        moves[at, :, ends[i] : ends[i + 1]] -= inverse @ found.by_camera
     moves = np.linalg.solve(normal, moves)
     middle = points - points.mean(axis=0)
     rigid_moves = np.concatenate([np.tile(np.eye(3), (len(points), 1)), -rigid.skew(middle).reshape(-1, 3)], axis=1)

@@ -18,8 +18,9 @@ from tracker.geometry.cameras import Camera
 Poses = Mapping[tuple[int, int], Sequence[Array]]
 """Poses of the board in front of cameras, `T_camera_board`, by camera and frame."""
 
-_STEPS = 6
-"""Steps by which each pose is refined before it is compared: Gauss-Newton on six unknowns converges within them."""
+_STEPS, _TOLERANCE = 6, 1e-2
+"""Steps by which each pose is refined before it is compared, and the relative decrease of all costs at which it ends:
+Gauss-Newton on six unknowns converges within them."""
 _MAX_SLOPE = 20.0
 """Largest slope of a ray to a corner, 87 degrees from the axis: farther aside a pinhole cannot show it."""
 _BESIDE = rigid.transform(None, np.array([0.0, 0.0, 1.0]))
@@ -74,7 +75,7 @@ def best_poses(problem: BoardProblem, cameras: Sequence[Camera], poses: Poses, n
     trials = [] if now is None else [now]
     trials += [np.stack([c[min(n, len(c) - 1)] for c in candidates]) for n in range(max(map(len, candidates)))]
     for trial in trials:
-        rig = solve_bundle(still, Rig(tuple(cameras), trial), _STEPS).state
+        rig = solve_bundle(still, Rig(tuple(cameras), trial), _STEPS, _TOLERANCE).state
         costs = still.group_costs(rig)
         own[costs < best] = rig.own[costs < best]
         best = np.minimum(best, costs)

@@ -38,7 +38,7 @@ def pose2sim_text(cameras: Sequence[Camera]) -> str:
 
 
 def caliscope_text(cameras: Sequence[Camera]) -> str:
-    """Return `camera_array.toml` of Caliscope, which numbers its cameras: by the last number of each name if all differ.
+    """Return `camera_array.toml` of Caliscope, which numbers its cameras: by the ends of their names if these differ.
 
     Its videos are named `cam_0.mp4` and so on.
     """
