@@ -12,7 +12,7 @@ from tracker.boards.lens_fit import TOLD_FOCAL, LensFit, blank_camera, fit_lens
 from tracker.boards.rig_fit import HELD_OUT_EVERY, RigCalibration, adjust_rig, held_out_errors
 from tracker.boards.view_choice import MAX_LENS_VIEWS, choose_frames, choose_views, outlines, posed_views
 from tracker.calibration.camera_columns import FOCAL
-from tracker.calibration.rig_problem import column_ends
+from tracker.calibration.reprojection import column_ends
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, IntArray

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.boards.board_description import Board
-from tracker.calibration.rig_problem import Located, Observations, Prior, RigProblem
+from tracker.calibration.reprojection import Located, Observations, Prior, ReprojectionProblem
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray, Mask
 
@@ -36,7 +36,7 @@ class SeenCorners(NamedTuple):
         return self.where(np.isin(self.frames, frames))
 
 
-class BoardProblem(RigProblem):
+class BoardProblem(ReprojectionProblem):
     """A board in one pose per frame: each is a group with six unknowns, a turn about the board's origin and a shift."""
 
     n_own = 6
@@ -57,14 +57,14 @@ class BoardProblem(RigProblem):
         self._corners_board = board.corners[seen.ids]
 
     def locate(self, own: Array) -> Located:
-        """See `RigProblem`."""
+        """See `ReprojectionProblem`."""
         Ts = own[self.observations.groups]
         turned = (Ts[:, :3, :3] @ self._corners_board[:, :, None])[..., 0]
         by_own = np.concatenate([-rigid.skew(turned), np.broadcast_to(np.eye(3), (len(turned), 3, 3))], axis=2)
         return Located(turned + Ts[:, :3, 3], by_own)
 
     def move_own(self, own: Array, step: Array) -> Array:
-        """See `RigProblem`."""
+        """See `ReprojectionProblem`."""
         out = own.copy()
         out[:, :3, :3] = rigid.so3_exp(step[:, :3]) @ own[:, :3, :3]
         out[:, :3, 3] += step[:, 3:]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.calibration.camera_columns import project_with_columns
-from tracker.calibration.rig_problem import column_ends
+from tracker.calibration.reprojection import column_ends
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera

@@ -11,7 +11,7 @@ from tracker.boards.board_problem import BoardProblem, SeenCorners
 from tracker.boards.pose_choice import best_poses, board_poses
 from tracker.calibration.camera_columns import FOCAL
 from tracker.calibration.lens_priors import UNKNOWN_LENS, prior_sigmas
-from tracker.calibration.rig_problem import Prior, Rig, RigFit, fit_rig
+from tracker.calibration.reprojection import Prior, Rig, RigFit, fit_rig
 from tracker.fitting.bundle import solve_bundle
 from tracker.geometry.arrays import IntArray
 from tracker.geometry.cameras import Camera

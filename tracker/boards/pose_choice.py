@@ -9,7 +9,7 @@ from tracker.boards.board_description import Board
 from tracker.boards.board_problem import BoardProblem, SeenCorners
 from tracker.boards.view_choice import posed_views
 from tracker.calibration.lens_priors import UNKNOWN_LENS, prior_sigmas
-from tracker.calibration.rig_problem import Prior, Rig
+from tracker.calibration.reprojection import Prior, Rig
 from tracker.fitting.bundle import solve_bundle
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray

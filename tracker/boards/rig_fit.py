@@ -11,7 +11,7 @@ from tracker.boards.board_problem import BoardProblem, SeenCorners
 from tracker.boards.expected_error import MAX_POINTS, VolumeError, expected_error
 from tracker.boards.pose_choice import Poses, best_poses, posed_frames
 from tracker.calibration.lens_priors import UNKNOWN_LENS, prior_sigmas
-from tracker.calibration.rig_problem import Prior, Rig, RigFit, fit_rig
+from tracker.calibration.reprojection import Prior, Rig, RigFit, fit_rig
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 

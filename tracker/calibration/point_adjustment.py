@@ -8,7 +8,16 @@ import numpy as np
 
 from tracker.calibration.camera_columns import FOCAL
 from tracker.calibration.lens_priors import CALIBRATED, prior_sigmas
-from tracker.calibration.rig_problem import Located, Observations, Prior, Rig, RigFit, RigProblem, column_ends, fit_rig
+from tracker.calibration.reprojection import (
+    Located,
+    Observations,
+    Prior,
+    ReprojectionProblem,
+    Rig,
+    RigFit,
+    column_ends,
+    fit_rig,
+)
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray, Mask
@@ -45,18 +54,18 @@ class AdjustedPoints:
     """Cameras whose lens stays as it was, with the reason, a sentence each."""
 
 
-class PointProblem(RigProblem):
+class PointProblem(ReprojectionProblem):
     """Free points: each is a group with three unknowns."""
 
     n_own = 3
     has_common_noise = True
 
     def locate(self, own: Array) -> Located:
-        """See `RigProblem`."""
+        """See `ReprojectionProblem`."""
         return Located(own[self.observations.groups], None)
 
     def move_own(self, own: Array, step: Array) -> Array:
-        """See `RigProblem`."""
+        """See `ReprojectionProblem`."""
         return own + step
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import tomli_w
 
 from tracker.files import write_text_atomic
-from tracker.formats.anipose import calibration_text
+from tracker.formats.anipose import format_calibration
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 
@@ -34,7 +34,7 @@ def anipose_text(cameras: Sequence[Camera], metadata: Mapping[str, Any] | None =
 
 def pose2sim_text(cameras: Sequence[Camera]) -> str:
     """Return `Calib.toml` of Pose2Sim: a section for each camera under its own name."""
-    return calibration_text(cameras)
+    return format_calibration(cameras)
 
 
 def caliscope_text(cameras: Sequence[Camera]) -> str:

@@ -42,11 +42,11 @@ def read_calibration(path: str | Path) -> tuple[Camera, ...]:
 
 def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
     """Write cameras, in metres. `read_calibration` reads them back to 12 digits and in the same order."""
-    write_text_atomic(Path(path), calibration_text(cameras))
+    write_text_atomic(Path(path), format_calibration(cameras))
 
 
-def calibration_text(cameras: Sequence[Camera]) -> str:
-    """Return the text of the calibration of a session."""
+def format_calibration(cameras: Sequence[Camera]) -> str:
+    """Format cameras as `write_calibration` writes them."""
     data: dict[str, Any] = {}
     for c in cameras:
         data[c.name] = {

@@ -23,7 +23,7 @@ from tracker.boards.lens_fit import blank_camera, fit_lens
 from tracker.boards.rig_fit import held_out_errors
 from tracker.boards.view_choice import choose_frames, choose_views, outlines, posed_views
 from tracker.calibration.camera_columns import FOCAL, POSE, moved_camera
-from tracker.calibration.rig_problem import column_ends
+from tracker.calibration.reprojection import column_ends
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 

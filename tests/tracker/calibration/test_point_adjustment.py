@@ -14,7 +14,7 @@ from tracker.calibration.point_adjustment import (
     adjust_points,
     triangulate_all,
 )
-from tracker.calibration.rig_problem import Observations, Prior, Rig
+from tracker.calibration.reprojection import Observations, Prior, Rig
 from tracker.errors import CalibrationError
 from tracker.fitting.bundle import solve_bundle
 

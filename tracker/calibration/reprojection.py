@@ -102,10 +102,10 @@ class RigFit(NamedTuple):
     weights: Array
     """Robust weight of each observation, 0 to 1, (N,)."""
     common_share: float
-    """By how much errors of one view agree, at least 1; see `RigProblem.common_share`."""
+    """By how much errors of one view agree, at least 1; see `ReprojectionProblem.common_share`."""
 
 
-class RigProblem:
+class ReprojectionProblem:
     """Cameras that see the points of groups, for `solve_bundle`. Subclasses say where the points are."""
 
     n_own: int
@@ -309,7 +309,7 @@ class RigProblem:
         return out
 
 
-def fit_rig(problem: RigProblem, rig: Rig) -> RigFit:
+def fit_rig(problem: ReprojectionProblem, rig: Rig) -> RigFit:
     """Fit cameras and own unknowns, and measure the noise between fits until it settles.
 
     The standard deviation begins at that of the largest errors and falls to that of the median one, so that no error of
@@ -335,7 +335,7 @@ def fit_rig(problem: RigProblem, rig: Rig) -> RigFit:
     return _result(problem, rig)
 
 
-def _result(problem: RigProblem, rig: Rig) -> RigFit:
+def _result(problem: ReprojectionProblem, rig: Rig) -> RigFit:
     equations, errors = problem.linearize(rig), problem.errors_px(rig)
     squares = np.sum(errors**2, axis=1) / problem.sigmas_px[problem.observations.cameras] ** 2
     squares = np.nan_to_num(squares, nan=np.inf)
