@@ -8,7 +8,9 @@ These are the part's `N_MOTIONS` motions: a spatial rotation and translation, th
 Residuals are summed by the motions of each part first, and then converted to all unknowns.
 """
 
+import itertools
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +18,9 @@ from tracker.acquisition.size_parameters import DIFFERENCE, SizeArrays
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel
 from tracker.fitting.contour_residuals import PieceSums
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera, project_with_jacobian
+from tracker.geometry.rigid import skew
 from tracker.geometry.shapes import EllipticalCone, Shape, TaperedSuperquadric
 
 N_MOTIONS = 13
@@ -38,8 +41,51 @@ def sum_motions(
     Returns:
         Gradients, (n_parts, N_MOTIONS), and normal matrices, (n_parts, N_MOTIONS, N_MOTIONS).
     """
-    n_parts = len(body.parts)
-    b, M = np.zeros((n_parts, N_MOTIONS)), np.zeros((n_parts, N_MOTIONS, N_MOTIONS))
+    rows = rows_of_pieces(views, body, kinematics, with_shapes)
+    return rows.sums(len(body.parts))
+
+
+class PieceRows(NamedTuple):
+    """Residuals at pieces of contour of several views, with derivatives of their images."""
+
+    parts: IntArray
+    """Index of the part of each piece, (N,)."""
+    points_world: Array
+    """Middle of each piece, (N, 3), metres."""
+    px_by_point: Array
+    """Derivative of its image by it, (N, 2, 3), px per metre."""
+    gradients: Array
+    """Derivative of the cost by the image, (N, 2), per px."""
+    hessians: Array
+    """Second derivative by it, (N, 2, 2), per px^2."""
+    rows: Array
+    """Derivative of the image by k motions, (N, 2, k)."""
+
+    def with_columns(self, more: Array) -> "PieceRows":
+        """Return the same pieces with derivatives of their images by further motions, (N, 2, m), after the others."""
+        return self._replace(rows=np.concatenate([self.rows, more], axis=2))
+
+    def sums(self, n_parts: int) -> tuple[Array, Array]:
+        """Sum the residuals by part: gradients, (n_parts, k), and normal matrices, (n_parts, k, k)."""
+        k = self.rows.shape[2]
+        b, M = np.zeros((n_parts, k)), np.zeros((n_parts, k, k))
+        order = np.argsort(self.parts, kind="stable")
+        bounds = np.searchsorted(self.parts[order], np.arange(n_parts + 1))
+        rows = self.rows[order]
+        pulls = np.einsum("ni,nik->nk", self.gradients[order], rows)
+        weighted = (self.hessians[order] @ rows).reshape(-1, k)
+        rows = rows.reshape(-1, k)
+        for part, (first, last) in enumerate(itertools.pairwise(bounds)):
+            if first < last:
+                b[part] = pulls[first:last].sum(axis=0)
+                M[part] = rows[2 * first : 2 * last].T @ weighted[2 * first : 2 * last]
+        return b, M
+
+
+def rows_of_pieces(
+    views: Sequence[tuple[Camera, PieceSums]], body: BodyModel, kinematics: Kinematics, with_shapes: bool = True
+) -> PieceRows:
+    """Differentiate the images of pieces by the motions of their parts; arguments as in `sum_motions`."""
     sums = [s.pulled for _, s in views]
     parts, _, unit_points, gradients, hessians = (np.concatenate(fields) for fields in zip(*sums, strict=True))
     half_axes, Ts = np.array([s.half_axes for s in body.shapes]), kinematics.Ts_world_part[parts]
@@ -52,15 +98,8 @@ def sum_motions(
             for (camera, _), i, k in zip(views, firsts[:-1], firsts[1:], strict=True)
         ]
     )
-    for part in range(n_parts):
-        at = np.flatnonzero(parts == part)
-        if len(at):
-            T = kinematics.Ts_world_part[part]
-            moved = _motions_of_points(body.shapes[part], T, points[at], unit_points[at], with_shapes)
-            rows = px_by_point[at] @ moved  # (N, 2, N_MOTIONS)
-            b[part] = np.einsum("ni,nik->k", gradients[at], rows)
-            M[part] = rows.reshape(-1, N_MOTIONS).T @ (hessians[at] @ rows).reshape(-1, N_MOTIONS)
-    return b, M
+    moved = motions_of_points(body.shapes, parts, Ts, points, unit_points, with_shapes)
+    return PieceRows(parts, points, px_by_point, gradients, hessians, px_by_point @ moved)
 
 
 def to_unknowns(J: Array, b: Array, M: Array) -> tuple[Array, Array]:
@@ -102,29 +141,31 @@ def motions_by_pose(model: BodyModel, kinematics: Kinematics) -> Array:
     return out
 
 
-def _motions_of_points(
-    shape: Shape, T_world_part: Array, points_world: Array, unit_points: Array, with_shapes: bool = True
-) -> Array:
-    """Differentiate points on the surface of a part by its motions.
+def motions_of_points(
+    shapes: Sequence[Shape], parts: IntArray, Ts_world_part: Array, points_world: Array, unit_points: Array,
+    with_shapes: bool = True,
+) -> Array:  # fmt: skip
+    """Differentiate points on the surface of parts by the motions of their part.
 
     Args:
-        shape: of the part.
-        T_world_part: its pose, (4, 4).
+        shapes: of all parts.
+        parts: index of the part of each point, (N,).
+        Ts_world_part: pose of the part of each point, (N, 4, 4).
         points_world: the points, (N, 3), metres.
-        unit_points: the same in the unit coordinates of the part, (N, 3).
+        unit_points: the same in the unit coordinates of their part, (N, 3).
         with_shapes: whether to differentiate by tapers and exponents; else these are 0.
 
     Returns:
         (N, 3, N_MOTIONS), metres per radian, metre, or 1.
     """
-    out, R = np.zeros((len(points_world), 3, N_MOTIONS)), T_world_part[:3, :3]
-    x, y, z = points_world.T
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = z, -y, x  # omega x X
-    out[:, 1, 0], out[:, 2, 0], out[:, 2, 1] = -z, y, -x
+    out, Rs = np.zeros((len(points_world), 3, N_MOTIONS)), Ts_world_part[:, :3, :3]
+    out[:, :, :3] = -skew(points_world)  # omega x X
     out[:, :, 3:6] = np.eye(3)
-    out[:, :, 6:9] = R * unit_points[:, None, :]
+    out[:, :, 6:9] = Rs * unit_points[:, None, :]
     if with_shapes:
-        out[:, :, 9:] = R @ _shape_derivatives(shape, unit_points)
+        for part in np.unique(parts):
+            at = parts == part
+            out[at, :, 9:] = Rs[at] @ _shape_derivatives(shapes[part], unit_points[at])
     return out
 
 

@@ -12,6 +12,7 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.compute.threads import one_blas_thread
 from tracker.fitting.gauss_newton import DAMPING, NormalEquations, damped_step
 from tracker.geometry.arrays import Array
 
@@ -97,6 +98,11 @@ class ArrowEquations(NamedTuple):
         shared = damped_step(H, g, damping * np.diag(self.hessian)) if n else g
         return shared, -(solved @ np.append(shared, 1.0)).reshape(-1, m)
 
+    def promised(self, shared: Array, own: Array, damping: float) -> float:
+        """Return the decrease of the cost that the step of a damping promises."""
+        damped = np.sum(shared**2 * np.diag(self.hessian)) + np.sum(own**2 * np.einsum("gii->gi", self.own_hessians))
+        return 0.5 * float(damping * damped - self.gradient @ shared - np.sum(self.own_gradients * own))
+
 
 class BundleProblem(Protocol[S]):
     """A problem for `solve_bundle`; its state holds all unknowns."""
@@ -143,15 +149,25 @@ def solve_bundle(
         problem: gives the normal equations.
         state: initial state.
         max_iterations: largest number of steps.
-        tolerance: smallest relative decrease of the cost for another iteration.
+        tolerance: smallest relative decrease of the cost that a step must promise.
         report: is given the number of each iteration before it begins. An exception that it raises ends the fit.
     """
+    with one_blas_thread():
+        return _solve(problem, state, max_iterations, tolerance, report)
+
+
+def _solve(
+    problem: BundleProblem[S], state: S, max_iterations: int, tolerance: float, report: Callable[[int], None]
+) -> BundleFit[S]:
     here, damping, evaluations = problem.linearize(state), DAMPING.first, 1
     for iteration in range(max_iterations):
         report(iteration)
         equations = here.held(*problem.free(state, here))
         while True:
-            trial = problem.moved(state, *equations.step(damping))
+            step = equations.step(damping)
+            if equations.promised(*step, damping) <= tolerance * here.cost:
+                return BundleFit(state, here, evaluations)
+            trial = problem.moved(state, *step)
             there = problem.linearize(trial)
             evaluations += 1
             if there.cost < here.cost:
@@ -159,8 +175,5 @@ def solve_bundle(
             if damping > DAMPING.most:
                 return BundleFit(state, here, evaluations)
             damping = max(10 * damping, DAMPING.least_again)
-        gained, before = here.cost - there.cost, here.cost
         state, here, damping = trial, there, max(DAMPING.least, damping / 10)
-        if gained <= tolerance * before:
-            break
     return BundleFit(state, here, evaluations)

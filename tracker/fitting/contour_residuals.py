@@ -41,6 +41,7 @@ from tracker.fitting.gauss_newton import NormalEquations
 from tracker.fitting.match_points import points_to_match
 from tracker.fitting.twists import twists_to_dofs
 from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.cameras import Camera
 from tracker.geometry.segment_distance import sort_points, stack_rows
 
 CAPTURE = 2.0
@@ -228,6 +229,15 @@ class ContourResiduals:
         """
         out = copy(self)
         out._model, out._term = model, self._term._replace(surfaces=surfaces)
+        return out
+
+    def with_camera(self, camera: Camera) -> "ContourResiduals":
+        """Return the same residuals of a single view under another camera of the same pixels. Both use the same
+        buffers."""
+        out, term = copy(self), self._term
+        assert len(term.views.sizes) == 1
+        views = term.views._replace(P=camera.projection[None], eyes=camera.center_world[None])
+        out._term = term._replace(views=views, static=term.static._replace(Ts=np.full_like(term.static.Ts, np.nan)))
         return out
 
     def with_information(self, factor: float) -> "ContourResiduals":

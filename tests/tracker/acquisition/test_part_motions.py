@@ -5,9 +5,9 @@ import pytest
 from staging import posed
 
 from tracker.acquisition.part_motions import (
-    _motions_of_points,
     motions_by_pose,
     motions_by_sizes,
+    motions_of_points,
     points_by_sizes,
 )
 from tracker.acquisition.size_parameters import SizeParameters
@@ -36,6 +36,12 @@ def on_surface(body, part):
     return unit[smooth], normals[smooth]
 
 
+def motions_of(body, kinematics, part, points, unit):
+    """Derivatives of points of one part by its motions."""
+    parts = np.full(len(points), part)
+    return motions_of_points(body.shapes, parts, kinematics.Ts_world_part[parts], points, unit)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["gavrila22_cones", pytest.param("gavrila34", marks=pytest.mark.slow)])
 def test_surface_points_move_as_their_derivatives_say(name):
@@ -47,7 +53,7 @@ def test_surface_points_move_as_their_derivatives_say(name):
     for part in range(len(body.parts)):
         unit, normals = on_surface(body, part)
         T = kinematics.Ts_world_part[part]
-        found = _motions_of_points(body.shapes[part], T, surface(body, pose, part, unit), unit) @ by_sizes[part]
+        found = motions_of(body, kinematics, part, surface(body, pose, part, unit), unit) @ by_sizes[part]
         across = normals @ T[:3, :3].T
         for i, parameter in enumerate(parameters.names):
             step = np.eye(len(sizes))[i] * 1e-5
@@ -90,6 +96,6 @@ def test_a_pose_moves_the_parts_as_the_body_says(name):
     for part in range(len(body.parts)):
         unit, _ = on_surface(body, part)
         points = surface(body, pose, part, unit)
-        found = _motions_of_points(body.shapes[part], kinematics.Ts_world_part[part], points, unit) @ by_pose[part]
+        found = motions_of(body, kinematics, part, points, unit) @ by_pose[part]
         expected = body.point_jacobian(kinematics, np.full(len(points), part), points)
         np.testing.assert_allclose(found, expected, atol=1e-9)

@@ -1,0 +1,73 @@
+"""Small corrections of a camera: its rotation, the place of its centre, its focal length, and its clock.
+
+    R' = exp([w]x) R,   C' = C + R^T t,   f' = e^s f,   and the picture of time k / fps shows time k / fps + d.
+
+R maps the world to the camera, C is its centre in the world, f its focal lengths. `Correction` names w, t, s, d.
+"""
+
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import inverse, skew, so3_exp, so3_log, transform
+
+ROTATION, POSITION, FOCAL, TIME = slice(0, 3), slice(3, 6), 6, 7
+"""Where a correction, (8,), holds w in rad and t in metres, both along the axes of the camera, s, and d in seconds."""
+N_CORRECTIONS = 8
+KINDS = MappingProxyType({"rotation": ROTATION, "position": POSITION, "focal": slice(6, 7), "time": slice(7, 8)})
+"""Corrections that are tried one by one, by name."""
+
+
+def corrected(camera: Camera, correction: Array) -> Camera:
+    """Return a camera with a correction, (8,), except that of its clock."""
+    if not correction[:TIME].any():
+        return camera
+    K, R = camera.K.copy(), so3_exp(correction[ROTATION])
+    K[:2, :2] *= np.exp(correction[FOCAL])
+    turned = transform(R, -R @ correction[POSITION])
+    return replace(camera, K=K, T_world_camera=inverse(turned @ camera.T_camera_world))
+
+
+def with_step(correction: Array, step: Array) -> Array:
+    """Return a correction, (8,), after a further small step, (8,), in the columns of `columns`."""
+    out = correction + step
+    if not step[ROTATION].any():
+        return out
+    out[ROTATION] = so3_log(so3_exp(step[ROTATION]) @ so3_exp(correction[ROTATION]))
+    return out
+
+
+def columns(camera: Camera, correction: Array, points_world: Array, px_by_point: Array) -> Array:
+    """Differentiate the images of points by a further step of a correction, except that of the clock.
+
+    Args:
+        camera: with the correction, without lens distortion.
+        correction: (8,).
+        points_world: (N, 3), metres.
+        px_by_point: derivatives of their images by them, (N, 2, 3), px per metre.
+
+    Returns:
+        (N, 2, 7), px per radian, metre and 1.
+    """
+    R = camera.T_camera_world[:3, :3]
+    points_camera = points_world @ R.T + camera.T_camera_world[:3, 3]
+    px_by_camera = px_by_point @ R.T
+    out = np.empty((len(points_world), 2, FOCAL + 1))
+    out[:, :, ROTATION] = -px_by_camera @ skew(points_camera)
+    out[:, :, POSITION] = -px_by_camera @ so3_exp(correction[ROTATION])
+    slopes = points_camera[:, :2] / points_camera[:, 2:]
+    out[:, :, FOCAL] = slopes @ camera.K[:2, :2].T
+    return out
+
+
+def in_units(correction: Array) -> dict[str, list[float] | float]:
+    """Return a correction, or its standard deviations, (8,), in the units of people: degrees, mm, percent and ms."""
+    return {
+        "rotation_deg": np.degrees(correction[ROTATION]).tolist(),
+        "position_mm": (1000 * correction[POSITION]).tolist(),
+        "focal_percent": float(100 * np.expm1(correction[FOCAL])),
+        "time_ms": float(1000 * correction[TIME]),
+    }
