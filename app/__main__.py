@@ -14,8 +14,6 @@ from app.cli import (
     acquire,
     audit,
     bench,
-    calibrate,
-    check,
     evaluate,
     experiment,
     export,
@@ -30,6 +28,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
+from app.cli.calibration import calibrate, check
 from app.remedies import command_line_text
 from app.runtime import process_exit
 from app.runtime.log_limit import limit_log

@@ -20,6 +20,7 @@ HOUSE = {
     ],
     "app/  the viewer": [
         ["__main__"],
+        ["cli/calibration"],
         ["cli"],
         ["bench", "server"],
         ["page", "scene3d"],
@@ -34,11 +35,12 @@ HOUSE = {
     "tracker/  the library": [
         ["experiments"],
         ["pipeline", "export"],
-        ["simulate", "evaluation", "posing"],
-        ["acquisition", "initialization", "boards"],
+        ["simulate", "evaluation", "boards"],
+        ["calibration", "posing"],
+        ["acquisition", "initialization"],
         ["tracking/chamfer, tracking/contour, tracking/voxel"],
         ["tracking/estimation"],
-        ["tracking", "initialization/generators", "calibration"],
+        ["tracking", "initialization/generators"],
         ["search", "appearance", "fitting", "voxels"],
         ["evidence"],
         ["contours", "images", "store"],

@@ -62,6 +62,7 @@ ROOMS = [
     "app.server",
     "app.bench",
     "app.cli",
+    "app.cli.calibration",
     "app.__main__",
 ]
 FLOOR = {room: floor for floor, room in enumerate(ROOMS)}

@@ -24,8 +24,10 @@ def flat(board):
 
 
 def drawn(board, camera, T_world_board, from_behind=False):
-    """Picture of a board on a gray ground, (H, W); `from_behind` shows a transparent one from its back."""
+    """Picture of a board on a gray ground, (H, W); empty from behind, but `from_behind` shows a transparent one."""
     T = camera.T_camera_world @ T_world_board
+    if (T[:3, 2] @ T[:3, 3] < 0) != from_behind:
+        return np.full(camera.size[::-1], 120, np.uint8)
     to_metres = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, SQUARE_PX / board.square_m]]) / SQUARE_PX * board.square_m
     H = camera.K @ np.stack([T[:3, 0], T[:3, 1], T[:3, 3]], axis=1) @ to_metres
     # Drawn at four times the size and reduced, so that edges are as smooth as those of a camera.
@@ -36,8 +38,6 @@ def drawn(board, camera, T_world_board, from_behind=False):
     paper = cv2.copyMakeBorder(flat(board), *[margin] * 4, cv2.BORDER_CONSTANT, value=ground)
     H = larger @ H @ np.array([[1, 0, -margin], [0, 1, -margin], [0, 0, 1]])
     image = cv2.warpPerspective(paper, H, size, flags=cv2.INTER_LINEAR, borderValue=120)
-    normal = T[:3, 2] @ T[:3, 3]
-    assert (normal < 0) == from_behind, "seen from the other side"
     return cv2.resize(image, camera.size, interpolation=cv2.INTER_AREA)
 
 

@@ -1,5 +1,7 @@
 """Find out with which other description a board would be found, where no corner was."""
 
+import re
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -14,6 +16,10 @@ _N_DESCRIBED = 4
 """Corners in a picture from which on another description counts: fewer may be found by chance."""
 _MAX_SIDE = 14
 """Largest number of squares along a side that is tried: markers of larger boards are small in most pictures."""
+_HIDDEN = 2
+"""Markers with the highest numbers that may be covered in all pictures."""
+_MAX_SAMPLES = 8
+"""Pictures that are looked at: each takes a second for all descriptions."""
 _MAX_TILT_PX = 3.0
 """Distance from a flat grid within which a corner agrees with the others, px: lenses bend a board by as much."""
 
@@ -25,8 +31,10 @@ def found_instead(board: Board, samples: Sequence[NDArray[np.uint8]]) -> str:
         board: as described; it was not found.
         samples: pictures, (H, W) gray.
     """
-    tried = list(_others(board, samples))
-    for other in tried:
+    samples = [samples[i] for i in np.unique(np.linspace(0, len(samples) - 1, _MAX_SAMPLES).round().astype(int))]
+    n_tried = 0
+    for other in _others(board, samples):
+        n_tried += 1
         counts = [_n_agreeing(other, image) for image in samples]
         found = sum(n >= _N_DESCRIBED for n in counts)
         if found:
@@ -35,7 +43,7 @@ def found_instead(board: Board, samples: Sequence[NDArray[np.uint8]]) -> str:
                 "if it is that one"
             )
     return (
-        f"{len(tried)} other descriptions (black and white exchanged, other sets of markers and numbers of squares) "
+        f"{n_tried} other descriptions (black and white exchanged, other sets of markers and numbers of squares) "
         "find none either; check that the videos show the board, large and sharp enough"
     )
 
@@ -60,7 +68,7 @@ def _others(board: Board, samples: Sequence[NDArray[np.uint8]]) -> Iterator[Boar
         # A marker lies in every second square.
         for columns in range(3, _MAX_SIDE + 1):
             for rows in range(3, _MAX_SIDE + 1):
-                if columns * rows // 2 >= n_markers:
+                if n_markers <= columns * rows // 2 <= n_markers + _HIDDEN:
                     yield replace(named, columns=columns, rows=rows)
 
 
@@ -70,8 +78,8 @@ def _best_dictionary(samples: Sequence[NDArray[np.uint8]], inverted: bool) -> tu
     Small sets are parts of larger ones, so that the smallest set wins a tie.
     """
     best, most, largest = "", 0, 0
-    names = sorted((n for n in DICTIONARIES if n.count("_") == 2), key=lambda n: int(n.rpartition("_")[2]))
-    for name in names:
+    sizes = {name: re.fullmatch(r"DICT_\dX\d_(\d+)", name) for name in DICTIONARIES}
+    for name in sorted(DICTIONARIES, key=lambda n: int(size[1]) if (size := sizes[n]) else sys.maxsize):
         detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)))
         found = [detector.detectMarkers(_as_described(image, inverted))[1] for image in samples]
         ids = np.concatenate([np.zeros(0, int), *(i.ravel() for i in found if i is not None)])

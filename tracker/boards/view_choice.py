@@ -1,6 +1,6 @@
 """Choose diverse views of a board: a bounded number of those that differ most in place, size and tilt."""
 
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import cv2
 import numpy as np
@@ -24,7 +24,7 @@ def posed_views(board: Board, seen: SeenCorners) -> dict[tuple[int, int], slice]
     """Return where the corners of each view stand that tells a pose of the board, by camera and frame."""
     out = {}
     starts = np.flatnonzero((np.diff(seen.cameras, prepend=-1) != 0) | (np.diff(seen.frames, prepend=-1) != 0))
-    for start, end in zip(starts, [*starts[1:], len(seen.frames)], strict=True):
+    for start, end in pairwise([*starts, len(seen.frames)]):
         xy = board.corners[seen.ids[start:end], :2]
         extents = np.linalg.svd(xy - xy.mean(axis=0), compute_uv=False)
         if end - start >= MIN_CORNERS and extents[-1] > _MIN_SPREAD * extents[0]:

@@ -30,7 +30,7 @@ from tracker.geometry import rigid
 
 @pytest.fixture(scope="module")
 def rig():
-    return simulated_rig(15, 3)
+    return simulated_rig(15, 3, gross=0)
 
 
 @pytest.fixture(scope="module")
