@@ -61,10 +61,10 @@ def main():
         "nothing",
         "defaults",
         "none",
-        "python tests/benchmarks/volume_error.py --write docs/measurements.md",
+        "python tests/benchmarks/volume_error.py --write docs/calibration.md",
     )
     heads = ("rigs", "within 90%", "above", "below", "median true / expected", "median true, mm", "largest, mm")
-    show(arguments.write, TABLES[0], conditions, table(heads, cells, "rigs"))
+    show(arguments.write, TABLES[0], conditions, table(heads, cells, "cameras"))
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ class SeenCorners(NamedTuple):
 
     def where(self, chosen: Mask) -> "SeenCorners":
         """Return some of them, by a mask, (N,)."""
-        return SeenCorners(*(rows[chosen] for rows in self))
+        return SeenCorners(self.cameras[chosen], self.frames[chosen], self.ids[chosen], self.px[chosen])
 
     def of_camera(self, camera: int) -> "SeenCorners":
         """Return those of one camera, whose index becomes 0."""

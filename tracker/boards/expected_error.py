@@ -65,15 +65,14 @@ def expected_error(cameras: Sequence[Camera], covariance: Array, points_world: A
         inverse = np.linalg.pinv(found.by_point)
         normal[at] += inverse @ found.by_point
         moves[at, :, ends[i] : ends[i + 1]] -= inverse @ found.by_camera
-    moves = np.linalg.solve(normal, moves)
+    field = np.asarray(np.linalg.solve(normal, moves), dtype=np.float64).reshape(3 * len(points), -1)
     middle = points - points.mean(axis=0)
     rigid_moves = np.concatenate([np.tile(np.eye(3), (len(points), 1)), -rigid.skew(middle).reshape(-1, 3)], axis=1)
     basis, _ = np.linalg.qr(rigid_moves)
-    moves = moves.reshape(3 * len(points), -1)
-    moves -= basis @ (basis.T @ moves)
+    field -= basis @ (basis.T @ field)
     # The mean square is a sum of squared Gaussian numbers whose variances are these eigenvalues.
     values, vectors = np.linalg.eigh(covariance)
-    factor = moves @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    factor = field @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     variances = np.linalg.eigvalsh(factor.T @ factor / len(points))
     normals = np.random.default_rng(0).normal(size=(_DRAWS, len(variances)))
     low, median, high = np.quantile(np.sqrt(normals**2 @ np.maximum(variances, 0.0)), _QUANTILES)

@@ -48,7 +48,10 @@ def _planar_poses(corners: Array, camera: Camera, px: Array) -> list[Array]:
     if not np.isfinite(slopes).all():
         return []
     _, turns, shifts, _ = cv2.solvePnPGeneric(corners, slopes, np.eye(3), None, flags=cv2.SOLVEPNP_IPPE)
-    return [rigid.transform(rigid.so3_exp(w.ravel()), t.ravel()) for w, t in zip(turns, shifts, strict=True)]
+    return [
+        rigid.transform(rigid.so3_exp(np.asarray(w, float).ravel()), np.asarray(t, float).ravel())
+        for w, t in zip(turns, shifts, strict=True)
+    ]
 
 
 def posed_frames(poses: Poses, seen: SeenCorners) -> IntArray:

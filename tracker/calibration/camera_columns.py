@@ -148,7 +148,8 @@ def _fisheye(points: Array, distortion: Array) -> tuple[Array, Array, Array]:
     by_point = unit[:, :, None] * along[:, None]
     by_point[:, :, :2] += side[:, :, None] * side[:, None] * turning[:, None, None]
     powers = angle[:, None] * a2[:, None] ** np.arange(1, 5)
-    return unit * radius[:, None], by_point, (unit[:, :, None] * powers[:, None])[:, :, : distortion.size]
+    by_distortion = np.asarray(unit[:, :, None] * powers[:, None], dtype=np.float64)[:, :, : distortion.size]
+    return np.asarray(unit * radius[:, None]), by_point, by_distortion
 
 
 def _matrices(*rows: Sequence[Array]) -> Array:

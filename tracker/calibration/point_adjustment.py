@@ -156,9 +156,9 @@ def triangulate_all(cameras: Sequence[Camera], observations: Observations) -> tu
     np.add.at(A, groups, across)
     np.add.at(b, groups, (across @ centers[:, :, None])[..., 0])
     # Of two rays at an angle, the least eigenvalue is 1 - cos of it; more rays raise it.
-    determined = np.linalg.eigvalsh(A)[:, 0] > 1 - np.cos(MIN_ANGLE_RAD)
+    determined = np.asarray(np.linalg.eigvalsh(A)[:, 0] > 1 - np.cos(MIN_ANGLE_RAD))
     A[~determined] = np.eye(3)
-    points = np.linalg.solve(A, b[:, :, None])[..., 0]
+    points = np.asarray(np.linalg.solve(A, b[:, :, None])[..., 0], dtype=np.float64)
     behind = np.sum((points[groups] - centers) * rays, axis=1) <= 0
     determined[groups[behind]] = False
     return points, determined

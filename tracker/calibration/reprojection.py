@@ -151,8 +151,8 @@ class ReprojectionProblem:
             at = self.observations.of_camera(i)
             by_own = None if located.by_own is None else located.by_own[at]
             cost += self._add_camera(out, i, camera, Located(located.points_world[at], by_own))
-        at = np.arange(self.n_own)
-        out.own_hessians[:, at, at] += _FLOOR
+        diagonal = np.arange(self.n_own)
+        out.own_hessians[:, diagonal, diagonal] += _FLOOR
         moves = zip(self.prior.cameras, rig.cameras, self.columns, strict=True)
         offsets = np.concatenate([camera_difference(before, now)[columns] for before, now, columns in moves])
         out.gradient[:] += self.precision * offsets
@@ -294,7 +294,7 @@ class ReprojectionProblem:
         """Return the robust cost of the observations of each group, (G,)."""
         s = self._squares_px2(rig) / self.sigmas_px[self.observations.cameras] ** 2
         robust = s / (1 + s / _OUTLIER_SIGMAS**2)
-        return 0.5 * np.bincount(self.observations.groups, robust, self.n_groups)
+        return np.asarray(0.5 * np.bincount(self.observations.groups, robust, self.n_groups), dtype=np.float64)
 
     def with_sigmas(self, sigmas_px: Array) -> Self:
         """Return the problem with other standard deviations."""
@@ -319,7 +319,7 @@ def fit_rig(problem: ReprojectionProblem, rig: Rig) -> RigFit:
     for _ in range(_ROUNDS):
         rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
         sigmas = problem.scaled_sigmas_px(rig, 0.5)
-        is_settled = np.all(sigmas > (1 - _SETTLED) * problem.sigmas_px)
+        is_settled = bool(np.all(sigmas > (1 - _SETTLED) * problem.sigmas_px))
         problem = problem.with_sigmas(np.maximum(sigmas, problem.sigmas_px / _FALL))
         if is_settled:
             break
