@@ -32,16 +32,19 @@ def found_instead(board: Board, samples: Sequence[NDArray[np.uint8]]) -> str:
         samples: pictures, (H, W) gray.
     """
     samples = [samples[i] for i in np.unique(np.linspace(0, len(samples) - 1, _MAX_SAMPLES).round().astype(int))]
-    n_tried = 0
+    n_tried, best, most = 0, board, 0
     for other in _others(board, samples):
         n_tried += 1
-        counts = [_n_agreeing(other, image) for image in samples]
-        found = sum(n >= _N_DESCRIBED for n in counts)
-        if found:
-            return (
-                f"a {other.words} would be found in {found} of {len(samples)} pictures; correct the board file "
-                "if it is that one"
-            )
+        found = sum(_n_agreeing(other, image) >= _N_DESCRIBED for image in samples)
+        if found > most:
+            best, most = other, found
+        if 2 * most > len(samples):
+            break
+    if most:
+        return (
+            f"a {best.words} would be found in {most} of {len(samples)} pictures; correct the board file if it is "
+            "that one"
+        )
     return (
         f"{n_tried} other descriptions (black and white exchanged, other sets of markers and numbers of squares) "
         "find none either; check that the videos show the board, large and sharp enough"

@@ -30,6 +30,7 @@ class Corners(NamedTuple):
 
 
 NO_CORNERS = Corners(np.empty(0, np.int64), np.empty((0, 2)), False)
+"""A picture without a board."""
 
 
 class CornerDetector:

@@ -12,6 +12,7 @@ from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
 
 _QUANTILES = (0.05, 0.5, 0.95)
+"""Bounds and middle of the 90% interval."""
 _DRAWS = 4000
 """Errors that are drawn for the quantiles: their own error is then some 2%."""
 MAX_POINTS = 300
