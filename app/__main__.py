@@ -29,7 +29,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
-from app.cli.calibration import check
+from app.cli.calibration import calibrate, check
 from app.remedies import command_line_text
 from app.runtime import process_exit
 from app.runtime.log_limit import limit_log
@@ -40,6 +40,7 @@ from tracker.errors import TrackerError
 _COMMANDS: dict[str, Callable[..., None]] = {
     "open": open_.command,
     "new": new.command,
+    "calibrate": calibrate.command,
     "info": info.command,
     "relink": relink.command,
     "index": index.command,

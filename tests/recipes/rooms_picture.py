@@ -35,9 +35,9 @@ HOUSE = {
     "tracker/  the library": [
         ["experiments"],
         ["pipeline", "export"],
-        ["simulate", "evaluation", "posing"],
-        ["initialization", "calibration"],
-        ["acquisition"],
+        ["simulate", "evaluation", "boards"],
+        ["calibration", "posing"],
+        ["acquisition", "initialization"],
         ["tracking/chamfer, tracking/contour, tracking/voxel"],
         ["tracking/estimation"],
         ["tracking", "initialization/generators"],

@@ -18,6 +18,8 @@ from memory import memory_mb
 from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
 from rigs import cameras, looking
 
+from tracker.boards.board_description import read_board
+from tracker.boards.corner_detection import CornerDetector
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import TrackerError
 from tracker.evaluation.clocks import place_rows
@@ -38,6 +40,13 @@ MODELS = ROOT / "tracker" / "body" / "models"
 MAX_S, MAX_MB = 2.0, 500.0
 
 JOINT_MAP = 'left_shoulder = "LSHO"\nleft_wrist = "LWRA"\nneck = "C7"\n'
+BOARDS = [
+    b'columns = 4\nrows = 5\nboard_height = 11.0\nboard_width = 8.5\ndictionary = "DICT_4X4_1000"\nunits = "inch"\n'
+    b"aruco_scale = 0.75\nsquare_size_override_cm = 5.4\ninverted = true\n",
+    b'[calibration]\nboard_type = "charuco"\nboard_size = [10, 7]\nboard_marker_length = 18.75\n'
+    b"board_square_side_length = 25\n",
+    b'kind = "checkerboard"\ncolumns = 9\nrows = 6\nsquare_mm = 40\n',
+]
 LOCK = {
     "host": socket.gethostname(), "process": 999_999, "started": "12345", "since": "2025-11-01T10:00:00+00:00",
     "token": "0123456789abcdef",
@@ -109,6 +118,12 @@ def read_markers(path):
     guess_joint_map(table.names, path.name)
 
 
+def read_described_board(path):
+    board = read_board(path)
+    assert np.isfinite(board.corners).all()
+    CornerDetector(board)
+
+
 def read_lock(path):
     with lock.SessionLock(path.parent):
         pass
@@ -126,6 +141,7 @@ KINDS = {
     "TRC": ("truth.trc", sources("*/*.trc", SAMPLES), read_markers, 4000),
     "lock": ("lock.json", [json_bytes(LOCK)], read_lock, 4000),
     "pose table": ("truth.csv", sources("*/*.csv", SAMPLES), read_pose_table, 1000),
+    "board": ("board.toml", BOARDS, read_described_board, 1000),
     "joint map": ("map.toml", [JOINT_MAP.encode()], read_joint_map, 1000),
 }
 """For each kind: name of the file, examples, what reads it, and the full number of cases."""

@@ -32,6 +32,7 @@ ROOMS = [
     "tracker.tracking.voxel",
     "tracker.acquisition",
     "tracker.calibration",
+    "tracker.boards",
     "tracker.initialization.generators",
     "tracker.initialization",
     "tracker.posing",

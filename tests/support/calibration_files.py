@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import tomli_w
 
+from tracker.calibrations.writing import anipose_section, anipose_text, caliscope_text
 from tracker.geometry import rigid
 
 
@@ -38,16 +39,9 @@ def to_storage(path, values):
     return path
 
 
-def toml_section(c):
-    K, distortion, R, t = parts(c)
-    return {"size": list(c.size), "matrix": K.tolist(), "distortions": distortion.tolist(),
-            "rotation": rigid.so3_log(R).tolist(), "translation": t.tolist()}  # fmt: skip
-
-
 def anipose(folder, cameras, metadata=None):
-    data = {f"cam_{i}": {"name": c.name} | toml_section(c) | {"fisheye": False} for i, c in enumerate(cameras)}
     path = folder / "Calib.toml"
-    path.write_text(tomli_w.dumps(data | {"metadata": metadata or {"error": 0.1}}))
+    path.write_text(anipose_text(cameras, metadata))
     return path
 
 
@@ -56,19 +50,15 @@ def freemocap(folder, cameras):
 
 
 def caliscope(folder, cameras):
-    sections = {
-        str(i): {"cam_id": i, "rotation_count": 0, "error": 0.4, "grid_count": 30, "ignore": False} | toml_section(c)
-        for i, c in enumerate(cameras)
-    }
     path = folder / "camera_array.toml"
-    path.write_text(tomli_w.dumps({"cameras": sections}))
+    path.write_text(caliscope_text(cameras))
     return path
 
 
 def pyxy3d(folder, cameras):
     sections = {
         f"cam_{i}": {"port": i, "error": 0.4, "exposure": -7, "verified_resolutions": [[640, 480]]}
-        | toml_section(c)
+        | anipose_section(c)
         | {"rotation": parts(c)[2].tolist()}
         for i, c in enumerate(cameras)
     }
@@ -79,7 +69,7 @@ def pyxy3d(folder, cameras):
 
 
 def aist(folder, cameras):
-    return to_json(folder / "setting1.json", [{"name": c.name} | toml_section(c) for c in cameras])
+    return to_json(folder / "setting1.json", [{"name": c.name} | anipose_section(c) for c in cameras])
 
 
 def panoptic(folder, cameras):

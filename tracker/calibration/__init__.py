@@ -1,5 +1,6 @@
 """Is the calibration right, which camera is off, by how much: from contours of bodies and from points (GD96 Sect. 5).
 
 `tracker/calibrations` reads and writes the files of calibrations; this room judges and corrects cameras. It may import
-`acquisition` and the rooms below.
+`acquisition` and the rooms below. `camera_columns.project_with_columns` differentiates projections by a camera, and
+`point_adjustment.adjust_points` fits cameras and points to reprojection errors.
 """

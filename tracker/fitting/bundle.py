@@ -93,7 +93,7 @@ class ArrowEquations(NamedTuple):
         own[:, at, at] *= 1 + damping
         right = np.concatenate([self.cross, self.own_gradients[..., None]], axis=2)
         solved = np.linalg.solve(own, right).reshape(-1, n + 1)
-        taken = self.cross.reshape(-1, n).T @ solved
+        taken = self.cross.reshape(len(solved), n).T @ solved
         H, g = self.hessian - taken[:, :-1], self.gradient - taken[:, -1]
         shared = damped_step(H, g, damping * np.diag(self.hessian)) if n else g
         return shared, -(solved @ np.append(shared, 1.0)).reshape(-1, m)

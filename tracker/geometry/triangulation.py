@@ -14,7 +14,7 @@ about three times as large. The smaller value lets pins win over edges, whose er
 wrong. It is relative because large images are displayed smaller."""
 
 
-_MIN_ANGLE_RAD = np.radians(1.0)
+MIN_ANGLE_RAD = np.radians(1.0)
 """Viewing rays that differ by less do not determine a depth: with pins 2 px off in images of 640 px, a point 4 m away
 would be uncertain by more than 1 m."""
 
@@ -63,7 +63,7 @@ def triangulate(cameras: Sequence[Camera], positions_px: Array) -> Triangulation
         return _nowhere(views, "one view does not determine the depth: pin the joint in another view too")
     # Two views that face each other are as bad as two side by side.
     sines = np.linalg.norm(np.cross(rays[:, None], rays[None]), axis=-1)
-    if sines.max() < np.sin(_MIN_ANGLE_RAD):
+    if sines.max() < np.sin(MIN_ANGLE_RAD):
         return _nowhere(views, "the lines of sight are almost parallel: pin the joint in a view from another side")
     across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
     centers = np.stack([c.center_world for c in views])

@@ -1,1 +1,1 @@
-"""Commands for the cameras of a recording: whether they are off, and how they are calibrated."""
+"""Commands that make and check calibrations: `quadrille calibrate` and `quadrille check`. Imports `app.cli`."""

@@ -8,7 +8,7 @@ import pytest
 from command_line import SAMPLE
 
 from app.__main__ import main
-from app.bench import acquisition_rows, contour_rows, report, voxel_rows
+from app.bench import acquisition_rows, calibration_rows, contour_rows, report, voxel_rows
 from app.bench import rows as bench_rows
 from app.bench.opencv_oracle import PaintedCost
 from app.bench.rows import Row, Yardstick
@@ -102,6 +102,7 @@ def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
         voxel_rows.voxel_frame(frame, Yardstick()),
         *bench_rows.evolution(cones, Yardstick()),
         *acquisition_rows.acquisitions(frame, Yardstick()),
+        *calibration_rows.adjustment(Yardstick()),
         *bench_rows.crowds(read_crowd(SAMPLE.with_name("tango"), 25), Yardstick()),
     ]
     names = [r.name for r in rows]

@@ -1,0 +1,169 @@
+"""`quadrille calibrate`: calibrate cameras by footage of a board."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from app.cli.arguments import NamedPaths, NamedValues, Names, OptionalPath, OptionalWhole, Paths, parse_pairs
+from app.runtime.json_output import format_json
+from app.runtime.progress import Reporter
+from tracker.errors import Remedy, TrackerError
+
+if TYPE_CHECKING:
+    from tracker.boards.footage_calibration import FilmedCalibration
+
+
+@dataclass(frozen=True)
+class CalibrateArguments:
+    """Arguments of `quadrille calibrate`."""
+
+    out: Annotated[Path, tyro.conf.arg(metavar="FILE")]
+    """file to write."""
+    board: OptionalPath = None
+    """.toml file of the board: Caliscope's charuco.toml, anipose's config.toml, or a few lines as in
+    docs/calibration.md."""
+    videos: Paths = ()
+    """video files or image folders, each named after its camera; frame k of all is of one instant."""
+    camera: NamedPaths = ()
+    """NAME=PATH: footage of a camera, under any file name."""
+    fisheye: Names = ()
+    """names of the cameras with fisheye lenses."""
+    offset: NamedValues = ()
+    """CAM=N: frame k of all is frame k + N of this camera."""
+    common_frames: bool = False
+    """leave out frames at the end that some cameras lack."""
+    every: OptionalWhole = None
+    """look at each N-th frame; by default at no more than 600 frames."""
+    floor_frame: OptionalWhole = None
+    """frame on which the board lies on the floor: it defines the world, with z up. By default the first camera does,
+    with y down."""
+    layout: Literal["quadrille", "anipose", "pose2sim", "caliscope", "opencv"] = "quadrille"
+    """layout of the file; quadrille is that of a session's calibration.toml."""
+    overwrite: bool = False
+    """replace a file that exists."""
+    json: bool = False
+    """print one JSON object; docs/calibration.md lists its keys."""
+
+
+def command(arguments: Annotated[CalibrateArguments, tyro.conf.arg(name="")]) -> None:
+    """Calibrate cameras by footage of a board.
+
+    The board may be a ChArUco board, also partly visible, or a checkerboard. Ctrl+C stops it and writes nothing.
+    """
+    from tracker.boards.board_description import read_board
+    from tracker.boards.footage_calibration import FilmedBoard, calibrate_footage
+
+    _check(arguments)
+    assert arguments.board is not None
+    filmed = FilmedBoard(
+        read_board(arguments.board),
+        arguments.videos,
+        parse_pairs(arguments.camera, "--camera", Path),
+        arguments.fisheye,
+        parse_pairs(arguments.offset, "--offset", int),
+        arguments.common_frames,
+        arguments.every,
+        arguments.floor_frame,
+    )
+    with Reporter(silent=arguments.json).share("calibrating") as advance:
+        found = calibrate_footage(filmed, lambda stage, share, text="", /: advance(share))
+    _write(arguments, found)
+    record = _record(arguments, found)
+    print(format_json(record) if arguments.json else _format(record, arguments))
+
+
+def _check(arguments: CalibrateArguments) -> None:
+    """Check what can be checked before the footage is read."""
+    if arguments.board is None:
+        raise TrackerError("expected --board FILE, found none; docs/calibration.md shows how to describe a board")
+    if arguments.every is not None and arguments.every < 1:
+        raise TrackerError(f"expected --every of at least 1, found {arguments.every}; correct it")
+    out = arguments.out
+    if out.is_dir():
+        raise TrackerError(f"expected {out} not to exist, found a folder", Remedy("another_file"))
+    if out.exists() and not arguments.overwrite:
+        raise TrackerError(f"expected {out} not to exist, found a file", Remedy("another_file_or_overwrite"))
+    if not out.parent.is_dir():
+        raise TrackerError(f"expected --out in a folder that exists, found none at {out.parent}; make it first")
+
+
+def _write(arguments: CalibrateArguments, found: "FilmedCalibration") -> None:
+    from tracker.calibrations.writing import write_layout
+    from tracker.formats.anipose import write_calibration
+
+    try:
+        if arguments.layout == "quadrille":
+            write_calibration(arguments.out, found.cameras)
+        else:
+            write_layout(arguments.out, arguments.layout, found.cameras)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise TrackerError(f"cannot write {arguments.out}: {reason}; choose a folder that you may write to") from error
+
+
+def _record(arguments: CalibrateArguments, found: "FilmedCalibration") -> dict[str, Any]:
+    """Return the result as plain data; docs/calibration.md lists its keys."""
+    import numpy as np
+
+    board, rig = found.found, found.found.rig
+    cameras = [
+        {
+            "name": c.name,
+            "size": list(c.size),
+            "focal_px": [float(c.K[0, 0]), float(c.K[1, 1])],
+            "focal_sigma_percent": 100 * float(board.focal_sigmas[i]),
+            "depth_ratio": board.lenses[i].depth_ratio,
+            "views": int(np.unique(found.views.seen.frames[found.views.seen.cameras == i]).size),
+            "noise_px": float(rig.fit.sigmas_px[i]),
+            "held_out_px": board.held_out_rms_px(i),
+        }
+        for i, c in enumerate(found.cameras)
+    ]
+    return {
+        "out": str(arguments.out),
+        "layout": arguments.layout,
+        "frames": found.views.n_frames,
+        "views": found.views.n_views,
+        "views_from_behind": found.views.n_from_behind,
+        "corners": len(found.views.seen.px),
+        "adjusted_frames": len(rig.frames),
+        "cameras": cameras,
+        "held_out_frames": board.held_out.tolist(),
+        "held_out_px": board.held_out_rms_px(),
+        "held_out_median_px": float(np.median(board.held_out_px)) if len(board.held_out_px) else None,
+        "volume_m": np.ptp(rig.points_world, axis=0).tolist(),
+        "expected_error_mm": 1000 * rig.volume.expected_m,
+        "interval_mm": [1000 * rig.volume.low_m, 1000 * rig.volume.high_m],
+        "notes": list(board.notes),
+    }
+
+
+def _format(record: dict[str, Any], arguments: CalibrateArguments) -> str:
+    low, high = record["interval_mm"]
+    behind = f", {record['views_from_behind']} of them from behind" if record["views_from_behind"] else ""
+    lines = [
+        f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['corners']} corners in "
+        f"{record['views']} views{behind}",
+    ]
+    width = max(len(c["name"]) for c in record["cameras"])
+    for c in record["cameras"]:
+        off = "  no corner held out" if c["held_out_px"] != c["held_out_px"] else f"{c['held_out_px']:6.2f} px held out"
+        lines.append(
+            f"  {c['name']:{width}}  {c['views']:4} views, focal length {c['focal_px'][0]:7.1f} px "
+            f"+- {c['focal_sigma_percent']:.1f}%, noise {c['noise_px']:.2f} px, {off}"
+        )
+    size = " x ".join(f"{side:.1f}" for side in record["volume_m"])
+    lines.append(
+        f"expected error in the volume of the board ({size} m): {record['expected_error_mm']:.2f} mm, with 90% between "
+        f"{low:.2f} and {high:.2f} mm"
+    )
+    lines += [f"note: {note}" for note in record["notes"]]
+    if arguments.floor_frame is None:
+        first = record["cameras"][0]["name"]
+        lines.append(
+            f"the world is that of camera '{first}', with y down: say --up -y to quadrille new, or name a frame on "
+            "which the board lies on the floor by --floor-frame"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,5 @@
+"""Calibrate cameras by footage of a board: corners, lenses, a graph of shared boards, and one adjustment of all.
+
+Imports `calibration`, `footage` and `formats`; knows no session. Callers use `board_description.read_board`,
+`board_footage.read_corners` and `board_calibration.calibrate_rig`.
+"""
