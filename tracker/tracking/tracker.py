@@ -55,6 +55,9 @@ class TrackingRun:
     regions: Callable[[int], Sequence[Region | None]] | None = None
     """Returns regions of the views of a frame that other runs over the same frames use, too. They are used where they
     hold the prediction."""
+    velocities: Callable[[int], Sequence[Array | None]] | None = None
+    """Returns the velocity of each person on a frame, (n_dofs,), per frame, if another run has found it; otherwise it
+    follows from the prediction. It counts in views whose pictures were taken between frames."""
 
     def __post_init__(self) -> None:
         """Check the poses: from one that is no number, none of the frames after it would be."""
