@@ -34,6 +34,26 @@ class MovedBlock:
         return self.block.linearize(model, moved, model.kinematics(moved))
 
 
+def at_time(block: ResidualBlock, velocity: Array | None, ahead_frames: float) -> ResidualBlock:
+    """Return a block that sees a body some frames later, by its velocity, (n_dofs,); as it is if that is unknown."""
+    return block if velocity is None or ahead_frames == 0.0 else MovedBlock(block, ahead_frames * velocity)
+
+
+@dataclass(frozen=True, eq=False)
+class SummedBlocks:
+    """Several residual blocks as one; see `ResidualBlock`."""
+
+    blocks: Sequence[ResidualBlock]
+
+    def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
+        """See `ResidualBlock`."""
+        found = [b.linearize(model, pose, kinematics) for b in self.blocks]
+        return NormalEquations(
+            sum(f.cost for f in found), np.sum([f.gradient for f in found], axis=0),
+            np.sum([f.hessian for f in found], axis=0),
+        )  # fmt: skip
+
+
 class _Group(NamedTuple):
     """Views whose pictures were taken at the same time."""
 
@@ -78,14 +98,8 @@ class ClockedResiduals:
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`."""
         assert model is self.model
-        cost, gradient, hessian = 0.0, np.zeros(model.n_dofs), np.zeros((model.n_dofs, model.n_dofs))
-        for group in self.groups:
-            block: ResidualBlock = group.residuals
-            if group.ahead_frames != 0.0:
-                block = MovedBlock(block, group.ahead_frames * self.velocity)
-            found = block.linearize(model, pose, kinematics)
-            cost, gradient, hessian = cost + found.cost, gradient + found.gradient, hessian + found.hessian
-        return NormalEquations(cost, gradient, hessian)
+        blocks = [at_time(g.residuals, self.velocity, g.ahead_frames) for g in self.groups]
+        return SummedBlocks(blocks).linearize(model, pose, kinematics)
 
     def costs(self, candidates: Array) -> Array:
         """See `ContourResiduals.costs`."""
