@@ -25,6 +25,7 @@ from app.cli import (
     relink,
     restore,
     simulate,
+    sync,
     track,
 )
 from app.cli import open as open_
@@ -40,6 +41,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "new": new.command,
     "info": info.command,
     "relink": relink.command,
+    "sync": sync.command,
     "index": index.command,
     "init": init.command,
     "acquire": acquire.command,
