@@ -57,7 +57,7 @@ class CameraSource:
         """
         offset = whole_frames(start_frames)
         # Fractions are typed with some digits: 2 - 2.4 would leave -0.3999999999999999.
-        ahead = round(offset - start_frames, 9)
+        ahead = round(float(offset - start_frames), 9)
         return replace(self, offset=offset, clock=Clock(ahead, self.clock.rate if rate is None else rate))
 
 

@@ -1,7 +1,7 @@
 """Offsets between cameras from the sound of their videos.
 
-The sound of two cameras is the same up to a delay and the echoes of the room. Their correlation peaks at the delay. Each
-frequency of a band has equal weight in it (generalized cross-correlation with phase transform: C. Knapp & G. Carter
+The sound of two cameras is the same up to a delay and the echoes of the room. Their correlation peaks at the delay.
+Each frequency of a band has equal weight in it (generalized cross-correlation with phase transform: C. Knapp & G. Carter
 1976). A parabola through the peak gives the delay below a sample. Sound takes 3 ms for a metre.
 """
 
@@ -120,4 +120,4 @@ def _peak(one: FloatArray, other: FloatArray, settings: SoundSettings) -> tuple[
     exact = best + (0.5 * (before - after) / bend if bend < 0 else 0.0)
     around = (np.arange(n) - best + n // 2) % n - n // 2
     elsewhere = found[np.abs(around) > settings.width_s * settings.rate].max()
-    return (exact if exact <= len(other) else exact - n), float(at / max(elsewhere, 1e-30))
+    return float(exact if exact <= len(other) else exact - n), float(at / max(elsewhere, 1e-30))

@@ -117,7 +117,7 @@ def _started(
         if out.offset + session.n_frames > n_frames:
             raise SessionError(
                 f"camera '{name}': expected an offset of at most {n_frames - session.n_frames}, since the session has "
-                f"{session.n_frames} of its {n_frames} frames, found {out.offset}; make the session anew with "
-                "--common-frames and this offset"
+                f"{session.n_frames} of its {n_frames} frames, found {out.offset}; make another "
+                "session of the frames that all cameras then have"
             )
     return out
