@@ -23,15 +23,19 @@ KINDS = MappingProxyType({"rotation": ROTATION, "position": POSITION, "focal": s
 
 def corrected(camera: Camera, correction: Array) -> Camera:
     """Return a camera with a correction, (8,), except that of its clock."""
-    K = camera.K.copy()
+    if not correction[:TIME].any():
+        return camera
+    K, R = camera.K.copy(), so3_exp(correction[ROTATION])
     K[:2, :2] *= np.exp(correction[FOCAL])
-    turned = transform(so3_exp(correction[ROTATION]), -so3_exp(correction[ROTATION]) @ correction[POSITION])
+    turned = transform(R, -R @ correction[POSITION])
     return replace(camera, K=K, T_world_camera=inverse(turned @ camera.T_camera_world))
 
 
 def with_step(correction: Array, step: Array) -> Array:
     """Return a correction, (8,), after a further small step, (8,), in the columns of `columns`."""
     out = correction + step
+    if not step[ROTATION].any():
+        return out
     out[ROTATION] = so3_log(so3_exp(step[ROTATION]) @ so3_exp(correction[ROTATION]))
     return out
 
@@ -59,11 +63,11 @@ def columns(camera: Camera, correction: Array, points_world: Array, px_by_point:
     return out
 
 
-def axes_of(correction: Array) -> dict[str, tuple[float, ...]]:
-    """Return a correction, (8,), in the units of people: degrees, mm, percent and ms."""
+def in_units(correction: Array) -> dict[str, list[float] | float]:
+    """Return a correction, or its standard deviations, (8,), in the units of people: degrees, mm, percent and ms."""
     return {
-        "rotation_deg": tuple(np.degrees(correction[ROTATION]).tolist()),
-        "position_mm": tuple((1000 * correction[POSITION]).tolist()),
-        "focal_percent": (float(100 * np.expm1(correction[FOCAL])),),
-        "time_ms": (float(1000 * correction[TIME]),),
+        "rotation_deg": np.degrees(correction[ROTATION]).tolist(),
+        "position_mm": (1000 * correction[POSITION]).tolist(),
+        "focal_percent": float(100 * np.expm1(correction[FOCAL])),
+        "time_ms": float(1000 * correction[TIME]),
     }

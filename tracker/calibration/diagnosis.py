@@ -5,15 +5,16 @@ lowers the cost by 1/2 b^T S^-1 b. The best are fitted, the best of these is kep
 the evidence is selected again by the corrected cameras, until no hypothesis is worth keeping (forward selection).
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS
+from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, with_step
 from tracker.calibration.rig_problem import RigProblem, RigState
 from tracker.calibration.seen_frames import SeenFrame, seen_people
 from tracker.compute.progress import Report, unreported
@@ -26,8 +27,10 @@ ROTATION_SIGMA, POSITION_SIGMA_M, FOCAL_SIGMA, TIME_SIGMA_FRAMES = float(np.radi
 """Standard deviations of the corrections of a camera in their prior."""
 WORTH_NATS = 4.0
 """Fall of the cost, for each number that a hypothesis corrects, from which it is kept."""
-_FITTED = 3
-"""Number of hypotheses that are fitted before one is kept."""
+_CAMERAS_FITTED, _KINDS_FITTED = 2, 2
+"""Number of cameras, and of kinds of each, that are fitted before one is kept: the most promising ones."""
+_BEGINNINGS = 3
+"""Largest number of cameras that the selection begins with."""
 _MOST = 8
 """Largest number of hypotheses that are kept."""
 _STEPS = 8
@@ -65,6 +68,17 @@ class Kept(NamedTuple):
     """Hypotheses that explained the contours as well when it was kept."""
 
 
+class Step(NamedTuple):
+    """The correction that a hypothesis promises, from the linearized problem."""
+
+    correction: Array
+    """Of its camera, (N_CORRECTIONS,), with those that were kept."""
+    sigma: Array
+    """Standard deviations of the numbers that it corrects, else 0, (N_CORRECTIONS,)."""
+    gain_nats: float
+    """Fall of the cost."""
+
+
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """What contours say of the cameras."""
@@ -75,8 +89,8 @@ class Diagnosis:
     """Of those that are not 0, whatever poses and sizes are, (V * N_CORRECTIONS, V * N_CORRECTIONS)."""
     kept: tuple[Kept, ...]
     """Hypotheses in the order in which they were kept."""
-    gains: Mapping[Hypothesis, float]
-    """Of the hypotheses that were not kept, the fall of the cost by each, nats."""
+    steps: Mapping[Hypothesis, "Step"]
+    """Of each hypothesis that was not kept, the correction that it would make."""
     state: RigState
     """Cameras, sizes and poses that fit the contours."""
 
@@ -107,22 +121,22 @@ def diagnose(
         np.zeros((n_views, N_CORRECTIONS)), tuple(np.zeros(len(p.names)) for p in parameters),
         tuple(b.values for f in frames for b in f.bodies),
     )  # fmt: skip
-    search, kept = _Search(frames, parameters, prior_sigmas(fps)), list[Kept]()
+    search = _Search(frames, parameters, prior_sigmas(fps))
     report("fitting poses to the contours", 0.0)
-    state = search.fitted(state, (), accepts=False).state
-    while True:
-        report("judging the cameras", len(kept) / _MOST)
-        chosen = [k.hypothesis for k in kept]
-        fit = search.fitted(state, chosen)
-        found = search.best(fit, chosen) if len(kept) < _MOST else None
-        if found is None:
+    start = search.fitted(state, (), accepts=False)
+    state = search.fitted(start.state, ()).state
+    best, tried = search.selected(state, (), partial(report, "judging the cameras")), set[int]()
+    # One camera that is off can look like two others that are: begin with other cameras as well.
+    while len(best.cameras) > 1 and len(tried) < _BEGINNINGS:
+        tried |= {k.hypothesis.camera for k in best.kept[:1]}
+        other = search.selected(state, tried, partial(report, "judging the cameras"))
+        if not other.kept:
             break
-        kept.append(found[0])
-        state = found[1]
-    needed, fit = search.without_idle(fit, kept)
+        tried.add(other.kept[0].hypothesis.camera)
+        best = min(best, other, key=lambda s: search.total(start.problem, s))
     report("done", 1.0)
-    gains = _gains(fit, [k.hypothesis for k in needed])
-    return Diagnosis(fit.state.corrections, _covariance(fit), needed, gains, fit.state)
+    steps = _steps(best.fit, [k.hypothesis for k in best.kept])
+    return Diagnosis(best.fit.state.corrections, _covariance(best.fit), best.kept, steps, best.fit.state)
 
 
 class _Fitted(NamedTuple):
@@ -139,11 +153,41 @@ class _Fitted(NamedTuple):
     """Which of them were fitted, (n,)."""
 
 
+class _Selection(NamedTuple):
+    """Hypotheses that were kept, and the rig that they give."""
+
+    kept: tuple[Kept, ...]
+    fit: _Fitted
+
+    @property
+    def cameras(self) -> set[int]:
+        """Indices of the cameras that are off."""
+        return {k.hypothesis.camera for k in self.kept}
+
+
 class _Search:
     """Fits the rig of some frames with various corrections free."""
 
     def __init__(self, frames: Sequence[SeenFrame], parameters: Sequence[SizeParameters], sigmas: Array) -> None:
         self._frames, self._parameters, self._sigmas = frames, parameters, sigmas
+
+    def selected(self, state: RigState, not_first: Collection[int], report: Callable[[float], None]) -> _Selection:
+        """Keep hypotheses one by one until none is worth it; the first is not of some cameras, given by index."""
+        kept = list[Kept]()
+        while True:
+            report(len(kept) / _MOST)
+            chosen = [k.hypothesis for k in kept]
+            fit = self.fitted(state, chosen)
+            found = self.best(fit, chosen, not_first if not kept else ()) if len(kept) < _MOST else None
+            if found is None:
+                return self.without_idle(fit, kept)
+            kept.append(found[0])
+            state = found[1]
+
+    def total(self, problem: RigProblem, selection: _Selection) -> float:
+        """Return the cost of a selection on the evidence of a problem, with the worth that its hypotheses need."""
+        hypotheses = [k.hypothesis for k in selection.kept]
+        return self.refitted(problem, selection.fit.state, hypotheses).cost + sum(map(_needed, hypotheses))
 
     def fitted(self, state: RigState, chosen: Collection[Hypothesis], accepts: bool = True) -> _Fitted:
         """Fit poses, sizes and chosen corrections, on the evidence that the state accepts or on all."""
@@ -164,11 +208,22 @@ class _Search:
             gradient, hessian = found.equations.held(every, own).reduced()
         return _Fitted(problem, found.state, found.cost, hessian, gradient, shared)
 
-    def best(self, fit: _Fitted, chosen: Collection[Hypothesis]) -> tuple[Kept, RigState] | None:
-        """Fit the most promising hypotheses; return the best with its state, or None if none is worth it."""
-        gains = _gains(fit, chosen)
-        promising = sorted((h for h in gains if gains[h] > _needed(h)), key=lambda h: gains[h] - _needed(h))
-        fits = {h: self.refitted(fit.problem, fit.state, {*chosen, h}) for h in promising[-_FITTED:]}
+    def best(
+        self, fit: _Fitted, chosen: Collection[Hypothesis], without: Collection[int]
+    ) -> tuple[Kept, RigState] | None:
+        """Fit the most promising hypotheses; return the best with its state, or None if none is worth it.
+
+        Args:
+            fit: the rig so far.
+            chosen: hypotheses that were kept.
+            without: indices of cameras that are not tried.
+        """
+        steps = {h: s for h, s in _steps(fit, chosen).items() if h.camera not in without}
+        promise = {h: s.gain_nats - _needed(h) for h, s in steps.items() if s.gain_nats > _needed(h)}
+        promising = sorted(promise, key=lambda h: -promise[h])
+        cameras = list(dict.fromkeys(h.camera for h in promising))[:_CAMERAS_FITTED]
+        tried = [h for c in cameras for h in [p for p in promising if p.camera == c][:_KINDS_FITTED]]
+        fits = {h: self.refitted(fit.problem, fit.state, {*chosen, h}) for h in tried}
         worth = {h: fit.cost - found.cost - _needed(h) for h, found in fits.items()}
         best = max(worth, key=lambda h: worth[h], default=None)
         if best is None or worth[best] <= 0:
@@ -176,7 +231,7 @@ class _Search:
         rivals = [h for h in worth if h != best and worth[h] > worth[best] - CLEAR_NATS]
         return Kept(best, fit.cost - fits[best].cost, tuple(rivals)), fits[best].state
 
-    def without_idle(self, fit: _Fitted, kept: Sequence[Kept]) -> tuple[tuple[Kept, ...], _Fitted]:
+    def without_idle(self, fit: _Fitted, kept: Sequence[Kept]) -> _Selection:
         """Drop hypotheses that later ones have made superfluous; return the others with their fit."""
         for candidate in list(kept):
             others = [k for k in kept if k is not candidate]
@@ -187,7 +242,7 @@ class _Search:
             found = self.refitted(fit.problem, state, [k.hypothesis for k in others])
             if found.cost - fit.cost < _needed(candidate.hypothesis):
                 kept, fit = others, found
-        return tuple(kept), fit
+        return _Selection(tuple(kept), fit)
 
 
 def _needed(hypothesis: Hypothesis) -> float:
@@ -195,20 +250,22 @@ def _needed(hypothesis: Hypothesis) -> float:
     return WORTH_NATS * len(hypothesis.columns)
 
 
-def _gains(fit: _Fitted, chosen: Collection[Hypothesis]) -> dict[Hypothesis, float]:
-    """Return the fall of the cost that each further hypothesis promises, nats."""
+def _steps(fit: _Fitted, chosen: Collection[Hypothesis]) -> dict[Hypothesis, Step]:
+    """Return the correction that each further hypothesis promises."""
     base, out = np.flatnonzero(fit.free), {}
     H_base = fit.hessian[np.ix_(base, base)]
-    for camera in range(len(fit.state.corrections)):
-        for kind in KINDS:
+    for camera, present in enumerate(fit.state.corrections):
+        for kind, own in KINDS.items():
             h = Hypothesis(camera, kind)
             if h in chosen:
                 continue
             across = fit.hessian[np.ix_(h.columns, base)]
             solved = np.linalg.solve(H_base, np.column_stack([across.T, fit.gradient[base]]))
-            S = fit.hessian[np.ix_(h.columns, h.columns)] - across @ solved[:, :-1]
+            covariance = np.linalg.inv(fit.hessian[np.ix_(h.columns, h.columns)] - across @ solved[:, :-1])
             b = fit.gradient[h.columns] - across @ solved[:, -1]
-            out[h] = 0.5 * float(b @ np.linalg.solve(S, b))
+            step, sigma = np.zeros(N_CORRECTIONS), np.zeros(N_CORRECTIONS)
+            step[own], sigma[own] = -covariance @ b, np.sqrt(np.diag(covariance))
+            out[h] = Step(with_step(present, step), sigma, 0.5 * float(b @ covariance @ b))
     return out
 
 

@@ -14,17 +14,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.acquisition.part_motions import N_MOTIONS, motions_by_unknowns, rows_of_pieces
+from tracker.acquisition.part_motions import motions_by_unknowns
 from tracker.acquisition.size_parameters import SizeArrays, SizeParameters
+from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody
-from tracker.calibration.camera_correction import N_CORRECTIONS, TIME, columns, corrected, with_step
+from tracker.calibration.camera_correction import N_CORRECTIONS, ROTATION, TIME, corrected, with_step
+from tracker.calibration.rig_kernels import N_CAMERA, N_PART, sum_pieces
 from tracker.compute.threads import map_parallel
 from tracker.contours.surfaces import Surfaces
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.bundle import ArrowEquations
-from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.contour_residuals import ContourResiduals, PieceSums
 from tracker.fitting.gauss_newton import NormalEquations, PosePrior, pressed_against_limit
 from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera
+from tracker.geometry.rigid import so3_exp
 
 SIZE_KINDS = ("height", "build", "length", "girth", "end", "free_end", "side", "joint")
 """Kinds of sizes that are found together with the cameras, see `SizePriors`: a body of other sizes looks like a
@@ -92,14 +96,14 @@ class RigProblem:
         """
         self._seen, self._parameters = seen, parameters
         self._sigmas = np.tile(sigmas, (len(corrections), 1))
-        self._free_corrections = np.zeros(self._sigmas.shape, np.bool_)
+        self._free_corrections, self._has_free_sizes = np.zeros(self._sigmas.shape, np.bool_), True
         self._views = map_parallel(lambda s: _views_of(s, corrections), seen)
         self._priors = [PosePrior.of_spreads(p.base) for p in parameters]
 
-    def with_free(self, corrections: NDArray[np.bool_]) -> "RigProblem":
-        """Return the same problem in which some corrections may change, (V, N_CORRECTIONS); at first none may."""
+    def with_free(self, corrections: NDArray[np.bool_], sizes: bool = True) -> "RigProblem":
+        """Return the same problem in which some corrections may change, (V, N_CORRECTIONS), and the sizes or not."""
         out = copy(self)
-        out._free_corrections = corrections
+        out._free_corrections, out._has_free_sizes = corrections, sizes
         return out
 
     @cached_property
@@ -133,7 +137,7 @@ class RigProblem:
 
     def free(self, state: RigState, equations: ArrowEquations) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """See `BundleProblem`."""
-        sizes = [p.of_kinds(*SIZE_KINDS) for p in self._parameters]
+        sizes = [p.of_kinds(*SIZE_KINDS) & self._has_free_sizes for p in self._parameters]
         own = np.zeros(equations.own_gradients.shape, np.bool_)
         for seen, pose, gradient, out in zip(self._seen, state.poses, equations.own_gradients, own, strict=True):
             model = self._model(seen)
@@ -191,21 +195,17 @@ class RigProblem:
         for delay, views in itertools.groupby(self._views[group], lambda v: float(state.corrections[v.camera, TIME])):
             assert surfaces is not None
             then = body.retract(pose, delay * seen.velocity) if delay else pose
-            kinematics, of_body = body.kinematics(then), np.zeros((len(body.parts), N_MOTIONS, N_MOTIONS))
-            J = motions_by_unknowns(body, kinematics, by_sizes)
+            kinematics, of_body = body.kinematics(then), np.zeros((len(body.parts), N_PART, N_PART))
+            J = motions_by_unknowns(body, kinematics, by_sizes)[:, :N_PART]
             moving, pulls = J[:, :, n_sizes:] @ seen.velocity, np.zeros(J.shape[:2])
             for view in views:
                 correction = state.corrections[view.camera]
                 camera = corrected(view.evidence.camera, correction)
                 own_cost, pieces = view.residuals.with_surfaces(body, surfaces).with_camera(camera).piece_sums(then)
                 cost += own_cost
-                if not pieces.hessians.any():
-                    continue
-                rows = rows_of_pieces([(camera, pieces)], body, kinematics, with_shapes=False)
-                of_camera = columns(camera, correction, rows.points_world, rows.px_by_point)
-                b, M = rows.with_columns(of_camera).sums(len(body.parts))
-                pulls += b[:, :N_MOTIONS]
-                of_body += M[:, :N_MOTIONS, :N_MOTIONS]
+                b, M = sums_of_pieces(pieces, body, kinematics, camera, correction)
+                pulls += b[:, :N_PART]
+                of_body += M[:, :N_PART, :N_PART]
                 sums.add_camera(view.camera, b, M, J, moving)
             sums.add_body(pulls, of_body, J)
         out = sums.equations(cost)
@@ -231,6 +231,34 @@ class _Resized(NamedTuple):
     """Derivatives of its sizes."""
     surfaces: Surfaces | None
     """Its shapes, and those of other people; None where no view shows it."""
+
+
+def sums_of_pieces(
+    pieces: PieceSums, body: BodyModel, kinematics: Kinematics, camera: Camera, correction: Array
+) -> tuple[Array, Array]:
+    """Sum the residuals of a view by the motions of parts and the corrections of its camera; see `rig_kernels`.
+
+    Args:
+        pieces: residuals of the view.
+        body: at its present sizes.
+        kinematics: of its pose.
+        camera: with the correction.
+        correction: (N_CORRECTIONS,).
+
+    Returns:
+        Gradients, (n_parts, N_PART + N_CAMERA), and normal matrices, (n_parts, N_PART + N_CAMERA, N_PART + N_CAMERA).
+    """
+    n_parts, k = len(body.parts), N_PART + N_CAMERA
+    b, M = np.zeros((n_parts, k)), np.zeros((n_parts, k, k))
+    half_axes = np.array([s.half_axes for s in body.shapes])
+    turn = so3_exp(correction[ROTATION]) if correction[ROTATION].any() else np.eye(3)
+    sum_pieces(
+        *(pieces.parts, pieces.unit_points, pieces.gradients, pieces.hessians),
+        *(kinematics.Ts_world_part, body.centers_part, half_axes, camera.T_camera_world, camera.K, turn, b, M),
+    )
+    below = np.tril_indices(k, -1)
+    M[:, below[0], below[1]] = M[:, below[1], below[0]]
+    return b, M
 
 
 class GroupSums(NamedTuple):
@@ -259,16 +287,16 @@ class GroupSums(NamedTuple):
             camera: index of the camera.
             b: gradients by the motions of parts and the corrections but that of the clock, (n_parts, k).
             M: their normal matrices, (n_parts, k, k).
-            J: derivatives of the motions by the unknowns of the body, (n_parts, N_MOTIONS, n_body).
-            moving: motions of the parts in a second, (n_parts, N_MOTIONS).
+            J: derivatives of the motions by the unknowns of the body, (n_parts, N_PART, n_body).
+            moving: motions of the parts in a second, (n_parts, N_PART).
         """
         first = camera * N_CORRECTIONS
         at, clock, body = slice(first, first + TIME), first + TIME, slice(self.n_cameras, None)
-        to_body, to_camera = M[:, :N_MOTIONS, :N_MOTIONS], M[:, N_MOTIONS:, :N_MOTIONS]
+        to_body, to_camera = M[:, :N_PART, :N_PART], M[:, N_PART:, :N_PART]
         moved = np.einsum("pij,pj->pi", to_body, moving)
-        self.gradient[at] += b[:, N_MOTIONS:].sum(axis=0)
-        self.gradient[clock] += np.sum(b[:, :N_MOTIONS] * moving)
-        self.hessian[at, at] += M[:, N_MOTIONS:, N_MOTIONS:].sum(axis=0)
+        self.gradient[at] += b[:, N_PART:].sum(axis=0)
+        self.gradient[clock] += np.sum(b[:, :N_PART] * moving)
+        self.hessian[at, at] += M[:, N_PART:, N_PART:].sum(axis=0)
         self.hessian[at, clock] += np.einsum("pij,pj->i", to_camera, moving)
         self.hessian[clock, clock] += np.sum(moved * moving)
         flat = J.reshape(-1, J.shape[2])

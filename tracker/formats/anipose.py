@@ -42,6 +42,11 @@ def read_calibration(path: str | Path) -> tuple[Camera, ...]:
 
 def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
     """Write cameras, in metres. `read_calibration` reads them back to 12 digits and in the same order."""
+    write_text_atomic(Path(path), format_calibration(cameras))
+
+
+def format_calibration(cameras: Sequence[Camera]) -> str:
+    """Format cameras as `write_calibration` writes them."""
     data: dict[str, Any] = {}
     for c in cameras:
         data[c.name] = {
@@ -54,7 +59,7 @@ def write_calibration(path: str | Path, cameras: Sequence[Camera]) -> None:
             "fisheye": c.fisheye,
         }
     data["metadata"] = {"adjusted": False, "error": 0.0}
-    write_text_atomic(Path(path), tomli_w.dumps(data))
+    return tomli_w.dumps(data)
 
 
 def _sections(data: dict[str, Any], where: str) -> dict[str, Any]:

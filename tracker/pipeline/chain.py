@@ -17,6 +17,7 @@ from tracker.footage.recording import Recording
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.initialization.first_pose import FirstPoses
 from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
+from tracker.pipeline.calibration_revisions import follow_history
 from tracker.pipeline.find_people import FindSettings, find_people, sentences, store_found
 from tracker.pipeline.stored_run import TrackPlan, is_interrupted, stored_run
 from tracker.pipeline.track_session import Step, TrackSession
@@ -220,6 +221,7 @@ def open_stored_session(session: Session) -> Iterator[StoredSession]:
     with (
         SessionLock(session.folder),
         closing(AnnotationStore(session.annotations_path)) as store,
-        Recording(session.cameras) as recording,
     ):
-        yield StoredSession(session, store, Observer(session.cameras, recording))
+        session = follow_history(session, store)
+        with Recording(session.cameras) as recording:
+            yield StoredSession(session, store, Observer(session.cameras, recording))

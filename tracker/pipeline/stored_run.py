@@ -148,6 +148,11 @@ def _frames_left(store: AnnotationStore, plan: TrackPlan) -> list[Sequence[int]]
     return legs
 
 
+def forget_unfinished(store: AnnotationStore) -> None:
+    """Forget an interrupted run, so that the same plan begins anew."""
+    store.set_setting(_UNFINISHED, None)
+
+
 def is_interrupted(store: AnnotationStore, plan: TrackPlan) -> bool:
     """Return whether a run of this plan was interrupted, so that it goes on there."""
     unfinished = store.setting(_UNFINISHED)

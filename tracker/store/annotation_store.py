@@ -104,6 +104,11 @@ class AnnotationStore:
             frames,
         )
 
+    def pose_edits(self, person: str) -> dict[int, int]:
+        """Return the entry of the history that made each pose of a person, by frame, ascending."""
+        sql = f"SELECT p.frame, c.edit {rows.CURRENT_POSES} WHERE p.person = ? ORDER BY p.frame"
+        return dict(self._connection.all(sql, (person,), lambda row: (int(row[0]), int(row[1]))))
+
     def alternatives(self, person: str, frame: int) -> tuple[Alternative, ...]:
         """Return the alternatives to a person's pose in a frame, best first."""
         found = self._connection.all(
@@ -174,6 +179,10 @@ class AnnotationStore:
     def history(self, limit: int = 100) -> list[HistoryEntry]:
         """List the edits that redo and undo can reach, latest first, at most `limit` of each."""
         return self._edits.history(limit)
+
+    def done_edits(self) -> list[int]:
+        """List the entries of the history that are done, ascending."""
+        return self._edits.done()
 
     def frames_of(self, edit: int) -> list[int]:
         """List the frames whose poses or pins an edit changes, ascending."""

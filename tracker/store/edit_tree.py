@@ -89,6 +89,14 @@ class EditTree:
         done = self._entries("(SELECT edit FROM head)", "line.parent", limit)
         return [entry._replace(undone=True) for entry in reversed(undone)] + done
 
+    def done(self) -> list[int]:
+        """List the edits that are done, ascending."""
+        sql = (
+            "WITH RECURSIVE line (id) AS (SELECT edit FROM head UNION ALL SELECT parent FROM line JOIN edits "
+            "USING (id)) SELECT id FROM line WHERE id IS NOT NULL ORDER BY id"
+        )
+        return self._connection.all(sql, (), lambda row: int(row[0]))
+
     def frames_of(self, edit: int) -> list[int]:
         """List the frames whose poses or pins an edit changes, ascending."""
         sql = "SELECT frame FROM pose_changes WHERE edit = ?1 UNION SELECT frame FROM pin_changes WHERE edit = ?1"

@@ -32,6 +32,11 @@ class _Chain(msgspec.Struct):
     done: list[Literal["backward", "forward"]]
 
 
+class _Calibration(msgspec.Struct):
+    toml: str
+    time: str
+
+
 class _Floor(msgspec.Struct):
     up: Literal["x", "y", "z", "-x", "-y", "-z"]
     normal: Vector | None = None
@@ -56,6 +61,8 @@ _DECLARATIONS: Mapping[str, Any] = {
     "store_id": Name,
     "locked": dict[Name, _Names],
     "sizes_edits": dict[_IdText, list[tuple[Name, _Id, _Id] | str | int]],
+    "calibrations": list[_Calibration],
+    "calibration_edits": dict[_IdText, tuple[_Id, _Id]],
     "confirmed_keyframes": dict[Name, dict[_FrameText, Annotated[int, Meta(ge=0, lt=2**32)]]],
     "silhouette_axes": _Axes | None,
     "find people": _Chain | None,

@@ -1,0 +1,156 @@
+"""`quadrille check`: find the cameras whose calibration the contours of tracked people contradict, and correct them."""
+
+from contextlib import closing
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from app.cli.arguments import OptionalRange, SessionArg
+from app.cli.target import parse_frames
+from app.runtime.json_output import format_json
+from app.runtime.progress import Reporter
+from tracker.errors import TrackerError
+
+if TYPE_CHECKING:
+    from tracker.calibration.findings import CameraFinding
+    from tracker.calibration.single_frames import FrameScore
+    from tracker.pipeline.calibration_check import CalibrationCheck
+    from tracker.session.session import Session
+
+
+@dataclass(frozen=True)
+class CheckArguments:
+    """Arguments of `quadrille check`."""
+
+    session: SessionArg
+    """session folder."""
+    frames: OptionalRange = None
+    """A:B, half open; all by default."""
+    max_frames: int = 20
+    """largest number of frames of diverse poses that are used: 3 find the camera, 20 measure its correction."""
+    apply: bool = False
+    """correct the cameras that are named, if other frames confirm it; the page undoes it."""
+    json: bool = False
+    """print one JSON object; docs/calibration.md lists its keys."""
+
+
+def command(arguments: Annotated[CheckArguments, tyro.conf.arg(name="")]) -> None:
+    """Find the cameras whose calibration the contours of tracked people contradict.
+
+    Needs poses, tracked with the present calibration. Says which camera is off, by how much, since which frame, and
+    the correction with its standard deviation. Ctrl+C stops it and changes nothing.
+    """
+    from tracker.session.session import load_session
+
+    session = load_session(arguments.session)
+    frames = parse_frames(arguments.frames, session)
+    if arguments.max_frames < 3:
+        raise TrackerError(f"expected --max-frames as a number from 3, found {arguments.max_frames}")
+    found = check(session, frames, arguments.max_frames, arguments.apply, Reporter(silent=arguments.json))
+    print(format_json(found) if arguments.json else _format(found))
+
+
+def check(session: "Session", frames: range, n: int, applies: bool, progress: Reporter) -> dict[str, Any]:
+    """Check the cameras of a session; correct them if asked.
+
+    Returns:
+        The object that `--json` prints.
+
+    Raises:
+        TrackerError: there are fewer than two cameras, or too few frames with poses; or the correction does not hold on
+            other frames.
+    """
+    from tracker.evidence.observer import Observer
+    from tracker.footage.recording import Recording
+    from tracker.pipeline.calibration_check import PosedRecording, check_calibration, held_out_scores
+    from tracker.session.relink import require_files
+
+    require_files(session)
+    with Recording(session.cameras) as recording, progress.share("checking the cameras") as advance:
+
+        def report(stage: str, share: float, text: str = "", /) -> None:
+            advance(share)
+
+        posed = PosedRecording(session, Observer(session.cameras, recording))
+        found = check_calibration(posed, frames, n, report)
+        scores = held_out_scores(posed, found, n, report) if found.named else []
+    out = _as_json(found, scores)
+    if applies:
+        out["applied"] = _apply(session, found, scores)
+    return out
+
+
+def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameScore"]]) -> list[str]:
+    """Correct the named cameras; return their names."""
+    from tracker.pipeline.calibration_revisions import apply_check
+    from tracker.session.lock import SessionLock
+    from tracker.store.annotation_store import AnnotationStore
+
+    if not found.named:
+        return []
+    found.require_applicable(scores)
+    with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
+        apply_check(session, store, found)
+    return list(found.named)
+
+
+def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameScore"]]) -> dict[str, Any]:
+    better = sum(after.cost < before.cost for before, after in scores)
+    return {
+        "named": list(found.named),
+        "cameras": [_camera(c, found.since.get(c.name)) for c in found.cameras],
+        "explained": {
+            "frames": list(found.frames),
+            "nats": sum(c.gain_nats for c in found.cameras if c.kinds),
+            "held_out_frames": len(scores),
+            "held_out_better": better,
+            "sentences": found.sentences,
+        },
+    }
+
+
+def _camera(finding: "CameraFinding", since: int | None) -> dict[str, Any]:
+    from tracker.calibration.camera_correction import in_units
+
+    return {
+        "name": finding.name,
+        "misfit_px": finding.misfit_px,
+        "misfit_mm": finding.misfit_mm,
+        **in_units(finding.correction),
+        "sigma": in_units(finding.sigma),
+        "kind": "+".join(finding.kinds) or None,
+        "as_well": list(finding.rivals),
+        "since_frame": since,
+    }
+
+
+def _format(found: dict[str, Any]) -> str:
+    lines = found["explained"]["sentences"] or ["no camera is off: the contours agree with the calibration"]
+    for camera in found["cameras"]:
+        if camera["kind"] is not None:
+            lines = [*lines, *_correction_lines(camera)]
+    n = found["explained"]["held_out_frames"]
+    if n:
+        lines = [*lines, f"of {n} other frames, {found['explained']['held_out_better']} fit better with it"]
+    if found.get("applied"):
+        lines = [*lines, "corrected; track again, because the poses are still those of the calibration before"]
+    elif found["named"]:
+        lines = [*lines, "say --apply to correct it"]
+    return "\n".join(lines)
+
+
+def _correction_lines(camera: dict[str, Any]) -> list[str]:
+    sigma, lines = camera["sigma"], []
+    units = {"rotation_deg": "turned by (deg)", "position_mm": "moved by (mm)"}
+    for key, words in units.items():
+        if any(camera[key]):
+            numbers = ", ".join(f"{v:.2f} ± {s:.2f}" for v, s in zip(camera[key], sigma[key], strict=True))
+            lines.append(f"  {camera['name']} {words} right, down, forward: {numbers}")
+    if camera["focal_percent"]:
+        lines.append(
+            f"  {camera['name']} focal length: {camera['focal_percent']:+.2f} ± {sigma['focal_percent']:.2f} %"
+        )
+    if camera["time_ms"]:
+        lines.append(f"  {camera['name']} clock: {camera['time_ms']:+.1f} ± {sigma['time_ms']:.1f} ms")
+    return lines

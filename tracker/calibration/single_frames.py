@@ -1,0 +1,82 @@
+"""Judge corrections of cameras frame by frame: since when a camera is off, and whether a correction helps elsewhere."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.acquisition.size_parameters import SizeParameters
+from tracker.calibration.camera_correction import N_CORRECTIONS
+from tracker.calibration.rig_problem import RigProblem, RigState
+from tracker.calibration.seen_frames import SeenFrame, seen_people
+from tracker.fitting.bundle import solve_bundle
+from tracker.fitting.hypothesis import CLEAR_NATS
+from tracker.geometry.arrays import Array
+
+_STEPS = 8
+"""Largest number of Gauss-Newton steps of the poses of a frame."""
+
+
+class FrameScore(NamedTuple):
+    """What one frame says of corrections, with its poses at their best."""
+
+    frame: int
+    cost: float
+    """Half the weighted sum of squares, nats."""
+    gradient: Array
+    """Derivative of the cost by further corrections of all cameras, (V * N_CORRECTIONS,)."""
+    hessian: Array
+    """Second derivative, (V * N_CORRECTIONS, V * N_CORRECTIONS)."""
+
+
+def score_frame(
+    frame: SeenFrame, parameters: Sequence[SizeParameters], sizes: Sequence[Array], corrections: Array, sigmas: Array
+) -> FrameScore:
+    """Fit the poses of a frame to all contours under given cameras and sizes.
+
+    Args:
+        frame: people on the frame.
+        parameters: of each person's body.
+        sizes: of each person, (n_sizes,).
+        corrections: of each camera, (V, N_CORRECTIONS).
+        sigmas: standard deviations of corrections in their prior, (N_CORRECTIONS,).
+    """
+    state = RigState(corrections, tuple(sizes), tuple(b.values for b in frame.bodies))
+    nothing = np.zeros(corrections.shape, np.bool_)
+    problem = RigProblem(seen_people([frame]), parameters, sigmas, corrections).with_free(nothing, sizes=False)
+    found = solve_bundle(problem, state, _STEPS)
+    n = corrections.size
+    cameras = np.arange(len(found.equations.gradient)) < n
+    gradient, hessian = found.equations.held(cameras, problem.free(found.state, found.equations)[1]).reduced()
+    prior = np.tile(1 / sigmas**2, len(corrections))
+    held = corrections.ravel()
+    cost = found.cost - 0.5 * float(np.sum(prior * held**2))
+    return FrameScore(frame.frame, cost, gradient[:n] - prior * held, hessian[:n, :n] - np.diag(prior))
+
+
+class Change(NamedTuple):
+    """The frame from which on a correction explains the contours best."""
+
+    first: int
+    """Index of the first score from which on the camera is off; 0 if it always is."""
+    gain_nats: float
+    """Fall of the cost against a camera that is off on all frames, or that never changes."""
+
+
+def find_change(scores: Sequence[FrameScore], camera: int, columns: Array, sigmas: Array) -> Change:
+    """Find since when a camera is off, by the likelihood of each frame (a change point; Page 1954).
+
+    Args:
+        scores: of frames in order, with the present cameras.
+        camera: index of the camera.
+        columns: indices of the numbers that are corrected, (n,), within those of a camera.
+        sigmas: standard deviations of corrections in their prior, (N_CORRECTIONS,).
+    """
+    at = camera * N_CORRECTIONS + columns
+    prior = np.diag(1 / sigmas[columns] ** 2)
+    b = np.cumsum([s.gradient[at] for s in scores][::-1], axis=0)[::-1]
+    S = np.cumsum([s.hessian[np.ix_(at, at)] for s in scores][::-1], axis=0)[::-1]
+    gains = [0.5 * float(g @ np.linalg.solve(H + prior, g)) for g, H in zip(b, S, strict=True)]
+    first = int(np.argmax(gains))
+    gain = gains[first] - gains[0]
+    return Change(first, gain) if gain > CLEAR_NATS else Change(0, gain)

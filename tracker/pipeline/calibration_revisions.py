@@ -1,0 +1,171 @@
+"""Revisions of the calibration of a session: corrections are entries of the history, and poses name theirs.
+
+A revision is a calibration with a number from 1 on, stored for good. The session's calibration is that of the last
+entry of the history that changed it. A pose belongs to the revision that was present when it was made: that of the last
+such entry before its own.
+"""
+
+import math
+import tomllib
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from tracker.calibration.camera_correction import corrected
+from tracker.errors import SessionError
+from tracker.files import refuse_links, write_text_atomic
+from tracker.formats.anipose import format_calibration
+from tracker.geometry.arrays import Array
+from tracker.pipeline.calibration_check import CalibrationCheck
+from tracker.pipeline.stored_run import forget_unfinished
+from tracker.session.session import CALIBRATION_FILE, Session, load_session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.edit_tree import now
+
+CALIBRATIONS = "calibrations"
+"""Setting of the session: the revisions, in order, each with its text as `toml` and its `time`."""
+CALIBRATION_EDITS = "calibration_edits"
+"""Setting of the session: by entry of the history, the revisions before and after it."""
+
+
+def apply_check(session: Session, store: AnnotationStore, check: CalibrationCheck) -> Session:
+    """Correct the cameras that a check names, as one entry of the history.
+
+    Args:
+        session: the session, which this process has locked.
+        store: its annotations.
+        check: what it says.
+
+    Returns:
+        The session with the corrected cameras. Poses stay as they are.
+
+    Raises:
+        SessionError: no camera is named, or the folder cannot be written.
+    """
+    if not check.named:
+        raise SessionError("expected a camera that is off, found none; the calibration stays as it is")
+    corrected_session = with_corrections(session, check.corrections)
+    return change_calibration(session, store, corrected_session, f"calibration of {', '.join(check.named)} corrected")
+
+
+def with_corrections(session: Session, corrections: Array) -> Session:
+    """Return a session with corrected cameras, (V, N_CORRECTIONS). Nothing is stored."""
+    cameras = tuple(
+        replace(source, camera=corrected(source.camera, c)) if np.any(c) else source
+        for source, c in zip(session.cameras, corrections, strict=True)
+    )
+    return replace(session, cameras=cameras)
+
+
+def change_calibration(session: Session, store: AnnotationStore, changed: Session, label: str) -> Session:
+    """Give a session other cameras, as one entry of the history that undo reverts.
+
+    Args:
+        session: the session, which this process has locked.
+        store: its annotations.
+        changed: the same session with other cameras.
+        label: of the entry.
+    """
+    before = _revision(store, _text(session))
+    after = _revision(store, _text(changed))
+    forget_unfinished(store)  # An interrupted run would go on under another calibration.
+    edit = store.commit(label, []).edit
+    edits = store.setting(CALIBRATION_EDITS, {})
+    store.set_setting(CALIBRATION_EDITS, {**edits, str(edit): [before, after]})
+    return _write(session, _text(changed))
+
+
+def follow_history(session: Session, store: AnnotationStore) -> Session:
+    """Give a session the calibration that belongs to its history, after undo, redo, or a change that was cut off.
+
+    A calibration that is no revision stays: somebody has replaced the file.
+    """
+    revision = present_revision(store)
+    known = [r["toml"] for r in store.setting(CALIBRATIONS, [])]
+    if revision is None or _same(_text(session), known[revision - 1]):
+        return session
+    if not any(_same(_text(session), text) for text in known):
+        return session
+    return _write(session, known[revision - 1])
+
+
+def present_revision(store: AnnotationStore) -> int | None:
+    """Return the number of the present calibration; None if it has never been changed."""
+    edits = _edits(store)
+    done = set(store.done_edits())
+    applied = [after for edit, (_, after) in edits.items() if edit in done]
+    return applied[-1] if applied else min((before for before, _ in edits.values()), default=None)
+
+
+def revisions_of_poses(store: AnnotationStore, person: str) -> dict[int, int]:
+    """Return the revision of the calibration that each pose of a person was made with, by frame.
+
+    It is empty if the calibration has never been changed.
+    """
+    edits = _edits(store)
+    if not edits:
+        return {}
+    done = set(store.done_edits())
+    applied = [edit for edit in edits if edit in done]
+    first = min(before for before, _ in edits.values())
+    of_entries = [first, *(edits[edit][1] for edit in applied)]
+    return {frame: of_entries[bisect_right(applied, edit)] for frame, edit in store.pose_edits(person).items()}
+
+
+def outdated_frames(session: Session, store: AnnotationStore) -> dict[str, list[int]]:
+    """Return the frames on which people have poses of an earlier calibration, by name; nobody without such frames."""
+    present, out = present_revision(store), {}
+    for person in session.people:
+        found = [k for k, r in revisions_of_poses(store, person.name).items() if r != present]
+        if found:
+            out[person.name] = found
+    return out
+
+
+def _edits(store: AnnotationStore) -> dict[int, tuple[int, int]]:
+    """Return the revisions before and after each entry of the history that changed the calibration, ascending."""
+    stored: Mapping[str, tuple[int, int]] = store.setting(CALIBRATION_EDITS, {})
+    return {int(edit): (int(stored[edit][0]), int(stored[edit][1])) for edit in sorted(stored, key=int)}
+
+
+def _revision(store: AnnotationStore, text: str) -> int:
+    """Return the number of a calibration, which is stored if it is new."""
+    known = store.setting(CALIBRATIONS, [])
+    for number, revision in enumerate(known, 1):
+        if _same(revision["toml"], text):
+            return number
+    store.set_setting(CALIBRATIONS, [*known, {"toml": text, "time": now()}])
+    return len(known) + 1
+
+
+def _same(text: str, other: str) -> bool:
+    """Return whether two calibrations are equal but for rounding: writing keeps 12 digits."""
+    return _alike(tomllib.loads(text), tomllib.loads(other))
+
+
+def _alike(a: object, b: object) -> bool:
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_alike(v, b[k]) for k, v in a.items())
+    if isinstance(a, list) and isinstance(b, list):
+        return len(a) == len(b) and all(map(_alike, a, b))
+    if isinstance(a, float) and isinstance(b, float):
+        return math.isclose(a, b, rel_tol=1e-9, abs_tol=1e-9)
+    return a == b
+
+
+def _text(session: Session) -> str:
+    return format_calibration([c.camera for c in session.cameras])
+
+
+def _write(session: Session, text: str) -> Session:
+    """Write a calibration, and return the session as it then is."""
+    refuse_links(session.folder, CALIBRATION_FILE)
+    try:
+        write_text_atomic(session.folder / CALIBRATION_FILE, text)
+    except OSError as error:
+        raise SessionError(
+            f"cannot write {session.folder / CALIBRATION_FILE}: {error}; see that you may write to the folder"
+        ) from error
+    return load_session(session.folder)
