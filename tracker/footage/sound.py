@@ -1,8 +1,8 @@
 """Offsets between cameras from the sound of their videos.
 
 The sound of two cameras is the same up to a delay and the echoes of the room. Their correlation peaks at the delay.
-Each frequency of a band has equal weight in it (generalized cross-correlation with phase transform: C. Knapp & G. Carter
-1976). A parabola through the peak gives the delay below a sample. Sound takes 3 ms for a metre.
+Each frequency of a band has equal weight in it (generalized cross-correlation with phase transform: C. Knapp and
+G. Carter 1976). A parabola through the peak gives the delay below a sample. Sound takes 3 ms for a metre.
 """
 
 from dataclasses import dataclass
