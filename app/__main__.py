@@ -29,7 +29,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
-from app.cli.calibration import calibrate, check
+from app.cli.calibration import calibrate, check, sync
 from app.remedies import command_line_text
 from app.runtime import process_exit
 from app.runtime.log_limit import limit_log
@@ -43,6 +43,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "calibrate": calibrate.command,
     "info": info.command,
     "relink": relink.command,
+    "sync": sync.command,
     "index": index.command,
     "init": init.command,
     "body": body.command,

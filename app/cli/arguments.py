@@ -1,5 +1,6 @@
 """Arguments that several commands share: SESSION, options that may be left out, and words such as NAME=VALUE."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar
@@ -37,6 +38,18 @@ def parse_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> 
         except ValueError:
             raise TrackerError(f"expected {option} as NAME=VALUE, found '{word}'") from None
     return out
+
+
+def finite(text: str) -> float:
+    """Parse a finite number.
+
+    Raises:
+        ValueError: it is none.
+    """
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError
+    return value
 
 
 def parse_common_or_pairs(words: Sequence[str], option: str, kind: Callable[[str], T]) -> Mapping[str, T] | T | None:

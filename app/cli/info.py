@@ -53,6 +53,8 @@ def summarize(session: "Session") -> dict[str, Any]:
                 "background": c.background is not None,
                 "masks": c.masks is not None,
                 "offset": c.offset,
+                "time_offset_s": c.clock.ahead_frames / session.fps,
+                "time_rate": c.clock.rate,
                 "missing": [m.kind for m in missing if m.camera == c.camera.name],
             }
             for c in session.cameras

@@ -16,6 +16,7 @@ from app.cli.arguments import (
     OptionalNumber,
     OptionalPath,
     Paths,
+    finite,
     parse_common_or_pairs,
     parse_pairs,
 )
@@ -42,7 +43,7 @@ class NewArguments:
     masks: OptionalPath = None
     """folder of CAM/%06d.png by video frame; 0 is background."""
     offset: NamedValues = ()
-    """CAM=N: frame k of the session is frame k + N of this camera."""
+    """CAM=N: frame k of the session is frame k + N of this camera; N may have a fraction, such as 2.4."""
     people: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME ...")] = ("person",)
     """names of the people."""
     model: CommonOrNamed = ()
@@ -81,7 +82,7 @@ def command(arguments: Annotated[NewArguments, tyro.conf.arg(name="")]) -> None:
         cameras=arguments.cameras,
         background=arguments.background,
         masks=arguments.masks,
-        offsets=parse_pairs(arguments.offset, "--offset", int),
+        offsets=parse_pairs(arguments.offset, "--offset", finite),
         people=arguments.people,
         models=_models(arguments) or DEFAULT_MODEL,
         heights=parse_common_or_pairs(arguments.height, "--height", float),

@@ -3,6 +3,7 @@
 import numpy as np
 
 from app.drawing.overlays import Path
+from app.drawing.seen_bodies import bodies_in, picture_times
 from app.state.page_view import View
 from app.state.state import State
 from tracker.geometry.arrays import Array
@@ -25,8 +26,9 @@ def error_ellipses(session: Session, state: State, view: View) -> list[Path]:
     if "errors" not in view.layers or shown.errors is None or person in state.undrawn:
         return []
     info, out = session.people[person], []
-    points = info.model.points_world(shown.values)
-    for index in sorted(view.cameras):
+    body = bodies_in(session, state)[person]
+    for index, time in picture_times(session, state.frame, view.cameras).items():
+        points = body.ahead(time).points_world
         outlines_px = ellipses(
             session.cameras[index].camera.pinhole, points, shown.errors, _MIN_SEMI_AXIS_PX * view.reductions[index]
         )

@@ -4,6 +4,7 @@ import numpy as np
 
 from app.drawing.overlay_colors import KIND_COLORS
 from app.drawing.overlays import Path
+from app.drawing.seen_bodies import picture_times
 from app.state.page_view import View
 from app.state.state import State
 from tracker.body.model import PosedBody
@@ -24,11 +25,10 @@ def former_limb_lines(session: Session, state: State, view: View) -> list[Path]:
             continue
         model = state.models[person]
         values = copy_dofs(model, state.poses[person], last.before[person].values, move.limb.dofs)
-        for index in sorted(view.cameras):
+        body = PosedBody(model, values, state.velocity(person))
+        for index, time in picture_times(session, state.frame, view.cameras).items():
             camera = session.cameras[index].camera.pinhole
-            contour = occluding_contours.trace(
-                [PosedBody(model, values)], camera, PIECE_PX * max(1.0, max(camera.size) / 640)
-            )
+            contour = occluding_contours.trace([body.ahead(time)], camera, PIECE_PX * max(1.0, max(camera.size) / 640))
             pieces = contour.pieces_px[np.isin(contour.parts, move.limb.parts) & ~contour.occluded]
             out.append(Path(index, person, "former", KIND_COLORS["former"], pieces))
     return out

@@ -4,6 +4,7 @@ import numpy as np
 
 from app.drawing.overlay_colors import KIND_COLORS
 from app.drawing.overlays import Path
+from app.drawing.seen_bodies import picture_times
 from app.state.page_view import View
 from app.state.state import State
 from tracker.body.limbs import limb_display_name, limbs
@@ -26,10 +27,10 @@ def ghost_lines(session: Session, state: State, view: View) -> list[Path]:
     if person in state.undrawn:
         return out
     for other in reason.alternatives or ():
-        body, parts = PosedBody(model, other.values), _parts_of(model, other.limbs)
-        for index in sorted(view.cameras):
+        body, parts = PosedBody(model, other.values, state.velocity(person)), _parts_of(model, other.limbs)
+        for index, time in picture_times(session, state.frame, view.cameras).items():
             camera = session.cameras[index].camera.pinhole
-            contour = occluding_contours.trace([body], camera, PIECE_PX * max(1.0, max(camera.size) / 640))
+            contour = occluding_contours.trace([body.ahead(time)], camera, PIECE_PX * max(1.0, max(camera.size) / 640))
             pieces = contour.pieces_px[np.isin(contour.parts, parts) & ~contour.occluded]
             out.append(Path(index, person, "alternative", KIND_COLORS["alternative"], pieces))
     return out

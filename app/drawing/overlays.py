@@ -1,7 +1,7 @@
 """Draw over the views: contours, candidates, part edges, joints, epipolar lines, edge segments."""
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, NamedTuple, get_args
 
@@ -9,10 +9,11 @@ import numpy as np
 
 from app.drawing.facing import facing_arrow
 from app.drawing.overlay_colors import KIND_COLORS
+from app.drawing.seen_bodies import at_one_time, bodies_in, picture_times
 from app.state.page_view import View
 from app.state.people import DragState
 from app.state.state import State
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import BodyModel, PosedBody, ahead
 from tracker.contours import occluding_contours, part_edges
 from tracker.contours.occluding_contours import Contour
 from tracker.contours.pieces import PIECE_PX
@@ -103,13 +104,14 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         views: the evidence of the shown frame; None draws no edge segments.
     """
     stored, state = state, state.drawn
-    bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
+    bodies = bodies_in(session, state)
     out = []
     tried = state.search.candidate if state.search.running or state.search_view.replay is not None else None
     drafted = _with_draft(state, bodies)
     others = _alternatives(state, bodies) if "alternatives" in view.layers else []
+    changed = {i for i, (now, other) in enumerate(zip(bodies, others, strict=False)) if now is not other}
     replaced = {} if state.range_comparison is None else state.range_comparison.others.get(state.frame, {})
-    former = [PosedBody(p.model, replaced.get(i, state.poses[i])) for i, p in enumerate(session.people)]
+    former = bodies_in(session, state, [replaced.get(i, pose) for i, pose in enumerate(state.poses)])
     result = stored.poses if state is not stored and state.search_view.replay is None else None
     preview, replay = state.search_view.preview, state.search_view.replay
     outlined: tuple[tuple[PathKind, tuple[Array, ...] | None], ...] = (
@@ -122,8 +124,11 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(view.cameras)}
     is_traced = "contours" in state.compiled  # otherwise the contours' kernels are being compiled
     has_edges = is_traced and "part_edges" in view.layers
-    edges = dict(zip(seen, part_edges.part_edges(bodies, list(seen.values())), strict=True)) if has_edges else {}
+    times = picture_times(session, state.frame, seen)
+    edges = _part_edges(bodies, seen, times) if has_edges else {}
+    on_frame = bodies, drafted, others, former
     for index, camera in seen.items():
+        bodies, drafted, others, former = ([b.ahead(times[index]) for b in people] for people in on_frame)
         if not is_traced:
             out += _skeletons(session, bodies, camera, index)
             continue
@@ -134,14 +139,14 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         if state.draft is not None:
             out += _some({state.draft.person}, drafted, camera, index, "new_sizes")
         if others:
-            changed = {i for i, (now, other) in enumerate(zip(bodies, others, strict=True)) if now is not other}
             out += _some(changed, others, camera, index, "alternative")
         if replaced:
             out += _some(replaced, former, camera, index, "compared")
         out += _found(state, bodies, camera, index, view)
         for kind, poses in outlined:
             if poses is not None:
-                out += _outlined(session, poses, camera, index, kind)
+                outlined_then = ahead(bodies_in(session, state, poses), times[index])
+                out += _outlined(outlined_then, camera, index, kind)
         if index in edges:
             out.append(Path(index, 0, "part_edge", KIND_COLORS["part_edge"], edges[index]))
         if views is not None:
@@ -161,17 +166,25 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
 
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
     """Project the joints of all visible people into some views, given by index; joints behind a camera are left out."""
-    bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
-    points = [b.points_world for b in bodies]
-    seen = {index: session.cameras[index].camera.pinhole for index in sorted(cameras)}
+    found: dict[int, list[Handle]] = {}
+    for time, group in at_one_time(picture_times(session, state.frame, cameras)):
+        found |= _handles(session, state, ahead(bodies_in(session, state), time), group)
+    return [handle for index in sorted(found) for handle in found[index]]
+
+
+def _handles(
+    session: Session, state: State, bodies: Sequence[PosedBody], cameras: Sequence[int]
+) -> dict[int, list[Handle]]:
+    """Return the handles of all visible people in views of one time, by index of the view."""
+    points, views = [b.points_world for b in bodies], [session.cameras[index].camera.pinhole for index in cameras]
     undrawn = state.undrawn
     if "contours" in state.compiled:
-        occluded = part_edges.points_occluded_by_body(bodies, list(seen.values()), np.concatenate(points))
+        occluded = part_edges.points_occluded_by_body(bodies, views, np.concatenate(points))
     else:  # the kernels are being compiled: every joint can be grabbed
-        occluded = np.zeros((len(seen), len(bodies), sum(map(len, points))), bool)
+        occluded = np.zeros((len(views), len(bodies), sum(map(len, points))), bool)
     people = np.repeat(np.arange(len(bodies)), list(map(len, points)))
-    out = []
-    for (index, camera), by_body in zip(seen.items(), occluded, strict=True):
+    out: dict[int, list[Handle]] = {index: [] for index in cameras}
+    for index, camera, by_body in zip(cameras, views, occluded, strict=True):
         first = 0
         hidden, occluders = by_body.any(axis=0), _other_occluders(by_body, people)
         for person, body in enumerate(bodies):
@@ -180,7 +193,7 @@ def handles(session: Session, state: State, cameras: Collection[int]) -> list[Ha
             for i, (name, (u, v)) in enumerate(zip(body.model.point_names, px.tolist(), strict=True)):
                 if person not in undrawn and is_in_front[i]:
                     is_visible, by, is_held = not hidden[first + i], occluders[first + i], name in held
-                    out.append(Handle(index, person, name, u, v, is_visible, by, is_held, side_of(name)))
+                    out[index].append(Handle(index, person, name, u, v, is_visible, by, is_held, side_of(name)))
             first += len(px)
     return out
 
@@ -261,9 +274,19 @@ def _facing(session: Session, bodies: Sequence[PosedBody], camera: Camera, index
     return out
 
 
-def _outlined(session: Session, poses: Sequence[Array], camera: Camera, index: int, kind: PathKind) -> list[Path]:
+def _part_edges(
+    bodies: Sequence[PosedBody], seen: Mapping[int, Camera], times: Mapping[int, float]
+) -> dict[int, FloatArray]:
+    """Return the curves in which parts intersect in some views, by index."""
+    out: dict[int, FloatArray] = {}
+    for time, group in at_one_time(times):
+        found = part_edges.part_edges(ahead(bodies, time), [seen[index] for index in group])
+        out |= dict(zip(group, found, strict=True))
+    return out
+
+
+def _outlined(bodies: Sequence[PosedBody], camera: Camera, index: int, kind: PathKind) -> list[Path]:
     """Draw the visible contours of other poses of all people."""
-    bodies = [PosedBody(p.model, v) for p, v in zip(session.people, poses, strict=True)]
     contour = _traced(bodies, camera)
     return _by_person(bodies, contour, ~contour.occluded, index, kind, [KIND_COLORS[kind]] * len(bodies))
 
@@ -273,7 +296,9 @@ def _with_draft(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     people, draft = list(bodies), state.draft
     if draft is not None:
         shown = people[draft.person]
-        people[draft.person] = PosedBody(draft.model, retarget_pose(shown.values, shown.model, draft.model))
+        people[draft.person] = PosedBody(
+            draft.model, retarget_pose(shown.values, shown.model, draft.model), shown.velocity
+        )
     return people
 
 
@@ -286,7 +311,7 @@ def _alternatives(state: State, bodies: Sequence[PosedBody]) -> list[PosedBody]:
     best = [() if i == explained else shown.alternatives[:1] for i, shown in enumerate(state.people)]
     if not any(best):
         return []
-    return [PosedBody(b.model, poses[0]) if poses else b for b, poses in zip(bodies, best, strict=True)]
+    return [replace(b, values=poses[0]) if poses else b for b, poses in zip(bodies, best, strict=True)]
 
 
 def _found(state: State, bodies: Sequence[PosedBody], camera: Camera, index: int, view: View) -> list[Path]:

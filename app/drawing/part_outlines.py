@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from app.drawing.seen_bodies import at_one_time, bodies_in, picture_times
 from app.state.page_view import View
 from app.state.state import State
-from tracker.body.model import PosedBody
+from tracker.body.model import ahead
 from tracker.geometry.arrays import FloatArray
 from tracker.posing import picking
 from tracker.session.session import Session
@@ -33,12 +34,13 @@ def part_hulls(session: Session, state: State, view: View) -> list[PartOutline]:
     drag = state.drag
     if "joints" not in view.layers or not state.is_stored_drawn or (drag is not None and not drag.by_surface):
         return []
-    bodies = [PosedBody(p.model, v) for p, v in zip(session.people, state.poses, strict=True)]
-    out = []
-    seen, undrawn = sorted(view.cameras), state.undrawn
-    found = picking.part_hulls(bodies, [session.cameras[index].camera.pinhole for index in seen])
-    for index, parts in zip(seen, found, strict=True):
-        for one in parts:
+    out, undrawn, found = [], state.undrawn, dict[int, list[picking.PartHull]]()
+    for time, group in at_one_time(picture_times(session, state.frame, view.cameras)):
+        cameras = [session.cameras[index].camera.pinhole for index in group]
+        hulls = picking.part_hulls(ahead(bodies_in(session, state), time), cameras)
+        found |= dict(zip(group, hulls, strict=True))
+    for index in sorted(found):
+        for one in found[index]:
             if one.body in undrawn:
                 continue
             if drag is None or (one.body, one.part) == (drag.person, drag.part):

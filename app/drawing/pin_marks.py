@@ -6,6 +6,7 @@ import numpy as np
 
 from app.drawing.overlay_colors import KIND_COLORS
 from app.drawing.overlays import Path
+from app.drawing.seen_bodies import bodies_in
 from app.state.page_view import View
 from app.state.state import State, finite_or_none
 from tracker.geometry.cameras import epipolar_segment
@@ -56,14 +57,13 @@ class PinTriangulation:
 
 def pin_marks(session: Session, state: State) -> list[PinMark]:
     """Return all pins of the frame, of visible people."""
-    out = []
+    out, bodies = [], bodies_in(session, state)
     for person, (info, pins) in enumerate(zip(session.people, state.pins, strict=True)):
         if not pins or person in state.visibility.hidden:
             continue
-        points = info.model.points_world(state.poses[person])
-        for point, camera, position_px in pins:
-            view = session.cameras[camera].camera.pinhole
-            u, v = view.project(points[info.model.point_names.index(point)])
+        for point, camera, position_px, _ in pins:
+            view, time = session.cameras[camera].camera.pinhole, session.cameras[camera].clock.ahead(state.frame)
+            u, v = view.project(bodies[person].ahead(time).points_world[info.model.point_names.index(point)])
             out.append(PinMark(camera, person, point, *position_px, finite_or_none(u), finite_or_none(v)))
     return out
 
@@ -92,7 +92,7 @@ def pin_lines(session: Session, state: State, view: View) -> list[Path]:
     out: list[Path] = []
     if "epipolar" not in view.layers:
         return out
-    for _, camera, position_px in _of_joint(state):
+    for _, camera, position_px, _ in _of_joint(state):
         source = session.cameras[camera].camera.pinhole
         for index, target in enumerate(session.cameras):
             segment = None

@@ -5,12 +5,12 @@ import itertools
 
 from app.control.controller import Controller
 from app.drawing import overlays, pictures
+from app.drawing.seen_bodies import bodies_in
 from app.page.binary_headers import ImageHeader
 from app.page.encoding import encode_binary
 from app.state.identity import Identity
 from app.state.page_view import EVIDENCE, PictureLayer, View
 from app.state.state import State
-from tracker.body.model import PosedBody
 
 Key = tuple[PictureLayer, int]
 """Layer and camera."""
@@ -69,7 +69,8 @@ class PictureSets:
             return frames.image(state.frame, camera, reduction), None
         if layer == "parts":
             shown = [i for i in range(len(session.people)) if i not in state.undrawn]
-            bodies = [PosedBody(session.people[i].model, state.drawn.poses[i]) for i in shown]
+            time, everybody = session.cameras[camera].clock.ahead(state.frame), bodies_in(session, state.drawn)
+            bodies = [everybody[i].ahead(time) for i in shown]
             colors = overlays.part_colors([session.people[i] for i in shown])
             return pictures.parts(bodies, session.cameras[camera].camera.pinhole, colors, reduction), None
         evidence = frames.evidence(state.frame)[camera]

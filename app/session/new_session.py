@@ -21,7 +21,7 @@ Report = Callable[[str, Any], None]
 """Takes the kind of a line, and its text or data."""
 
 _Height = Annotated[float, Meta(ge=30, le=300, title="Height", description="a height of 30 to 300 centimetres")]
-_Offset = Annotated[int, Meta(ge=-10_000_000, le=10_000_000, title="Offset", description="a whole number of frames")]
+_Offset = Annotated[float, Meta(ge=-10_000_000, le=10_000_000, title="Offset", description="a number of frames")]
 
 
 class CameraChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -33,7 +33,7 @@ class CameraChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     side_name: Name | None = None
     """Name after which its background and masks are filed; null for its own."""
     offset: _Offset = 0
-    """Frame k of the session is frame k + offset of the camera."""
+    """Frame k of the session is frame k + offset of the camera; it may have a fraction."""
 
 
 class NewSessionForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -49,6 +49,9 @@ class State:
     """Result of the last change of sizes."""
     acquisition: AcquisitionState = field(default_factory=AcquisitionState)
     """Acquisition of sizes from the footage."""
+    velocities: tuple[Array | None, ...] = ()
+    """Change of each person's pose from one frame to the next, (n_dofs,), by the stored poses around the frame; None
+    without any, and empty where all cameras share one clock."""
     person: int = 0
     """Index of the selected person."""
     point: str | None = None
@@ -196,6 +199,10 @@ class State:
         """Return the names of the points of a person, given by index, that are held on the shown frame."""
         return frozenset(h.point for h in self.held if (h.frame, h.person) == (self.frame, person))
 
+    def velocity(self, person: int) -> Array | None:
+        """Return the velocity of a person, given by index, if it is known and needed."""
+        return self.velocities[person] if self.velocities else None
+
     @property
     def poses(self) -> tuple[Array, ...]:
         """Pose of each person, (n_values,) each."""
@@ -226,6 +233,7 @@ class StateChanges(TypedDict, total=False):
     models: tuple[BodyModel, ...]
     revisions: tuple[int, ...]
     present: tuple[int, ...]
+    velocities: tuple[Array | None, ...]
     draft: SizeDraft | None
     sides_alike: bool
     sizes_message: str

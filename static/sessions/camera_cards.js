@@ -99,11 +99,11 @@ export class CameraCards {
     const picture = choice.footage ? firstFrame(name, choice.footage) : noPicture("No footage");
     const title = Object.assign(document.createElement("b"), { textContent: name });
     const offset = document.createElement("input");
-    Object.assign(offset, { id: `new-offset-${index}`, type: "number", step: "1", value: String(choice.offset), className: "query-field" });
-    offset.title = `Offset of ${name}: number of frames that it began earlier than the others`;
+    Object.assign(offset, { id: `new-offset-${index}`, type: "number", step: "any", value: String(choice.offset), className: "query-field" });
+    offset.title = `Offset of ${name}: number of frames that it began earlier than the others, such as 2 or 2.4`;
     offset.setAttribute("aria-label", `Offset of ${name} in frames`);
     offset.addEventListener("change", () => {
-      choice.offset = Math.round(Number(offset.value)) || 0;
+      choice.offset = Number(offset.value) || 0;
       offset.value = String(choice.offset);
       this.#changed();
     });

@@ -191,6 +191,9 @@ class Shown:
         self.views, self.asked = views, []
         self.working_cameras = [v.camera for v in views[0]]
 
+    def ahead_frames(self, k):
+        return (0.0,) * len(self.working_cameras)
+
     def prefetch(self, k, regions=None, with_static_edges=False, edges=None):
         pass
 

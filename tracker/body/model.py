@@ -349,6 +349,14 @@ class PosedBody:
     model: BodyModel
     values: Array
     """Pose, (n_values,)."""
+    velocity: Array | None = None
+    """Change of the pose from one frame to the next, (n_dofs,), rad or metres; None: unknown, or not needed."""
+
+    def ahead(self, frames: float) -> "PosedBody":
+        """Return the body some frames later, or earlier if negative, by its velocity; as it is if that is unknown."""
+        if frames == 0.0 or self.velocity is None:
+            return self
+        return PosedBody(self.model, self.model.retract(self.values, frames * self.velocity))
 
     @cached_property
     def kinematics(self) -> "Kinematics":
@@ -369,6 +377,11 @@ class PosedBody:
     def joint_centers_world(self) -> Array:
         """Its anatomical joint centres, (n_points, 3), metres; see `BodyModel.joint_centers_world`."""
         return self.model.joint_centers_at(self.kinematics, np.arange(len(self.model.point_parts)))
+
+
+def ahead(bodies: Sequence[PosedBody], frames: float) -> Sequence[PosedBody]:
+    """Return bodies some frames later, see `PosedBody.ahead`; the same ones for 0."""
+    return bodies if frames == 0.0 else [b.ahead(frames) for b in bodies]
 
 
 def parts_of(models: Sequence[BodyModel], person: int) -> slice:

@@ -99,6 +99,10 @@ class Observer:
         """Cameras of the whole views in working pixels: without lens distortion, at working scale."""
         return tuple(v.view.camera for v in self._views)
 
+    def ahead_frames(self, k: int) -> tuple[float, ...]:
+        """Return by how many frames the picture of each view was taken later than frame k; see `Clock.ahead`."""
+        return tuple(c.clock.ahead(k) for c in self.cameras)
+
     def empty_scenes(self) -> tuple[Image | None, ...]:
         """Return the smoothed empty scene of each view in working pixels, (H, W, 3); None without a background."""
         for view in self._views:  # those of all views at the same time
@@ -227,9 +231,10 @@ class Observer:
         view, box = self._views[i], self._box(i, region)
         working = view.view.camera
         camera, scale, filmed = working.cropped(box), view.view.scale, view.view.filmed
+        ahead = self.cameras[i].clock.ahead(k)
         if prepared is None:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
-            return RegionFeatures(camera, scale, box[:2], filmed.size, nothing)
+            return RegionFeatures(camera, scale, box[:2], filmed.size, nothing, ahead_frames=ahead)
         smooth = view.smooth_region(prepared, box)
         changes = view.changes(prepared, smooth, box) if settings.foreground else None
         margin_px = FOREGROUND_MARGIN * max(filmed.size)
@@ -248,5 +253,6 @@ class Observer:
             None if changes is None else silhouette_evidence(changes.inside, edges, 2 * default_theta_px(filmed))
         )
         return RegionFeatures(
-            camera, scale, box[:2], filmed.size, edges.found, segments, sample_segments(segments), smooth, silhouette
+            camera, scale, box[:2], filmed.size, edges.found, segments, sample_segments(segments), smooth, silhouette,
+            ahead,
         )  # fmt: skip

@@ -112,6 +112,8 @@ class ViewEvidence:
     """Which segments are static edges, (S,), and never accepted; None if unknown."""
     silhouette: Silhouette | None = None
     """Silhouette in the region; None without masks and background."""
+    ahead_frames: float = 0.0
+    """Frames by which the picture was taken later than the frame; see `Clock.ahead`."""
 
     @cached_property
     def color_counts(self) -> NDArray[np.int64]:
@@ -136,7 +138,7 @@ def with_colors_only(view: ViewEvidence, colors: Image | None = None) -> ViewEvi
     no_points, no_distance = np.empty((0, 2), np.float32), np.empty((0, 0), np.float32)
     return ViewEvidence(
         view.camera, view.scale, no_points, no_distance, view.corner_px, view.image_size,
-        colors=view.colors if colors is None else colors,
+        colors=view.colors if colors is None else colors, ahead_frames=view.ahead_frames,
     )  # fmt: skip
 
 
@@ -177,6 +179,7 @@ class RegionFeatures(NamedTuple):
     """Samples of the segments; None if not yet taken."""
     colors: Image | None = None
     silhouette: Silhouette | None = None
+    ahead_frames: float = 0.0
 
     @property
     def box(self) -> Region:
@@ -218,7 +221,7 @@ def select_evidence(
     distance = distance_image(found, 2 * theta)
     return ViewEvidence(
         features.camera, features.scale, points, distance, features.corner_px, features.image_size, normals,
-        features.colors, segments, samples, chosen, is_static, features.silhouette,
+        features.colors, segments, samples, chosen, is_static, features.silhouette, features.ahead_frames,
     )  # fmt: skip
 
 

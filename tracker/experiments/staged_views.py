@@ -112,6 +112,10 @@ class StagedObserver(Observer):
         """See `Observer.working_cameras`."""
         return self._cameras
 
+    def ahead_frames(self, k: int) -> tuple[float, ...]:
+        """Return 0 for each view: all pictures are of the time of the frame."""
+        return (0.0,) * len(self._cameras)
+
     def prefetch(
         self,
         k: int,

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import BodyModel, PosedBody, ahead
 from tracker.contours.part_edges import points_occluded
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
@@ -39,13 +39,26 @@ class Keypoints(NamedTuple):
     """Area of its silhouette within the image, px^2."""
 
 
-def keypoints_in_views(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[list[Keypoints]]:
+def keypoints_in_views(
+    bodies: Sequence[PosedBody], cameras: Sequence[Camera], times: Sequence[float] = ()
+) -> list[list[Keypoints]]:
     """Return the keypoints of each body in each view, by view.
 
     Args:
         bodies: all bodies in the scene.
         cameras: the views, with their lens distortion.
+        times: frames by which the picture of each view was taken later than the frame; 0 by default. The bodies are
+            where their velocities bring them by then.
     """
+    out: dict[int, list[Keypoints]] = {}
+    for time in dict.fromkeys(times or [0.0]):
+        group = [i for i in range(len(cameras)) if not times or times[i] == time]
+        found = _at_one_time(ahead(bodies, time), [cameras[i] for i in group])
+        out |= dict(zip(group, found, strict=True))
+    return [out[i] for i in range(len(cameras))]
+
+
+def _at_one_time(bodies: Sequence[PosedBody], cameras: Sequence[Camera]) -> list[list[Keypoints]]:
     points = np.concatenate([b.joint_centers_world for b in bodies])
     occluded = points_occluded(bodies, [c.pinhole for c in cameras], points)
     ends = np.cumsum([len(b.points_world) for b in bodies])[:-1]

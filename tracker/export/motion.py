@@ -1,7 +1,7 @@
 """Read the stored poses of a session that are exported."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,6 +11,7 @@ from tracker.errors import Remedy, SessionError
 from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
 from tracker.motion.interpolation import interpolate_pose
+from tracker.motion.velocity import velocity
 from tracker.session.session import Person, Session
 from tracker.store.stored_poses import StoredPose, read_stored_poses
 
@@ -24,6 +25,8 @@ class PersonMotion:
     person: Person
     poses: Mapping[int, StoredPose]
     """By frame; a frame may be missing."""
+    around: Mapping[int, StoredPose] = field(default_factory=dict)
+    """The same, with those of two frames before and after the exported ones."""
 
     @cached_property
     def model(self) -> BodyModel:
@@ -39,6 +42,13 @@ class PersonMotion:
     def n_refitted(self) -> int:
         """Number of poses that belong to another body than `model`."""
         return sum(p.body.model is not self.model for p in self.poses.values())
+
+    def moving(self, frame: int) -> PosedBody:
+        """Return the body on a frame with a pose, with its velocity by the poses around it in the same body."""
+        body = self.poses[frame].body
+        near = {k: p.body for k, p in self.around.items() if abs(k - frame) <= 2}
+        same = {k: b.values for k, b in near.items() if b.model is body.model}
+        return replace(body, velocity=velocity(body.model, same, frame))
 
     def in_one_body(self) -> dict[int, Array]:
         """Return the poses in the body `model` by frame, (n_values,); those of other sizes are refitted to it.
@@ -104,8 +114,11 @@ class ExportedMotion:
         return frame / self.session.fps
 
     def bodies(self, frame: int) -> list[tuple[PersonMotion, PosedBody]]:
-        """Return the people who have a pose in a frame, with their bodies."""
-        return [(p, p.poses[frame].body) for p in self.people if frame in p.poses]
+        """Return the people who have a pose in a frame, with their bodies, and velocities if a view needs them."""
+        shown = [p for p in self.people if frame in p.poses]
+        if any(c.clock.ahead(frame) for c in self.session.cameras):
+            return [(p, p.moving(frame)) for p in shown]
+        return [(p, p.poses[frame].body) for p in shown]
 
 
 def read_motion(
@@ -125,11 +138,13 @@ def read_motion(
     within = range(session.n_frames) if frames is None else frames
     people, n_lost = [], 0
     for index, person in enumerate(session.people):
-        stored = read_stored_poses(session.annotations_path, person.name, person.model, within)
+        wider = range(max(0, within.start - 2), within.stop + 2)
+        around = read_stored_poses(session.annotations_path, person.name, person.model, wider)
+        stored = {frame: pose for frame, pose in around.items() if frame in within}
         lost = {f for f, pose in stored.items() if pose.record.status == "lost" and not pose.record.keyframe}
         n_lost += len(lost) * (index in chosen)
         poses = {f: p for f, p in stored.items() if not skip_lost or f not in lost}
-        people.append(PersonMotion(index, person, poses))
+        people.append(PersonMotion(index, person, poses, around))
     having = tuple(i for i in chosen if people[i].poses)
     if not having:
         names = " and ".join(f"'{session.people[i].name}'" for i in chosen)

@@ -125,7 +125,8 @@ def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Seque
     annotations: list[CocoAnnotation] = []
     for frame in motion.frames:
         people = motion.bodies(frame)
-        views = keypoints_in_views([body for _, body in people], cameras) if people else [[] for _ in cameras]
+        times = [c.clock.ahead(frame) for c in motion.session.cameras]
+        views = keypoints_in_views([body for _, body in people], cameras, times) if people else [[] for _ in cameras]
         for name, found in zip(names, views, strict=True):
             image = name.image(len(images) + 1, frame)
             images.append(image)

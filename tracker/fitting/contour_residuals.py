@@ -30,8 +30,6 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_arrays import (
     ContourMotion,
     ContourTerm,
-    Scratch,
-    Sums,
     ViewArrays,
     scratch_buffer,
     sums_buffer,
@@ -124,20 +122,11 @@ class PieceSums(NamedTuple):
         )
 
 
-class Workspace(NamedTuple):
-    """Buffers for one pose. Residuals that share a workspace must be used one at a time."""
-
-    Ts: Array
-    """Poses of all parts, (P, 4, 4), metres."""
-    scratch: Scratch
-    sums: Sums
-
-
 class ContourResiduals:
     """Residuals of one person's contours against the edges of all views; see `ResidualBlock`.
 
     The other people are fixed. They occlude, and take the edges that are nearer to them. Only one thread may use an
-    object at a time, because its kernels work in its `workspace`; `clone_for_thread` makes an object for another
+    object at a time, because its kernels work in its buffers; `clone_for_thread` makes an object for another
     thread.
     """
 
@@ -210,11 +199,6 @@ class ContourResiduals:
         moves[parts] = True
         return static_contours_buffer(len(arrays.sizes), self._max_pieces, arrays.points.shape[1], moves)
 
-    @property
-    def workspace(self) -> Workspace:
-        """Buffers of these residuals."""
-        return Workspace(self._term.Ts, self._term.scratch, self._term.sums)
-
     def resized(self, model: BodyModel) -> Surfaces:
         """Return the shapes of all bodies, the person's at other sizes, for `with_surfaces`."""
         models = tuple(model if i == self._person else m for i, m in enumerate(self._models))
@@ -267,19 +251,18 @@ class ContourResiduals:
         )
         return cost, sums
 
-    def restricted_to(self, parts: IntArray, workspace: Workspace) -> "ContourResiduals":
+    def restricted_to(self, parts: IntArray) -> "ContourResiduals":
         """Return the residuals for poses that differ in some parts of the person only; faster.
 
         Residuals of other parts count in the cost, but not in the derivatives. Poses in which other parts move too are
-        evaluated correctly, but more slowly.
+        evaluated correctly, but more slowly. Both use the same buffers.
 
         Args:
             parts: indices of the parts that move, (n,).
-            workspace: buffers to use, such as those of these residuals if the two are used one at a time.
         """
         out, term = copy(self), self._term
         static = self._static_buffer(self._own.start + parts, len(term.Ts), term.views)
-        out._term = term._replace(static=static, **workspace._asdict())
+        out._term = term._replace(static=static)
         return out
 
     def clone_for_thread(self) -> "ContourResiduals":

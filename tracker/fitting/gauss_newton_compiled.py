@@ -16,6 +16,7 @@ from tracker.body.model import BodyModel
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import FAST_MATH, NO_REFCOUNT
 from tracker.fitting import gauss_newton
+from tracker.fitting.clocked_residuals import ClockedResiduals
 from tracker.fitting.contour_kernels import WITH_JACOBIAN, ContourTerm, accumulate_normal_equations
 from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import (
@@ -90,9 +91,13 @@ def solve_compiled(
 ) -> Fit:
     """Minimize the summed cost of all blocks within the joint limits, as `gauss_newton.solve` does, up to rounding.
 
+    Residuals of views of different times are handed to `gauss_newton.solve`.
+
     Raises:
         TypeError: the kernel does not cover the body or the blocks.
     """
+    if any(isinstance(b, ClockedResiduals) for b in blocks):
+        return gauss_newton.solve(model, pose, blocks, active_dofs, max_iterations, tolerance, gain)
     compiled = _compiled(model, blocks)
     is_active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
     found, hessian = np.where(is_active, model.clip(pose), pose), np.empty((model.n_dofs, model.n_dofs))

@@ -1,9 +1,26 @@
 """One camera of a session: its calibration and the paths of its images."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tracker.geometry.cameras import Camera
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The clock of a camera against that of the session, besides the whole frames of `CameraSource.offset`.
+
+    The picture shown on frame k was taken at the time k + `ahead(k)`, in frames of the session.
+    """
+
+    ahead_frames: float = 0.0
+    """Frames by which the picture of frame 0 was taken later than frame 0; negative if earlier."""
+    rate: float = 0.0
+    """Change of that from one frame to the next, frames; as a pure number it is the same in seconds per second."""
+
+    def ahead(self, frame: float) -> float:
+        """Return by how many frames the picture of a frame was taken later than the frame."""
+        return self.ahead_frames + self.rate * frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,3 +40,27 @@ class CameraSource:
     """Frame rate that the video declares where it is not the session's, as for high-speed footage, 1/s."""
     footage_frames: int | None = None
     """Number of frames of the footage where frames at its end are left out because other cameras lack them."""
+    clock: Clock = Clock()
+    """Time of the pictures below a frame, and its drift."""
+
+    @property
+    def start_frames(self) -> float:
+        """Frame of the footage, with its fraction, at the time of frame 0 of the session."""
+        return self.offset - self.clock.ahead_frames
+
+    def starting_at(self, start_frames: float, rate: float | None = None) -> "CameraSource":
+        """Return the camera with its nearest whole frame as offset and the rest in its clock.
+
+        Args:
+            start_frames: see the property.
+            rate: drift of the clock, see `Clock`; unchanged by default.
+        """
+        offset = whole_frames(start_frames)
+        # Fractions are typed with some digits: 2 - 2.4 would leave -0.3999999999999999.
+        ahead = round(float(offset - start_frames), 9)
+        return replace(self, offset=offset, clock=Clock(ahead, self.clock.rate if rate is None else rate))
+
+
+def whole_frames(start_frames: float) -> int:
+    """Return the nearest whole frame; frame 0 within a frame before it, since footage has none earlier."""
+    return 0 if -1 < start_frames < 0 else round(start_frames)

@@ -28,6 +28,8 @@ class PointObservation(NamedTuple):
     """Index of the view."""
     position_px: tuple[float, float]
     """Position of the point in the image, undistorted px."""
+    ahead_frames: float = 0.0
+    """Frames by which the picture was taken later than the frame, where a fit is to heed it; 0 in what is stored."""
 
 
 def sigma_px(camera: Camera) -> float:

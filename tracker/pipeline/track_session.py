@@ -18,7 +18,7 @@ from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import Tracker, TrackingRun
-from tracker.tracking.view_tracks import FrameTracks, tracks_without_views
+from tracker.tracking.view_tracks import FrameTracks, tracks_without_views, velocities_of
 
 
 class SmoothedRows(NamedTuple):
@@ -260,13 +260,17 @@ class TrackSession:
         frames = [k for leg in self.legs for k in leg.whole if all(k in r.tracks for r in self._rows.values())]
         if not frames or not isinstance(settings, EstimationSettings):
             return
-        bodies = {}
+        bodies, known = {}, {}
         for k in frames:
             poses = [*self.tracked[k].poses]
             for i, rows in self._rows.items():
                 if i not in subjects.keyframes_at(k):
                     poses[i] = rows.consensus(subjects.models[i], k, subjects.active_dofs[i]).pose
-            bodies[k] = tuple(PosedBody(m, pose) for m, pose in zip(subjects.models, poses, strict=True))
+            known[k] = poses
+        velocities = velocities_of(subjects.models, known)
+        for k in frames:
+            moving = velocities(k) if any(self.observer.ahead_frames(k)) else [None] * len(subjects.models)
+            bodies[k] = tuple(map(PosedBody, subjects.models, known[k], moving))
         tracks = {i: rows.tracks for i, rows in self._rows.items()}
         yield from RunRepair(self.observer, subjects, settings, bodies, tracks).steps()
 

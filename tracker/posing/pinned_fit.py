@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.fitting.clocked_residuals import SummedBlocks, at_time, person_residuals
 from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import CLOSE_ENOUGH, OTHER_BODY_M, ResidualBlock, solve, value_mask
 from tracker.fitting.gauss_newton_compiled import solver_of
-from tracker.fitting.pins import PinBlock, pin_block
+from tracker.fitting.pins import pin_block
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import PointObservation
@@ -54,7 +55,7 @@ def fit_frame(
     """Fit some of the people on a frame to their pins and to the edges; the others are fixed.
 
     Args:
-        bodies: all people, at their initial poses.
+        bodies: all people, at their initial poses. Velocities count in views of other times than the frame's.
         pins: pins of each person.
         cameras: all views.
         views: evidence of each view. Without it only pins count, and people without pins stay.
@@ -68,7 +69,7 @@ def fit_frame(
     models, now = [b.model for b in bodies], [np.array(b.values) for b in bodies]
     constraints = constraints or [Constraints()] * len(models)
     active = [c.active_dofs for c in constraints]
-    blocks = [pin_block(m, cameras, p) if p else None for m, p in zip(models, pins, strict=True)]
+    blocks = [_pin_blocks(b, cameras, p) if p else None for b, p in zip(bodies, pins, strict=True)]
     pinned = [np.zeros(len(m.value_names), dtype=bool) for m in models]
     # At their placed positions: pins of the trunk must not carry placed limbs away.
     held = [
@@ -83,16 +84,25 @@ def fit_frame(
     for reach in _REACHES if views is not None else ():
         for person in people:
             assert views is not None
-            posed, model = [PosedBody(m, v) for m, v in zip(models, now, strict=True)], models[person]
+            posed = [replace(b, values=v) for b, v in zip(bodies, now, strict=True)]
+            model = models[person]
             theta_px = settings.theta_px  # None: that of each view
             if reach != 1.0:
                 theta_px = reach * (theta_px or float(np.median([v.theta_px / v.scale for v in views])))
-            match = ContourResiduals(views, posed, person, settings.match, theta_px, everywhere=True)
+            match = person_residuals(views, posed, person, settings.match, theta_px, everywhere=True)
             sigma = np.where(model.dof_is_length, PLACED_M, PLACED_RAD)
             now[person], pinned[person] = _fit_one(
                 model, now[person], blocks[person], [match, *held[person]], sigma, active[person]
             )  # fmt: skip
     return FrameFit(tuple(now), tuple(pinned))
+
+
+def _pin_blocks(body: PosedBody, cameras: Sequence[Camera], pins: Sequence[PointObservation]) -> ResidualBlock:
+    """Return the residuals of pins, each at the time of its picture."""
+    by_time = {time: [p for p in pins if p.ahead_frames == time] for time in {p.ahead_frames for p in pins}}
+    return SummedBlocks(
+        [at_time(pin_block(body.model, cameras, p), body.velocity, time) for time, p in by_time.items()]
+    )
 
 
 def _held_blocks(
@@ -121,7 +131,7 @@ def _held_blocks(
 def _fit_one(
     model: BodyModel,
     pose: Array,
-    pins: PinBlock | None,
+    pins: ResidualBlock | None,
     evidence: Sequence[ResidualBlock],
     sigmas: Array,
     active_dofs: NDArray[np.bool_] | None,

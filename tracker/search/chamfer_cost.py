@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import BodyModel, PosedBody, parts_of
+from tracker.body.model import BodyModel, PosedBody, ahead, parts_of
 from tracker.compute.threads import kernel_pool
 from tracker.contours import occluding_contours
 from tracker.contours.pieces import PIECE_PX, piece_buffer, place_parts
@@ -87,6 +87,8 @@ class ChamferCost:
         self._threads = min(threads, os.cpu_count() or 1)
         self.models: tuple[BodyModel, ...] = tuple(b.model for b in predicted)
         self.outliers = outliers
+        self._velocities = [b.velocity for b in predicted]
+        self._times = np.array([v.ahead_frames for v in views])
         self._surfaces = surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
         thetas = [v.outlier_px(theta_px) for v in views]
@@ -148,9 +150,11 @@ class ChamferCost:
 
     def _traced(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], room: int) -> TracedContours:
         """Trace the contours of posed bodies in all views."""
-        pieces, traced = piece_buffer(self._surfaces, room), []
-        place_parts(occluding_contours.part_poses(bodies), self._surfaces, pieces)
+        pieces, traced, time = piece_buffer(self._surfaces, room), [], None
         for view in views:
+            if view.ahead_frames != time:
+                time = view.ahead_frames
+                place_parts(occluding_contours.part_poses(ahead(bodies, time)), self._surfaces, pieces)
             n = occluding_contours.trace_pieces(
                 view.camera.projection, view.camera.center_world, self._surfaces, PIECE_PX, pieces
             )
@@ -160,7 +164,24 @@ class ChamferCost:
         return TracedContours(np.concatenate(ends, axis=1), np.concatenate(occluded), np.concatenate(edges), firsts)
 
     def _directed(self, person: int, candidates: Array, poses: Sequence[Array]) -> Array:
-        """Return the directed costs of candidates of a person, see `of_person`, (C, V, 2), working px."""
+        """Return the directed costs of candidates of a person, see `of_person`, (C, V, 2), working px.
+
+        Views of other times than the frame's see the poses moved by the velocities of the predicted bodies.
+        """
+        if not self._times.any() or all(v is None for v in self._velocities):
+            return self._directed_on_frame(person, candidates, poses)
+        directed = np.empty((len(candidates), len(self._seen), 2))
+        for time in np.unique(self._times):
+            steps = [None if v is None else time * v for v in self._velocities]
+            then = [p if s is None else m.retract(p, s) for m, p, s in zip(self.models, poses, steps, strict=True)]
+            own = steps[person]
+            moved = candidates if own is None else [self.models[person].retract(c, own) for c in candidates]
+            at = self._times == time
+            directed[:, at] = self._directed_on_frame(person, np.asarray(moved), then)[:, at]
+        return directed
+
+    def _directed_on_frame(self, person: int, candidates: Array, poses: Sequence[Array]) -> Array:
+        """Return the same in all views with all people where they are on the frame."""
         model = self.models[person]
         first = parts_of(self.models, person).start
         directed = np.empty((len(candidates), len(self._seen), 2))

@@ -8,7 +8,7 @@ from typing import TypeVar
 from tracker.calibrations.convention_names import PoseConvention
 from tracker.calibrations.reading import CalibratedCameras, read_cameras
 from tracker.errors import RecordingError, Remedy, SessionError
-from tracker.footage.camera_source import CameraSource
+from tracker.footage.camera_source import CameraSource, whole_frames
 from tracker.footage.frame_rates import same_rate
 from tracker.footage.image_file import IMAGE_SUFFIXES
 from tracker.footage.recording import check_size, read_background, read_mask
@@ -59,8 +59,9 @@ class NewSession:
     """Folder of CAM/%06d.png."""
     side_names: Mapping[str, str] = field(default_factory=dict)
     """Name after which the background and masks of a camera are filed, by camera; its own for cameras left out."""
-    offsets: Mapping[str, int] = field(default_factory=dict)
-    """Shift by camera name: frame k of the session is frame k + offset of the camera."""
+    offsets: Mapping[str, float] = field(default_factory=dict)
+    """Shift by camera name: frame k of the session is frame k + offset of the camera. The nearest whole frame is shown;
+    the rest goes into the camera's clock."""
     people: Sequence[str] = ("person",)
     """Names of the people to track."""
     models: Mapping[str, str] | str = DEFAULT_MODEL
@@ -175,13 +176,15 @@ def check_parts(
         cameras = {name: _fitted(calibrated[name], footage[name], request.rescale) for name in names}
         report("All footage can be read and has the calibrated shape.")
         fps = common_rate(footage, request.fps)
-        check_image_numbers(footage, request.offsets, request.common_frames)
+        whole = {name: whole_frames(start) for name, start in request.offsets.items()}
+        check_image_numbers(footage, whole, request.common_frames)
         if request.common_frames:
-            request = replace(request, offsets=common_offsets(footage, request.offsets))
-        n_frames = common_length(footage, request.offsets, request.common_frames)
+            whole = common_offsets(footage, whole)
+            request = replace(request, offsets={**whole, **request.offsets})
+        n_frames = common_length(footage, whole, request.common_frames)
         report(f"All cameras have {n_frames} frames at {fps:g} per second.")
         sources = tuple(_source(request, cameras[name], footage[name], fps, n_frames) for name in names)
-        for sentence in (*_left_out(sources, n_frames), *footage_notes(footage, fps, request.offsets)):
+        for sentence in (*_left_out(sources, n_frames), *footage_notes(footage, fps, whole)):
             note(sentence)
     finally:
         for f in footage.values():
@@ -289,9 +292,9 @@ def _left_out(sources: Sequence[CameraSource], n_frames: int) -> Iterator[str]:
 
 
 def _source(request: NewSession, camera: Camera, footage: Footage, fps: float, n_frames: int) -> CameraSource:
-    offset = request.offsets.get(camera.name, 0)
-    side_name = request.side_names.get(camera.name, camera.name)
-    return CameraSource(
+    start = request.offsets.get(camera.name, 0)
+    offset, side_name = whole_frames(start), request.side_names.get(camera.name, camera.name)
+    source = CameraSource(
         camera,
         footage.path,
         find_background(request.background, side_name) if request.background is not None else None,
@@ -300,6 +303,7 @@ def _source(request: NewSession, camera: Camera, footage: Footage, fps: float, n
         None if footage.fps is None or same_rate(footage.fps, fps) else footage.fps,
         footage.n_frames if request.common_frames and footage.n_frames > n_frames + offset else None,
     )
+    return source.starting_at(start)
 
 
 def footage_in(folder: Path) -> list[Path]:

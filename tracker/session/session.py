@@ -23,7 +23,7 @@ import tomli_w
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.files import check_regular, refuse_links, write_text_atomic
-from tracker.footage.camera_source import CameraSource
+from tracker.footage.camera_source import CameraSource, Clock
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
@@ -188,6 +188,7 @@ def _load_cameras(row: SessionFile, folder: Path) -> tuple[CameraSource, ...]:
             c.offset,
             c.declared_fps,
             c.footage_frames,
+            Clock(round(c.time_offset_s * row.fps, 9), c.time_rate),
         )
         for c in row.cameras
     )
@@ -302,6 +303,10 @@ def _checked_content(session: Session) -> dict[str, Any]:
             row["declared_fps"] = c.declared_fps
         if c.footage_frames is not None:
             row["footage_frames"] = c.footage_frames
+        if c.clock.ahead_frames:
+            row["time_offset_s"] = round(c.clock.ahead_frames / session.fps, 12)
+        if c.clock.rate:
+            row["time_rate"] = float(c.clock.rate)
         cameras.append(row)
     data: dict[str, Any] = {
         "name": session.name,

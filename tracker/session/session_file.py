@@ -23,9 +23,10 @@ from tracker.validation import (
     check_version,
 )
 
-VERSION = 4
+VERSION = 5
 """Newest version. A session is written in the oldest version that can describe it, so that older programs can read it:
-version 2 has a floor, version 3 a camera with a `declared_fps`, version 4 one with `footage_frames`."""
+version 2 has a floor, version 3 a camera with a `declared_fps`, version 4 one with `footage_frames`, version 5 one with
+`time_offset_s` or `time_rate`."""
 
 Up: TypeAlias = Literal["x", "-x", "y", "-y", "z", "-z"]
 UPS: tuple[str, ...] = get_args(Up)
@@ -66,6 +67,9 @@ class CameraRow(_Row):
     ] = 0
     declared_fps: FrameRate | None = None
     footage_frames: _FrameCount | None = None
+    # Whole frames are in `offset`. More than a tenth of a second per second would be another frame rate.
+    time_offset_s: Annotated[float, Meta(ge=-1, le=1, description="a time from -1 to 1 s")] = 0.0
+    time_rate: Annotated[float, Meta(ge=-0.1, le=0.1, description="a drift from -0.1 to 0.1 s per s")] = 0.0
 
     def __post_init__(self) -> None:
         if self.offset < 0:
@@ -128,6 +132,8 @@ def read_session_file(path: Path) -> SessionFile:
 
 def needed_version(data: dict[str, Any]) -> int:
     """Return the oldest version that can describe the content of a session file."""
+    if any("time_offset_s" in row or "time_rate" in row for row in data["cameras"]):
+        return 5
     if any("footage_frames" in row for row in data["cameras"]):
         return 4
     if any("declared_fps" in row for row in data["cameras"]):

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.model import PosedBody
+from tracker.body.model import PosedBody, ahead
 from tracker.compute.jit import njit
 from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import Contour, contour_buffer, store_contour, trace_pieces
@@ -82,12 +82,10 @@ class EvidenceAssignment:
 
     @cached_property
     def _views(self) -> list["_View"]:
-        surfaces, Ts = (
-            surfaces_of(tuple(b.model for b in self.bodies)),
-            occluding_contours.part_poses(self.bodies),
-        )
-        pool = self._pool
-        return [_View(v, *s, surfaces, Ts) for v, s in zip(pool.views, pool.samples, strict=True)]
+        surfaces, pool = surfaces_of(tuple(b.model for b in self.bodies)), self._pool
+        times = {v.ahead_frames for v in pool.views}
+        Ts = {time: occluding_contours.part_poses(ahead(self.bodies, time)) for time in times}
+        return [_View(v, *s, surfaces, Ts[v.ahead_frames]) for v, s in zip(pool.views, pool.samples, strict=True)]
 
 
 class _View:

@@ -62,6 +62,9 @@ class PersonMemory:
         """The last pose of status "good", (n_values,)."""
         self.part_colors: PartColors | None = None
         """The colours of the parts; None before the first frame."""
+        self.step_frames: int | None = None
+        """Frames from the last pose to the one that is estimated, negative backward; None where the velocity there is
+        unknown, or known otherwise than from the last pose."""
         self._n_frames = 0
         self._backoffs: dict[str, tuple[int, int]] = {}  # by limb: frame of the last search, back-off
         self._odds_searched: dict[str, float] = {}  # by limb: search odds before the last search

@@ -58,6 +58,9 @@ class TrackingRun:
     estimates_keyframes: bool = False
     """Whether tracked people are also estimated on their keyframes, from the frames before. Tracking goes on from the
     keyframe all the same."""
+    velocities: Callable[[int], Sequence[Array | None]] | None = None
+    """Returns the velocity of each person on a frame, (n_dofs,), per frame, if another run has found it; otherwise it
+    follows from the prediction. It counts in views whose pictures were taken between frames."""
 
     def __post_init__(self) -> None:
         """Check the poses: from one that is no number, none of the frames after it would be."""

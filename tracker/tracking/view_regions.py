@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tracker.appearance.region_model import REACH_M
-from tracker.body.model import PosedBody
+from tracker.body.model import PosedBody, ahead
 from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.observer import Observer
@@ -67,9 +67,20 @@ def read_views(
     observer: Observer, frame: int, bodies: Sequence[PosedBody], static_edges: Sequence[StaticEdgeModel] | None = None
 ) -> tuple[ViewEvidence, ...]:
     """Return the evidence of a frame around all people."""
-    cameras = observer.working_cameras
-    visible = [visible_pieces_px(occluding_contours.trace(bodies, c)) for c in cameras]
-    return observer.evidence(frame, regions(cameras, bodies), visible, static_edges)
+    where, visible = regions(observer.working_cameras, bodies), accepting_pieces_px(observer, frame, [bodies])
+    return observer.evidence(frame, where, visible, static_edges)
+
+
+def accepting_pieces_px(observer: Observer, frame: int, guesses: Sequence[Sequence[PosedBody]]) -> list[FloatArray]:
+    """Return the visible pieces of several guesses of all people in each view, at the time of its picture.
+
+    They are x0, y0, x1, y1, (M, 4), px of the working cameras.
+    """
+    views = list(zip(observer.working_cameras, observer.ahead_frames(frame), strict=True))
+    return [
+        np.concatenate([visible_pieces_px(occluding_contours.trace(ahead(g, time), c)) for g in guesses])
+        for c, time in views
+    ]
 
 
 def px_per_m(cameras: Sequence[Camera], body: PosedBody) -> float:

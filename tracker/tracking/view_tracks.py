@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.model import PosedBody
+from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.shared_observers import shared_observers
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Region
+from tracker.motion.velocity import velocity
 from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.tracker import Tracker, TrackingRun
@@ -73,6 +74,8 @@ def tracks_without_views(
     names = [c.camera.name for c in run.observer.cameras]
     without = tuple(", ".join(n for i, n in enumerate(names) if i not in views) for views in groups)
     observers = shared_observers(run.observer, groups)
+    if any(any(run.observer.ahead_frames(k)) for k in run.frames):
+        run = replace(run, velocities=velocities_of(models, known))
     runs = [
         replace(run, observer=o, regions=around(views), estimates_keyframes=True)
         for o, views in zip(observers, groups, strict=True)
@@ -82,6 +85,18 @@ def tracks_without_views(
     for n_before, frame in enumerate(run.frames if ways else ()):
         found, has_history = [next(way) for way in ways], n_before >= HISTORY_FRAMES
         yield frame, {person: _of_person(found, person, without, has_history) for person in run.subjects.tracked}
+
+
+def velocities_of(
+    models: Sequence[BodyModel], known: Mapping[int, Sequence[Array]]
+) -> Callable[[int], list[Array | None]]:
+    """Return a function from a frame to the velocity of each person there, by known poses of all people by frame."""
+    by_person = [{k: poses[p] for k, poses in known.items()} for p in range(len(models))]
+
+    def at(frame: int) -> list[Array | None]:
+        return [velocity(m, poses, frame) for m, poses in zip(models, by_person, strict=True)]
+
+    return at
 
 
 def _of_person(found: Sequence[PoseEstimate], person: int, without: tuple[str, ...], has_history: bool) -> FrameTracks:

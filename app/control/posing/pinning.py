@@ -251,8 +251,11 @@ class Pinning:
             constraints = [replace(c, active_dofs=session_state.active_dofs(i) & dofs) if i in fitted else c
                            for i, c in enumerate(constraints)]  # fmt: skip
         found = fit_frame(
-            [PosedBody(m, p.values) for m, p in zip(session_state.models, start, strict=True)],
-            pins,
+            [
+                PosedBody(m, p.values, session_state.state.velocity(i))
+                for i, (m, p) in enumerate(zip(session_state.models, start, strict=True))
+            ],
+            self._timed(pins),
             cameras,
             views,
             session_state.state.settings,
@@ -273,6 +276,11 @@ class Pinning:
             people[person] = ShownPose(found.poses[person], source, *doubt, sources=sources)
         costs = session_state.costs(tuple(p.values for p in people))
         session_state.set(people=tuple(people), pins=pins, **costs)
+
+    def _timed(self, pins: Pins) -> list[list[PointObservation]]:
+        """Return the pins of all people with the times of their pictures."""
+        cameras, frame = self._session_state.session.cameras, self._session_state.state.frame
+        return [[p._replace(ahead_frames=cameras[p.camera].clock.ahead(frame)) for p in own] for own in pins]
 
     def _save(self, drag: _PinDrag) -> None:
         """Save the gesture so far."""

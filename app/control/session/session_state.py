@@ -16,7 +16,7 @@ from app.state.people import ShownPose
 from app.state.search import SearchView
 from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_none
 from app.storage.saver import Saver
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.interpretation import interpreted
 from tracker.compute.kernel_cache import STAGES
 from tracker.errors import SessionError, TrackerError
@@ -26,12 +26,13 @@ from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import up_rotation
 from tracker.geometry.triangulation import PointObservation
+from tracker.motion.velocity import velocity
 from tracker.pipeline.seen_points import seen_points
 from tracker.posing.default_pose import default_pose
 from tracker.posing.grab import Constraints
 from tracker.session.locked_dofs import active_dofs
 from tracker.session.session import Session
-from tracker.tracking.chamfer.settings import pose_cost
+from tracker.tracking.estimation.settings import chamfer_cost
 
 Pins = tuple[tuple[PointObservation, ...], ...]
 """The pins of each person on a frame."""
@@ -172,6 +173,8 @@ class SessionState:
             frame = changes.get("frame", self.state.frame)
             if frame != self.state.frame and "pins" not in changes:
                 changes["pins"] = self._load_pins(frame)
+            if frame != self.state.frame and "velocities" not in changes:
+                changes["velocities"] = self._load_velocities(frame)
             if frame != self.state.frame and "search_view" not in changes:
                 changes["search_view"] = SearchView(speed=self.state.search_view.speed)
             state = replace(self.state, **changes)
@@ -182,9 +185,11 @@ class SessionState:
     def show_frame(self, frame: int, /, **changes: Unpack[StateChanges]) -> None:
         """Show the stored poses of a frame, with other changes; the next save makes a new entry of the history."""
         self.open_edit_owner = None
-        shown = self._load(frame)
-        costs = self.costs(tuple(p.values for p in shown["people"]), frame, shown["models"])
-        loaded: StateChanges = {"frame": frame, "pins": self._load_pins(frame), **shown, **costs}
+        shown, velocities = self._load(frame), self._load_velocities(frame)
+        costs = self.costs(tuple(p.values for p in shown["people"]), frame, shown["models"], velocities)
+        loaded: StateChanges = {
+            "frame": frame, "pins": self._load_pins(frame), "velocities": velocities, **shown, **costs
+        }  # fmt: skip
         no_gesture: StateChanges = {"drag": None, "is_pin_held": False}
         after: StateChanges = {**loaded, **no_gesture, **changes}
         self._stored = loaded["people"], loaded["pins"]
@@ -208,7 +213,11 @@ class SessionState:
                 self.set(**self.costs(self.state.poses))
 
     def costs(
-        self, poses: tuple[Array, ...], frame: int | None = None, models: tuple[BodyModel, ...] | None = None
+        self,
+        poses: tuple[Array, ...],
+        frame: int | None = None,
+        models: tuple[BodyModel, ...] | None = None,
+        velocities: tuple[Array | None, ...] | None = None,
     ) -> Costs:
         """Score poses, (n_values,) each.
 
@@ -216,6 +225,7 @@ class SessionState:
             poses: of all people.
             frame: on which they are scored; by default the shown one.
             models: bodies of the poses; by default the shown ones.
+            velocities: see `State.velocities`; by default those of the shown frame.
 
         Returns:
             Costs without values while the frame has no evidence.
@@ -223,7 +233,8 @@ class SessionState:
         views = self.frames.cached_evidence(self.state.frame if frame is None else frame)
         if views is None or "cost" not in self.state.compiled:
             return {"cost_px": None, "view_costs_px": ()}
-        return self._scored(views, models or self.models, poses)
+        moving = self.state.velocities if velocities is None else velocities
+        return self._scored(views, models or self.models, poses, moving)
 
     def score_interpreted(self) -> None:
         """Score the shown poses without compiled kernels, unless they are scored or move; takes up to a second."""
@@ -233,13 +244,17 @@ class SessionState:
         if views is None or scored.cost_px is not None or scored.drag is not None:
             return
         with interpreted():
-            costs = self._scored(views, models, scored.poses)
+            costs = self._scored(views, models, scored.poses, scored.velocities)
         with self.lock:
             if self.state.people is scored.people and self.state.frame == scored.frame:
                 self.set(**costs)
 
-    def _scored(self, views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array]) -> Costs:
-        cost = pose_cost(views, models, poses, self.state.settings).at_prediction()
+    def _scored(
+        self, views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array],
+        velocities: Sequence[Array | None],
+    ) -> Costs:  # fmt: skip
+        bodies = map(PosedBody, models, poses, velocities or [None] * len(poses))
+        cost = chamfer_cost(views, [*bodies], self.state.settings).at_prediction()
         return {
             "cost_px": finite_or_none(cost.total_px),
             "view_costs_px": tuple(finite_or_none(c) for c in cost.view_costs_px),
@@ -352,6 +367,19 @@ class SessionState:
         saver = self.saver
         revisions = tuple(saver.revisions.current(i) if p.revision is None else p.revision for i, p in enumerate(shown))
         return tuple(saver.revisions.body(r) for r in revisions), revisions
+
+    def _load_velocities(self, frame: int) -> tuple[Array | None, ...]:
+        """Return the velocity of each person by the stored poses around a frame; empty where no camera needs them."""
+        if not any(c.clock.ahead(frame) for c in self.session.cameras):
+            return ()
+        out: list[Array | None] = []
+        for person in range(len(self.session.people)):
+            around = {k: self.saver.pose(person, k) for k in range(frame - 2, frame + 3)}
+            own = around[frame]
+            same = {k: p.values for k, p in around.items() if p and own and p.revision == own.revision}
+            known = None if own is None else own.revision
+            out.append(None if known is None else velocity(self.saver.revisions.body(known), same, frame))
+        return tuple(out)
 
     def _load_pins(self, frame: int) -> tuple[tuple[PointObservation, ...], ...]:
         """Return the pins of all people on a frame."""

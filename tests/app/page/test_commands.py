@@ -22,8 +22,10 @@ def drag_to(u, phase, seq):
 @pytest.fixture
 def scorings(placed, monkeypatch):
     """The poses scored from now on."""
-    scored, score = [], session_state.pose_cost
-    monkeypatch.setattr(session_state, "pose_cost", lambda *args: scored.append(args[2]) or score(*args))
+    scored, score = [], session_state.chamfer_cost
+    monkeypatch.setattr(
+        session_state, "chamfer_cost", lambda *args: scored.append([b.values for b in args[1]]) or score(*args)
+    )
     return scored
 
 

@@ -115,7 +115,7 @@ def test_a_match_of_a_limb_is_that_of_the_body_as_far_as_the_limb_goes(gavrila, 
     start, rng = staged[1], np.random.default_rng(2)
     whole = afresh(staged, start)
     for limb in limbs(gavrila):
-        of_limb, body = whole.restricted_to(limb.parts, whole.workspace), start[0]
+        of_limb, body = whole.restricted_to(limb.parts), start[0]
         for _ in range(3):
             for _ in range(3):
                 moved = with_limb_shaken(body, limb, rng, 0.3)

@@ -23,6 +23,9 @@ class Filmed:
     def __init__(self, walk):
         self.walk, self.cameras = walk, [SimpleNamespace(camera=SimpleNamespace(name=n)) for n in ("LEFT", "RIGHT")]
 
+    def ahead_frames(self, frame):
+        return (0.0,) * len(CAMERAS)
+
     def empty_scenes(self):
         return (None,) * len(CAMERAS)
 

@@ -129,6 +129,12 @@ def test_offsets_shorten_the_session(room):
     assert [c.offset for c in session.cameras] == [0, 2]
 
 
+def test_fraction_of_an_offset_goes_into_the_clock(room):
+    session = new(room, offsets={"left": 2.4, "front": 0.25})
+    assert [(c.offset, c.clock.ahead_frames) for c in session.cameras] == [(0, -0.25), (2, -0.4)]
+    assert session.n_frames == 7
+
+
 def test_offset_explains_a_longer_video(room):
     encode(room / "left.mp4", n=12)
     assert new(room, offsets={"left": 3}).n_frames == 9

@@ -1,11 +1,12 @@
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from clips import SIZE, encode
 
 from tracker.errors import CalibrationError, ModelError, Remedy, SessionError
-from tracker.footage.camera_source import CameraSource
+from tracker.footage.camera_source import CameraSource, Clock
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
@@ -138,6 +139,40 @@ def test_negative_offset_says_what_to_do(tmp_path, cameras):
         make(tmp_path, [*cameras, early])
 
 
+def test_clocks_below_a_frame_are_kept(tmp_path, cameras):
+    front, left = cameras
+    clocked = [front.starting_at(1.4), replace(left, clock=Clock(0.25, 2e-5))]
+    make(tmp_path, clocked)
+    text = (tmp_path / "s" / "session.toml").read_text()
+    assert all(row in text for row in ("version = 5", "time_offset_s = -0.008", "time_rate = 2e-05"))
+    read = load_session(tmp_path / "s")
+    assert [(c.offset, c.clock) for c in read.cameras] == [(1, Clock(-0.4)), (3, Clock(0.25, 2e-5))]
+    save_session(read)
+    assert (tmp_path / "s" / "session.toml").read_text() == text
+
+
+def test_without_clocks_none_are_written(tmp_path, cameras):
+    make(tmp_path, cameras)
+    text = (tmp_path / "s" / "session.toml").read_text()
+    assert "time_" not in text
+    assert "version = 1" in text
+
+
+@pytest.mark.parametrize(("start", "offset", "ahead"), [(2.4, 2, -0.4), (2.75, 3, 0.25), (-0.8, 0, 0.8), (5, 5, 0.0)])
+def test_start_is_split_into_the_nearest_frame_and_the_rest(cameras, start, offset, ahead):
+    source = cameras[0].starting_at(start)
+    assert (source.offset, source.clock.ahead_frames) == (offset, ahead)
+    assert source.start_frames == pytest.approx(start, abs=1e-12)
+
+
+@pytest.mark.parametrize(("key", "expected"), [("time_offset_s", "a time from -1 to 1 s"), ("time_rate", "a drift")])
+def test_impossible_clock_is_refused(tmp_path, cameras, key, expected):
+    make(tmp_path, cameras)
+    edit(tmp_path / "s", "offset = 3", f"offset = 3, {key} = 7.0")
+    with pytest.raises(SessionError, match=expected):
+        load_session(tmp_path / "s")
+
+
 def test_nothing_half_written_when_writing_fails(tmp_path, cameras, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
@@ -158,7 +193,7 @@ def edit(folder, old, new):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("version = 1", "version = 5", "version 5, this program reads up to 4; upgrade"),
+        ("version = 1", "version = 6", "version 6, this program reads up to 5; upgrade"),
         ("version = 1", "version = 'x'", "'version': expected a whole number, found 'x'"),
         ("fps = 50.0", "", "expected the key 'fps', found none"),
         ("fps = 50.0", "fps = 'fast'", "a frame rate above 0.* as 'fps', found 'fast'"),

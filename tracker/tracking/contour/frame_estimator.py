@@ -70,7 +70,7 @@ class ContourEstimator(FrameEstimator):
     def _minimize(self, person: int) -> PersonFit:
         """Minimize the squared chamfer distances of a person's contours from the pose so far (KRH08 Eq. 60)."""
         problem, bodies, settings = self.problem, self.bodies, self._contour_settings
-        model, _, active, _ = problem.people[person]
+        model, active = problem.people[person].model, problem.people[person].active_dofs
         start, blocks = bodies[person].values, [self._paper_residuals(person)]
         if self._is_first[person] and settings.incremental_start:
             for step in fit_by_chains(model, start, blocks, active):

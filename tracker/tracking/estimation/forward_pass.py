@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from tracker.body.model import PosedBody
+from tracker.body.model import PosedBody, ahead
 from tracker.compute.threads import map_parallel
 from tracker.contours import occluding_contours
 from tracker.contours.occluding_contours import Contour
@@ -10,7 +10,7 @@ from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Region
 from tracker.images.static_edges import StaticEdgeModel
-from tracker.motion.prediction import PredictSettings
+from tracker.motion.prediction import PredictSettings, unwrapped
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import AlternativePose, PoseEstimate
@@ -60,7 +60,8 @@ def track_forward(
         frame: int, bodies: Bodies, where: Sequence[Region | None]
     ) -> tuple[list[Contour], tuple[ViewEvidence, ...]]:
         """Return the contours of all people in each view, and the evidence around them."""
-        contours = [occluding_contours.trace(bodies, c) for c in cameras]
+        times = observer.ahead_frames(frame)
+        contours = [occluding_contours.trace(ahead(bodies, t), c) for c, t in zip(cameras, times, strict=True)]
         visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
         return contours, observer.evidence(frame, where, visible, static_edges, edges)
 
@@ -72,7 +73,7 @@ def track_forward(
                 chosen.look_ahead(frame, placed(frame, PersonMemory.predict_before_last))
             observer.prefetch(frame, chosen.ahead or None, learns_static, edges)
         keyframes, fixed = subjects.keyframes_at(frame), held.keyframes_at(frame)
-        predicted = placed(frame, PersonMemory.predict)
+        predicted = _moving(run, memories, placed(frame, PersonMemory.predict), i)
         where = chosen.around(predicted)
         following = frames[i + 1 : i + 2]
         for k in following if chosen.is_ahead else ():
@@ -152,6 +153,25 @@ def _placed(
 def _learnt(bodies: Bodies, keyframes: Mapping[int, Array]) -> Bodies:
     """Return all people, some of them in their keyframes."""
     return tuple(PosedBody(b.model, keyframes[p]) if p in keyframes else b for p, b in enumerate(bodies))
+
+
+def _moving(run: TrackingRun, memories: Sequence[PersonMemory], bodies: Bodies, i: int) -> Bodies:
+    """Return all people on the ith frame of a run with their velocities, if a view needs them.
+
+    The memories take in by how many frames the frame follows the last poses.
+    """
+    if not any(run.observer.ahead_frames(run.frames[i])):
+        return bodies
+    frames, out = run.frames, []
+    first, second = (frames[i - 1], frames[i]) if i > 0 else (frames[0], frames[min(1, len(frames) - 1)])
+    known = [None] * len(bodies) if run.velocities is None else run.velocities(frames[i])
+    for memory, body, velocity in zip(memories, bodies, known, strict=True):
+        memory.step_frames = None if velocity is not None else (second - first) or 1
+        if memory.step_frames is not None:
+            step = body.model.difference(body.values, memory.history[-1])
+            velocity = unwrapped(body.model, step) / memory.step_frames
+        out.append(PosedBody(body.model, body.values, velocity))
+    return tuple(out)
 
 
 def make_estimate(

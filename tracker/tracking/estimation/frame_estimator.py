@@ -61,7 +61,8 @@ class FrameEstimator:
         self.bodies: Bodies = tuple(bodies)
         """All people in their poses so far."""
         people = [
-            PersonPrior(m.model, b.values, m.active_dofs, m.part_colors) for m, b in zip(memories, bodies, strict=True)
+            PersonPrior(m.model, b.values, m.active_dofs, m.part_colors, b.velocity, m.step_frames)
+            for m, b in zip(memories, bodies, strict=True)
         ]
         predicted = None if contours is None else (self.bodies, contours)
         self.problem = FrameProblem(views, people, settings, predicted)

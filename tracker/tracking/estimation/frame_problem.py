@@ -4,6 +4,7 @@ Nothing here moves a person: bodies come in as arguments, and fits are returned.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,12 +16,14 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.body.searches import Search
 from tracker.contours.occluding_contours import Contour
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals, PartCosts
+from tracker.fitting.clocked_residuals import ClockedResiduals, PersonResiduals, person_residuals
+from tracker.fitting.contour_residuals import MIN_DECREASE, PartCosts
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import SETTLED_M, Hypothesis, distance_m
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.geometry.arrays import Array
+from tracker.motion.prediction import PredictSettings, unwrapped
 from tracker.tracking.confidence import PoseQuality
 from tracker.tracking.estimation.settings import (
     MAX_ITERATIONS,
@@ -49,6 +52,18 @@ class PersonPrior(NamedTuple):
     """The degrees of freedom that may move, (n_dofs,); None: all."""
     colors: PartColors | None = None
     """Colours of the parts; None before the first frame."""
+    velocity: Array | None = None
+    """Predicted change of the pose from one frame to the next, (n_dofs,); None where no view needs it."""
+    step_frames: int | None = None
+    """Frames since the last pose, from which the velocity of another pose follows; None if it stays as predicted."""
+
+    def moving(self, pose: Array, settings: PredictSettings) -> PosedBody:
+        """Return the person in a pose, (n_values,), with the velocity that brought them there, within the bounds."""
+        if self.velocity is None or self.step_frames is None:
+            return PosedBody(self.model, pose, self.velocity)
+        bound = np.where(self.model.dof_is_length, settings.bound_m, settings.bound_rad)
+        change = unwrapped(self.model, self.model.difference(pose, self.predicted)) / self.step_frames
+        return PosedBody(self.model, pose, np.clip(self.velocity + change, -bound, bound))
 
 
 class Assessment(NamedTuple):
@@ -61,7 +76,7 @@ class Assessment(NamedTuple):
 class PersonFit(NamedTuple):
     """One person fitted to a frame."""
 
-    residuals: ContourResiduals
+    residuals: PersonResiduals
     """The residuals that were minimized."""
     bodies: Bodies
     """All people when the residuals were made."""
@@ -124,7 +139,7 @@ class FrameProblem:
         residuals = self.residuals(person, bodies, everywhere=untrusted is not None)
         blocks = [residuals, *self.priors(person, bodies, untrusted or ())]
         fit = self.solve(person, bodies[person].values, blocks, self.settings.max_iterations, MIN_DECREASE)
-        body = PosedBody(self.people[person].model, fit.pose)
+        body = self._moving(person, fit.pose)
         if before is None:
             return PersonFit(residuals, bodies, fit, body)
         return before._replace(residuals=residuals, bodies=bodies, fit=fit, body=body, assessment=None)
@@ -137,15 +152,20 @@ class FrameProblem:
         of the first refinement's distances, if that is below 1 px^2. Priors then pull less where the body fits well.
         """
         prediction, own, *others = self._priors_of(person, found)
+        if isinstance(found.residuals, ClockedResiduals) and found.body.velocity is not None:
+            found = found._replace(residuals=found.residuals.with_velocity(found.body.velocity))
         model, residuals = self.people[person].model, self._as_precise_as_measured(found)
         fit = self.solve(person, own.pose, [residuals, own, *others], MAX_ITERATIONS, MIN_DECREASE)
         if residuals is found.residuals:
             fit = fit.with_prior(model, own, prediction)
         else:
             fit = self.solve(person, fit.pose, [found.residuals, prediction, *others], 0)
-        return found._replace(fit=fit, body=PosedBody(model, fit.pose), assessment=None)
+        return found._replace(fit=fit, body=self._moving(person, fit.pose), assessment=None)
 
-    def _as_precise_as_measured(self, found: PersonFit) -> ContourResiduals:
+    def _moving(self, person: int, pose: Array) -> PosedBody:
+        return self.people[person].moving(pose, self.settings.predict)
+
+    def _as_precise_as_measured(self, found: PersonFit) -> PersonResiduals:
         """Return the residuals of a fit with the variance of their distances, if that is wanted and below 1 px^2."""
         if not self.settings.measure_noise:
             return found.residuals
@@ -169,7 +189,7 @@ class FrameProblem:
         self, person: int, start: Array, blocks: Sequence[ResidualBlock], max_iterations: int, min_decrease: float = 0.0
     ) -> Fit:
         """Minimize the cost of some blocks from a pose, (n_values,)."""
-        model, _, active, _ = self.people[person]
+        model, active = self.people[person].model, self.people[person].active_dofs
         return solver_of(model)(model, start, blocks, active, max_iterations, TOLERANCE, min_decrease)
 
     def sigma(self, person: int) -> Array:
@@ -184,7 +204,7 @@ class FrameProblem:
             sigma[limb.dofs] = settings.recover.trust_rad
         return [*prior_blocks(model, self.people[person].predicted, sigma), *penetration(bodies, person, settings)]
 
-    def residuals(self, person: int, bodies: Bodies, everywhere: bool = False) -> ContourResiduals:
+    def residuals(self, person: int, bodies: Bodies, everywhere: bool = False) -> PersonResiduals:
         """Build the residuals of a person's contours against the evidence assigned to them.
 
         Args:
@@ -197,7 +217,7 @@ class FrameProblem:
 
     def residuals_on(
         self, own: Sequence[ViewEvidence], person: int, bodies: Bodies, everywhere: bool
-    ) -> ContourResiduals:
+    ) -> PersonResiduals:
         """Build the same against given evidence of the person."""
         settings, (around, index) = self.settings, self.around(person, bodies)
         # Of segments a prediction accepts those near it: to look for what is farther costs more than it saves.
@@ -205,7 +225,7 @@ class FrameProblem:
         contours = None
         if self._predicted is not None and bodies == self._predicted[0] and len(around) == len(bodies):
             contours = self._predicted[1]
-        return ContourResiduals(own, around, index, settings.match, settings.theta_px, everywhere, contours)
+        return person_residuals(own, around, index, settings.match, settings.theta_px, everywhere, contours)
 
     def own_evidence(
         self, people: Sequence[int], bodies: Bodies, everywhere: bool = False
@@ -249,7 +269,9 @@ def _variance_px2(costs: PartCosts) -> float:
 
 
 def with_body(bodies: Bodies, person: int, body: PosedBody) -> Bodies:
-    """Return all people with one in another pose."""
+    """Return all people with one in another pose, at the former velocity if that of the pose is not known."""
+    if body.velocity is None and bodies[person].velocity is not None:
+        body = replace(body, velocity=bodies[person].velocity)
     return (*bodies[:person], body, *bodies[person + 1 :])
 
 

@@ -12,10 +12,10 @@ from tracker.body.kinematics import Kinematics
 from tracker.body.limbs import Limb
 from tracker.body.model import BodyModel
 from tracker.compute.threads import N_HELPERS, kernel_pool, map_chunked
-from tracker.contours import occluding_contours
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.contour_residuals import MIN_DECREASE, ContourResiduals
+from tracker.fitting.clocked_residuals import PersonResiduals, person_residuals
+from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import Hypothesis
@@ -28,7 +28,7 @@ from tracker.tracking.estimation.settings import (
     EstimationSettings,
     RecoverSettings,
 )
-from tracker.tracking.view_regions import regions, visible_pieces_px
+from tracker.tracking.view_regions import accepting_pieces_px, regions
 
 T = TypeVar("T")
 
@@ -40,7 +40,7 @@ class PoseScorer:
     It shares its thread clones with the scorers made from it; use one of them at a time.
     """
 
-    residuals: ContourResiduals
+    residuals: PersonResiduals
     priors: Sequence[ResidualBlock]
     colors: Colors
     part_colors: PartColors | None
@@ -48,12 +48,12 @@ class PoseScorer:
     settings: RecoverSettings
     active_dofs: NDArray[np.bool_] | None
     """The degrees of freedom that may move, (n_dofs,); None: all. Limbs are given without the others."""
-    clones: tuple[ContourResiduals, ...]
+    clones: tuple[PersonResiduals, ...]
     """The residuals once for each helper thread, each with scratch of its own."""
 
     @classmethod
     def of(
-        cls, residuals: ContourResiduals, priors: Sequence[ResidualBlock], colors: Colors,
+        cls, residuals: PersonResiduals, priors: Sequence[ResidualBlock], colors: Colors,
         part_colors: PartColors | None, settings: RecoverSettings, active_dofs: NDArray[np.bool_] | None = None,
     ) -> "PoseScorer":  # fmt: skip
         """Return a scorer with a clone for each helper thread."""
@@ -67,7 +67,7 @@ class PoseScorer:
 
     def restricted_to(self, limb: Limb) -> "PoseScorer":
         """Return a faster scorer for poses that differ in a limb alone. It works in the room of this one's clones."""
-        return replace(self, clones=tuple(c.restricted_to(limb.parts, c.workspace) for c in self.clones))
+        return replace(self, clones=tuple(c.restricted_to(limb.parts) for c in self.clones))
 
     def each(self, work: Callable[["PoseScorer", Array], T], poses: Sequence[Array] | Array) -> list[T]:
         """Apply work to each of several poses, (n_values,) each, in parallel; each thread has a scorer of its own."""
@@ -85,7 +85,7 @@ class PoseScorer:
         """Return the costs of poses, (n, n_values), without refinement and without priors, (n,)."""
         costs, n = np.empty(len(candidates)), len(self.clones)
 
-        def score(i: int, residuals: ContourResiduals) -> None:
+        def score(i: int, residuals: PersonResiduals) -> None:
             own = candidates[i::n]
             costs[i::n] = residuals.costs(own) + self._color_costs(own)
 
@@ -127,7 +127,7 @@ def common_evidence(
 ) -> tuple[ViewEvidence, ...]:
     """Return the evidence of a frame around several guesses of the poses of all people, to compare them on."""
     cameras = observer.working_cameras
-    visible = [np.concatenate([visible_pieces_px(occluding_contours.trace(g, c)) for g in guesses]) for c in cameras]
+    visible = accepting_pieces_px(observer, frame, guesses)
     where = regions(cameras, [body for g in guesses for body in g])
     return observer.evidence(frame, where, visible if settings.segments else None, edges=settings.edges)
 
@@ -146,7 +146,7 @@ def scorer_without_prediction(
         part_colors: colours of the parts; None where they are unknown.
         active_dofs: degrees of freedom that may move, (n_dofs,); None: all.
     """
-    residuals = ContourResiduals(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
+    residuals = person_residuals(views, bodies, person, settings.match, settings.theta_px, everywhere=True)
     priors: list[ResidualBlock] = [
         PosePrior.of_spreads(bodies[person].model),
         SelfPenetration(),

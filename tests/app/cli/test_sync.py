@@ -1,0 +1,68 @@
+"""`quadrille sync` from end to end."""
+
+import json
+
+import numpy as np
+import pytest
+from command_line import assert_refused
+
+from tracker.footage import sound
+from tracker.session import synchronize
+from tracker.session.session import load_session
+
+
+def clocks(session):
+    return {c.camera.name: (c.offset, round(c.clock.ahead_frames, 6)) for c in load_session(session).cameras}
+
+
+@pytest.fixture
+def heard(session, monkeypatch):
+    """A session the last camera of which hears everything 10 ms later, and the second something else."""
+    rng, rate = np.random.default_rng(0), sound.SoundSettings().rate
+    samples = rng.normal(size=4 * rate).astype(np.float32)
+    others = {c.camera.name: samples for c in load_session(session).cameras}
+    first, second, *_, last = others
+    others[second] = rng.normal(size=4 * rate).astype(np.float32)
+    others[last] = np.concatenate([np.zeros(rate // 100, np.float32), samples])
+    monkeypatch.setattr(synchronize, "read_sound", lambda path, name: others[name])
+    return session, (first, second, last)
+
+
+def test_offset_of_an_existing_session(run, session):
+    name, fps = load_session(session).cameras[1].camera.name, load_session(session).fps
+    status, out, _ = run("sync", session, "--offset", f"{name}=0.4", "--drift", f"{name}=0.00002", "--json")
+    (row,) = [c for c in json.loads(out)["cameras"] if c["name"] == name]
+    assert (status, row["offset"], row["time_rate"]) == (0, 0, 0.00002)
+    assert row["time_offset_s"] == pytest.approx(-0.4 / fps)
+    assert clocks(session)[name] == (0, -0.4)
+    assert run("sync", session, "--offset", f"{name}=0", "--drift", f"{name}=0")[0] == 0
+    assert "time_" not in (session / "session.toml").read_text()
+
+
+def test_sound_writes_what_is_clear_only_when_asked(run, heard):
+    session, (first, second, last) = heard
+    before = (session / "session.toml").read_text()
+    status, out, _ = run("sync", session, "--sound")
+    assert status == 0
+    assert f"{second}: offset" in out
+    assert "not clear, so not taken" in out
+    assert "nothing written" in out
+    assert (session / "session.toml").read_text() == before
+    status, _, error = run("sync", session, "--sound", "--apply")
+    assert (status, error) == (0, "")
+    found = clocks(session)
+    assert found[first] == found[second] == (0, 0.0)
+    offset, ahead = found[last]
+    assert offset - ahead == pytest.approx(0.01 * load_session(session).fps, abs=0.01)
+
+
+def test_wrong_input(run, session):
+    assert_refused(run("sync", session), ["one of --sound, --flash, or --offset"])
+    assert_refused(run("sync", session, "--sound", "--offset", "x=1"), ["one of --sound, --flash"])
+    assert_refused(run("sync", session, "--sound"), ["expected sound in the videos of two cameras", "found it in 0"])
+    assert_refused(run("sync", session, "--offset", "nobody=1"), ["unknown camera 'nobody'"])
+    name = load_session(session).cameras[0].camera.name
+    assert_refused(run("sync", session, "--offset", f"{name}=nan"), ["--offset as NAME=VALUE"])
+    assert_refused(run("sync", session, "--offset", f"{name}=5000.5"), [f"'{name}'", "an offset of at most 0"])
+    assert_refused(run("sync", session, "--offset", f"{name}=-3"), ["give each of the others an offset of 3"])
+    assert_refused(run("sync", session, "--drift", f"{name}=3"), ["a drift from -0.1 to 0.1"])

@@ -1,0 +1,123 @@
+"""Find and set when cameras of a session began, to a fraction of a frame."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from tracker.errors import SessionError
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.flash import find_flash
+from tracker.footage.recording import Recording
+from tracker.footage.sound import read_sound, sound_delay
+from tracker.footage.video import open_footage
+from tracker.session.matching import check_names
+from tracker.session.session import Session, save_cameras
+
+
+class FoundStart(NamedTuple):
+    """The start of a camera against that of the first one, by a sound or a flash."""
+
+    camera: str
+    start_frames: float | None
+    """See `CameraSource.start_frames`; None where nothing was found."""
+    sigma_ms: float | None
+    """Its standard deviation, ms; None where it is not known."""
+    ratio: float | None
+    """How much the peak or the flash stands out from the next largest."""
+    is_clear: bool
+    """Whether it stands out enough to be taken."""
+
+
+def starts_by_sound(session: Session) -> list[FoundStart]:
+    """Return the starts of all cameras but the first one with sound, by the sound of their videos.
+
+    Raises:
+        RecordingError: a video cannot be read.
+        SessionError: fewer than two cameras have sound, or a video declares another frame rate than the session's.
+    """
+    for source in session.cameras:
+        if source.declared_fps is not None:
+            raise SessionError(
+                f"camera '{source.camera.name}': expected a video of {session.fps:g} frames per second, found one that "
+                f"declares {source.declared_fps:g}; its sound has another clock, so give the offset by --offset"
+            )
+    heard = [(c, read_sound(c.footage, c.camera.name)) for c in session.cameras]
+    with_sound = [(c, sound) for c, sound in heard if sound is not None]
+    if len(with_sound) < 2:
+        raise SessionError(
+            f"expected sound in the videos of two cameras or more, found it in {len(with_sound)}; give offsets, or "
+            "use a flash"
+        )
+    (first, sound_of_first), out = with_sound[0], []
+    for source, sound in heard:
+        if source is first:
+            continue
+        found = None if sound is None else sound_delay(sound_of_first, sound)
+        if found is None:
+            out.append(FoundStart(source.camera.name, None, None, None, False))
+            continue
+        start = first.start_frames + found.delay_s * session.fps
+        out.append(FoundStart(source.camera.name, start, 1000 * found.sigma_s, found.ratio, found.is_clear))
+    return out
+
+
+def starts_by_flash(session: Session, recording: Recording) -> list[FoundStart]:
+    """Return the starts of all cameras but the first, by a light that goes on in all pictures.
+
+    Raises:
+        RecordingError: footage cannot be read.
+    """
+    found = [find_flash(recording, i, session.n_frames) for i in range(len(session.cameras))]
+    first, seen = session.cameras[0], found[0]
+    if seen is None or not seen.is_clear:
+        return [FoundStart(c.camera.name, None, None, None, False) for c in session.cameras[1:]]
+    out = []
+    for source, flash in zip(session.cameras[1:], found[1:], strict=True):
+        if flash is None:
+            out.append(FoundStart(source.camera.name, None, None, None, False))
+            continue
+        in_footage, in_first = flash.frame + source.offset, seen.frame + first.offset
+        start = first.start_frames + in_footage - in_first
+        out.append(FoundStart(source.camera.name, start, None, flash.ratio, flash.is_clear))
+    return out
+
+
+def with_starts(session: Session, starts: Mapping[str, float], rates: Mapping[str, float]) -> Session:
+    """Give cameras of a session other starts and drifts, and write them into session.toml.
+
+    Poses stay as they are: those tracked before are at the former times.
+
+    Args:
+        session: as it was loaded.
+        starts: `CameraSource.start_frames` by camera name.
+        rates: drift by camera name, see `Clock.rate`.
+
+    Returns:
+        The session with those clocks.
+
+    Raises:
+        SessionError: an unknown camera, or a start before its footage or too late for all frames of the session.
+        RecordingError: footage cannot be read.
+    """
+    names = [c.camera.name for c in session.cameras]
+    check_names([*starts, *rates], names, "camera", "the offsets")
+    return save_cameras(session, [_started(session, c, starts, rates) for c in session.cameras])
+
+
+def _started(
+    session: Session, source: CameraSource, starts: Mapping[str, float], rates: Mapping[str, float]
+) -> CameraSource:
+    name = source.camera.name
+    if name not in starts and name not in rates:
+        return source
+    out = source.starting_at(starts.get(name, source.start_frames), rates.get(name))
+    if out.offset != source.offset:
+        footage = open_footage(source.footage, name)
+        n_frames = footage.n_frames
+        footage.close()
+        if out.offset + session.n_frames > n_frames:
+            raise SessionError(
+                f"camera '{name}': expected an offset of at most {n_frames - session.n_frames}, since the session has "
+                f"{session.n_frames} of its {n_frames} frames, found {out.offset}; make another "
+                "session of the frames that all cameras then have"
+            )
+    return out
