@@ -46,7 +46,7 @@ def viewed(off, frames=range(6), model=None, person=None, cameras=CAMERAS):
             (view,) = own_evidence([PosedBody(person, then)], [corrected(camera, correction)])
             views.append(replace(view, camera=camera))
         start = shaken(model, pose, random, 0.02, 0.01)
-        out.append(ViewedFrame(k, tuple(views), (PosedBody(model, start),), (velocity,)))
+        out.append(ViewedFrame(k, tuple(views), (PosedBody(model, start),), (velocity,), (0.0,) * len(cameras)))
     return out
 
 

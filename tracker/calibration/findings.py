@@ -75,8 +75,11 @@ def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tup
         view = frame.views[camera].camera
         mended = corrected(view, correction)
         for body, velocity in zip(frame.bodies, frame.velocities, strict=True):
-            then = body.model.points_world(body.model.retract(body.values, correction[TIME] * velocity))
-            moved = np.sum((mended.project(then) - view.project(body.points_world)) ** 2, axis=-1)
+            now, then = (
+                body.model.points_world(body.model.retract(body.values, (frame.ahead_s[camera] + later_s) * velocity))
+                for later_s in (0.0, correction[TIME])
+            )
+            moved = np.sum((mended.project(then) - view.project(now)) ** 2, axis=-1)
             px.append(moved / frame.views[camera].scale ** 2)
             mm.append(moved * _mm_per_px(view, body.points_world) ** 2)
     return tuple(float(np.sqrt(np.nanmean(np.concatenate(squares)))) for squares in (px, mm))  # type: ignore[return-value]

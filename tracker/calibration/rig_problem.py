@@ -47,6 +47,8 @@ class SeenPerson(NamedTuple):
     """All people; the others occlude."""
     velocity: Array
     """Change of the person's pose, (n_dofs,), rad or metres per second."""
+    ahead_s: Sequence[float]
+    """Time by which the picture of each view was taken later than the frame, by the present clocks, seconds."""
 
     @property
     def body(self) -> PosedBody:
@@ -192,7 +194,9 @@ class RigProblem:
         n_sizes, n_cameras = by_sizes.joints.shape[-1], self._sigmas.size
         sums = GroupSums.zeros(n_cameras, n_sizes + body.n_dofs)
         cost = prior.cost
-        for delay, views in itertools.groupby(self._views[group], lambda v: float(state.corrections[v.camera, TIME])):
+        for delay, views in itertools.groupby(
+            self._views[group], lambda v: float(seen.ahead_s[v.camera] + state.corrections[v.camera, TIME])
+        ):
             assert surfaces is not None
             then = body.retract(pose, delay * seen.velocity) if delay else pose
             kinematics, of_body = body.kinematics(then), np.zeros((len(body.parts), N_PART, N_PART))
@@ -323,7 +327,8 @@ def _views_of(seen: SeenPerson, corrections: Array) -> list[_View]:
     for i, (view, correction) in enumerate(zip(seen.views, corrections, strict=True)):
         if not len(view.points_px):
             continue
-        then = seen.moved(seen.body.model.retract(seen.body.values, correction[TIME] * seen.velocity))
+        later_s = seen.ahead_s[i] + correction[TIME]
+        then = seen.moved(seen.body.model.retract(seen.body.values, later_s * seen.velocity))
         evidence = replace(view, camera=corrected(view.camera, correction))
         out.append(_View(i, view, ContourResiduals([evidence], then.bodies, seen.person)))
     return out

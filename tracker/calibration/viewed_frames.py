@@ -25,6 +25,8 @@ class ViewedFrame(NamedTuple):
     """All people, as they were tracked."""
     velocities: tuple[Array, ...]
     """Change of each person's pose, (n_dofs,), rad or metres per second."""
+    ahead_s: tuple[float, ...]
+    """Time by which the picture of each view was taken later than the frame, by the present clocks, seconds."""
 
 
 def seen_people(frames: Sequence[ViewedFrame], state: RigState | None = None) -> list[SeenPerson]:
@@ -42,26 +44,25 @@ def seen_people(frames: Sequence[ViewedFrame], state: RigState | None = None) ->
         else:
             bodies = tuple(PosedBody(b.model, next(poses)) for b in seen.bodies)
             views = [
-                _accepted(view, bodies, seen.velocities, c)
-                for view, c in zip(seen.views, state.corrections, strict=True)
+                _accepted(view, _then(bodies, seen.velocities, ahead_s + c[TIME]), c)
+                for view, ahead_s, c in zip(seen.views, seen.ahead_s, state.corrections, strict=True)
             ]
         for person, velocity in enumerate(seen.velocities):
             own = own_views(views, bodies, person) if len(bodies) > 1 else views
-            out.append(SeenPerson(seen.frame, person, own, bodies, velocity))
+            out.append(SeenPerson(seen.frame, person, own, bodies, velocity, seen.ahead_s))
     return out
 
 
-def _accepted(
-    view: ViewEvidence, bodies: Sequence[PosedBody], velocities: Sequence[Array], correction: Array
-) -> ViewEvidence:
+def _then(bodies: Sequence[PosedBody], velocities: Sequence[Array], later_s: float) -> list[PosedBody]:
+    """Return people as they are some time later."""
+    return [PosedBody(b.model, b.model.retract(b.values, later_s * v)) for b, v in zip(bodies, velocities, strict=True)]
+
+
+def _accepted(view: ViewEvidence, bodies: Sequence[PosedBody], correction: Array) -> ViewEvidence:
     """Return a view with the segments that the contours of people accept under a corrected camera."""
     if view.segments is None or view.samples is None:
         return view
-    then = [
-        PosedBody(b.model, b.model.retract(b.values, correction[TIME] * v))
-        for b, v in zip(bodies, velocities, strict=True)
-    ]
-    contour = occluding_contours.trace(then, corrected(view.camera, correction))
+    contour = occluding_contours.trace(bodies, corrected(view.camera, correction))
     pieces = contour.pieces_px[~contour.occluded]
     chosen = accept_segments(view.samples, pieces, ACCEPTED_SHARE * view.theta_px)
     return with_segments(view, chosen if view.is_static is None else chosen & ~view.is_static)

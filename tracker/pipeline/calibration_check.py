@@ -137,7 +137,8 @@ class PosedRecording:
                 velocity(s[k].body.model, [s[j].body.values for j in range(k - 2, k + 3)], self.session.fps)
                 for s in self._stored
             )
-            out.append(ViewedFrame(k, views, bodies, velocities))
+            ahead_s = tuple(ahead / self.session.fps for ahead in self._observer.ahead_frames(k))
+            out.append(ViewedFrame(k, views, bodies, velocities, ahead_s))
         return out
 
     @cached_property

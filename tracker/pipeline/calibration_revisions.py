@@ -10,22 +10,22 @@ import tomllib
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
-import numpy as np
-
-from tracker.calibration.camera_correction import corrected
+from tracker.calibration.camera_correction import TIME, corrected
 from tracker.errors import SessionError
 from tracker.files import refuse_links, write_text_atomic
+from tracker.footage.camera_source import Clock
 from tracker.formats.anipose import format_calibration
 from tracker.geometry.arrays import Array
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.stored_run import forget_unfinished
-from tracker.session.session import CALIBRATION_FILE, Session, load_session
+from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_cameras
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.edit_tree import now
 
 CALIBRATIONS = "calibrations"
-"""Setting of the session: the revisions, in order, each with its text as `toml` and its `time`."""
+"""Setting of the session: the revisions, in order, each with its cameras as `toml`, their `clocks` and its `time`."""
 CALIBRATION_EDITS = "calibration_edits"
 """Setting of the session: by entry of the history, the revisions before and after it."""
 
@@ -52,11 +52,12 @@ def apply_check(session: Session, store: AnnotationStore, check: CalibrationChec
 
 def with_corrections(session: Session, corrections: Array) -> Session:
     """Return a session with corrected cameras, (V, N_CORRECTIONS). Nothing is stored."""
-    cameras = tuple(
-        replace(source, camera=corrected(source.camera, c)) if np.any(c) else source
-        for source, c in zip(session.cameras, corrections, strict=True)
-    )
-    return replace(session, cameras=cameras)
+    cameras = []
+    for source, c in zip(session.cameras, corrections, strict=True):
+        ahead = source.clock.ahead_frames + float(c[TIME]) * session.fps
+        clock = replace(source.clock, ahead_frames=ahead) if c[TIME] else source.clock
+        cameras.append(replace(source, camera=corrected(source.camera, c), clock=clock))
+    return replace(session, cameras=tuple(cameras))
 
 
 def change_calibration(session: Session, store: AnnotationStore, changed: Session, label: str) -> Session:
@@ -68,13 +69,12 @@ def change_calibration(session: Session, store: AnnotationStore, changed: Sessio
         changed: the same session with other cameras.
         label: of the entry.
     """
-    before = _revision(store, _text(session))
-    after = _revision(store, _text(changed))
+    before, after = _number(store, _content(session)), _number(store, _content(changed))
     forget_unfinished(store)  # An interrupted run would go on under another calibration.
     edit = store.commit(label, []).edit
     edits = store.setting(CALIBRATION_EDITS, {})
     store.set_setting(CALIBRATION_EDITS, {**edits, str(edit): [before, after]})
-    return _write(session, _text(changed))
+    return _write(session, _content(changed))
 
 
 def follow_history(session: Session, store: AnnotationStore) -> Session:
@@ -83,10 +83,10 @@ def follow_history(session: Session, store: AnnotationStore) -> Session:
     A calibration that is no revision stays: somebody has replaced the file.
     """
     revision = present_revision(store)
-    known = [r["toml"] for r in store.setting(CALIBRATIONS, [])]
-    if revision is None or _same(_text(session), known[revision - 1]):
+    known, present = store.setting(CALIBRATIONS, []), _content(session)
+    if revision is None or _same(present, known[revision - 1]):
         return session
-    if not any(_same(_text(session), text) for text in known):
+    if not any(_same(present, content) for content in known):
         return session
     return _write(session, known[revision - 1])
 
@@ -130,19 +130,20 @@ def _edits(store: AnnotationStore) -> dict[int, tuple[int, int]]:
     return {int(edit): (int(stored[edit][0]), int(stored[edit][1])) for edit in sorted(stored, key=int)}
 
 
-def _revision(store: AnnotationStore, text: str) -> int:
+def _number(store: AnnotationStore, content: Mapping[str, Any]) -> int:
     """Return the number of a calibration, which is stored if it is new."""
     known = store.setting(CALIBRATIONS, [])
     for number, revision in enumerate(known, 1):
-        if _same(revision["toml"], text):
+        if _same(revision, content):
             return number
-    store.set_setting(CALIBRATIONS, [*known, {"toml": text, "time": now()}])
+    store.set_setting(CALIBRATIONS, [*known, {**content, "time": now()}])
     return len(known) + 1
 
 
-def _same(text: str, other: str) -> bool:
-    """Return whether two calibrations are equal but for rounding: writing keeps 12 digits."""
-    return _alike(tomllib.loads(text), tomllib.loads(other))
+def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Return whether two revisions are equal but for rounding: writing keeps 12 digits."""
+    clocks = (one["clocks"], other["clocks"])
+    return _alike(*clocks) and _alike(tomllib.loads(one["toml"]), tomllib.loads(other["toml"]))
 
 
 def _alike(a: object, b: object) -> bool:
@@ -155,17 +156,23 @@ def _alike(a: object, b: object) -> bool:
     return a == b
 
 
-def _text(session: Session) -> str:
-    return format_calibration([c.camera for c in session.cameras])
+def _content(session: Session) -> dict[str, Any]:
+    """Return the calibration of a session as a revision holds it: the cameras, and by name their clocks."""
+    clocks = {c.camera.name: [float(c.clock.ahead_frames), float(c.clock.rate)] for c in session.cameras}
+    return {"toml": format_calibration([c.camera for c in session.cameras]), "clocks": clocks}
 
 
-def _write(session: Session, text: str) -> Session:
+def _write(session: Session, content: Mapping[str, Any]) -> Session:
     """Write a calibration, and return the session as it then is."""
     refuse_links(session.folder, CALIBRATION_FILE)
     try:
-        write_text_atomic(session.folder / CALIBRATION_FILE, text)
+        write_text_atomic(session.folder / CALIBRATION_FILE, content["toml"])
     except OSError as error:
         raise SessionError(
             f"cannot write {session.folder / CALIBRATION_FILE}: {error}; see that you may write to the folder"
         ) from error
-    return load_session(session.folder)
+    loaded, clocks = load_session(session.folder), content["clocks"]
+    clocked = [
+        replace(c, clock=Clock(*clocks[c.camera.name])) if c.camera.name in clocks else c for c in loaded.cameras
+    ]
+    return save_cameras(loaded, clocked)

@@ -35,6 +35,7 @@ class _Chain(msgspec.Struct):
 class _Calibration(msgspec.Struct):
     toml: str
     time: str
+    clocks: dict[Name, tuple[Number, Number]] = {}
 
 
 class _Floor(msgspec.Struct):
