@@ -14,6 +14,7 @@ from app.drawing.curves import CurveGroup
 from app.page.inspector_messages import (
     AcquireSizes,
     ApplySizes,
+    CheckCalibration,
     CoupleSides,
     DraftSizes,
     FindPeople,
@@ -244,7 +245,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
     FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, DraftSizes,
-    AcquireSizes, FindPeople,
+    AcquireSizes, FindPeople, CheckCalibration,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 
