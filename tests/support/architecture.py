@@ -31,6 +31,7 @@ ROOMS = [
     "tracker.tracking.contour",
     "tracker.tracking.voxel",
     "tracker.acquisition",
+    "tracker.calibration",
     "tracker.initialization.generators",
     "tracker.initialization",
     "tracker.posing",
