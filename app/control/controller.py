@@ -34,6 +34,7 @@ from app.control.session.kernel_warmup import KernelWarmup
 from app.control.session.save_retry import SaveRetry
 from app.control.session.session_state import SessionState
 from app.control.session.stored_poses import StoredPoses
+from app.control.tracking.calibrating import Calibrating
 from app.control.tracking.comparing_runs import ComparingRuns
 from app.control.tracking.finding import FindingPeople
 from app.control.tracking.inconsistent_frames import InconsistentFrames
@@ -109,7 +110,9 @@ class Controller:
         """Edits the sizes of bodies."""
         self.body_acquisition = BodyAcquisition(session_state)
         """Acquires the sizes of bodies from the footage."""
-        self.history = History(session_state, activities, self.body_sizes.follow)
+        self.calibrating = Calibrating(session_state, activities)
+        """Checks and corrects the cameras."""
+        self.history = History(session_state, activities, (self.body_sizes.follow, self.calibrating.follow))
         """Moves along the history."""
         self.cost_landscape = CostLandscapes(session_state, activities)
         """Samples the cost along one degree of freedom."""
@@ -167,6 +170,7 @@ class Controller:
         """Stop all work and save; the controller must not be used afterwards."""
         self.body_acquisition.stop()
         self.finding.stop()
+        self.calibrating.close()
         self._save_retry.close()
         with self.activities.editing():
             self.history.save()

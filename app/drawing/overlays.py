@@ -10,6 +10,7 @@ import numpy as np
 from app.drawing.facing import facing_arrow
 from app.drawing.overlay_colors import KIND_COLORS
 from app.drawing.seen_bodies import at_one_time, bodies_in, picture_times
+from app.state.calibration import CorrectedFrame
 from app.state.page_view import View
 from app.state.people import DragState
 from app.state.state import State
@@ -121,6 +122,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
         ("preview", None if preview is None else preview.poses),
         ("result", result),
     )
+    mended = state.calibration.shown_on(state.frame)
     seen = {index: session.cameras[index].camera.pinhole for index in sorted(view.cameras)}
     is_traced = "contours" in state.compiled  # otherwise the contours' kernels are being compiled
     has_edges = is_traced and "part_edges" in view.layers
@@ -133,7 +135,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             out += _skeletons(session, bodies, camera, index)
             continue
         if not view.layers.isdisjoint(("contours", "hidden")):
-            out += _model(session, bodies, camera, index, view)
+            out += _model(session, bodies, camera, index, view) if mended is None else _corrected(mended, index)
         if "contours" in view.layers:
             out += _facing(session, bodies, camera, index)
         if state.draft is not None:
@@ -250,6 +252,14 @@ def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index:
         elif layer in view.layers:
             out += _by_side(session, bodies, contour, pieces, index, kind)
     return out
+
+
+def _corrected(found: CorrectedFrame, index: int) -> list[Path]:
+    """Draw the visible contours of the people refitted under the corrected cameras."""
+    bodies = found.bodies[index]
+    contour = _traced(bodies, found.cameras[index])
+    colors = [KIND_COLORS["preview"]] * len(bodies)
+    return _by_person(bodies, contour, ~contour.occluded, index, "preview", colors)
 
 
 def _skeletons(session: Session, bodies: Sequence[PosedBody], camera: Camera, index: int) -> list[Path]:

@@ -15,6 +15,7 @@ from app.page.inspector_messages import (
     AcquireSizes,
     ApplySizes,
     ChangeBody,
+    CheckCalibration,
     CoupleSides,
     DraftSizes,
     FindPeople,
@@ -245,7 +246,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
     FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
-    DraftSizes, AcquireSizes, FindPeople,
+    DraftSizes, AcquireSizes, FindPeople, CheckCalibration,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

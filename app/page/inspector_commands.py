@@ -80,6 +80,18 @@ def _find_people(controller: Controller, _: int, message: wire.FindPeople) -> No
         controller.finding.stop()
 
 
+def _calibration(controller: Controller, _: int, message: wire.CheckCalibration) -> None:
+    calibrating = controller.calibrating
+    actions: dict[str, Callable[[], None]] = {
+        "start": calibrating.start,
+        "stop": calibrating.stop,
+        "preview": lambda: calibrating.preview(True),
+        "leave": lambda: calibrating.preview(False),
+        "apply": calibrating.apply,
+    }
+    actions[message.action]()
+
+
 INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetTrackSettings: _track_settings,
     wire.SetView3d: _view_3d,
@@ -92,4 +104,5 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.DraftSizes: _draft,
     wire.AcquireSizes: _acquire,
     wire.FindPeople: _find_people,
+    wire.CheckCalibration: _calibration,
 }

@@ -10,6 +10,7 @@ from app.drawing import dof_labels
 from app.page import inspector_messages as wire
 from app.page.message_types import Message
 from app.page.search_messages import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
+from app.state.calibration import CalibrationState
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
 from app.state.people import AcquisitionState
@@ -19,6 +20,8 @@ from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.searches import Search, SearchKind
+from tracker.calibration.camera_correction import in_units
+from tracker.calibration.findings import CameraFinding
 from tracker.formats.model_toml import PRESETS
 from tracker.geometry.arrays import Array
 from tracker.pipeline.methods import METHODS
@@ -44,6 +47,7 @@ class InspectorFeed:
         now: list[Message] = [
             settings(state.settings, state.run_choices), view_3d(controller, state), body_sizes(controller, state),
             acquisition(state.acquisition), finding(state.finding, [c.camera.name for c in controller.session.cameras]),
+            calibration(state.calibration, len(state.people)),
             reason(state, controller.session.camera_names), *cost_map(state),
         ]  # fmt: skip
         changed = [message for message in now if message not in self._sent]
@@ -56,7 +60,8 @@ def _ingredients(state: State) -> tuple[Identity, ...]:
     made_from = (
         state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
-        state.finding, state.reasons, state.reason, state.frame, state.people[state.person].trace, state.cost_map,
+        state.finding, state.calibration, state.reasons, state.reason, state.frame,
+        state.people[state.person].trace, state.cost_map,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
 
@@ -166,6 +171,28 @@ def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
     return wire.FindingMessage(
         found.running, found.stage, found.share, found.notes, found.message, found.failed, found.tried, found.camera,
         found.frame, axes,
+    )  # fmt: skip
+
+
+def calibration(found: CalibrationState, n_people: int) -> wire.CalibrationMessage:
+    """Describe the check of the cameras."""
+    check, preview = found.check, found.preview
+    rows = () if check is None else tuple(_camera(c, check.since.get(c.name)) for c in check.cameras)
+    return wire.CalibrationMessage(
+        found.running, found.stage, found.share, found.message, found.failed, check is not None,
+        () if check is None else check.frames, rows, () if check is None else tuple(check.sentences),
+        found.n_others, found.n_better, found.refused, found.is_previewed, None if preview is None else preview.frame,
+        0.0 if preview is None else round(preview.cost_before - preview.cost_after, 1),
+        tuple(found.outdated.get(i, ()) for i in range(n_people)),
+    )  # fmt: skip
+
+
+def _camera(found: CameraFinding, since: int | None) -> wire.CameraCheck:
+    units, sigma = in_units(found.correction), in_units(found.sigma)
+    (turned, moved, zoomed, shifted) = (tuple(np.atleast_1d(v).tolist()) for v in units.values())
+    return wire.CameraCheck(
+        found.name, found.misfit_px, found.misfit_mm, found.kinds, found.rivals, turned, moved, zoomed[0], shifted[0],
+        {key: tuple(np.atleast_1d(v).tolist()) for key, v in sigma.items()}, since, found.is_seen,
     )  # fmt: skip
 
 

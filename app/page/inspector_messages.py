@@ -135,6 +135,12 @@ class FindPeople(Command, frozen=True, tag="find_people"):
     action: Literal["start", "stop"]
 
 
+class CheckCalibration(Command, frozen=True, tag="calibration_check"):
+    """Check the cameras by the tracked people, preview the corrections, or apply them."""
+
+    action: Literal["start", "stop", "preview", "leave", "apply"]
+
+
 # --- to the page ----------------------------------------------------------------------------------------------------
 
 
@@ -349,3 +355,62 @@ class FindingMessage(Message, frozen=True, tag="finding"):
     """The frame on which people were found last."""
     axes: tuple[SilhouetteAxes, ...]
     """The axes of the silhouettes on that frame, of each view that has some."""
+
+
+class CameraCheck(Part, frozen=True):
+    """What a check says of a camera. Numbers that are corrected are 0 where the camera is not off."""
+
+    name: str
+    misfit_px: float
+    misfit_mm: float
+    kinds: tuple[str, ...]
+    """How it is off: `rotation`, `position`, `focal`, `time`; empty where it is not."""
+    rivals: tuple[str, ...]
+    """Kinds that explain the contours as well."""
+    rotation_deg: tuple[float, ...]
+    """About its right, down and forward axes."""
+    position_mm: tuple[float, ...]
+    """Along the same axes."""
+    focal_percent: float
+    time_ms: float
+    sigma: dict[str, tuple[float, ...]]
+    """Standard deviations, by the name of the field; of one number, too."""
+    since_frame: int | None
+    """The frame from which on it is off; null for all frames."""
+    is_seen: bool
+    """Whether it shows the people at all."""
+
+
+class CalibrationMessage(Message, frozen=True, tag="calibration"):
+    """The check of the cameras: its progress, or its result."""
+
+    running: bool
+    stage: str
+    """The kind of work."""
+    share: float
+    """Share of the work that is done, 0 to 1."""
+    message: str
+    """How the last check or correction ended, or empty."""
+    failed: bool
+    """Whether it ended with an error."""
+    is_checked: bool
+    """Whether there is a result."""
+    frames: tuple[int, ...]
+    """Frames that the check used."""
+    cameras: tuple[CameraCheck, ...]
+    sentences: tuple[str, ...]
+    """What there is to say; empty where no camera is off."""
+    others: int
+    """Number of other frames on which the corrections were compared."""
+    better: int
+    """Number of those that fit better with them."""
+    refused: str
+    """Why the corrections cannot be applied, or empty."""
+    is_previewed: bool
+    """Whether the views show the corrections."""
+    preview_frame: int | None
+    """The frame that is previewed; null until it is ready."""
+    preview_fall_nats: float
+    """Fall of the cost of that frame by the corrections."""
+    outdated: tuple[tuple[int, ...], ...]
+    """Frames of each person with poses of an earlier calibration."""

@@ -87,5 +87,11 @@ def _wanted(state: State, view: View) -> dict[Key, tuple[object, ...]]:
             # Evidence has the scale of matching, whatever the size of the pane.
             content = () if layer in EVIDENCE else (view.reductions[camera],)
             poses = (state.revisions, state.undrawn, *map(Identity, state.drawn.poses)) if layer == "parts" else ()
-            wanted[layer, camera] = (state.frame, state.footage.recoveries, *content, *poses)
+            wanted[layer, camera] = (
+                state.frame,
+                state.footage.recoveries,
+                state.calibration.n_changes,
+                *content,
+                *poses,
+            )
     return wanted

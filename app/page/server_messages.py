@@ -10,6 +10,7 @@ from typing import Literal, TypeAlias, Union, get_args
 from app.page.inspector_messages import (
     AcquisitionMessage,
     BodySizesMessage,
+    CalibrationMessage,
     FindingMessage,
     SettingsMessage,
     View3dMessage,
@@ -392,7 +393,7 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
     RangeComparisonMessage, ObservabilityMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
-    AcquisitionMessage, FindingMessage, ReasonMessage, CostMapMessage,
+    AcquisitionMessage, FindingMessage, CalibrationMessage, ReasonMessage, CostMapMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -382,6 +382,8 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.undrawn,
         state.compiled,
         Identity(state.finding.candidates),
+        state.calibration.n_changes,
+        Identity(state.calibration.preview) if state.calibration.is_previewed else None,
         Identity(None if state.reason is None else state.reason.alternatives),
     )
     return (*drawn, _pins(state), state.floor.picking)

@@ -72,13 +72,16 @@ class CameraView:
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Follow the controller's state and the pages' canvases."""
         self._controller = controller
-        self._cameras = [c.camera.pinhole for c in controller.session.cameras]
         self._views: dict[int, _PageView] = {}
         # One thread for states and reports, so that neither overtakes the other.
         self._latest: LatestWinsWorker[State | _Report] = LatestWinsWorker(self._take, "camera view")
         controller.subscribe(self._latest.offer)
         server.on_client_connect(self._connected)
         server.on_client_disconnect(self._disconnected)
+
+    @property
+    def _cameras(self) -> list[Camera]:
+        return [c.camera.pinhole for c in self._controller.session.cameras]
 
     async def _connected(self, client: viser.ClientHandle) -> None:
         self._views[client.client_id] = _PageView(client)
@@ -124,7 +127,7 @@ class CameraView:
             return
         seen = view.client.camera
         size = (seen.image_width, seen.image_height)
-        wanted = (state.snapped, state.frame, size)
+        wanted = (state.snapped, state.frame, size, state.calibration.n_changes)
         if wanted == view.shown or min(size) < _LEAST_PX or state.is_3d_paused:
             return
         camera = self._cameras[state.snapped]

@@ -9,11 +9,15 @@ import viser
 from app.control.controller import Controller
 from app.drawing.centred_image import aspect_around, centred, field_of_view
 from app.runtime.jobs import LatestWinsWorker
+from app.state.calibration import CalibrationState, CorrectedFrame
 from app.state.state import State
 from tracker.geometry import rigid
+from tracker.geometry.cameras import Camera
 
 _SCALE_M = 0.25
 _COLOR = (120, 130, 140)
+_CORRECTED_COLOR = (230, 130, 30)
+"""Of a camera as a preview corrects it: it stands out from the others and from both backgrounds."""
 _WIDTH_PX = 192
 _JPEG_QUALITY = 75
 _REST_S = 0.35
@@ -27,6 +31,9 @@ class Frusta:
         """Add the frusta and follow the controller's state."""
         self._server, self._controller = server, controller
         self._cameras = [c.camera.pinhole for c in controller.session.cameras]
+        self._n_changes = controller.state.calibration.n_changes
+        self._corrected: list[viser.CameraFrustumHandle] = []
+        self._previewed: CorrectedFrame | None = None
         self._shown: int | None = None  # the frame of the images
         self._handles = [self._add(index) for index in range(len(self._cameras))]
         self._labels = [server.scene.add_label(f"/cameras/{c.name}/name", c.name) for c in self._cameras]
@@ -35,22 +42,44 @@ class Frusta:
 
     def show(self, state: State) -> None:
         """Show or hide the cameras. Looking through a camera hides them, because they would cover its image."""
+        self._show_calibration(state.calibration)
         is_shown = state.view_3d.cameras and state.snapped is None
         for handle, label in zip(self._handles, self._labels, strict=True):
             if handle.visible != is_shown:
                 handle.visible = label.visible = is_shown
 
-    def _add(self, index: int) -> viser.CameraFrustumHandle:
-        camera = self._cameras[index]
+    def _show_calibration(self, found: CalibrationState) -> None:
+        """Move the frusta to other cameras, and show the corrected ones of a preview beside them."""
+        if found.n_changes != self._n_changes:
+            self._n_changes = found.n_changes
+            self._cameras = [c.camera.pinhole for c in self._controller.session.cameras]
+            for handle, camera in zip(self._handles, self._cameras, strict=True):
+                handle.fov = field_of_view(camera, aspect_around(camera))
+                handle.wxyz = rigid.quaternion_from_matrix(camera.T_world_camera[:3, :3])
+                handle.position = camera.T_world_camera[:3, 3]
+        preview = found.preview if found.is_previewed else None
+        if preview is not self._previewed:
+            self._previewed = preview
+            for handle in self._corrected:
+                handle.remove()
+            changed = () if preview is None else zip(self._cameras, preview.cameras, strict=True)
+            self._corrected = [
+                self._frustum(f"/corrected/{after.name}", after, _CORRECTED_COLOR)
+                for before, after in changed
+                if not np.array_equal(before.T_world_camera, after.T_world_camera)
+                or not np.array_equal(before.K, after.K)
+            ]
+
+    def _frustum(self, name: str, camera: Camera, color: tuple[int, int, int]) -> viser.CameraFrustumHandle:
         aspect = aspect_around(camera)
-        handle = self._server.scene.add_camera_frustum(
-            f"/cameras/{camera.name}",
+        return self._server.scene.add_camera_frustum(
+            name,
             fov=field_of_view(camera, aspect),
             aspect=aspect,
             scale=_SCALE_M,
             thickness=1.5,
             thickness_units="screen",
-            color=_COLOR,
+            color=color,
             format="jpeg",
             jpeg_quality=_JPEG_QUALITY,
             wxyz=rigid.quaternion_from_matrix(camera.T_world_camera[:3, :3]),
@@ -58,6 +87,9 @@ class Frusta:
             cast_shadow=False,
             receive_shadow=False,
         )
+
+    def _add(self, index: int) -> viser.CameraFrustumHandle:
+        handle = self._frustum(f"/cameras/{self._cameras[index].name}", self._cameras[index], _COLOR)
 
         @handle.on_click
         def _(_: Any) -> None:

@@ -35,6 +35,7 @@ from app.storage.saver import Saver
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
+from tracker.pipeline.calibration_revisions import follow_history
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 
@@ -75,6 +76,7 @@ def open_session(
     with Recording(session.cameras, indices=indices, in_background=True) as recording:
         remember(tokens, session.folder)
         store = AnnotationStore(session.annotations_path)
+        session = follow_history(session, store)  # A correction may have been cut off.
         if store.backup_error is not None:
             say(store.backup_error)
         offers = [page_text(*found.offer) for found in rescue.find(session.folder, store.id)]

@@ -16,6 +16,7 @@ from app.runtime.byte_bounded_cache import ByteBoundedCache
 from tracker.errors import RecordingError
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ViewEvidence
+from tracker.footage.camera_source import CameraSource
 from tracker.footage.proxy import Proxy
 from tracker.geometry.arrays import Image
 from tracker.images.working_view import WorkingView
@@ -47,10 +48,7 @@ class FrameCache:
             rest_s: time a frame is shown before its evidence is computed.
         """
         self.observer, self._proxies, self._rest_s = observer, list(proxies), rest_s
-        self._images = ByteBoundedCache(self._undistorted, _IMAGE_BYTES)
-        self._pictures = ByteBoundedCache(self._picture, _PICTURE_BYTES)
-        self._resamplers = lru_cache(_SIZES)(self._resampler)
-        self._evidence = ByteBoundedCache(self._compute_evidence, _EVIDENCE_BYTES)
+        self._empty_caches()
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
         self._wanted: int | None = None
         self._n_pictures = 0  # number of pictures in the making
@@ -59,6 +57,21 @@ class FrameCache:
         self._failed_lock = threading.Lock()
         self.on_unreadable: Callable[[], None] = lambda: None
         """Called when footage could not be read, from any thread; `problem` returns the reason."""
+
+    def set_cameras(self, cameras: Sequence[CameraSource]) -> None:
+        """Continue with other calibrations of the same cameras; what was made with the former ones is dropped.
+
+        Raises:
+            RecordingError: a background cannot be read.
+        """
+        self.observer = Observer(cameras, self.observer.recording)
+        self._empty_caches()
+
+    def _empty_caches(self) -> None:
+        self._images = ByteBoundedCache(self._undistorted, _IMAGE_BYTES)
+        self._pictures = ByteBoundedCache(self._picture, _PICTURE_BYTES)
+        self._resamplers = lru_cache(_SIZES)(self._resampler)
+        self._evidence = ByteBoundedCache(self._compute_evidence, _EVIDENCE_BYTES)
 
     def images(self, frame: int) -> tuple[Image | None, ...]:
         """Return the undistorted images of all views, shared by all callers; None for a damaged or unreadable one."""

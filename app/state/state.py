@@ -5,6 +5,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from app.state.calibration import CalibrationState
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import FloorState
 from app.state.people import (
@@ -78,6 +79,8 @@ class State:
     track: TrackState = field(default_factory=TrackState)
     finding: FindState = field(default_factory=FindState)
     """Search for people whom nobody has placed."""
+    calibration: CalibrationState = field(default_factory=CalibrationState)
+    """Check of the cameras."""
     follow: bool = True
     """Whether each frame is shown as it is tracked."""
     locked: tuple[frozenset[int], ...] = ()
@@ -253,6 +256,7 @@ class StateChanges(TypedDict, total=False):
     landscape: CostLandscape | None
     track: TrackState
     finding: FindState
+    calibration: CalibrationState
     follow: bool
     locked: tuple[frozenset[int], ...]
     ranges: RangeState

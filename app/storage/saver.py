@@ -17,6 +17,8 @@ from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
+from tracker.pipeline.calibration_check import CalibrationCheck
+from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames
 from tracker.pipeline.seen_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
@@ -84,6 +86,33 @@ class Saver:
     def store_setting(self, key: str, value: Any) -> None:
         """Store a setting with the session; it is no part of the history."""
         self._store.set_setting(key, value)
+
+    def correct_cameras(self, check: CalibrationCheck) -> Session:
+        """Correct the cameras that a check names, as one entry of the history; returns the session with them.
+
+        Raises:
+            SessionError: a queued edit still cannot be written, or the calibration cannot be.
+        """
+        self._write_all()
+        return self._with_cameras(apply_check(self._session, self._store, check))
+
+    def follow_calibration(self) -> Session:
+        """Return the session with the calibration that belongs to its history; the same session if it has it.
+
+        Raises:
+            SessionError: the calibration cannot be written.
+        """
+        found = follow_history(self._session, self._store)
+        return found if found is self._session else self._with_cameras(found)
+
+    def _with_cameras(self, found: Session) -> Session:
+        self._session = replace(self._session, cameras=found.cameras)
+        return self._session
+
+    def frames_of_earlier_calibration(self) -> dict[int, tuple[int, ...]]:
+        """Return the frames with poses that were made with an earlier calibration, by index of the person."""
+        found = outdated_frames(self._session, self._store)
+        return {i: tuple(sorted(found[p.name])) for i, p in enumerate(self._session.people) if p.name in found}
 
     def pose(self, person: int, frame: int) -> ShownPose | None:
         """Return the stored pose of a person on a frame; None if there is none or its body has other values."""

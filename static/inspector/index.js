@@ -6,6 +6,7 @@
 
 import { button } from "../widgets/elements.js";
 import { alt, inArea } from "../widgets/key_matching.js";
+import { calibrationSection } from "./calibration_section.js";
 import { findSection } from "./find_section.js";
 import { BodySection } from "./body_section.js";
 import { Inspector } from "./inspector.js";
@@ -40,6 +41,7 @@ export function mount(context, { panes, posing, scene }) {
     new BodySection(context),
     trackSection(context),
     searchSection(context),
+    calibrationSection(context),
     viewSection(context, scene, panes),
   ];
   const inspector = new Inspector(context.store, sections);

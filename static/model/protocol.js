@@ -90,6 +90,7 @@
  * @typedef {{type: "body_sizes", action: "discard" | "previous", person: number}} DraftSizes
  * @typedef {{type: "acquire", action: "start" | "stop", person: number, method?: "contours" | "voxels"}} AcquireSizes
  * @typedef {{type: "find_people", action: "start" | "stop"}} FindPeople
+ * @typedef {{type: "calibration_check", action: "start" | "stop" | "preview" | "leave" | "apply"}} CheckCalibration
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo
@@ -189,6 +190,13 @@
  * @typedef {{camera: number, people: [number, number, number, number][][]}} SilhouetteAxes
  * @typedef {{type: "finding", running: boolean, stage: string, share: number, notes: string[], message: string, failed:
  *   boolean, tried: number | null, camera: number | null, frame: number | null, axes: SilhouetteAxes[]}} FindingMessage
+ * @typedef {{name: string, misfit_px: number, misfit_mm: number, kinds: string[], rivals: string[], rotation_deg:
+ *   number[], position_mm: number[], focal_percent: number, time_ms: number, sigma: Record<string, number[]>,
+ *   since_frame: number | null, is_seen: boolean}} CameraCheck
+ * @typedef {{type: "calibration", running: boolean, stage: string, share: number, message: string, failed: boolean,
+ *   is_checked: boolean, frames: number[], cameras: CameraCheck[], sentences: string[], others: number, better: number,
+ *   refused: string, is_previewed: boolean, preview_frame: number | null, preview_fall_nats: number, outdated:
+ *   number[][]}} CalibrationMessage
  * @typedef {{name: string, parts: number[]}} LimbReason
  * @typedef {{below_nats: (number | null)[], outside: (number | null)[], usual_outside: (number | null)[], contour_px:
  *   (number | null)[], usual_contour_px: (number | null)[], below_in_all_nats: number}} PartReason
@@ -234,11 +242,11 @@
  *   SetLandscapeDof | ShowCostMap | SetCostMapPlace | AskReason | StartTracking | ControlTracking | EditRange |
  *   CompareRange | StopRange | ToggleMark | ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d | SetHeight
  *   | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | ChangeBody | DraftSizes | AcquireSizes | FindPeople |
- *   EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ *   CheckCalibration | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
- *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | ReasonMessage | CostMapMessage}
- *   TextMessage
+ *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | CalibrationMessage | ReasonMessage |
+ *   CostMapMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

@@ -63,6 +63,9 @@ export class Receiver {
       case "finding":
         this.#store.set({ finding: message });
         break;
+      case "calibration":
+        this.#store.set({ calibration: message });
+        break;
       case "acquisition":
         this.#store.set({ acquisition: message });
         break;

@@ -39,6 +39,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("./protocol.js").BodySizesMessage | null} bodySizes of the active person
  * @property {import("./protocol.js").AcquisitionMessage | null} acquisition of sizes from the footage
  * @property {import("./protocol.js").FindingMessage | null} finding the search for people whom nobody has placed
+ * @property {import("./protocol.js").CalibrationMessage | null} calibration the check of the cameras
  * @property {number | null} exporting share of an export that is done, 0 to 1; null without one
  * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
  * @property {import("./protocol.js").SearchRunsMessage | null} searchRuns
@@ -103,6 +104,7 @@ export class Store {
     bodySizes: null,
     acquisition: null,
     finding: null,
+    calibration: null,
     exporting: null,
     searchSetup: null,
     searchRuns: null,

@@ -61,7 +61,7 @@ export class Transport {
       if (changed.has("target") || changed.has("session")) this.#showFrame();
       if (changed.has("playing")) this.#showPlaying();
       if (changed.has("rate") || changed.has("loops") || changed.has("everyFrame")) this.#showHow();
-      if (["state", "timeline", "lanes", "target", "connected"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
+      if (["state", "calibration", "timeline", "lanes", "target", "connected"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
         this.#showSource();
       }
       if (changed.has("timeline")) this.#showLegend();
@@ -98,8 +98,9 @@ export class Transport {
     const { target, connected, state, session } = this.#store.facts;
     const source = state?.source ?? null;
     const other = state?.other_sizes ?? false;
+    const isOutdated = !!state && !!this.#store.facts.calibration?.outdated[state.person]?.includes(state.frame);
     const name = session && session.people.length > 1 && state ? session.people[state.person].name : "";
-    const what = state?.replay ? "replay" : `${source}${other ? ", earlier sizes" : ""}`;
+    const what = state?.replay ? "replay" : `${source}${other ? ", earlier sizes" : ""}${isOutdated ? ", earlier calibration" : ""}`;
     this.#source.textContent = source === null && !state?.replay ? `${name && `${name}: `}No pose` : `${name || "Pose"}: ${what}`;
     const converted = "Track again to use the present ones; a keyframe is refitted by Body sizes, Apply, in the inspector";
     const made = `This pose was made with earlier body sizes and is shown with them. ${converted}`;

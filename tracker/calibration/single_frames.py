@@ -25,6 +25,8 @@ class FrameScore(NamedTuple):
     """Derivative of the cost by further corrections of all cameras, (V * N_CORRECTIONS,)."""
     hessian: Array
     """Second derivative, (V * N_CORRECTIONS, V * N_CORRECTIONS)."""
+    poses: tuple[Array, ...] = ()
+    """Of each person, at their best, (n_values,)."""
 
 
 def score_frame(
@@ -49,7 +51,9 @@ def score_frame(
     prior = np.tile(1 / sigmas**2, len(corrections))
     held = corrections.ravel()
     cost = found.cost - 0.5 * float(np.sum(prior * held**2))
-    return FrameScore(frame.frame, cost, gradient[:n] - prior * held, hessian[:n, :n] - np.diag(prior))
+    return FrameScore(
+        frame.frame, cost, gradient[:n] - prior * held, hessian[:n, :n] - np.diag(prior), found.state.poses
+    )
 
 
 class Change(NamedTuple):

@@ -1,6 +1,6 @@
 """Move along the history of a session, by one entry or many, and retry failed saves."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
@@ -11,13 +11,15 @@ from tracker.store.records import HistoryEntry
 class History:
     """Moves along the history of one session."""
 
-    def __init__(self, session_state: SessionState, activities: Activities, follow: Callable[[], None]) -> None:
+    def __init__(
+        self, session_state: SessionState, activities: Activities, follow: Sequence[Callable[[], None]]
+    ) -> None:
         """Move along the history of this session.
 
         Args:
             session_state: holds the state.
             activities: ends jobs and gestures before an edit.
-            follow: restores body models after a move (`BodySizeEditing.follow`).
+            follow: functions that restore body models and cameras after a move.
         """
         self._session_state, self._activities, self._follow = session_state, activities, follow
 
@@ -66,7 +68,8 @@ class History:
                 raise
             self._session_state.note_moved()
             try:
-                self._follow()
+                for follow in self._follow:
+                    follow()
             finally:
                 self._session_state.show_frame(min(changed, key=lambda frame: abs(frame - here), default=here))
                 self._session_state.refresh_saving()

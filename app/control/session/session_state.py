@@ -151,6 +151,15 @@ class SessionState:
         self.saver.set_body_models(session)
         self.set_default_poses(self._R_world_up)
 
+    def set_cameras(self, session: Session) -> None:
+        """Continue with a session that has other cameras; call `show_frame` afterwards.
+
+        Raises:
+            RecordingError: a background cannot be read.
+        """
+        self.frames.set_cameras(session.cameras)
+        self.session = replace(self.session, cameras=session.cameras)
+
     def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
         """Call a view with every new state; returns the function that ends this."""
         with self.lock:

@@ -9,6 +9,7 @@ from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.state.floor_picking import FloorState, Picking, with_mark, with_next, without_last
 from tracker.errors import TrackerError
+from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import GroundPlane, nearest_axis, up_rotation
 from tracker.session.session import save_floor
 from tracker.session.session_file import UPS
@@ -28,9 +29,12 @@ class FloorEditing:
             activities: ends jobs and gestures before an edit.
         """
         self._session_state, self._activities = session_state, activities
-        self._cameras = [c.camera for c in session_state.session.cameras]
         floor = FloorState(session_state.session.up, session_state.session.floor, former=self._former() is not None)
         session_state.set(floor=floor)
+
+    @property
+    def _cameras(self) -> list[Camera]:
+        return [c.camera for c in self._session_state.session.cameras]
 
     def begin(self) -> None:
         """Begin to click points; earlier clicks are discarded."""

@@ -1,0 +1,221 @@
+"""Check the cameras by the contours of the tracked people, preview the corrections, and apply them."""
+
+import logging
+import threading
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
+from app.remedies import page_text
+from app.runtime.jobs import LatestWinsWorker
+from app.state.calibration import CorrectedFrame
+from app.state.state import State
+from tracker.acquisition.size_parameters import SizeParameters
+from tracker.body.model import PosedBody
+from tracker.calibration.camera_correction import TIME, corrected
+from tracker.calibration.diagnosis import prior_sigmas
+from tracker.calibration.single_frames import score_frame
+from tracker.errors import TrackerError
+from tracker.pipeline.calibration_check import (
+    CalibrationCheck,
+    PosedRecording,
+    check_calibration,
+    held_out_scores,
+)
+
+_LOG = logging.getLogger(__name__)
+_STEPS = 100
+"""Progress is shown in so many steps."""
+
+
+class _StoppedError(Exception):
+    """The user has stopped the check."""
+
+
+class Calibrating:
+    """At most one check of the cameras at a time. It changes nothing until its corrections are applied."""
+
+    def __init__(self, session_state: SessionState, activities: Activities) -> None:
+        """Check nothing yet.
+
+        Args:
+            session_state: holds the state.
+            activities: ends jobs and gestures before the cameras change.
+        """
+        self._session_state, self._activities = session_state, activities
+        self._thread: threading.Thread | None = None
+        self._stopping = threading.Event()
+        self._version: tuple[int, int] | None = None
+        self._tried: tuple[int, int] | None = None  # the check and the frame of the last preview
+        self._previews = LatestWinsWorker(self._refit, "calibration preview")
+        self._outdated = LatestWinsWorker(self._find_outdated, "earlier calibration")
+        self._unsubscribe = session_state.subscribe(self._follow_state)
+        self._outdated.offer(session_state.state)
+
+    def start(self) -> None:
+        """Begin to check the cameras by poses of all frames.
+
+        Raises:
+            TrackerError: another check is at work.
+        """
+        with self._session_state.lock:
+            if self._session_state.state.calibration.running:
+                raise TrackerError(
+                    "expected no other check of the cameras at work, found one; stop it or wait for its end"
+                )
+            self._set(
+                running=True, stage="starting", share=0.0, message="", failed=False, check=None, is_previewed=False,
+                preview=None, refused="",
+            )  # fmt: skip
+        self._stopping.clear()
+        self._thread = threading.Thread(target=self._work, name="check cameras", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop a check that is at work. The caller must not hold the lock."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join(30)
+
+    def close(self) -> None:
+        """Stop all work."""
+        self._unsubscribe()
+        self.stop()
+        self._previews.close()
+        self._outdated.close()
+
+    def preview(self, on: bool) -> None:
+        """Show people and cameras as the corrections make them, or as they are."""
+        if on:
+            self._found()
+        self._set(is_previewed=on)
+
+    def apply(self) -> None:
+        """Correct the cameras that were named, as one entry of the history. Poses stay until they are tracked again.
+
+        Raises:
+            TrackerError: nothing is to be corrected, other frames do not confirm it, or it cannot be written.
+        """
+        check = self._found()
+        with self._activities.editing():
+            session_state, found = self._session_state, self._session_state.state.calibration
+            if found.refused:
+                raise TrackerError(found.refused)
+            session_state.set_cameras(session_state.saver.correct_cameras(check))
+            self._set(check=None, is_previewed=False, preview=None, message=f"Corrected: {', '.join(check.named)}.")
+            self._show_cameras()
+
+    def follow(self) -> None:
+        """Restore the cameras that belong to the present entry of the history, after a move.
+
+        Raises:
+            TrackerError: the calibration cannot be written.
+        """
+        session_state = self._session_state
+        changed = session_state.saver.follow_calibration()
+        if changed is not session_state.session:
+            session_state.set_cameras(changed)
+            self._set(check=None, is_previewed=False, preview=None, message="The calibration followed the history.")
+            self._show_cameras()
+
+    def _show_cameras(self) -> None:
+        """Draw and score the shown frame with other cameras."""
+        session_state = self._session_state
+        self._set(n_changes=session_state.state.calibration.n_changes + 1)
+        session_state.show_frame(session_state.state.frame)
+        session_state.refresh_saving()
+
+    def _found(self) -> CalibrationCheck:
+        check = self._session_state.state.calibration.check
+        if check is None or not check.named:
+            raise TrackerError(
+                "expected a camera that a check has found to be off, found none; check the cameras first"
+            )
+        return check
+
+    def _work(self) -> None:
+        try:
+            recording = self._recording()
+            check = check_calibration(recording, report=self._report)
+            scores = held_out_scores(recording, check, report=self._report) if check.named else []
+            refused = ""
+            try:
+                check.require_applicable(scores)
+            except TrackerError as error:
+                refused = page_text(error) if check.named else ""
+            better = sum(after.cost < before.cost for before, after in scores)
+            self._set(running=False, check=check, n_others=len(scores), n_better=better, refused=refused)
+        except _StoppedError:
+            self._set(running=False, message="Stopped; nothing was changed.")
+        except Exception as error:
+            if not isinstance(error, TrackerError):
+                _LOG.exception("a check of the cameras failed")
+            text = page_text(error)
+            self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
+
+    def _recording(self) -> PosedRecording:
+        return PosedRecording(self._session_state.session, self._session_state.frames.observer)
+
+    def _report(self, stage: str, share: float, text: str = "", /) -> None:
+        if self._stopping.is_set():
+            raise _StoppedError
+        before, share = self._session_state.state.calibration, round(share * _STEPS) / _STEPS
+        if (stage, share) != (before.stage, before.share):
+            self._set(stage=stage, share=share)
+
+    def _set(self, **changes: Any) -> None:
+        with self._session_state.lock:
+            before = self._session_state.state.calibration
+            self._session_state.set(calibration=replace(before, **changes))
+
+    def _follow_state(self, state: State) -> None:
+        found = state.calibration
+        if found.is_previewed and self._tried != (id(found.check), state.frame):
+            self._previews.offer(state)
+        version = (state.timeline_version, found.n_changes)
+        if version != self._version and not state.track.running:
+            self._version = version
+            self._outdated.offer(state)
+
+    def _refit(self, _: State) -> None:
+        """Refit the people of the shown frame to the corrected cameras."""
+        state, session = self._session_state.state, self._session_state.session
+        found, check = state.calibration, state.calibration.check
+        if check is None or not found.is_previewed or self._tried == (id(check), state.frame):
+            return
+        self._tried = id(check), state.frame
+        recording = self._recording()
+        if state.frame not in recording.credible_frames([state.frame]):
+            self._set(message="The preview needs poses on this frame and on two before and after it.")
+            return
+        (seen,) = recording.seen([state.frame])
+        parameters = [SizeParameters(b.model) for b in seen.bodies]
+        sizes, sigmas = check.diagnosis.state.sizes, prior_sigmas(session.fps)
+        before, after = (
+            score_frame(seen, parameters, sizes, c, sigmas)
+            for c in (np.zeros_like(check.corrections), check.corrections)
+        )
+        models = [p.body(s) for p, s in zip(parameters, sizes, strict=True)]
+        bodies = tuple(
+            tuple(
+                PosedBody(model, model.retract(values, c[TIME] * speed))
+                for model, values, speed in zip(models, after.poses, seen.velocities, strict=True)
+            )
+            for c in check.corrections
+        )
+        cameras = tuple(
+            corrected(source.camera, c).pinhole for source, c in zip(session.cameras, check.corrections, strict=True)
+        )
+        with self._session_state.lock:
+            if self._session_state.state.calibration.check is check:
+                self._set(preview=CorrectedFrame(state.frame, cameras, bodies, before.cost, after.cost), message="")
+
+    def _find_outdated(self, _: State) -> None:
+        session_state = self._session_state
+        with session_state.lock:
+            found = session_state.saver.frames_of_earlier_calibration()
+            if found != session_state.state.calibration.outdated:
+                self._set(outdated=found)
