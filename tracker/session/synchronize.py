@@ -38,7 +38,7 @@ def starts_by_sound(session: Session) -> list[FoundStart]:
         if source.declared_fps is not None:
             raise SessionError(
                 f"camera '{source.camera.name}': expected a video of {session.fps:g} frames per second, found one that "
-                f"declares {source.declared_fps:g}; its sound has another clock, so give the offset by --offset"
+                f"declares {source.declared_fps:g}; its sound has another clock, so measure the offset by hand"
             )
     heard = [(c, read_sound(c.footage, c.camera.name)) for c in session.cameras]
     with_sound = [(c, sound) for c, sound in heard if sound is not None]

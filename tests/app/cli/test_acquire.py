@@ -31,8 +31,8 @@ def placed(run, session):
 @pytest.fixture
 def quick(monkeypatch):
     """A fit of one step in each round."""
-    advance = size_fit._Problem.advance
-    monkeypatch.setattr(size_fit._Problem, "advance", lambda problem: advance(problem) and False)
+    solve = size_fit.solve_bundle
+    monkeypatch.setattr(size_fit, "solve_bundle", lambda problem, state, *rest: solve(problem, state, 1, *rest[1:]))
 
 
 def files_of(session):
@@ -76,15 +76,15 @@ def test_an_acquired_body_goes_to_the_next_session(run, placed, quick, tmp_path)
 
 
 def test_a_fit_that_is_stopped_leaves_the_session_as_it_was(run, placed, monkeypatch, tmp_path):
-    before, steps, advance = files_of(placed), [], size_fit._Problem.advance
+    before, steps, linearize = files_of(placed), [], size_fit._Problem.linearize
 
-    def stopped(problem):
-        steps.append(advance(problem))
+    def stopped(problem, state):
+        steps.append(linearize(problem, state))
         if len(steps) == 2:
             signal.raise_signal(signal.SIGINT)  # as Ctrl+C does
         return steps[-1]
 
-    monkeypatch.setattr(size_fit._Problem, "advance", stopped)
+    monkeypatch.setattr(size_fit._Problem, "linearize", stopped)
     words = ("acquire", placed, "--frames", "20:23", "--n-frames", "2", "--out", tmp_path / "b.toml", "--json")
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background ignores it
     try:

@@ -141,6 +141,9 @@ class _Staged:
         self._views = {k: own_evidence([PosedBody(person, p)], CAMERAS) for k, p in poses.items()}
         self.working_cameras, self.cameras = CAMERAS, []
 
+    def ahead_frames(self, k):
+        return (0.0,) * len(CAMERAS)
+
     def evidence(self, k, regions=None, predicted_px=None, static_edges=None):
         return self._views[k]
 

@@ -157,6 +157,9 @@ class _Staged:
         self.working_cameras, self.cameras = ROUND, []
         self._views = own_evidence([PosedBody(person, pose)], ROUND)
 
+    def ahead_frames(self, k):
+        return (0.0,) * len(ROUND)
+
     def evidence(self, k, regions=None, predicted_px=None, static_edges=None):
         return self._views
 

@@ -2,6 +2,7 @@
 
 import shutil
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.view_tracks import FrameTracks
 
 N, WRONG, APART = 10, 3, 4
+OBSERVER = SimpleNamespace(ahead_frames=lambda frame: (0.0,))
 SETTINGS = TrackSettings(smooth=False)
 CLEAR = PoseQuality(
     0.05, 4, 0.0, 0.02,
@@ -94,7 +96,7 @@ def store(session):
 
 
 def track(session, store, settings=SETTINGS, stop=lambda step: False):
-    with stored_run(session, store, None, TrackPlan(range(N), (0,), settings)) as run:
+    with stored_run(session, store, OBSERVER, TrackPlan(range(N), (0,), settings)) as run:
         for step in run.steps():
             run.take(step)
             if stop(step):
@@ -242,7 +244,7 @@ def test_a_run_that_was_stopped_meanwhile_ends_like_one_without_a_break(session,
 
 def test_a_short_run_has_no_tracks_with_a_history(session, store, audited):
     plan = TrackPlan(range(HISTORY_FRAMES), (0,), SETTINGS)
-    with stored_run(session, store, None, plan) as run:
+    with stored_run(session, store, OBSERVER, plan) as run:
         for step in run.steps():
             run.take(step)
     assert audited == []
