@@ -83,7 +83,11 @@ def test_a_layout_is_written_and_the_report_is_read_by_people(run, footage, tmp_
 @pytest.mark.parametrize(
     ("change", "found"),
     [
-        (("DICT_4X4_50", "DICT_5X5_100"), "ChArUco board of 4 x 5 squares with DICT_4X4_50 would be found"),
+        pytest.param(
+            ("DICT_4X4_50", "DICT_5X5_100"),
+            "ChArUco board of 4 x 5 squares with DICT_4X4_50 would be found",
+            marks=pytest.mark.slow,
+        ),
         (("kind", "inverted = true\nkind"), "ChArUco board of 4 x 5 squares with DICT_4X4_50 would be found"),
     ],
 )

@@ -20,8 +20,8 @@ def pictures(board):
 @pytest.mark.parametrize(
     ("board", "change"),
     [
-        (CHARUCO, {"columns": 5, "rows": 4}),
-        (CHARUCO, {"columns": 6, "rows": 8}),
+        pytest.param(CHARUCO, {"columns": 5, "rows": 4}, marks=pytest.mark.slow),
+        pytest.param(CHARUCO, {"columns": 6, "rows": 8}, marks=pytest.mark.slow),
         (CHARUCO, {"inverted": True}),
         (CHECKERS, {"columns": 8, "rows": 7}),
     ],

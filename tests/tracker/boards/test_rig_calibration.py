@@ -138,6 +138,7 @@ def test_too_few_views_of_a_camera_are_refused():
         calibrated(rig._replace(seen=few))
 
 
+@pytest.mark.slow
 def test_a_board_at_one_distance_tells_no_focal_length():
     """The board faces one camera at one distance: focal length and distance cannot be told apart, and that is said."""
     random = np.random.default_rng(4)
