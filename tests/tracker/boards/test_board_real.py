@@ -12,9 +12,9 @@ from tracker.boards.footage_calibration import FilmedBoard, calibrate_footage
 from tracker.boards.pose_choice import board_poses
 from tracker.boards.rig_fit import held_out_errors
 from tracker.calibrations.reading import read_cameras
+from tracker.footage.video import VideoFile
 
 pytestmark = pytest.mark.slow
-from tracker.footage.video import VideoFile
 
 
 @pytest.fixture(scope="module")
