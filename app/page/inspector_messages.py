@@ -358,7 +358,7 @@ class FindingMessage(Message, frozen=True, tag="finding"):
 
 
 class CameraCheck(Part, frozen=True):
-    """What a check says of a camera. Numbers that are corrected are 0 where the camera is not off."""
+    """Judgement of a check on one camera. Numbers that are corrected are 0 where the camera is not off."""
 
     name: str
     misfit_px: float
@@ -399,7 +399,7 @@ class CalibrationMessage(Message, frozen=True, tag="calibration"):
     """Frames that the check used."""
     cameras: tuple[CameraCheck, ...]
     sentences: tuple[str, ...]
-    """What there is to say; empty where no camera is off."""
+    """Sentences for the user; empty where no camera is off."""
     others: int
     """Number of other frames on which the corrections were compared."""
     better: int

@@ -395,5 +395,5 @@ def _pins(state: State) -> object:
 
 
 def _value_names(session: Session) -> list[tuple[str, ...]]:
-    """Return the names of the values of each person's poses, with which a page is told joints, parts and limbs."""
+    """Return the names of the values of each person's poses, by which a page knows joints, parts and limbs."""
     return [p.model.value_names for p in session.people]

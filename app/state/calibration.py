@@ -37,7 +37,7 @@ class CalibrationState:
     failed: bool = False
     """Whether it ended with an error."""
     check: CalibrationCheck | None = None
-    """What the last check says; None before, and after its corrections were applied."""
+    """Result of the last check; None before, and after its corrections were applied."""
     n_others: int = 0
     """Number of frames that the check did not use, on which its corrections were compared."""
     n_better: int = 0

@@ -1,6 +1,6 @@
 """Tables that benchmarks write into the documents, between the lines `<!-- table: NAME -->` and `<!-- end -->`.
 
-A benchmark lists the names of its tables in `TABLES`. The first word of a name is the benchmark, the rest tells its
+A benchmark lists the names of its tables in `TABLES`. The first word of a name is the benchmark, the rest names its
 tables apart. `--write docs/accuracy.md` replaces exactly these blocks; without it, tables are only printed.
 """
 

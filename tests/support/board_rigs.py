@@ -21,7 +21,7 @@ BOARDS = [
 
 
 class SimulatedRig(NamedTuple):
-    """What cameras have seen of a board, and the truth."""
+    """Corners of a board that cameras have seen, and the truth."""
 
     board: Board
     cameras: list[Camera]

@@ -15,7 +15,7 @@ def cloud(n, seed=0, size=(0.8, 0.8, 0.9)):
 
 
 def seen_points(cameras, points, sigma_px=0.5, gross=0.0, seed=0):
-    """What the cameras see of points: all that lie in their pictures; a share of the places is grossly wrong."""
+    """Observations of points: all that lie in their pictures; a share of the places is grossly wrong."""
     random, of_gross = np.random.default_rng(seed), np.random.default_rng((seed, 1))
     rows = []
     for i, camera in enumerate(cameras):

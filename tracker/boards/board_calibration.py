@@ -19,7 +19,7 @@ from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 
 MIN_LENS_VIEWS = 5
-"""Fewest views of the board from which a lens is fitted. Each tells two of its nine numbers (Zhang 2000, Sect.
+"""Fewest views of the board from which a lens is fitted. Each determines two of its nine numbers (Zhang 2000, Sect.
 3.1)."""
 
 
@@ -48,7 +48,7 @@ class BoardCalibration:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what the footage does not tell."""
+        """Sentences on quantities that the footage does not determine."""
         return tuple(
             f"camera '{lens.camera.name}': the board does not tell its focal length better than to {100 * sigma:.1f}%: "
             f"the farthest corner was {lens.depth_ratio:.1f} times as far away as the nearest; film the board nearer, "

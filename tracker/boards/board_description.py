@@ -166,7 +166,7 @@ def read_board(path: str | Path) -> Board:
     """Read the description of a board.
 
     Raises:
-        CalibrationError: the file is missing or malformed, or the board cannot tell its own orientation.
+        CalibrationError: the file is missing or malformed, or the orientation of the board is ambiguous.
     """
     data, where = read_toml(Path(path), KIND), f"board {path}"
     declared, section = _form_of(data)

@@ -19,7 +19,7 @@ _CAP = 0.1
 """Largest error that counts in the choice of a relative pose, in longer sides of the picture. Lenses that are 10% off
 move points in the corners of a picture by less."""
 MIN_SHARED = 3
-"""Fewest frames that link two cameras. Of the two poses of a board that look alike, one frame cannot tell the right
+"""Fewest frames that link two cameras. Of the two poses of a board that look alike, one frame does not show the right
 one, and two frames may disagree."""
 
 

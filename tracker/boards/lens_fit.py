@@ -66,13 +66,13 @@ def blank_camera(name: str, size: tuple[int, int], focal: float = 1.0, fisheye: 
 def fit_lens(board: Board, seen: SeenCorners, blank: Camera, frames: IntArray) -> LensFit:
     """Fit the lens of one camera.
 
-    Coefficients of distortion that the corners do not tell stay near 0 by their priors (`UNKNOWN_LENS`).
+    Coefficients of distortion that the corners do not determine stay near 0 by their priors (`UNKNOWN_LENS`).
 
     Args:
         board: the board.
         seen: corners of this camera, as camera 0.
         blank: its size and the model of its lens.
-        frames: frames to use, ascending; the camera tells a pose of the board on each.
+        frames: frames to use, ascending; each determines a pose of the board.
     """
     chosen = seen.in_frames(frames)
     prior = Prior((blank,), (prior_sigmas(blank, UNKNOWN_LENS, pose=False),))

@@ -24,7 +24,7 @@ Gauss-Newton on six unknowns converges within them."""
 _MAX_SLOPE = 20.0
 """Largest slope of a ray to a corner, 87 degrees from the axis: farther aside a pinhole cannot show it."""
 _BESIDE = rigid.transform(None, np.array([0.0, 0.0, 1.0]))
-"""Pose of a board whose corners tell none, from which no fit starts well: a metre in front of the camera."""
+"""Pose of a board whose corners determine none, from which no fit starts well: a metre in front of the camera."""
 
 
 def board_poses(board: Board, seen: SeenCorners, *cameras: Camera) -> dict[tuple[int, int], list[Array]]:
@@ -55,7 +55,7 @@ def _planar_poses(corners: Array, camera: Camera, px: Array) -> list[Array]:
 
 
 def posed_frames(poses: Poses, seen: SeenCorners) -> IntArray:
-    """Return the frames with corners on which some camera tells a pose, ascending."""
+    """Return the frames with corners on which some camera determines a pose, ascending."""
     return np.array(sorted({k for _, k in poses} & set(seen.frames.tolist())), dtype=np.int64)
 
 

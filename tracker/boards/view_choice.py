@@ -10,18 +10,18 @@ from tracker.boards.board_problem import SeenCorners
 from tracker.geometry.arrays import Array, IntArray
 
 MIN_CORNERS = 6
-"""Fewest corners by which a view tells a pose of the board: 6 have 12 coordinates for 6 unknowns, so that half of them
+"""Fewest corners by which a view determines a board's pose: 6 have 12 coordinates for 6 unknowns, so that half of them
 check it."""
 MAX_LENS_VIEWS = 60
 """Most views from which a lens is fitted. Zhang (2000, Fig. 3) finds little gain beyond 10."""
 MAX_FRAMES = 240
 """Most frames of the adjustment of all cameras, for its time: half a minute with eight cameras."""
 _MIN_SPREAD = 0.1
-"""Least extent of corners across their longest extent: those of one row are on a line and tell no pose."""
+"""Least extent of corners across their longest extent: those of one row are on a line and determine no pose."""
 
 
 def posed_views(board: Board, seen: SeenCorners) -> dict[tuple[int, int], slice]:
-    """Return where the corners of each view stand that tells a pose of the board, by camera and frame."""
+    """Return the corners of each view that determines a pose of the board, by camera and frame."""
     out = {}
     starts = np.flatnonzero((np.diff(seen.cameras, prepend=-1) != 0) | (np.diff(seen.frames, prepend=-1) != 0))
     for start, end in pairwise([*starts, len(seen.frames)]):

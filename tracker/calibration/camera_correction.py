@@ -5,17 +5,17 @@
 R maps the world to the camera, C is its centre in the world, f its focal lengths. `Correction` names w, t, s, d.
 """
 
-from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
+from tracker.calibration.camera_columns import moved_camera, n_columns
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import inverse, skew, so3_exp, so3_log, transform
+from tracker.geometry.rigid import skew, so3_exp, so3_log
 
 KINDS = MappingProxyType({"rotation": slice(0, 3), "position": slice(3, 6), "focal": slice(6, 7), "time": slice(7, 8)})
-"""Where a correction, (8,), holds w in rad and t in metres, both along the axes of the camera, s, and d in seconds."""
+"""Columns of a correction, (8,): w in rad and t in metres, both along the axes of the camera, s, and d in seconds."""
 ROTATION, POSITION, FOCAL, TIME = KINDS["rotation"], KINDS["position"], KINDS["focal"].start, KINDS["time"].start
 N_CORRECTIONS = KINDS["time"].stop
 
@@ -24,10 +24,9 @@ def corrected(camera: Camera, correction: Array) -> Camera:
     """Return a camera with a correction, (8,), except that of its clock."""
     if not correction[:TIME].any():
         return camera
-    K, R = camera.K.copy(), so3_exp(correction[ROTATION])
-    K[:2, :2] *= np.exp(correction[FOCAL])
-    turned = transform(R, -R @ correction[POSITION])
-    return replace(camera, K=K, T_world_camera=inverse(turned @ camera.T_camera_world))
+    step = np.zeros(n_columns(camera))
+    step[:TIME] = correction[:TIME]  # The columns of a whole camera begin with these.
+    return moved_camera(camera, step)
 
 
 def with_step(correction: Array, step: Array) -> Array:

@@ -105,7 +105,7 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What contours say of the cameras."""
+    """Judgement of the contours on all cameras."""
 
     corrections: Array
     """That mend the cameras, (V, N_CORRECTIONS); 0 where nothing is off."""

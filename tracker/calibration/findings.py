@@ -1,4 +1,4 @@
-"""What a diagnosis says of each camera: which correction, how sure, how far it moves the body, what else it may be."""
+"""Findings of a diagnosis on each camera: the correction, its certainty, its effect on the body, and its rivals."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -15,11 +15,11 @@ WORDS = {"rotation": "turned", "position": "moved", "focal": "zoomed", "time": "
 """How a camera is said to be off, by the kind of its correction."""
 SEEN_PX = 1.0
 """Misfit below which a camera is not named, px of the footage. Surfaces of acquired bodies are off by about 1 cm, which
-is 1 to 2 px at 4 m: contours cannot tell a smaller fault from the shape of the person."""
+is 1 to 2 px at 4 m: contours cannot distinguish a smaller fault from the shape of the person."""
 
 
 class CameraFinding(NamedTuple):
-    """What contours say of a camera."""
+    """Judgement of the contours on one camera."""
 
     name: str
     kinds: tuple[str, ...]

@@ -25,10 +25,10 @@ from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import MIN_ANGLE_RAD
 
 _NEWS = 0.5
-"""Largest standard deviation of a focal length, as a share of what it was before, at which observations tell it. At
-a half they have told three times as much as was known."""
+"""Largest standard deviation of a focal length, as a share of that before, at which observations determine it. At
+a half they have added three times as much as was known."""
 _DEPTH_QUANTILES = (0.05, 0.95)
-"""Depths between which observations of a camera count as spread: the few nearest and farthest tell little."""
+"""Depths between which observations of a camera count as spread: the few nearest and farthest add little."""
 
 
 class KnownLength(NamedTuple):
@@ -82,7 +82,7 @@ def adjust_points(
     Args:
         cameras: as calibrated before.
         observations: their groups are the points, numbered from 0.
-        intrinsics: also correct focal lengths, principal points and distortions where the observations tell them.
+        intrinsics: also correct focal lengths, principal points and distortions where the observations determine them.
         lengths: distances of points; the scale becomes that of their median.
 
     Raises:
@@ -107,24 +107,24 @@ def adjust_points(
 
 
 def _fitted(rig: Rig, seen: Observations, has_free_lens: Mask) -> tuple[RigFit, tuple[str, ...]]:
-    """Fit a rig; lenses that the observations do not tell are then held, and it is fitted again."""
+    """Fit a rig; lenses that the observations do not determine are then held, and it is fitted again."""
     sigmas = tuple(
         prior_sigmas(c, CALIBRATED, lens=bool(free)) for c, free in zip(rig.cameras, has_free_lens, strict=True)
     )
     problem = PointProblem(seen, Prior(rig.cameras, sigmas), len(rig.own), np.ones(len(rig.cameras)))
     fit = fit_rig(problem, rig)
     after = np.sqrt(np.diag(fit.covariance))[np.array(column_ends(rig.cameras)[:-1]) + FOCAL]
-    told = has_free_lens & (after < _NEWS * CALIBRATED.focal)
-    if np.array_equal(told, has_free_lens):
+    is_determined = has_free_lens & (after < _NEWS * CALIBRATED.focal)
+    if np.array_equal(is_determined, has_free_lens):
         return fit, ()
     ratios = depth_ratios(fit.rig, seen)
     held = tuple(
         f"camera '{c.name}' keeps its lens: the points that it sees are too equally far away to tell its focal length "
         f"(the farthest {ratio:.1f} times as far as the nearest)"
-        for c, ratio, free, is_told in zip(rig.cameras, ratios, has_free_lens, told, strict=True)
-        if free and not is_told
+        for c, ratio, free, determined in zip(rig.cameras, ratios, has_free_lens, is_determined, strict=True)
+        if free and not determined
     )
-    again, more = _fitted(rig, seen, told)
+    again, more = _fitted(rig, seen, is_determined)
     return again, held + more
 
 

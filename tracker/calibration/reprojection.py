@@ -6,6 +6,7 @@ the pose of a board. Squared errors s, in standard deviations of a picture, coun
 """
 
 import itertools
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -105,7 +106,7 @@ class RigFit(NamedTuple):
     """By how much errors of one view agree, at least 1; see `ReprojectionProblem.common_share`."""
 
 
-class ReprojectionProblem:
+class ReprojectionProblem(ABC):
     """Cameras that see the points of groups, for `solve_bundle`. Subclasses say where the points are."""
 
     n_own: int
@@ -133,13 +134,13 @@ class ReprojectionProblem:
 
     # --- for subclasses -----------------------------------------------------------------------------------------
 
+    @abstractmethod
     def locate(self, own: Array) -> Located:
-        """Return where the observed points are."""
-        raise NotImplementedError
+        """Return the places of the observed points."""
 
+    @abstractmethod
     def move_own(self, own: Array, step: Array) -> Array:
         """Return the own unknowns after a step, (G, m)."""
-        raise NotImplementedError
 
     # --- for the solver -----------------------------------------------------------------------------------------
 
@@ -212,7 +213,7 @@ class ReprojectionProblem:
         """Return by how much errors of one view agree, at least 1: variance of their means over that of lone errors.
 
         A board that moves while cameras film it at slightly different times shifts all its corners together. A view
-        with such errors tells less than its number of corners promises. A view is a camera's part of a group.
+        with such errors holds less information than its number of corners promises; it is a camera's part of a group.
         """
         equations, located = self.linearize(rig), self.locate(rig.own)
         if located.by_own is None:
@@ -253,7 +254,7 @@ class ReprojectionProblem:
     def measured_sigmas_px(self, rig: Rig) -> Array:
         """Measure the standard deviation of an observation in each camera by the median error, (n_cameras,), px.
 
-        Free points can be moved onto what a single camera observes, so that its errors alone do not tell its noise. The
+        Free points can be moved onto what a single camera observes, so that its errors alone do not show its noise. The
         ratios of the cameras' noise then stay as they are.
         """
         if self.has_common_noise:

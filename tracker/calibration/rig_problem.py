@@ -73,7 +73,7 @@ class RigState(NamedTuple):
 
 
 class _View(NamedTuple):
-    """What a view shows of a person on a frame."""
+    """Evidence of one view for a person on a frame."""
 
     camera: int
     evidence: ViewEvidence
@@ -110,7 +110,7 @@ class RigProblem:
 
     @cached_property
     def _ranges(self) -> tuple[slice, ...]:
-        """Where the sizes of each person are among the shared unknowns."""
+        """Places of each person's sizes among the shared unknowns."""
         ends = np.cumsum([self._sigmas.size, *(len(p.names) for p in self._parameters)])
         return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(ends))
 

@@ -16,7 +16,7 @@ from tracker.geometry.arrays import Array
 
 
 class FrameScore(NamedTuple):
-    """What one frame says of corrections, with its poses at their best."""
+    """Cost of a frame and its derivatives by corrections, with the poses at their best."""
 
     frame: int
     cost: float

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.from_contours import own_views
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import PosedBody
 from tracker.calibration.camera_correction import TIME, corrected
 from tracker.calibration.rig_problem import RigState, SeenPerson
 from tracker.contours import occluding_contours
@@ -66,17 +66,6 @@ def _accepted(view: ViewEvidence, bodies: Sequence[PosedBody], correction: Array
     pieces = contour.pieces_px[~contour.occluded]
     chosen = accept_segments(view.samples, pieces, ACCEPTED_SHARE * view.theta_px)
     return with_segments(view, chosen if view.is_static is None else chosen & ~view.is_static)
-
-
-def velocity(model: BodyModel, poses: Sequence[Array], fps: float) -> Array:
-    """Return the change of a pose by central differences, averaged over three frames, (n_dofs,), per second.
-
-    Args:
-        model: the body.
-        poses: of two frames before, one before, the frame, one after and two after, (n_values,).
-        fps: frames per second.
-    """
-    return np.asarray(sum(model.difference(poses[i + 2], poses[i]) for i in range(3)) * (fps / 6))
 
 
 def spread_poses(joints: Array, n: int, apart_m: float = 0.0, fewest: int = 1) -> list[int]:

@@ -12,13 +12,14 @@ from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS
 from tracker.calibration.diagnosis import Diagnosis, diagnose, prior_sigmas
 from tracker.calibration.findings import CameraFinding, findings, sentence
 from tracker.calibration.single_frames import FrameScore, find_change, score_frame
-from tracker.calibration.viewed_frames import ViewedFrame, spread_poses, velocity
+from tracker.calibration.viewed_frames import ViewedFrame, spread_poses
 from tracker.compute.progress import Report, part_of, unreported
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.hypothesis import SAME_POSE_M
 from tracker.geometry.arrays import Array
 from tracker.images.static_edges import StaticEdgeModel
+from tracker.motion.velocity import velocity
 from tracker.session.session import Session
 from tracker.store.stored_poses import StoredPose, read_stored_poses
 from tracker.tracking.view_regions import regions
@@ -32,7 +33,7 @@ _FEWEST = 3
 
 @dataclass(frozen=True)
 class CalibrationCheck:
-    """What the contours of a session say of its cameras."""
+    """Judgement of the contours of a session on its cameras."""
 
     frames: tuple[int, ...]
     """Frames that were used, ascending."""
@@ -54,10 +55,10 @@ class CalibrationCheck:
 
     @property
     def sentences(self) -> list[str]:
-        """What there is to say, the worst first; nothing where nothing is off."""
+        """Sentences for the user, the worst camera first; none where nothing is off."""
         if len(self.cameras) == 2:
             worst = max(self.cameras, key=lambda c: c.misfit_px)
-            apart = f"the two cameras contradict each other by {worst.misfit_px:.1f} px; two cannot tell which is off"
+            apart = f"the two cameras contradict each other by {worst.misfit_px:.1f} px; nothing shows which is off"
             return [apart] if self.diagnosis.kept else []
         by_name = {c.name: c for c in self.cameras}
         out = [sentence(by_name[name], self.since.get(name)) for name in self.named]
@@ -82,7 +83,7 @@ class CalibrationCheck:
                 "expected other frames with poses to confirm the correction, found none; track more frames, or use "
                 "fewer for the check"
             )
-        better = sum(after.cost < before.cost for before, after in scores)
+        better = n_better(scores)
         if 2 * better <= len(scores) or sum(b.cost - a.cost for b, a in scores) <= 0:
             raise TrackerError(
                 f"expected frames that the check did not use to fit better with the corrected cameras, found {better} "
@@ -133,13 +134,17 @@ class PosedRecording:
             bodies = tuple(s[k].body for s in self._stored)
             regions_px = regions(self._observer.working_cameras, bodies)
             views = self._observer.evidence(k, regions_px, None, self._static_edges)
-            velocities = tuple(
-                velocity(s[k].body.model, [s[j].body.values for j in range(k - 2, k + 3)], self.session.fps)
-                for s in self._stored
-            )
+            velocities = tuple(self._velocity(own, k) for own in self._stored)
             ahead_s = tuple(ahead / self.session.fps for ahead in self._observer.ahead_frames(k))
             out.append(ViewedFrame(k, views, bodies, velocities, ahead_s))
         return out
+
+    def _velocity(self, own: Mapping[int, StoredPose], frame: int) -> Array:
+        """Return the change of a person's pose on a credible frame, (n_dofs,), per second."""
+        around = {k: own[k].body.values for k in range(frame - 2, frame + 3)}
+        per_frame = velocity(own[frame].body.model, around, frame)
+        assert per_frame is not None
+        return self.session.fps * per_frame
 
     @cached_property
     def _static_edges(self) -> list[StaticEdgeModel] | None:
@@ -177,6 +182,11 @@ def check_calibration(
     if since and len(after) >= _FEWEST:  # The frames before would dilute the correction.
         check = _checked(recording, after, part_of(report, 0.8, 1.0))
     return replace(check, since={k: v for k, v in since.items() if k in check.named})
+
+
+def n_better(scores: Sequence[tuple[FrameScore, FrameScore]]) -> int:
+    """Return the number of frames that fit better with the corrected cameras; see `held_out_scores`."""
+    return sum(after.cost < before.cost for before, after in scores)
 
 
 def held_out_scores(

@@ -96,7 +96,8 @@ def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["Fr
 
 
 def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameScore"]]) -> dict[str, Any]:
-    better = sum(after.cost < before.cost for before, after in scores)
+    from tracker.pipeline.calibration_check import n_better
+
     return {
         "named": list(found.named),
         "cameras": [_camera(c, found.since.get(c.name)) for c in found.cameras],
@@ -104,7 +105,7 @@ def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameS
             "frames": list(found.frames),
             "nats": sum(c.gain_nats for c in found.cameras if c.kinds),
             "held_out_frames": len(scores),
-            "held_out_better": better,
+            "held_out_better": n_better(scores),
             "sentences": found.sentences,
         },
     }

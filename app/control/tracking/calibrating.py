@@ -24,6 +24,7 @@ from tracker.pipeline.calibration_check import (
     PosedRecording,
     check_calibration,
     held_out_scores,
+    n_better,
 )
 
 _LOG = logging.getLogger(__name__)
@@ -146,8 +147,7 @@ class Calibrating:
                 check.require_applicable(scores)
             except TrackerError as error:
                 refused = page_text(error) if check.named else ""
-            better = sum(after.cost < before.cost for before, after in scores)
-            self._set(running=False, check=check, n_others=len(scores), n_better=better, refused=refused)
+            self._set(running=False, check=check, n_others=len(scores), n_better=n_better(scores), refused=refused)
         except _StoppedError:
             self._set(running=False, message="Stopped; nothing was changed.")
         except Exception as error:
@@ -201,10 +201,10 @@ class Calibrating:
         models = [p.body(s) for p, s in zip(parameters, sizes, strict=True)]
         bodies = tuple(
             tuple(
-                PosedBody(model, model.retract(values, c[TIME] * speed))
+                PosedBody(model, model.retract(values, (ahead_s + c[TIME]) * speed))
                 for model, values, speed in zip(models, after.poses, seen.velocities, strict=True)
             )
-            for c in check.corrections
+            for ahead_s, c in zip(seen.ahead_s, check.corrections, strict=True)
         )
         cameras = tuple(
             corrected(source.camera, c).pinhole for source, c in zip(session.cameras, check.corrections, strict=True)

@@ -97,7 +97,7 @@ def test_a_lens_is_found_from_its_views(focal, distortion, fisheye):
     found = fit_lens(board, seen, blank_camera("cam", true.size, fisheye=fisheye), frames)
     assert found.camera.K[0, 0] == pytest.approx(true.K[0, 0], rel=4 * found.focal_sigma + 0.001)
     assert found.focal_sigma < 0.02
-    # Where the board was, pixels are those of the true lens.
+    # Pixels at which the board was are those of the true lens.
     rays = true.rays(seen.px) @ true.T_world_camera[:3, :3]
     off = found.camera.project(rays) - seen.px
     assert np.median(np.linalg.norm(off - np.median(off, axis=0), axis=1)) < 15
@@ -140,7 +140,7 @@ def test_too_few_views_of_a_camera_are_refused():
 
 @pytest.mark.slow
 def test_a_board_at_one_distance_tells_no_focal_length():
-    """The board faces one camera at one distance: focal length and distance cannot be told apart, and that is said."""
+    """The board faces one camera at one distance: focal length and distance are alike, and that is said."""
     random = np.random.default_rng(4)
     cameras = true_cameras(random, 2)
     cameras[1] = replace(

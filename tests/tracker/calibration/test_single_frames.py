@@ -6,14 +6,15 @@ from rig_scenes import FPS
 
 from tracker.calibration.diagnosis import prior_sigmas
 from tracker.calibration.single_frames import FrameScore, find_change
-from tracker.calibration.viewed_frames import spread_poses, velocity
+from tracker.calibration.viewed_frames import spread_poses
 from tracker.formats.model_toml import load_model
+from tracker.motion.velocity import velocity
 
 SIGMAS = prior_sigmas(FPS)
 
 
 def scores(since, n=20, shift=0.01, sharpness=1e6, seed=0):
-    """Scores of frames with one camera, turned by an angle from a frame on, as its contours would tell with noise."""
+    """Scores of frames with one camera, turned by an angle from a frame on, as its contours would show with noise."""
     random, out = np.random.default_rng(seed), []
     for k in range(n):
         true = np.zeros(8)
@@ -46,5 +47,5 @@ def test_poses_are_as_different_as_possible():
 def test_a_velocity_is_that_of_an_even_motion():
     model = load_model("gavrila22", 1.7)
     step = np.random.default_rng(0).normal(scale=0.02, size=model.n_dofs)
-    poses = [model.retract(model.neutral(), i * step) for i in range(5)]
-    np.testing.assert_allclose(velocity(model, poses, 25.0), 25.0 * step, atol=1e-2)
+    poses = {i: model.retract(model.neutral(), i * step) for i in range(5)}
+    np.testing.assert_allclose(25.0 * velocity(model, poses, 2), 25.0 * step, atol=1e-2)

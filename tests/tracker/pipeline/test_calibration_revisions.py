@@ -44,7 +44,7 @@ def turned(session, by_rad=0.02):
 
 
 def stands(session):
-    """Where the first camera of the file on disk looks."""
+    """Return the pose of the first camera of the file on disk."""
     return read_calibration(session.folder / "calibration.toml")[0].T_world_camera
 
 
