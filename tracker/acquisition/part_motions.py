@@ -61,10 +61,6 @@ class PieceRows(NamedTuple):
     rows: Array
     """Derivative of the image by k motions, (N, 2, k)."""
 
-    def with_columns(self, more: Array) -> "PieceRows":
-        """Return the same pieces with derivatives of their images by further motions, (N, 2, m), after the others."""
-        return self._replace(rows=np.concatenate([self.rows, more], axis=2))
-
     def sums(self, n_parts: int) -> tuple[Array, Array]:
         """Sum the residuals by part: gradients, (n_parts, k), and normal matrices, (n_parts, k, k)."""
         k = self.rows.shape[2]

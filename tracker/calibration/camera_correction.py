@@ -12,7 +12,7 @@ import numpy as np
 from tracker.calibration.camera_columns import moved_camera, n_columns
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.geometry.rigid import skew, so3_exp, so3_log
+from tracker.geometry.rigid import so3_exp, so3_log
 
 KINDS = MappingProxyType({"rotation": slice(0, 3), "position": slice(3, 6), "focal": slice(6, 7), "time": slice(7, 8)})
 """Columns of a correction, (8,): w in rad and t in metres, both along the axes of the camera, s, and d in seconds."""
@@ -30,34 +30,11 @@ def corrected(camera: Camera, correction: Array) -> Camera:
 
 
 def with_step(correction: Array, step: Array) -> Array:
-    """Return a correction, (8,), after a further small step, (8,), in the columns of `columns`."""
+    """Return a correction, (8,), after a further small step, (8,),."""
     out = correction + step
     if not step[ROTATION].any():
         return out
     out[ROTATION] = so3_log(so3_exp(step[ROTATION]) @ so3_exp(correction[ROTATION]))
-    return out
-
-
-def columns(camera: Camera, correction: Array, points_world: Array, px_by_point: Array) -> Array:
-    """Differentiate the images of points by a further step of a correction, except that of the clock.
-
-    Args:
-        camera: with the correction, without lens distortion.
-        correction: (8,).
-        points_world: (N, 3), metres.
-        px_by_point: derivatives of their images by them, (N, 2, 3), px per metre.
-
-    Returns:
-        (N, 2, 7), px per radian, metre and 1.
-    """
-    R = camera.T_camera_world[:3, :3]
-    points_camera = points_world @ R.T + camera.T_camera_world[:3, 3]
-    px_by_camera = px_by_point @ R.T
-    out = np.empty((len(points_world), 2, FOCAL + 1))
-    out[:, :, ROTATION] = -px_by_camera @ skew(points_camera)
-    out[:, :, POSITION] = -px_by_camera @ so3_exp(correction[ROTATION])
-    slopes = points_camera[:, :2] / points_camera[:, 2:]
-    out[:, :, FOCAL] = slopes @ camera.K[:2, :2].T
     return out
 
 

@@ -118,11 +118,6 @@ class Diagnosis:
     state: RigState
     """Cameras, sizes and poses that fit the contours."""
 
-    @property
-    def named(self) -> tuple[int, ...]:
-        """Indices of the cameras that are off, the worst first."""
-        return tuple(dict.fromkeys(k.fault.camera for k in self.kept))
-
     def sigmas(self, camera: int) -> Array:
         """Return the standard deviations of the correction of a camera, (N_CORRECTIONS,)."""
         at = slice(camera * N_CORRECTIONS, (camera + 1) * N_CORRECTIONS)

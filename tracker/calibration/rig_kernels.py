@@ -1,6 +1,6 @@
 """Sum the residuals at pieces of contour by the motions of their part and the corrections of their camera, compiled.
 
-`part_motions.rows_of_pieces` and `camera_correction.columns` are the same derivatives by numpy, as the tests' oracle.
+`part_motions.rows_of_pieces` has the derivatives of the parts by numpy. With those of the camera, tests compare both.
 """
 
 import numpy as np

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from rig_oracle import columns
 from staging import camera_at
 
-from tracker.calibration.camera_correction import FOCAL, POSITION, ROTATION, columns, corrected, in_units, with_step
+from tracker.calibration.camera_correction import FOCAL, POSITION, ROTATION, corrected, in_units, with_step
 from tracker.geometry.cameras import project_with_jacobian
 from tracker.geometry.rigid import so3_exp
 

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from rig_oracle import columns
 from rig_scenes import CAMERAS, viewed
 
 from tracker.acquisition.part_motions import motions_by_unknowns, rows_of_pieces
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.calibration.camera_correction import N_CORRECTIONS, columns, corrected
+from tracker.calibration.camera_correction import N_CORRECTIONS, corrected
 from tracker.calibration.diagnosis import prior_sigmas
 from tracker.calibration.rig_kernels import N_PART
 from tracker.calibration.rig_problem import GroupSums, RigProblem, RigState, sums_of_pieces
@@ -29,9 +30,9 @@ def test_the_kernel_sums_as_numpy_does(pieces):
     sums, body, camera = pieces
     b, M = sums_of_pieces(sums, body.model, body.kinematics, camera, CORRECTION)
     rows = rows_of_pieces([(camera, sums)], body.model, body.kinematics, with_shapes=False)
-    rows = rows._replace(rows=rows.rows[:, :, :N_PART])
     of_camera = columns(camera, CORRECTION, rows.points_world, rows.px_by_point)
-    expected_b, expected_M = rows.with_columns(of_camera).sums(len(body.model.parts))
+    rows = rows._replace(rows=np.concatenate([rows.rows[:, :, :N_PART], of_camera], axis=2))
+    expected_b, expected_M = rows.sums(len(body.model.parts))
     np.testing.assert_allclose(b, expected_b, rtol=1e-9, atol=1e-9 * np.abs(expected_b).max())
     np.testing.assert_allclose(M, expected_M, rtol=1e-9, atol=1e-9 * np.abs(expected_M).max())
 
