@@ -13,7 +13,8 @@ from tracker.export.options import ExportOptions, file_from_world, up_in_file
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_folder import ImageFolder
 from tracker.formats.bvh import UPRIGHT_Y, BvhFrame, write_bvh
-from tracker.formats.coco import (
+from tracker.formats.file_names import identifier
+from tracker.formats.keypoints.coco import (
     CocoAnnotation,
     CocoCategory,
     CocoImage,
@@ -22,7 +23,6 @@ from tracker.formats.coco import (
     person_category,
     write_coco,
 )
-from tracker.formats.file_names import identifier
 from tracker.formats.motion_csv import MotionRow, write_motion_csv
 from tracker.formats.opensim_model import write_osim
 from tracker.formats.opensim_mot import write_mot
