@@ -285,7 +285,7 @@ def _plan_of_space(
     )  # fmt: skip
     views = []
     for k, ((path, _), person) in enumerate(zip(files, request.people, strict=True)):
-        with_points = np.flatnonzero(np.isfinite(placed.joints.joints_world[:, k]).all(axis=-1).any(axis=1))
+        with_points = np.flatnonzero(np.isfinite(placed.joints.joints_world[:, k]).all(axis=-1).sum(axis=1))
         frames = (int(with_points[0]), int(with_points[-1])) if len(with_points) else None
         views.append(ViewPreview(person, path, len(placed.row_frames), frames, 1))
     return ImportPlan(observations, by_path, tuple(views), tuple(problems))

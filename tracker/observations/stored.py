@@ -35,6 +35,7 @@ from tracker.validation import FileStem, Name, check, check_version, quoted
 FOLDER = "observations"
 _FILE, _POINTS, _FILES = "observations.toml", "points.npz", "files"
 _VERSION = 1
+"""Newest version of the file that this program writes and reads."""
 _KIND = TextKind("observations", TABLE_BYTES, SessionError)
 
 
