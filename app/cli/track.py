@@ -31,6 +31,11 @@ class TrackWords:
     init: Literal["auto"] | None = None
     """auto finds people who have no pose first, on the frame where they track best, and tracks from there in both
     directions."""
+    of: OptionalName = None
+    """name of imported observations: their key points show --init auto the people, and are the evidence that --evidence
+    says."""
+    evidence: Literal["contours", "both"] = "contours"
+    """both: key points of --of too; contours overrule them where they contradict."""
     acquire: bool = False
     """acquire sizes from the contours before tracking, of people whose body has the sizes of its preset; then track
     from the frame where people are placed in both directions."""
@@ -102,8 +107,10 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     if arguments.paper and paper is not None:
         paper.require_body({p.name: p.model for p in (at.session.people[i] for i in at.people)})
     used = check_names(arguments.cameras, [c.camera.name for c in at.session.cameras], "camera", "--cameras")
-    find = None if arguments.init is None else FindSettings()
-    plan = ChainPlan(TrackPlan(frames, at.people, settings, tuple(used)), find, at.people if arguments.acquire else ())
+    find = None if arguments.init is None else FindSettings(keypoints=arguments.of)
+    keypoints = arguments.of if arguments.evidence == "both" else None
+    track_plan = TrackPlan(frames, at.people, settings, tuple(used), keypoints=keypoints)
+    plan = ChainPlan(track_plan, find, at.people if arguments.acquire else ())
     found = track(at.session, plan, Reporter(silent=arguments.json))
     print(format_json(found) if arguments.json else format_summary(found))
     if found["stopped_at"] is not None:

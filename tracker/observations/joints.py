@@ -31,6 +31,11 @@ class TriangulatedObservations:
     """Whether a view agrees with a point, (n_frames, n_people, n_views, n_points)."""
     residuals_px: Array
     """Distance of each observation from its point, (n_frames, n_people, n_views, n_points), undistorted px."""
+    positions_px: Array
+    """Each observation with its sides mended, (n_frames, n_people, n_views, n_points, 2), undistorted px; NaN where
+    absent."""
+    confidence: Array
+    """Its confidence, (n_frames, n_people, n_views, n_points), 0 to 1; 0 where absent."""
 
 
 def observed_joints(observations: ObservationSet, cameras: Sequence[Camera]) -> ObservedJoints:
@@ -64,7 +69,7 @@ def triangulate_observations(
     detections = np.stack([_detections_of(identities, p) for p in range(len(people))], axis=1)
     groups = side_pairs(observations)
     found: list[Triangulated] = []
-    exchanged = []
+    exchanged, positions, confidences = [], [], []
     for person in range(len(people)):
         own_px, own_confidence = _gather(px, points.confidence, detections[:, person])
         flags = np.zeros((*own_confidence.shape[:2], len(groups)), dtype=bool)
@@ -73,6 +78,8 @@ def triangulate_observations(
             own_px = with_sides_exchanged(own_px, pairs, flags[..., g])
             own_confidence = with_sides_exchanged(own_confidence, pairs, flags[..., g])
         found.append(triangulate_points(views, own_px, own_confidence))
+        positions.append(own_px)
+        confidences.append(own_confidence)
         exchanged.append(flags)
     return TriangulatedObservations(
         ObservedJoints(
@@ -86,6 +93,8 @@ def triangulate_observations(
         np.stack(exchanged, axis=1),
         np.stack([t.is_inlier for t in found], axis=1),
         np.stack([t.residuals_px for t in found], axis=1),
+        np.stack(positions, axis=1),
+        np.stack(confidences, axis=1),
     )
 
 
