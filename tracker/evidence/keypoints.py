@@ -53,14 +53,14 @@ class PersonKeypoints:
 
 
 @dataclass(frozen=True, eq=False)
-class Keypoints:
+class KeypointEvidence:
     """Key points of all people over a recording, by index of the person; None for people without any."""
 
     people: tuple[PersonKeypoints | None, ...]
 
-    def of_views(self, chosen: Sequence[int]) -> "Keypoints":
+    def of_views(self, chosen: Sequence[int]) -> "KeypointEvidence":
         """Return those in some of the views, by their indices."""
-        return Keypoints(
+        return KeypointEvidence(
             tuple(
                 None if p is None else replace(p, seen=p.seen[:, list(chosen)], sigmas=p.sigmas[:, list(chosen)])
                 for p in self.people

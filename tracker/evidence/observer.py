@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from tracker.evidence.foreground import Foreground, Prepared
-from tracker.evidence.keypoints import Keypoints
+from tracker.evidence.keypoints import KeypointEvidence
 from tracker.evidence.view_evidence import (
     DEFAULT_EDGES,
     EdgeSettings,
@@ -59,7 +59,7 @@ class Observer:
 
     def __init__(
         self, cameras: Sequence[CameraSource], recording: Recording, in_recording: Sequence[int] | None = None,
-        views: Sequence[Foreground] | None = None, keypoints: Keypoints | None = None,
+        views: Sequence[Foreground] | None = None, keypoints: KeypointEvidence | None = None,
     ) -> None:  # fmt: skip
         """Read the backgrounds.
 
@@ -91,14 +91,14 @@ class Observer:
         """Return an observer of some of the views, by their indices, of the same footage."""
         return Observer(*self._of(chosen))
 
-    def with_keypoints(self, keypoints: Keypoints | None) -> "Observer":
+    def with_keypoints(self, keypoints: KeypointEvidence | None) -> "Observer":
         """Return an observer of the same views to which key points are evidence, too; None: to which they are not."""
         cameras, recording, in_recording, views, _ = self._of(range(len(self.cameras)))
         return Observer(cameras, recording, in_recording, views, keypoints)
 
     def _of(
         self, chosen: Sequence[int]
-    ) -> tuple[list[CameraSource], Recording, list[int], list[Foreground], Keypoints | None]:
+    ) -> tuple[list[CameraSource], Recording, list[int], list[Foreground], KeypointEvidence | None]:
         """Return the arguments of an observer of some of the views."""
         known = range(len(self.cameras)) if self._in_recording is None else self._in_recording
         cameras = [self.cameras[i] for i in chosen]

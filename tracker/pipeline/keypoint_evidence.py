@@ -13,7 +13,7 @@ from tracker.acquisition.segment_lengths import segment_lengths
 from tracker.body.dimensions import HEIGHT_LIMITS_M
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import Remedy, TrackerError
-from tracker.evidence.keypoints import Keypoints
+from tracker.evidence.keypoints import KeypointEvidence
 from tracker.evidence.observer import Observer
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model, has_preset_sizes
@@ -112,7 +112,9 @@ def learn_seen_bodies(
     return out
 
 
-def keypoint_evidence(session: Session, name: str, seen: Mapping[int, SeenBody], views: Sequence[str]) -> Keypoints:
+def keypoint_evidence(
+    session: Session, name: str, seen: Mapping[int, SeenBody], views: Sequence[str]
+) -> KeypointEvidence:
     """Return key points as evidence of a run.
 
     Args:
@@ -126,7 +128,7 @@ def keypoint_evidence(session: Session, name: str, seen: Mapping[int, SeenBody],
         seen[i].keypoints(p.model, points[i]) if i in seen and i in points else None
         for i, p in enumerate(session.people)
     )
-    return Keypoints(people).of_views([names.index(v) for v in views])
+    return KeypointEvidence(people).of_views([names.index(v) for v in views])
 
 
 def with_keypoints(

@@ -7,7 +7,7 @@ import pytest
 from staging import cameras_around, posed
 
 from tracker.body.model import PosedBody
-from tracker.evidence.keypoints import Keypoints, PersonKeypoints, ViewKeypoints
+from tracker.evidence.keypoints import KeypointEvidence, PersonKeypoints, ViewKeypoints
 from tracker.fitting.gauss_newton import PosePrior, solve
 from tracker.fitting.keypoints import GROSS_SIGMAS, KeypointBlock, keypoint_blocks
 from tracker.formats.model_toml import load_model
@@ -75,7 +75,7 @@ def test_a_cropped_view_has_the_pixels_of_its_region():
     person = PersonKeypoints(
         np.array([1, 2]), np.zeros((2, 3)), normalized[None, None], np.full((1, 1, 2), 1 / camera.K[0, 0])
     )
-    found = Keypoints((None, person)).of_views([0]).in_view(0, 0, camera.cropped((100, 50, 400, 300)))
+    found = KeypointEvidence((None, person)).of_views([0]).in_view(0, 0, camera.cropped((100, 50, 400, 300)))
     assert found[0] is None
     expected = camera.K[:2, :2] @ normalized[0] + camera.K[:2, 2] - (100, 50)
     np.testing.assert_allclose(found[1].positions_px, [expected])
