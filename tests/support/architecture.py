@@ -45,6 +45,7 @@ ROOMS = [
     "tracker.simulate.stage",
     "tracker.simulate",
     "tracker.pipeline",
+    "tracker.judging",
     "tracker.experiments",
     "app",
     "app.runtime",

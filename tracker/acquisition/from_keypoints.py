@@ -12,7 +12,15 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.keypoints import PersonKeypoints
-from tracker.fitting.gauss_newton import OTHER_BODY_M, PointTargets, PosePrior, fit_to_points, solve, weak_pull
+from tracker.fitting.gauss_newton import (
+    OTHER_BODY_M,
+    PointTargets,
+    PosePrior,
+    ResidualBlock,
+    fit_to_points,
+    solve,
+    weak_pull,
+)
 from tracker.fitting.keypoints import GROSS_SIGMAS
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
@@ -54,7 +62,7 @@ def _refitted(body: PosedBody, points: IntArray, targets_world: Array) -> PosedB
     known = np.isfinite(targets_world).all(axis=1)
     weights = np.full(np.count_nonzero(known), 1 / OTHER_BODY_M)
     block = PointTargets(points[known], targets_world[known], weights, centers=True)
-    blocks = [block, PosePrior.of_spreads(body.model), weak_pull(body.model, body.values)]
+    blocks: list[ResidualBlock] = [block, PosePrior.of_spreads(body.model), weak_pull(body.model, body.values)]
     return PosedBody(body.model, solve(body.model, body.values, blocks).pose)
 
 
