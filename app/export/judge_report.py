@@ -102,7 +102,7 @@ def _views(own: Judgement, doubt: Doubt, recording: Recording, cameras: Sequence
     for camera, image in zip(cameras, recording.read(doubt.frame), strict=True):
         if image is None:
             continue
-        canvas = np.ascontiguousarray(image)
+        canvas = np.array(image)
         drawn = [_draw(canvas, camera, tracked, joints, _TRACKED) for joints in (*LIMBS.values(), _TRUNK)]
         imported = own.imported.places(doubt.frame)
         for limb, joints in (*LIMBS.items(), ("", _TRUNK)):

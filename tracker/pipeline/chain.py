@@ -14,6 +14,7 @@ from tracker.body.model import PosedBody
 from tracker.compute.progress import Report, part_of
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
+from tracker.fitting.gauss_newton import PointTargets
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.initialization.first_pose import FirstPoses
@@ -24,8 +25,10 @@ from tracker.pipeline.keypoint_evidence import (
     SEEN_BODIES,
     learn_seen_bodies,
     seen_bodies_record,
+    seen_joints,
     with_keypoints,
 )
+from tracker.pipeline.keypoint_poses import store_keypoint_poses
 from tracker.pipeline.stored_run import TrackPlan, is_interrupted, stored_run
 from tracker.pipeline.track_session import Step, TrackSession
 from tracker.session.lock import SessionLock
@@ -153,10 +156,11 @@ def _acquire(
     for number, person in enumerate(people):
         session, part = opened.session, part_of(report, number / len(people), (number + 1) / len(people))
         known = posed_frames(session, person, whole, track.start)
-        observer = opened.observer
+        observer, joints = opened.observer, dict[int, PointTargets]()
         if track.keypoints is not None:
             observer = with_keypoints(session, observer, track.keypoints)
-        acquired = acquire_body(session, observer, person, whole, settings, part, known)
+            joints = seen_joints(session, track.keypoints, person, settings.n_frames)
+        acquired = acquire_body(session, observer, person, whole, settings, part, known, joints)
         if acquired.is_better:
             opened.store_body(person, acquired, track.start)
             poses = zip(acquired.frames, acquired.poses, strict=True)
@@ -231,6 +235,10 @@ class StoredSession:
     def is_interrupted(self, plan: TrackPlan) -> bool:
         """See `OpenSession.is_interrupted`."""
         return is_interrupted(self._store, plan)
+
+    def store_keypoint_poses(self, people: Sequence[int], frames: Sequence[int], name: str) -> dict[int, int]:
+        """Store poses by key points alone; see `keypoint_poses.store_keypoint_poses`."""
+        return store_keypoint_poses(self.session, self._store, people, frames, name)
 
     def track(self, plan: TrackPlan, sink: Sink) -> TrackPlan:
         """See `OpenSession.track`."""

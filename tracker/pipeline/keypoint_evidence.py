@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from tracker.acquisition.from_joints import place_joints
 from tracker.acquisition.from_keypoints import SeenBody, fit_to_keypoints, learn_seen_body
 from tracker.acquisition.segment_lengths import segment_lengths
 from tracker.body.dimensions import HEIGHT_LIMITS_M
@@ -15,6 +16,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.keypoints import KeypointEvidence
 from tracker.evidence.observer import Observer
+from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model, has_preset_sizes
 from tracker.initialization.first_pose import FirstPose, FirstPoses
@@ -25,6 +27,8 @@ from tracker.store.annotation_store import AnnotationStore
 
 SEEN_BODIES = "seen bodies"
 """Setting of the session: how the detector of each set of observations sees the people, see `seen_bodies_record`."""
+_OFFSET_M = 0.025
+"""Standard deviation of the constant offset of a detector's joint, metres: hips and shoulders are off by 2 to 5 cm."""
 SOURCE = "key points"
 """Source of a first pose."""
 
@@ -91,6 +95,24 @@ def _at_height(model: BodyModel, points: BodyPoints) -> BodyModel:
     seen = segment_lengths({n: points.joints_world[:, i] for i, n in enumerate(points.names)})
     ratio = float(np.median([seen[n] / own[n] for n in own]))
     return model.with_height(float(np.clip(model.height_m * ratio, *HEIGHT_LIMITS_M)))
+
+
+def seen_joints(session: Session, name: str, person: int, n_frames: int) -> dict[int, PointTargets]:
+    """Return the observed limb joints of a person by frame, to acquire sizes with.
+
+    A joint is off by as much on all frames, so that those of several frames together count as one.
+
+    Args:
+        session: the session.
+        name: of the observations.
+        person: index of the person.
+        n_frames: number of frames from which sizes are acquired.
+    """
+    own, model = read_points(session, name).get(person), session.people[person].model
+    if own is None:
+        return {}
+    found = {k: place_joints(model, own.places(k), _OFFSET_M * n_frames**0.5) for k in range(len(own.joints_world))}
+    return {k: t for k, t in found.items() if len(t.points)}
 
 
 def learn_seen_bodies(
