@@ -315,9 +315,9 @@ class GroupSums(NamedTuple):
 
     def equations(self, cost: float) -> NormalEquations:
         """Return the normal equations, whose hessian is symmetric."""
-        lower = np.tril_indices(len(self.gradient), -1)
-        hessian = self.hessian.copy()
-        hessian[lower] = hessian.T[lower]
+        upper = np.triu(self.hessian)
+        hessian = upper + upper.T
+        np.fill_diagonal(hessian, upper.diagonal())
         return NormalEquations(cost, self.gradient, hessian)
 
 
