@@ -183,8 +183,15 @@ def calibration(found: CalibrationState, n_people: int) -> wire.CalibrationMessa
         () if check is None else check.frames, rows, () if check is None else tuple(check.sentences),
         found.n_others, found.n_better, found.refused, found.is_previewed, None if preview is None else preview.frame,
         0.0 if preview is None else round(preview.cost_before - preview.cost_after, 1),
-        tuple(found.outdated.get(i, ()) for i in range(n_people)),
+        found.revision, tuple(_intervals(found.outdated.get(i, ())) for i in range(n_people)),
     )  # fmt: skip
+
+
+def _intervals(frames: Sequence[int]) -> tuple[tuple[int, int], ...]:
+    """Return the first and last frames of the intervals that frames, ascending, make up."""
+    found = np.asarray(frames, dtype=int)
+    parts = np.split(found, np.flatnonzero(np.diff(found) > 1) + 1)
+    return tuple((int(part[0]), int(part[-1])) for part in parts if len(part))
 
 
 def _camera(found: CameraFinding, since: int | None) -> wire.CameraCheck:

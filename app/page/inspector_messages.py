@@ -136,9 +136,9 @@ class FindPeople(Command, frozen=True, tag="find_people"):
 
 
 class CheckCalibration(Command, frozen=True, tag="calibration_check"):
-    """Check the cameras by the tracked people, preview the corrections, or apply them."""
+    """Check the cameras by the tracked people, preview the corrections, apply them, or track again what is older."""
 
-    action: Literal["start", "stop", "preview", "leave", "apply"]
+    action: Literal["start", "stop", "preview", "leave", "apply", "track_again"]
 
 
 # --- to the page ----------------------------------------------------------------------------------------------------
@@ -412,5 +412,7 @@ class CalibrationMessage(Message, frozen=True, tag="calibration"):
     """The frame that is previewed; null until it is ready."""
     preview_fall_nats: float
     """Fall of the cost of that frame by the corrections."""
-    outdated: tuple[tuple[int, ...], ...]
-    """Frames of each person with poses of an earlier calibration."""
+    revision: int
+    """Number of the present calibration, from 1 on; each correction makes another."""
+    outdated: tuple[tuple[tuple[int, int], ...], ...]
+    """Of each person, the first and last frames of intervals with poses of an earlier calibration."""

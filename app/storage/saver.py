@@ -18,7 +18,7 @@ from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.calibration_check import CalibrationCheck
-from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames
+from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames, present_revision
 from tracker.pipeline.seen_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
@@ -108,6 +108,11 @@ class Saver:
     def _with_cameras(self, found: Session) -> Session:
         self._session = replace(self._session, cameras=found.cameras)
         return self._session
+
+    @property
+    def calibration_revision(self) -> int:
+        """Number of the present calibration; 1 if it has never been changed."""
+        return present_revision(self._store) or 1
 
     def frames_of_earlier_calibration(self) -> dict[int, tuple[int, ...]]:
         """Return the frames with poses that were made with an earlier calibration, by index of the person."""

@@ -90,7 +90,8 @@
  * @typedef {{type: "body_sizes", action: "discard" | "previous", person: number}} DraftSizes
  * @typedef {{type: "acquire", action: "start" | "stop", person: number, method?: "contours" | "voxels"}} AcquireSizes
  * @typedef {{type: "find_people", action: "start" | "stop"}} FindPeople
- * @typedef {{type: "calibration_check", action: "start" | "stop" | "preview" | "leave" | "apply"}} CheckCalibration
+ * @typedef {{type: "calibration_check", action: "start" | "stop" | "preview" | "leave" | "apply" | "track_again"}}
+ *   CheckCalibration
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo
@@ -195,8 +196,8 @@
  *   since_frame: number | null, is_seen: boolean}} CameraCheck
  * @typedef {{type: "calibration", running: boolean, stage: string, share: number, message: string, failed: boolean,
  *   is_checked: boolean, frames: number[], cameras: CameraCheck[], sentences: string[], others: number, better: number,
- *   refused: string, is_previewed: boolean, preview_frame: number | null, preview_fall_nats: number, outdated:
- *   number[][]}} CalibrationMessage
+ *   refused: string, is_previewed: boolean, preview_frame: number | null, preview_fall_nats: number, revision: number,
+ *   outdated: [number, number][][]}} CalibrationMessage
  * @typedef {{name: string, parts: number[]}} LimbReason
  * @typedef {{below_nats: (number | null)[], outside: (number | null)[], usual_outside: (number | null)[], contour_px:
  *   (number | null)[], usual_contour_px: (number | null)[], below_in_all_nats: number}} PartReason

@@ -24,8 +24,8 @@ pytestmark = pytest.mark.slow
 
 SAMPLE = ROOT / "sample_sessions" / "elbow_rotation"
 FRONT, LEFT = 0, 3
-FRAME = 20
-"""The forearms are on their way."""
+FRAME = 12
+"""The arms move fastest."""
 SECTION = "localStorage.setItem('quadrille.inspector', JSON.stringify({ open: true, sections: ['calibration'] }))"
 OUTLINE = """([camera, kind]) => {
   const { paths, segments } = quadrille.state.overlay;
@@ -86,7 +86,7 @@ def silhouette_px(session, camera, frame):
 
 
 async def gap_px(page, border, camera, kind="model"):
-    """Median distance from the border of the person to the drawn outline of the body, px."""
+    """Median distance from the border of the person to the drawn outline of the body, px; the body has no hands."""
     segments = np.reshape(await page.evaluate(OUTLINE, [camera, kind]), (-1, 4))
     assert len(segments)
     steps = np.linspace(0, 1, 5)[:, None, None]
@@ -120,7 +120,7 @@ async def tracked_again(page):
     await page.get_by_role("button", name="Track again").click()
     await shows(page, "!quadrille.state.state.track.running && quadrille.state.state.undo.startsWith('track')", 120)
     await at_frame(page, FRAME)
-    await shows(page, "quadrille.state.timeline[20].source === 'tracked'", 20)
+    await shows(page, f"quadrille.state.timeline[{FRAME}].source === 'tracked'", 20)
 
 
 async def undone(page, label):
@@ -140,15 +140,15 @@ async def test_a_turned_camera_is_named_corrected_and_given_back(browser, tmp_pa
         assert await off.count() == 1
         said = await off.inner_text()
         assert said.startswith("LEFT")
-        assert "turned" in said
+        assert "yaw" in said
         gaps = [await gap_px(page, border, LEFT)]
         await previewed(page)
         gaps.append(await gap_px(page, border, LEFT, "preview"))
         await page.get_by_role("button", name="Apply", exact=True).last.click()
-        await shows(page, "quadrille.state.calibration.outdated[0].length === 50", 30)
+        await shows(page, "quadrille.state.calibration.outdated[0].join() === '0,49'", 30)
         assert np.abs(poses_of(folder) - before).max() > 0.01
         await tracked_again(page)
-        await shows(page, "quadrille.state.calibration.outdated[0].join() === '0'", 20)  # the keyframe
+        await shows(page, "quadrille.state.calibration.outdated[0].join() === '0,0'", 20)  # the keyframe
         gaps.append(await gap_px(page, border, LEFT))
         assert max(gaps[1:]) < 0.5 * gaps[0]
 
@@ -168,18 +168,19 @@ async def test_a_late_camera_is_named_and_moved_in_time(browser, tmp_path):
         await checked(page)
         said = await page.locator(".calibration-cameras tr.is-off").inner_text()
         assert said.startswith("FRONT")
-        assert "shifted in time" in said
+        assert "time" in said
         row = (await state_of(page))["calibration"]["cameras"][FRONT]
         assert row["time_ms"] == pytest.approx(40, abs=6)
-        gap = await gap_px(page, border, FRONT)
+        gaps = [await gap_px(page, border, FRONT)]
         await previewed(page)
-        assert await gap_px(page, border, FRONT, "preview") < gap
+        gaps.append(await gap_px(page, border, FRONT, "preview"))
         await page.get_by_role("button", name="Apply", exact=True).last.click()
-        await shows(page, "quadrille.state.calibration.outdated[0].length === 49", 30)
+        await shows(page, "quadrille.state.calibration.outdated[0].join() === '0,48'", 30)
         (clock,) = [c.clock for c in load_session(folder).cameras if c.clock.ahead_frames]
         assert clock.ahead_frames == pytest.approx(1, abs=0.15)
         await tracked_again(page)
-        assert await gap_px(page, border, FRONT) < gap
+        gaps.append(await gap_px(page, border, FRONT))
+        assert max(gaps[1:]) < 0.95 * gaps[0]
         await undone(page, (await state_of(page))["state"]["undo"])
         await undone(page, "calibration of FRONT corrected")
         assert not any(c.clock.ahead_frames for c in load_session(folder).cameras)
