@@ -18,11 +18,12 @@ from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.calibration_check import CalibrationCheck
-from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames, present_revision
+from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames
 from tracker.pipeline.seen_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.calibration_log import present_revision
 from tracker.store.records import (
     SEEN,
     SOURCES,

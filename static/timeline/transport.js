@@ -104,7 +104,7 @@ export class Transport {
     this.#source.textContent = source === null && !state?.replay ? `${name && `${name}: `}No pose` : `${name || "Pose"}: ${what}`;
     const converted = "Track again to use the present ones; a keyframe is refitted by Body sizes, Apply, in the inspector";
     const made = `This pose was made with earlier body sizes and is shown with them. ${converted}`;
-    const stale = "This pose was made before the cameras were corrected. Calibration, Track again, in the inspector makes it anew; a keyframe stays as it was set";
+    const stale = "This pose was made before the cameras were corrected. Track it again in the inspector, section Calibration";
     this.#source.title = other ? made : isOutdated ? stale : `Source of the pose${name && ` of ${name}`}, as stored: the most manual one of its values`;
     const cell = personCells(this.#store.facts).get(target);
     this.#keyframe.disabled = !connected || !state;

@@ -114,8 +114,8 @@ class Calibrating:
     def track_again(self) -> None:
         """Track the frames again on which somebody has a pose of an earlier calibration. Keyframes stay.
 
-        The run covers the frames from the first such pose to the last, keyframes included. It goes out from the keyframe in its middle, or
-        else from its first pose, which is tracked, too.
+        The run covers the frames from the first such pose to the last, keyframes included. It goes out from the
+        keyframe in its middle, or else from its first pose, which is tracked, too.
 
         Raises:
             TrackerError: all such poses are keyframes, or there are none.

@@ -58,7 +58,8 @@ async def test_poses_of_an_earlier_calibration_are_marked_counted_and_tracked_ag
     assert "earlier calibration" in await page.locator("#legend").get_attribute("title")
     await page.locator("#frame").fill("2")
     await page.keyboard.press("Enter")
-    await shows(page, "document.querySelector('#timeline').getAttribute('aria-valuetext').includes('earlier calibration')")
+    said = "document.querySelector('#timeline').getAttribute('aria-valuetext')"
+    await shows(page, f"{said}.includes('earlier calibration')")
     await page.locator("#show-jumps").click()
     jump = page.locator("#jump-menu .jump-row", has_text="Earlier calibration")
     assert await jump.locator("output").inner_text() == "29"

@@ -12,17 +12,15 @@ from tracker.errors import SessionError
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.calibration_revisions import (
-    CALIBRATION_EDITS,
     apply_check,
     change_calibration,
     follow_history,
     outdated_frames,
-    present_revision,
-    revisions_of_poses,
     with_corrections,
 )
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.calibration_log import CALIBRATION_EDITS, present_revision, revisions_of_poses
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 
 
