@@ -19,6 +19,7 @@
  * @typedef {{type: "seek", frame: number}} Seek
  * @typedef {{type: "select", person: number, point?: string | null}} Select
  * @typedef {{type: "view", layers: Layer[], reductions: number[], by_part: boolean}} SetView
+ * @typedef {{type: "epipolar", points: [number, number, number][]}} CheckEpipolar
  * @typedef {{type: "people", action: "show", person: number, shown: boolean}} ShowPerson
  * @typedef {{type: "people", action: "solo", on: boolean}} Solo
  * @typedef {{type: "before", shown: boolean}} ShowBefore
@@ -150,6 +151,9 @@
  *   Stretch[], run: number | null}} RangeComparisonMessage
  * @typedef {{level: "known" | "weak" | "unknown", sigma: number, sentence: string}} DofObservability
  * @typedef {{type: "observability", frame: number, person: number, dofs: DofObservability[]}} ObservabilityMessage
+ * @typedef {{camera: number, x0: number, y0: number, x1: number, y1: number}} EpipolarLine
+ * @typedef {{camera: number, px: number, mm: number | null}} EpipolarDistance
+ * @typedef {{type: "epipolar", lines: EpipolarLine[], distance: EpipolarDistance | null}} EpipolarMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null, bound_m:
  *   number | null, step_m: number | null, angles: number, lengths: number, own: boolean}} SearchLeaf
  * @typedef {{type: "search_setup", speed: number | null, leaves: SearchLeaf[]}} SearchSetupMessage
@@ -236,18 +240,18 @@
  *   current_px: number | null, count: number}} LandscapeHeader
  * @typedef {SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
  *   HoldPoint} PoseEdit
- * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowBefore | ShowCurves | WatchTab | ShowHistory |
- *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
- *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | TakeLimbBack | RunSearch | RepeatSearch |
- *   SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape |
- *   SetLandscapeDof | ShowCostMap | SetCostMapPlace | AskReason | StartTracking | ControlTracking | EditRange |
- *   CompareRange | StopRange | ToggleMark | ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d | SetHeight
- *   | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | ChangeBody | DraftSizes | AcquireSizes | FindPeople |
- *   CheckCalibration | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ * @typedef {Seek | Select | SetView | CheckEpipolar | ShowPerson | Solo | ShowBefore | ShowCurves | WatchTab |
+ *   ShowHistory | LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson |
+ *   TakeAlternative | ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | TakeLimbBack | RunSearch |
+ *   RepeatSearch | SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate |
+ *   ShowLandscape | SetLandscapeDof | ShowCostMap | SetCostMapPlace | AskReason | StartTracking | ControlTracking |
+ *   EditRange | CompareRange | StopRange | ToggleMark | ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d
+ *   | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | ChangeBody | DraftSizes | AcquireSizes |
+ *   FindPeople | CheckCalibration | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
- *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
- *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | CalibrationMessage | ReasonMessage |
- *   CostMapMessage} TextMessage
+ *   RangeComparisonMessage | ObservabilityMessage | EpipolarMessage | SearchSetupMessage | SearchRunsMessage |
+ *   SettingsMessage | View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | CalibrationMessage |
+ *   ReasonMessage | CostMapMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

@@ -219,6 +219,7 @@ export class Pane {
     drawAxes(context, this.view, this.#store.facts, this.#camera);
     this.#drawJoints(context, state, session.people);
     drawPins(context, this.view, this.#store.facts, this.#camera, width);
+    drawing.drawEpipolar(context, this.view, this.#store.facts, this.#camera);
   }
 
   showCost() {
