@@ -5,6 +5,7 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
+from app.drawing.misfit_field import MisfitArrow
 from app.page.message_types import Command, Index, Message, Name, Part
 from app.page.search_messages import OutlierMode
 from app.state.run_choices import MAX_STRIDE
@@ -400,6 +401,10 @@ class CalibrationMessage(Message, frozen=True, tag="calibration"):
     cameras: tuple[CameraCheck, ...]
     sentences: tuple[str, ...]
     """Sentences for the user; empty where no camera is off."""
+    misfits: tuple[MisfitArrow, ...]
+    """Mean shifts from contours to edges in cells of the pictures, over the frames that the check used."""
+    misfit_factor: int
+    """Factor by which they are drawn longer, the same in all pictures."""
     others: int
     """Number of other frames on which the corrections were compared."""
     better: int

@@ -49,9 +49,12 @@ export function calibrationSection({ store, send, notify }) {
     act(store.facts.calibration?.is_previewed ? "leave" : "preview"),
   );
   const apply = textButton("Apply", "Correct the cameras; undo restores them. Poses stay until they are tracked again", () => act("apply"));
+  const misfits = textButton("Misfits", "Show in each view how the edges lie off the contours, magnified: all one way for a turned camera, round for a rolled one, outwards or inwards for a zoomed one", () =>
+    store.set({ showsMisfits: !store.facts.showsMisfits }),
+  ); // prettier-ignore
   const buttons = document.createElement("div");
   buttons.className = "acquisition-work";
-  buttons.append(preview, apply);
+  buttons.append(misfits, preview, apply);
   const fit = note();
   const outdated = note();
   const again = textButton("Track again", "Track the frames of an earlier calibration with the present one; keyframes stay", () => act("track_again"));
@@ -73,7 +76,10 @@ export function calibrationSection({ store, send, notify }) {
     status.classList.toggle("is-failed", found.failed);
     result.hidden = !found.is_checked;
     if (found.is_checked) result.replaceChildren(...describe(found));
-    buttons.hidden = !named;
+    buttons.hidden = !found.is_checked;
+    preview.hidden = apply.hidden = !named;
+    misfits.setAttribute("aria-pressed", String(store.facts.showsMisfits));
+    misfits.disabled = found.is_previewed;
     preview.setAttribute("aria-pressed", String(found.is_previewed));
     apply.disabled = found.refused !== "";
     fit.hidden = !named;
@@ -95,10 +101,22 @@ export function calibrationSection({ store, send, notify }) {
     body,
     update(changed) {
       const { calibration } = store.facts;
-      if (calibration && ["calibration", "state", "timeline", "lanes"].some((f) => changed.has(/** @type {"state"} */ (f)))) show(calibration);
+      if (calibration && ["calibration", "showsMisfits", "state", "timeline", "lanes"].some((f) => changed.has(/** @type {"state"} */ (f)))) show(calibration);
     },
     bindings(reveal) {
       const noCamera = () => (isNamed() ? null : "No camera is known to be off. Check the cameras first.");
+      const binding = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) => ({
+        keys: [],
+        label,
+        words: `${words} calibration`,
+        matches: () => false,
+        why,
+        run: () => {
+          reveal();
+          run();
+        },
+      });
+      const notChecked = () => (store.facts.calibration?.is_checked ? null : "There is no check. Check the cameras first.");
       /** @type {[string, string, Action | (() => Action), () => string | null][]} */
       const actions = [
         ["Check the cameras", "contours body wrong moved turned", "start", () => (store.facts.calibration?.running ? "The check is at work." : null)],
@@ -107,17 +125,12 @@ export function calibrationSection({ store, send, notify }) {
         ["Track again what is of an earlier calibration", "retrack", "track_again", () =>
           earlierPoses(store.facts).tracked ? null : "No tracked pose is of an earlier calibration."],
       ]; // prettier-ignore
-      return actions.map(([label, words, action, why]) => ({
-        keys: [],
-        label,
-        words: `${words} calibration`,
-        matches: () => false,
-        why,
-        run: () => {
-          reveal();
-          act(typeof action === "string" ? action : action());
-        },
-      }));
+      return [
+        ...actions.map(([label, words, action, why]) => binding(label, words, why, () => act(typeof action === "string" ? action : action()))),
+        binding("Show where contours miss the edges (toggle)", "misfits residuals arrows field", notChecked, () =>
+          store.set({ showsMisfits: !store.facts.showsMisfits }),
+        ),
+      ];
     },
   };
 }

@@ -198,10 +198,11 @@
  * @typedef {{name: string, misfit_px: number, misfit_mm: number, kinds: string[], rivals: string[], rotation_deg:
  *   number[], position_mm: number[], focal_percent: number, time_ms: number, sigma: Record<string, number[]>,
  *   since_frame: number | null, is_seen: boolean}} CameraCheck
+ * @typedef {{camera: number, u: number, v: number, du: number, dv: number}} MisfitArrow
  * @typedef {{type: "calibration", running: boolean, stage: string, share: number, message: string, failed: boolean,
- *   is_checked: boolean, frames: number[], cameras: CameraCheck[], sentences: string[], others: number, better: number,
- *   refused: string, is_previewed: boolean, preview_frame: number | null, preview_fall_nats: number, revision: number,
- *   outdated: [number, number][][]}} CalibrationMessage
+ *   is_checked: boolean, frames: number[], cameras: CameraCheck[], sentences: string[], misfits: MisfitArrow[],
+ *   misfit_factor: number, others: number, better: number, refused: string, is_previewed: boolean, preview_frame:
+ *   number | null, preview_fall_nats: number, revision: number, outdated: [number, number][][]}} CalibrationMessage
  * @typedef {{name: string, parts: number[]}} LimbReason
  * @typedef {{below_nats: (number | null)[], outside: (number | null)[], usual_outside: (number | null)[], contour_px:
  *   (number | null)[], usual_contour_px: (number | null)[], below_in_all_nats: number}} PartReason

@@ -69,6 +69,15 @@ export function earlierCalibration({ calibration }) {
 }
 
 /**
+ * Arrows of the last check of the cameras that the views show: none while its correction is previewed.
+ *
+ * @param {import("./store.js").Facts} facts
+ */
+export function shownMisfits({ calibration, showsMisfits }) {
+  return showsMisfits && calibration && !calibration.is_previewed ? calibration.misfits : [];
+}
+
+/**
  * Whether a search is running, or paused between two steps.
  *
  * @param {import("./protocol.js").StateMessage | null} state

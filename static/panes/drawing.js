@@ -24,8 +24,6 @@ const HELD_RADIUS = 8.5;
 const CORNERS_PX = 44;
 /** Dashes of right limbs: sides differ in line, people in colour. */
 const RIGHT_DASH = [9, 4];
-/** Half side of a cross on a clicked place. */
-const CROSS_PX = 6;
 /** Border of joints behind a dimmed person. */
 const BEHIND_DASH = [2, 2.5];
 /** Opacity of dimmed people. */
@@ -139,34 +137,6 @@ export function drawPaths(context, view, overlay, camera, layers, isDimmed) {
 }
 
 /**
- * Draw the lines of the epipolar check in one view, and crosses on the places that were clicked.
- *
- * @param {CanvasRenderingContext2D} context
- * @param {PaneView} view
- * @param {import("../model/store.js").Facts} facts
- * @param {number} camera
- */
-export function drawEpipolar(context, view, { epipolar, epipolarLines }, camera) {
-  if (!epipolar) return;
-  const path = new Path2D();
-  for (const line of epipolarLines?.lines ?? []) {
-    if (line.camera !== camera) continue;
-    const [from, to] = [view.toScreen(line.x0, line.y0), view.toScreen(line.x1, line.y1)];
-    path.moveTo(from.x, from.y);
-    path.lineTo(to.x, to.y);
-  }
-  for (const point of epipolar.kept) {
-    if (point.camera !== camera) continue;
-    const { x, y } = view.toScreen(point.u, point.v);
-    for (const [dx, dy] of [[CROSS_PX, CROSS_PX], [CROSS_PX, -CROSS_PX]]) {
-      path.moveTo(x - dx, y - dy);
-      path.lineTo(x + dx, y + dy);
-    }
-  }
-  stroke(context, path, imageColor("mark"), LINE_STYLES.epipolar.width, true);
-}
-
-/**
  * Number the ghosts of one view in their order, each at the middle of its lines.
  *
  * @param {CanvasRenderingContext2D} context
@@ -225,7 +195,7 @@ function tracePath(view, segments, first, count) {
  * @param {number} width
  * @param {boolean} hasOutline
  */
-function stroke(context, line, color, width, hasOutline = true) {
+export function stroke(context, line, color, width, hasOutline = true) {
   context.lineJoin = context.lineCap = "round";
   if (hasOutline) {
     context.strokeStyle = imageColor("outline");

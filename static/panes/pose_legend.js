@@ -1,6 +1,7 @@
 /** Legend of the poses that the panes show besides the stored ones: replayed, tested, compared, previewed, alternative. */
 
 import { byId } from "../widgets/elements.js";
+import { shownMisfits } from "../model/selectors.js";
 import { LINE_STYLES } from "./drawing.js";
 
 /**
@@ -33,7 +34,7 @@ export class PoseLegend {
   constructor(store) {
     this.#store = store;
     store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("overlay") || changed.has("calibration") || changed.has("layers")) this.#show();
+      if (changed.has("state") || changed.has("overlay") || changed.has("calibration") || changed.has("showsMisfits") || changed.has("layers")) this.#show();
     });
   }
 
@@ -54,11 +55,12 @@ export class PoseLegend {
     if (replay && colors.has("model")) {
       lines.unshift({ kind: "model", color: session?.people[state.person].color ?? "#fff", text: "best pose so far" });
     }
-    const texts = [replay, ...(replay && !colors.has("model") ? ["contours are hidden"] : []), replay && "Esc exits"];
+    const misfits = shownMisfits(this.#store.facts).length > 0 ? `misfit × ${calibration?.misfit_factor}` : "";
+    const texts = [misfits, replay, ...(replay && !colors.has("model") ? ["contours are hidden"] : []), replay && "Esc exits"];
     const described = JSON.stringify([texts, lines]);
     if (described === this.#shown) return;
     this.#shown = described;
-    this.#element.hidden = !replay && lines.length === 0;
+    this.#element.hidden = !replay && !misfits && lines.length === 0;
     this.#element.replaceChildren(...texts.filter(Boolean).map((text) => entry(text ?? "")), ...lines.map((line) => entry(line.text, line)));
   }
 }

@@ -15,10 +15,18 @@ TURNED = CAMERA | {
 CHECKED = {
     "type": "calibration", "running": False, "stage": "", "share": 0, "message": "", "failed": False,
     "is_checked": True, "frames": [3, 9, 12], "cameras": [CAMERA, TURNED], "sentences": ["camera LEFT is turned"],
+    "misfits": [{"camera": 0, "u": 100, "v": 100, "du": 4, "dv": 0}], "misfit_factor": 20,
     "others": 11, "better": 9, "refused": "", "is_previewed": False, "preview_frame": None, "preview_fall_nats": 0,
     "revision": 1, "outdated": [[]],
 }  # fmt: skip
-APPLIED = CHECKED | {"is_checked": False, "cameras": [], "sentences": [], "revision": 2, "outdated": [[[2, 30]]]}
+APPLIED = CHECKED | {
+    "is_checked": False,
+    "cameras": [],
+    "sentences": [],
+    "misfits": [],
+    "revision": 2,
+    "outdated": [[[2, 30]]],
+}
 
 
 @pytest.fixture
@@ -71,6 +79,20 @@ async def test_poses_of_an_earlier_calibration_are_marked_counted_and_tracked_ag
     await endpoint.broadcast(APPLIED | {"outdated": [[]]})
     await shows(page, "!document.querySelector('[data-section=calibration]').innerText.includes('earlier')")
     assert await section.get_by_role("button", name="Track again").is_hidden()
+
+
+async def test_misfits_are_drawn_magnified_and_not_during_a_preview(page, endpoint, section):
+    await opened(page)
+    await endpoint.broadcast(CHECKED)
+    await shows(page, "document.querySelector('.calibration-cameras')")
+    pane = "document.querySelector('.pane-overlay').toDataURL()"
+    plain = await page.evaluate(pane)
+    await section.get_by_role("button", name="Misfits").click()
+    await shows(page, "document.querySelector('#pose-legend').innerText === 'misfit × 20'")
+    assert await page.evaluate(pane) != plain
+    await endpoint.broadcast(CHECKED | {"is_previewed": True})
+    await shows(page, "document.querySelector('#pose-legend').hidden")
+    assert await section.get_by_role("button", name="Misfits").is_disabled()
 
 
 async def drawn(page):
