@@ -63,9 +63,9 @@ export function mount(context, { panes, posing, scene }) {
     },
     {
       keys: ["Alt W"],
-      label: "Why this pose is in doubt: parts by views",
+      label: "Why this pose is in doubt",
       area: "Views",
-      words: "reason explain evidence colours outside silhouette contour nats",
+      words: "reason explain evidence colours outside silhouette contour nats parts views",
       matches: alt("KeyW", false),
       run: () => inspector.reveal("reason"),
     },

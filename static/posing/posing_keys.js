@@ -140,8 +140,8 @@ export function noteBindings(notes, away) {
 export function epipolarBindings(check, why) {
   const binding = {
     keys: ["Alt X"],
-    label: "Epipolar lines of the place under the pointer (toggle)",
-    words: "calibration check cameras line of sight distance",
+    label: "Epipolar lines (toggle)",
+    words: "calibration check cameras line of sight distance pointer",
     matches: alt("KeyX", false),
     run: () => check.toggle(),
   };

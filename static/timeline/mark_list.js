@@ -40,7 +40,7 @@ export function markSection() {
     ...STATUSES.map((status) => row(statusSwatch(status), STATUS_MEANINGS[status])),
     row(diamondSwatch(), "keyframe; larger with an exclamation mark: check it"),
     ...SOURCES.map((source) => row(sourceSwatch(source), SOURCE_MEANINGS[source])),
-    row(earlierSwatch(), "earlier calibration: made before the cameras were corrected"),
+    row(earlierSwatch(), "of an earlier calibration"),
     ...LINES.map(([kind, color, meaning]) => row(sampleOf(kind, `var(--image-${color})`), meaning)),
   );
   section.append(heading, list);
