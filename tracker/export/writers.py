@@ -95,7 +95,7 @@ def write_person_opensim(motion: ExportedMotion, options: ExportOptions, paths: 
     values = np.array([poses[f] for f in frames])
     times = np.array([motion.time_s(f) for f in frames])
     title = identifier(f"{motion.session.name}_{person.person.name}")
-    write_mot(paths[0], person.model, values, times, title)
+    write_mot(paths[0], person.model, values, times, title, motion.calibration_note)
     T_ground_world = file_from_world(motion.session, options.axes)
     write_osim(paths[1], person.model, title, T_ground_world, up_in_file(motion.session, options.axes).tolist())
     for _ in motion.frames:
@@ -132,23 +132,26 @@ def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Seque
             images.append(image)
             for (person, body), seen in zip(people, found, strict=True):
                 if person.index in motion.chosen and seen.box_px is not None:
-                    status = person.poses[frame].record.status
-                    annotations += _annotations(categories, person, body, seen, image.id, status, len(annotations))
+                    annotations += _annotations(motion, categories, person, body, seen, image, len(annotations))
         tick()
-    write_coco(paths[0], f"{motion.session.name}, exported by Quadrille", categories, images, annotations)
+    description = f"{motion.session.name}, exported by Quadrille, {motion.calibration_note}"
+    write_coco(paths[0], description, motion.calibrations.present, categories, images, annotations)
 
 
 def _annotations(
+    motion: ExportedMotion,
     categories: Sequence[CocoCategory],
     person: PersonMotion,
     body: PosedBody,
     seen: Keypoints,
-    image: int,
-    status: str,
+    image: CocoImage,
     n_before: int,
 ) -> list[CocoAnnotation]:
     """Return the annotations of a person in an image, one for each category that the body has."""
     out: list[CocoAnnotation] = []
+    status = person.poses[image.frame].record.status
+    calibration = motion.calibration_of(person, image.frame)
+    is_earlier = calibration != motion.calibrations.present
     for category in categories:
         if category.name not in ("person", body.model.name):
             continue
@@ -157,8 +160,8 @@ def _annotations(
         assert seen.box_px is not None
         out.append(
             CocoAnnotation(
-                n_before + len(out) + 1, image, category.id, triples, n, seen.box_px, seen.area_px, person.person.name,
-                person.index, status,
+                n_before + len(out) + 1, image.id, category.id, triples, n, seen.box_px, seen.area_px,
+                person.person.name, person.index, status, calibration, is_earlier,
             )
         )  # fmt: skip
     return out
@@ -188,7 +191,11 @@ def _row(motion: ExportedMotion, person: PersonMotion, frame: int) -> MotionRow:
         return row
     record = stored.record
     costs = (record.cost_px, *record.view_costs_px)
-    return replace(row, status=record.status, source=stored.source, is_keyframe=record.keyframe, costs_px=costs)
+    calibration = motion.calibration_of(person, frame)
+    return replace(
+        row, status=record.status, source=stored.source, is_keyframe=record.keyframe, calibration=calibration,
+        is_earlier=calibration != motion.calibrations.present, costs_px=costs,
+    )  # fmt: skip
 
 
 def _errors(record: PoseRecord) -> Array:
