@@ -18,11 +18,9 @@ from app.cli import (
     evaluate,
     experiment,
     export,
-    import_,
     index,
     info,
     init,
-    judge,
     new,
     observability,
     relink,
@@ -32,6 +30,7 @@ from app.cli import (
 )
 from app.cli import open as open_
 from app.cli.calibration import calibrate, check, sync
+from app.cli.observations import import_, judge
 from app.remedies import command_line_text
 from app.runtime import process_exit
 from app.runtime.log_limit import limit_log

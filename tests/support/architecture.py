@@ -66,6 +66,7 @@ ROOMS = [
     "app.bench",
     "app.cli",
     "app.cli.calibration",
+    "app.cli.observations",
     "app.__main__",
 ]
 FLOOR = {room: floor for floor, room in enumerate(ROOMS)}
