@@ -1,5 +1,6 @@
 """`quadrille init`: set a first pose, from known joints, from a table of poses, or from the silhouettes."""
 
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
     from tracker.initialization.first_pose import FirstPoses
+    from tracker.pipeline.find_people import FindSettings
     from tracker.pipeline.given_pose import GivenPose
     from tracker.session.session import Session
 
@@ -35,10 +37,12 @@ class InitArguments:
     """TRC file of 3-D joints."""
     poses: OptionalPath = None
     """table of poses (CSV), as `simulate` writes it."""
-    method: Literal["joints", "poses", "voxels", "axis", "auto"] = "joints"
+    method: Literal["joints", "poses", "voxels", "axis", "auto", "keypoints"] = "joints"
     """joints fits the pose to known joints; poses copies it from a table; voxels finds the parts of the body in the
     visual hull; axis searches the body on the axis of the silhouettes; auto tries both on several frames and keeps the
-    start that tracks best."""
+    start that tracks best; keypoints takes the frame on which the key points of --of fit a body best."""
+    of: OptionalName = None
+    """keypoints: name of the imported observations."""
     frame: int = 0
     """frame to set; with auto the first one to try."""
     voxel_size: float = 25.0
@@ -63,7 +67,9 @@ class InitArguments:
 def command(arguments: Annotated[InitArguments, tyro.conf.arg(name="")]) -> None:
     """Set a first pose."""
     method, frame = arguments.method, arguments.frame
-    is_found = method in ("voxels", "axis", "auto")
+    is_found = method in ("voxels", "axis", "auto", "keypoints")
+    if (method == "keypoints") != (arguments.of is not None):
+        raise TrackerError("expected --method keypoints together with --of NAME, found one of them; give both")
     at = load_target(arguments.session, arguments.person, several=is_found)
     if not 0 <= frame < at.session.n_frames:
         n = at.session.n_frames
@@ -139,26 +145,26 @@ def _print(arguments: InitArguments, given: "GivenPose", found: dict[str, Any], 
 
 
 def _init_from_silhouettes(at: Target, arguments: InitArguments) -> None:
+    from tracker.pipeline.find_people import FindSettings
     from tracker.tracking.voxel.settings import check_voxel_size
 
     check_voxel_size(arguments.voxel_size / 1000)
     progress = Reporter(silent=arguments.json or arguments.method != "auto")
-    found = init_from_silhouettes(
-        at, arguments.method, arguments.frame, arguments.voxel_size / 1000, arguments.person is None, progress
-    )
+    generator = None if arguments.method in ("auto", "keypoints") else arguments.method
+    settings = FindSettings(arguments.frame, generator, arguments.voxel_size / 1000, arguments.of)
+    found = init_from_footage(at, arguments.method, settings, arguments.person is None, progress)
     print(format_json(found) if arguments.json else format_first_poses(found))
 
 
-def init_from_silhouettes(
-    at: Target, method: str, frame: int, voxel_m: float, only_unplaced: bool, progress: Reporter
+def init_from_footage(
+    at: Target, method: str, settings: "FindSettings", only_unplaced: bool, progress: Reporter
 ) -> dict[str, Any]:
     """Find the poses of people on one frame, and store them as one entry of the history.
 
     Args:
         at: the session and the people.
-        method: `voxels`, `axis` or `auto`.
-        frame: frame to set; with `auto` the first one to try.
-        voxel_m: edge of a voxel, metres.
+        method: its name in the history.
+        settings: of the search.
         only_unplaced: whether people who have a pose keep it.
         progress: says what was tried.
 
@@ -170,7 +176,7 @@ def init_from_silhouettes(
         TrackerError: everybody has a pose, or no frame shows the people well enough; nothing is stored then.
     """
     from tracker.pipeline.chain import open_stored_session, unplaced
-    from tracker.pipeline.find_people import FindSettings, find_people
+    from tracker.pipeline.find_people import find_people
 
     def report(stage: str, share: float, text: str = "", /) -> None:
         if text:
@@ -183,21 +189,20 @@ def init_from_silhouettes(
             raise TrackerError(
                 "expected a person without a pose, found none; name one with --person to find the person again"
             )
-        settings = FindSettings(frame, None if method == "auto" else method, voxel_m)
         first = find_people(session, opened.observer, people, range(session.n_frames), settings, report)
         opened.store_found(first, f"init from {method}")
     return first_poses_record(session, first)
 
 
 def first_poses_record(session: "Session", first: "FirstPoses") -> dict[str, Any]:
-    """Return what `init_from_silhouettes` returns."""
+    """Return what `init_from_footage` returns."""
     people = [
         {
             "person": session.people[i].name,
             "method": p.start.source,
             "height_m": p.model.height_m,
             "status": p.status,
-            "cost_px": p.cost_px,
+            "cost_px": None if math.isnan(p.cost_px) else p.cost_px,
             "facing_sure": p.is_facing_sure,
             "notes": list(p.notes),
         }
@@ -210,7 +215,8 @@ def format_first_poses(found: dict[str, Any]) -> str:
     """Format the result for a terminal."""
     lines = []
     for own in found["people"]:
-        head = f"{own['person']}, {own['height_m']:.2f} m tall, frame {found['frame']}, by {own['method']}: "
-        lines.append(f"{head}{own['status']}, cost {own['cost_px']:.2f} px")
+        head = f"{own['person']}, {own['height_m']:.2f} m tall, frame {found['frame']}, by {own['method']}"
+        cost = "" if own["cost_px"] is None else f": {own['status']}, cost {own['cost_px']:.2f} px"
+        lines.append(head + cost)
         lines += [f"note: {note}" for note in own["notes"]]
     return "\n".join(lines)

@@ -64,7 +64,7 @@ class FirstPose(NamedTuple):
     status: Status
     """The tracker's status of the fit on that frame, at best doubtful if silhouettes, rivals or a track object."""
     cost_px: float
-    """Mean cost of the short track, px of the footage."""
+    """Mean cost of the short track, px of the footage; NaN of a pose that was not tracked."""
     is_facing_sure: bool
     """Whether the contours tell left from right."""
     notes: tuple[str, ...]

@@ -84,7 +84,9 @@ def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[
         )
     frame = min(common, key=lambda k: sum(own[k] for own in costs.values()))
     starts = {i: Hypothesis(bodies[i][frame], SOURCE, costs[i][frame], is_measured=False) for i in people}
-    return FirstPoses(frame, {i: FirstPose(frame, start, "doubtful", 0.0, True, ()) for i, start in starts.items()})
+    return FirstPoses(
+        frame, {i: FirstPose(frame, start, "doubtful", float("nan"), True, ()) for i, start in starts.items()}
+    )
 
 
 def _at_height(model: BodyModel, points: BodyPoints) -> BodyModel:
