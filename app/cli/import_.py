@@ -35,7 +35,8 @@ class ImportArguments:
     session: SessionArg
     """session folder."""
     files: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER|FILE ...")]
-    """files of one format, or folders of them: OpenPose JSON, TRC."""
+    """files of one format, or folders of them: OpenPose JSON, COCO, DeepLabCut, Lightning Pose, SLEAP, NWB; TRC, C3D,
+    BVH, CSV."""
     name: Annotated[str, tyro.conf.arg(name="as", metavar="NAME")]
     """name of the observations in the session."""
     person: Names = ()

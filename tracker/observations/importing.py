@@ -15,7 +15,7 @@ from tracker.observations.observed import ObservationSet, ObservedPoints, Source
 from tracker.observations.placing import place_pictures
 from tracker.observations.readers import PICTURE_FORMATS, find_files
 from tracker.observations.request import ImportRequest
-from tracker.observations.sources import FileGroup, match_cameras
+from tracker.observations.sources import FileGroup, Found, match_cameras
 from tracker.observations.space import read_space
 from tracker.observations.stored import checksum, save_observations
 from tracker.session.session import Session
@@ -60,7 +60,7 @@ def plan_import(session: Session, request: ImportRequest) -> ImportPlan:
     format_name, files = find_files(request.paths)
     if format_name not in PICTURE_FORMATS:
         return _plan_of_space(session, request, format_name, files)
-    return _plan_of_pictures(session, request, PICTURE_FORMATS[format_name].name, files)
+    return _plan_of_pictures(session, request, format_name, files)
 
 
 def store_import(session: Session, plan: ImportPlan) -> None:
@@ -75,9 +75,7 @@ def store_import(session: Session, plan: ImportPlan) -> None:
     save_observations(session, plan.observations, plan.files)
 
 
-def _plan_of_pictures(
-    session: Session, request: ImportRequest, format_name: str, files: list[tuple[Path, Path]]
-) -> ImportPlan:
+def _plan_of_pictures(session: Session, request: ImportRequest, format_name: str, files: list[Found]) -> ImportPlan:
     groups = PICTURE_FORMATS[format_name].read(files)
     names = match_cameras([(g.labels, g.place) for g, _ in groups], session.camera_names, request.cameras)
     unmatched = [g for (g, _), name in zip(groups, names, strict=True) if not name]
@@ -268,9 +266,7 @@ def _preview(
     return ViewPreview(name, chosen[name][0].place, len(table.numbers), frames, most, median)
 
 
-def _plan_of_space(
-    session: Session, request: ImportRequest, format_name: str, files: list[tuple[Path, Path]]
-) -> ImportPlan:
+def _plan_of_space(session: Session, request: ImportRequest, format_name: str, files: list[Found]) -> ImportPlan:
     if len(files) != len(request.people):
         raise SessionError(
             f"expected one file of points in space for each person ({', '.join(request.people)}), found {len(files)}",

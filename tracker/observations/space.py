@@ -47,7 +47,7 @@ def read_space(
     rows = np.zeros(0)
     for path in paths:
         where = f"{SPACE_FORMATS[format_name].title} file {path}"
-        read = remap_axes(SPACE_FORMATS[format_name].read(path, request.unit_m), request.axes)
+        read = remap_axes(SPACE_FORMATS[format_name].read(path, request.unit_m, session.fps), request.axes)
         if tables and tables[0].names != read.names:
             raise FormatError(f"{where}: expected the points of {paths[0].name}, found others; import them apart")
         placed = place_rows(read, where, session.fps, known)
