@@ -219,6 +219,10 @@ PHRASES = {
         "give frames of one body as --frames, or another format", "choose Frames of one body, or another format"
     ),
     "name_format": Phrases("correct --format", "choose another format"),
+    "export_other_format": Phrases(
+        "export the poses with --format instead, or leave them unedited to get the files as they came",
+        "export the poses in another format",
+    ),
     "another_file": Phrases("choose another --out", "choose another file"),
     "another_file_or_overwrite": Phrases("choose another --out, or add --overwrite", "choose another file"),
 }

@@ -6,13 +6,16 @@ NAME.x_mm. Other columns, such as errors, are left out. A file without a unit ne
 
 import csv
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
+from tracker.formats.exact_text import exact_text, replace_cells
 from tracker.formats.number_rows import MAX_NAMES, NumberRows
 from tracker.formats.trc import METRES_BY_WORD, MarkerTable
+from tracker.geometry.arrays import Array
 from tracker.text_files import TABLE_BYTES, TextKind, read_lines
 from tracker.validation import MAX_NUMBER, quoted
 
@@ -93,3 +96,25 @@ def _points_of(columns: list[str], where: str) -> tuple[tuple[str, ...], list[in
             f"{f'{quoted(wrong)} without all three' if wrong else quoted(columns[:4])}; rename them"
         )
     return tuple(whole), [axes[a] for axes in whole.values() for a in "xyz"], units.pop()
+
+
+def patch_points_csv(path: Path, unit_m: float | None, changes: Mapping[int, Array]) -> bytes:
+    """Return a file with some points replaced, in its unit; all other bytes stay.
+
+    Args:
+        path: the file, which has been read before.
+        unit_m: metres per unit, if the file states none.
+        changes: positions, (n_points, 3), metres, by row, from 0; points of NaN stay.
+    """
+    table = read_points_csv(path, unit_m, 1.0)
+    exact = exact_text(path.read_bytes())
+    head = next(line for line in exact.text.splitlines() if line.strip() and line[0] != "#")
+    columns = [cell.strip().lstrip("\ufeff") for cell in next(csv.reader([head]))]
+    _, at, unit = _points_of(columns, str(path))
+    scale = METRES_BY_WORD[unit] if unit else unit_m
+    assert scale is not None
+    new = {
+        row: {at[i]: float(x / scale) for i, x in enumerate(points.ravel()) if not np.isnan(x)}
+        for row, points in changes.items()
+    }
+    return exact.encoded(replace_cells(exact.text, ",", len(table.frames), new, 7 if scale > 0.1 else 4))

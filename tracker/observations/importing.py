@@ -12,7 +12,7 @@ from tracker.formats.keypoints.picture_table import PictureTable, check_size
 from tracker.geometry.arrays import IntArray
 from tracker.observations.checks import agreement_problem, picture_problems
 from tracker.observations.observed import ObservationSet, ObservedPoints, SourceFile
-from tracker.observations.placing import place_pictures
+from tracker.observations.placing import place_pictures, rescaled
 from tracker.observations.readers import PICTURE_FORMATS, find_files
 from tracker.observations.request import ImportRequest
 from tracker.observations.sources import FileGroup, Found, match_cameras
@@ -119,11 +119,8 @@ def _scaled(table: PictureTable, size: tuple[int, int], given: tuple[int, int] |
     """Return points in the pixels of the camera, if they are said to be of pictures of another size."""
     if given is None:
         return table
-    factors = np.array(size) / np.array(given)
-    # Pixel borders stay aligned, as in OpenCV's resize; normalized points count from the border.
-    middle = 0.0 if given == (1, 1) else 0.5
     points = table.points.copy()
-    points[..., :2] = (points[..., :2] + middle) * factors - 0.5
+    points[..., :2] = rescaled(points[..., :2], given, size)
     return PictureTable(table.names, table.numbers, points, None, table.rate, table.notes)
 
 

@@ -19,9 +19,6 @@ from tracker.observations.request import ImportRequest
 from tracker.session.clocks import Placement, place_rows
 from tracker.session.session import Session
 
-_MIN_SEEN = 0.5
-"""Smallest share of points that lie within the pictures of two cameras: most, for footage of these people."""
-
 
 class PlacedPoints(NamedTuple):
     """Points in space at the frames of a session."""
@@ -110,7 +107,7 @@ def _not_seen(joints_world: Array, session: Session) -> list[FormatError]:
         known = np.isfinite(px).all(axis=-1)
         n_views[known] += source.camera.is_filmed(px[known])
     seen = n_views >= min(2, len(session.cameras))
-    if seen.mean() >= _MIN_SEEN:
+    if 2 * seen.sum() >= len(points):
         return []
     middle = ", ".join(f"{x:.2f}" for x in np.median(points, axis=0))
     return [

@@ -8,13 +8,14 @@ import csv
 import io
 import pickle
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from tracker.errors import FormatError
+from tracker.formats.exact_text import exact_text, replace_cells
 from tracker.formats.keypoints.hdf5 import open_hdf5
 from tracker.formats.keypoints.picture_table import PictureTable, check_size
 from tracker.formats.number_rows import MAX_NAMES, NumberRows
@@ -187,3 +188,32 @@ def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: 
     if not any(c.coordinate == "likelihood" for c in columns):
         points[~absent, 2] = np.nan
     return PictureTable(tuple(names), numbers, points)
+
+
+def patch_deeplabcut_csv(path: Path, changes: Mapping[int, Sequence[tuple[int, Array]]]) -> bytes:
+    """Return a file with points of some rows replaced; all other bytes stay.
+
+    Args:
+        path: the file, which has been read before.
+        changes: by row, from 0: number of the individual and x, y, confidence of all points, (n_points, 3); rows of
+            NaN stay, confidence 0 makes a point absent.
+    """
+    lines = enumerate(read_lines(path, _KIND), 1)
+    columns, n_index, _ = _read_head(lines, str(path))
+    table = read_deeplabcut_csv(path)
+    individuals = list(dict.fromkeys(c.individual for c in columns))
+    new: dict[int, dict[int, float]] = {}
+    for row, people in changes.items():
+        for person, values in people:
+            for i, column in enumerate(columns):
+                value = values[table.names.index(column.point)]
+                if column.individual == individuals[person] and not np.isnan(value[2]):
+                    absent = value[2] == 0 and column.coordinate != "likelihood"
+                    cell = np.nan if absent else float(value[_COORDINATES.index(column.coordinate)])
+                    new.setdefault(row, {})[n_index + i] = cell
+    exact = exact_text(path.read_bytes())
+    return exact.encoded(replace_cells(exact.text, ",", len(table.numbers), new, _DECIMALS))
+
+
+_DECIMALS = 3
+"""Fewest decimals of a number that is replaced: a thousandth of a pixel."""
