@@ -114,10 +114,15 @@ def _send_back(arguments: ExportArguments) -> None:
     if arguments.json:
         print(format_json(found))
         return
-    n = len(done.changed)
-    print(f"wrote {len(done.paths)} files like {observations.name} to {arguments.out}")
-    print(f"{n} differ from those that were imported: the points of {len(done.frames)} frames were replaced" if n else
-          "all are as they were imported")  # fmt: skip
+    if not done.changed:
+        print("all as imported")
+        return
+    frames, files = _count(len(done.frames), "frame"), _count(len(done.changed), "file")
+    print(f"points of {frames} were replaced, in {files}; all else is as imported")
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n} {noun}{'s' * (n != 1)}"
 
 
 def _file(out: Path, chosen: ExportFormat, name: str) -> Path:

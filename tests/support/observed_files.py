@@ -112,3 +112,43 @@ def write_bvh_chain(path):
         "MOTION\nFrames: 2\nFrame Time: 0.0333333\n"
         "10 20 30 90 0 0 0 0 0 0 90 0\n10 20 30 90 0 0 0 0 0 0 0 0\n"
     )
+
+
+def convert_c3d(path, kind):
+    """Rewrite the numbers of a C3D file of Intel's reals: as whole numbers, as SGI's or as DEC's."""
+    data = bytearray(path.read_bytes())
+    parameters = 512 * (data[0] - 1)
+    block = int.from_bytes(data[16:18], "little")
+    start, n_points = 512 * (block - 1), int.from_bytes(data[2:4], "little")
+    n_frames = int.from_bytes(data[8:10], "little") - int.from_bytes(data[6:8], "little") + 1
+    reals = np.frombuffer(bytes(data[start : start + 16 * n_points * n_frames]), "<f4").copy()
+
+    def real(values):
+        values = np.atleast_1d(np.asarray(values, "<f4"))
+        if kind == "big-endian":
+            return values.astype(">f4").tobytes()
+        return np.ascontiguousarray((values * 4).view("<u2").reshape(-1, 2)[:, ::-1]).tobytes()
+
+    if kind == "integers":
+        scale = np.abs(reals).max() / 16_000
+        data[12:16] = np.float32(scale).tobytes()
+        rows = reals.reshape(-1, 4)
+        rows[:, :3] /= scale
+        path.write_bytes(bytes(data[:start]) + np.round(rows).astype("<i2").tobytes())
+        return
+    for at in (12, 20):
+        data[at : at + 4] = real(np.frombuffer(bytes(data[at : at + 4]), "<f4"))
+    data[parameters + 3] = 86 if kind == "big-endian" else 85
+    if kind == "big-endian":
+        for at in (2, 4, 6, 8, 16):
+            data[at : at + 2] = data[at : at + 2][::-1]
+        at = parameters + 4
+        while data[at]:
+            length = abs(int.from_bytes(data[at : at + 1], "little", signed=True))
+            after = at + 2 + length
+            step = int.from_bytes(data[after : after + 2], "little")
+            data[after : after + 2] = data[after : after + 2][::-1]
+            if not step:
+                break
+            at = after + step
+    path.write_bytes(bytes(data[:start]) + real(reals))

@@ -138,11 +138,6 @@ def _patch_pictures(format_name: str, pictures: StoredPictures, changes: Changes
     if format_name == "openpose":
         return {pictures.files[row]: patch_openpose(pictures.files[row].read_bytes(), c) for row, c in changes.items()}
     (path,) = pictures.files
-    if path.suffix.lower() != ".csv":
-        raise FormatError(
-            "expected DeepLabCut's CSV, whose points can be replaced in place, found HDF5",
-            Remedy("export_other_format"),
-        )
     # A table has columns for each individual: one who was not found has the first that is free.
     free = {row: _with_free_individuals(some, pictures.table.points.shape[1]) for row, some in changes.items()}
     return {path: patch_deeplabcut_csv(path, free)}

@@ -11,11 +11,10 @@ from tracker.files import read_regular
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import read_c3d
 from tracker.formats.keypoints.coco_reading import is_coco, read_coco
-from tracker.formats.keypoints.deeplabcut import is_deeplabcut, read_deeplabcut_csv, read_deeplabcut_hdf5
-from tracker.formats.keypoints.hdf5 import open_hdf5
+from tracker.formats.keypoints.deeplabcut import is_deeplabcut, read_deeplabcut_csv
+from tracker.formats.keypoints.hdf5 import read_hdf5_apart
 from tracker.formats.keypoints.openpose import numbered_name, read_openpose_pictures
 from tracker.formats.keypoints.picture_table import PictureTable
-from tracker.formats.keypoints.sleap_files import read_sleap
 from tracker.formats.points_csv import read_points_csv
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
@@ -56,19 +55,13 @@ def _read_coco(files: Sequence[Found]) -> Groups:
 
 
 def _read_deeplabcut(files: Sequence[Found]) -> Groups:
-    return [
-        (
-            FileGroup((path,), folder_labels(path, root), root),
-            read_deeplabcut_csv(path) if path.suffix.lower() == ".csv" else read_deeplabcut_hdf5(path),
-        )
-        for path, root in files
-    ]
+    return [(FileGroup((path,), folder_labels(path, root), root), read_deeplabcut_csv(path)) for path, root in files]
 
 
-def _read_sleap(files: Sequence[Found]) -> Groups:
+def _read_hdf5(files: Sequence[Found]) -> Groups:
     out = []
     for path, root in files:
-        found = read_sleap(path)
+        found = read_hdf5_apart(path)
         for video, table in found:
             # A file of one camera is named after it more often than after its video.
             of_video = (video.stem, video.parent.name)
@@ -82,7 +75,7 @@ PICTURE_FORMATS = {
     "openpose": PictureFormat("OpenPose JSON", _read_openpose),
     "coco": PictureFormat("COCO", _read_coco),
     "deeplabcut": PictureFormat("DeepLabCut", _read_deeplabcut),
-    "sleap": PictureFormat("SLEAP or NWB", _read_sleap),
+    "hdf5": PictureFormat("SLEAP, NWB or HDF5", _read_hdf5),
 }
 SPACE_FORMATS = {
     "trc": SpaceFormat("TRC", lambda path, unit_m, rate: read_trc(path)),
@@ -92,8 +85,8 @@ SPACE_FORMATS = {
 }
 FORMATS: Mapping[str, PictureFormat | SpaceFormat] = {**PICTURE_FORMATS, **SPACE_FORMATS}
 """The formats by name."""
-_BY_SUFFIX = {".slp": "sleap", ".nwb": "sleap", ".trc": "trc", ".c3d": "c3d", ".bvh": "bvh"}
-SUFFIXES = (".json", ".csv", ".h5", *_BY_SUFFIX)
+_BY_SUFFIX = {".slp": "hdf5", ".nwb": "hdf5", ".h5": "hdf5", ".trc": "trc", ".c3d": "c3d", ".bvh": "bvh"}
+SUFFIXES = (".json", ".csv", *_BY_SUFFIX)
 
 
 def find_files(paths: Sequence[Path]) -> tuple[str, list[Found]]:
@@ -129,9 +122,6 @@ def _format_of(path: Path) -> str:
         return _BY_SUFFIX[suffix]
     if suffix == ".csv":
         return "deeplabcut" if is_deeplabcut(path) else "csv"
-    if suffix == ".h5":
-        with open_hdf5(path, f"file {path}") as file:
-            return "deeplabcut" if any("non_index_axes" in item.attrs for item in file.values()) else "sleap"
     if suffix == ".json":
         return "openpose" if numbered_name(path.name) is not None and not _is_dataset(path) else "coco"
     raise FormatError(

@@ -121,7 +121,10 @@ def write_kind(kind, session, folder, truth):
     return folder / "a.c3d", {}
 
 
-KINDS = ["openpose", "coco", "dlc csv", "dlc multi", "dlc h5", "sleap", "trc", "trc utf-16", "csv", "c3d"]
+KINDS = [
+    *("openpose", "coco", "dlc csv", "dlc multi", "trc", "trc utf-16", "csv", "c3d"),
+    *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("dlc h5", "sleap")),
+]
 NEEDS = {"dlc h5": "h5py", "sleap": "sleap_io", "c3d": "ezc3d"}
 
 

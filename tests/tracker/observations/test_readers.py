@@ -1,11 +1,11 @@
 """Files of each format: key points and joints come back as they were written, and wrong ones are refused."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
 from observed_files import (
+    convert_c3d,
     write_bvh_chain,
     write_c3d,
     write_coco_images,
@@ -17,11 +17,12 @@ from observed_people import BODY_25, make_session, seen, walking
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.bvh_reading import read_bvh
-from tracker.formats.c3d import read_c3d
+from tracker.formats.c3d import patch_c3d, read_c3d
+from tracker.formats.keypoints import hdf5
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
+from tracker.formats.keypoints.hdf5 import read_hdf5_apart
 from tracker.formats.keypoints.openpose import numbered_name, read_openpose
-from tracker.formats.keypoints.sleap_files import read_sleap
 from tracker.formats.points_csv import read_points_csv
 from tracker.observations.importing import plan_import
 from tracker.observations.joints import observed_joints
@@ -47,7 +48,7 @@ def in_space(session, observations):
     return observed_joints(observations, [c.camera for c in session.cameras]).joints_world[:, 0]
 
 
-@pytest.mark.parametrize("kind", ["csv", "multi", "h5"])
+@pytest.mark.parametrize("kind", ["csv", "multi", pytest.param("h5", marks=pytest.mark.slow)])
 def test_deeplabcut(session, tmp_path, kind):
     if kind == "h5":
         pytest.importorskip("h5py")
@@ -55,7 +56,7 @@ def test_deeplabcut(session, tmp_path, kind):
     for v, name in enumerate(session.camera_names):
         write_deeplabcut(tmp_path / "dlc" / f"{name}DLC_resnet50_demo", BODY_25.points, points[:, v], kind)
     found = imported(session, tmp_path / "dlc")
-    assert found.format == "deeplabcut"
+    assert found.format == ("hdf5" if kind == "h5" else "deeplabcut")
     assert np.abs(in_space(session, found) - TRUTH).max() < 1e-4
     assert np.allclose(found.points.confidence[found.points.is_known], 0.9)
 
@@ -90,6 +91,7 @@ def test_malformed_deeplabcut(tmp_path, text, expected):
         read_deeplabcut_csv(tmp_path / "a.csv")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".slp", ".h5", ".nwb"])
 def test_sleap_and_nwb(session, tmp_path, suffix):
     pytest.importorskip("sleap_io")
@@ -97,25 +99,41 @@ def test_sleap_and_nwb(session, tmp_path, suffix):
     for v, name in enumerate(session.camera_names):
         write_sleap(tmp_path / "sleap" / f"{name}{suffix}", BODY_25.points, points[:, v])
     found = imported(session, tmp_path / "sleap")
-    assert found.format == "sleap"
+    assert found.format == "hdf5"
     assert np.abs(in_space(session, found) - TRUTH).max() < 1e-4
 
 
-def test_damaged_sleap(tmp_path):
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["a.slp", "a.h5", "a.nwb"])
+def test_damaged_hdf5(tmp_path, name):
     pytest.importorskip("sleap_io")
-    (tmp_path / "a.slp").write_bytes(b"nothing")
-    with pytest.raises(FormatError, match=r"a\.slp cannot be read: .*; export it again"):
-        read_sleap(tmp_path / "a.slp")
+    (tmp_path / name).write_bytes(b"nothing")
+    with pytest.raises(FormatError, match=r"cannot be read: .*; export it again"):
+        read_hdf5_apart(tmp_path / name)
 
 
-@pytest.mark.parametrize(("name", "read"), [("a.slp", read_sleap), ("a.c3d", lambda p: read_c3d(p, None))])
-def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch, name, read):
-    for package in ("sleap_io", "ezc3d"):
-        monkeypatch.setitem(sys.modules, package, None)
-    (tmp_path / name).write_bytes(b"x")
-    with pytest.raises(FormatError, match=r"needs the package .*, which is not installed") as caught:
-        read(tmp_path / name)
-    assert caught.value.remedy == Remedy("install_import")
+def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
+    """A module that raises on import stands for one that is not there."""
+    for package in ("sleap_io", "h5py"):
+        (tmp_path / f"{package}.py").write_text(f"raise ModuleNotFoundError('no', name='{package}')")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    for name, needed in (("a.slp", "sleap-io"), ("a.h5", "h5py")):
+        (tmp_path / name).write_bytes(b"x")
+        with pytest.raises(FormatError, match=f"needs the package {needed}, which is not installed") as caught:
+            read_hdf5_apart(tmp_path / name)
+        assert caught.value.remedy == Remedy("install_import")
+
+
+def test_a_library_that_hangs_or_dies(tmp_path, monkeypatch):
+    (tmp_path / "a.slp").write_bytes(b"x")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    (tmp_path / "sleap_io.py").write_text("import os; os._exit(11)")
+    with pytest.raises(FormatError, match="its library failed; export it again"):
+        read_hdf5_apart(tmp_path / "a.slp")
+    (tmp_path / "sleap_io.py").write_text("import time; time.sleep(60)")
+    monkeypatch.setattr(hdf5, "SECONDS", 1.0)
+    with pytest.raises(FormatError, match="it took over 1 s, as damaged files do"):
+        read_hdf5_apart(tmp_path / "a.slp")
 
 
 @pytest.mark.parametrize("of", ["folders", "cameras", "scores"])
@@ -287,3 +305,54 @@ def test_several_formats_and_none(session, tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(FormatError, match=r"files that end in .*, found none in"):
         imported(session, tmp_path / "empty")
+
+
+@pytest.mark.parametrize("kind", ["integers", "big-endian", "dec"])
+def test_c3d_of_other_computers(tmp_path, kind):
+    pytest.importorskip("ezc3d")
+    write_c3d(tmp_path / "a.c3d", BODY_25.points, TRUTH, 30.0)
+    convert_c3d(tmp_path / "a.c3d", kind)
+    table = read_c3d(tmp_path / "a.c3d", None)
+    assert table.names == BODY_25.points
+    assert table.rate == 30.0
+    assert np.abs(table.points - TRUTH).max() < (1e-4 if kind == "integers" else 1e-6)
+    moved = {2: TRUTH[2] + 0.1}
+    if kind == "dec":
+        with pytest.raises(FormatError, match="found DEC's"):
+            patch_c3d(tmp_path / "a.c3d", None, moved)
+        return
+    (tmp_path / "b.c3d").write_bytes(patch_c3d(tmp_path / "a.c3d", None, moved))
+    again = read_c3d(tmp_path / "b.c3d", None).points
+    assert np.abs(again[2] - moved[2]).max() < 1e-4
+    assert np.array_equal(np.delete(again, 2, axis=0), np.delete(table.points, 2, axis=0))
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda d: d[:300], "is not a C3D file"),
+        (lambda d: d[:2] + b"\xff\x7f" + d[4:], "expected 1 to 2000 points"),
+        (lambda d: b"\x09" + d[1:], "the section of parameters"),
+        (lambda d: d[:20] + b"\0\0\0\0" + d[24:], "a frame rate above 0"),
+        (lambda d: d.replace(b"LABELS", b"LABELX"), "a name for each of 25 points"),
+        (lambda d: d.replace(b"\x02mm", b"\x02zz"), "POINT:UNITS to be mm or m, found 'zz'"),
+        (lambda d: d[: len(d) - 9 * 25 * 16], "frames of points, found none|it has"),
+    ],
+)
+def test_malformed_c3d(tmp_path, change, expected):
+    pytest.importorskip("ezc3d")
+    write_c3d(tmp_path / "a.c3d", BODY_25.points, TRUTH, 30.0)
+    (tmp_path / "a.c3d").write_bytes(change((tmp_path / "a.c3d").read_bytes()))
+    with pytest.raises(FormatError, match=expected):
+        read_c3d(tmp_path / "a.c3d", None)
+
+
+def test_a_c3d_that_was_cut_off(tmp_path):
+    pytest.importorskip("ezc3d")
+    write_c3d(tmp_path / "a.c3d", BODY_25.points, TRUTH, 30.0)
+    data = (tmp_path / "a.c3d").read_bytes()
+    start = 512 * (int.from_bytes(data[16:18], "little") - 1)
+    (tmp_path / "a.c3d").write_bytes(data[: start + 3 * 25 * 16 + 7])
+    table = read_c3d(tmp_path / "a.c3d", None)
+    assert len(table.points) == 3
+    assert table.notes == ("its header promises 8 frames, it has 3",)

@@ -16,7 +16,6 @@ import numpy as np
 
 from tracker.errors import FormatError
 from tracker.formats.exact_text import exact_text, replace_cells
-from tracker.formats.keypoints.hdf5 import open_hdf5
 from tracker.formats.keypoints.picture_table import PictureTable, check_size
 from tracker.formats.number_rows import MAX_NAMES, NumberRows
 from tracker.geometry.arrays import Array, IntArray
@@ -68,14 +67,24 @@ def read_deeplabcut_csv(path: Path) -> PictureTable:
     return _table(columns, numbers, values, where)
 
 
+def is_deeplabcut_hdf5(path: Path) -> bool:
+    """Return whether an HDF5 file is a table of pandas. It needs h5py, which raises for a damaged file."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return any("non_index_axes" in item.attrs for item in file.values())
+
+
 def read_deeplabcut_hdf5(path: Path) -> PictureTable:
     """Read a table that pandas wrote, in its `table` format. It needs h5py.
 
     Raises:
-        FormatError: the file is missing, malformed or of another kind, or h5py is not installed.
+        FormatError: the file is of another kind. h5py raises other errors for a damaged file.
     """
     where = f"DeepLabCut file {path}"
-    with open_hdf5(path, where) as file:
+    import h5py
+
+    with h5py.File(path, "r") as file:
         groups = [g for g in file.values() if "table" in g and "non_index_axes" in g.attrs]
         if len(groups) != 1:
             raise FormatError(f"{where}: expected one table of pandas, found {len(groups)}; export it as CSV")

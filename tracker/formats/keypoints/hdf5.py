@@ -1,44 +1,79 @@
-"""Open HDF5 files, and turn the errors of the libraries that read them into ours."""
+"""Read HDF5 files (SLEAP, NWB, DeepLabCut) in a process of their own.
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+The HDF5 library hangs on some damaged files, or ends the process that reads them. So another process reads a file,
+within a time limit, and hands back plain arrays.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
-from typing import Any
 
-from tracker.errors import FormatError, Remedy, TrackerError
+import msgspec
+import numpy as np
+
+from tracker.errors import FormatError, Remedy
 from tracker.files import check_regular
+from tracker.formats.keypoints.picture_table import PictureTable
+
+SECONDS = 60.0
+"""Time that a file of up to a megabyte may take, s; each more has another second. An import of sleap-io takes 2 s."""
+_BYTES_PER_SECOND = 1_000_000
+"""Growth of the time limit with the size of a file."""
 
 
-@contextmanager
-def open_hdf5(path: Path, where: str) -> Iterator[Any]:
-    """Open an HDF5 file to read.
+class VideoHead(msgspec.Struct):
+    """The key points of one video, but for the arrays."""
+
+    video: str
+    names: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+
+
+class Answer(msgspec.Struct):
+    """The answer of the process that reads a file."""
+
+    videos: tuple[VideoHead, ...] = ()
+    error: str = ""
+    """Sentence on why it cannot be read; empty if it can."""
+    remedy: str = ""
+
+
+def read_hdf5_apart(path: Path) -> list[tuple[Path, PictureTable]]:
+    """Read the key points of each video of a file, with the video's path.
 
     Raises:
-        FormatError: h5py is not installed, or reading fails, within the block too; `where` names the file.
+        FormatError: the file is malformed, a package is not installed, or the reading process fails or takes too long.
     """
-    with foreign_reader(path, where, "h5py"):
-        import h5py
-
-        with h5py.File(path, "r") as file:
-            yield file
-
-
-@contextmanager
-def foreign_reader(path: Path, where: str, library: str) -> Iterator[None]:
-    """Run a block that reads a file by a library of others, which may raise anything for a damaged file.
-
-    Raises:
-        FormatError: the library is not installed, or the block raises another error than ours.
-    """
+    where = f"file {path}"
     try:
         check_regular(path)
-        yield
-    except TrackerError:
-        raise
-    except ImportError as error:
+        limit_s = SECONDS + path.stat().st_size / _BYTES_PER_SECOND
+        with tempfile.TemporaryDirectory() as folder:
+            return _answer(path, Path(folder), limit_s)
+    except subprocess.TimeoutExpired as error:
         raise FormatError(
-            f"{where} needs the package {library}, which is not installed", Remedy("install_import")
+            f"{where} cannot be read: it took over {error.timeout:.0f} s, as damaged files do; export it again"
         ) from error
-    except Exception as error:
-        words = " ".join(str(error).split())[:200] or type(error).__name__
-        raise FormatError(f"{where} cannot be read: {words}; export it again") from error
+    except OSError as error:
+        raise FormatError(f"{where} cannot be read: {error.strerror or error}; check the path") from error
+
+
+def _answer(path: Path, folder: Path, limit_s: float) -> list[tuple[Path, PictureTable]]:
+    root = str(Path(__file__).resolve().parents[3])
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
+    words = [sys.executable, "-m", "tracker.formats.keypoints.hdf5_process", str(path.resolve()), str(folder)]
+    subprocess.run(words, env=environment, timeout=limit_s, capture_output=True, check=False, stdin=subprocess.DEVNULL)
+    try:
+        answer = msgspec.json.decode((folder / "answer.json").read_bytes(), type=Answer)
+    except (OSError, msgspec.DecodeError) as error:
+        raise FormatError(f"file {path} cannot be read: its library failed; export it again") from error
+    if answer.error:
+        raise FormatError(answer.error, Remedy("install_import") if answer.remedy else None)
+    out = []
+    for i, video in enumerate(answer.videos):
+        with np.load(folder / f"{i}.npz", allow_pickle=False) as arrays:
+            table = PictureTable(video.names, arrays["numbers"], arrays["points"], notes=video.notes)
+        out.append((Path(video.video), table))
+    return out

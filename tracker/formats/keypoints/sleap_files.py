@@ -3,33 +3,28 @@
 sleap-io is an optional package. A file may have several videos, one for each camera.
 """
 
-import warnings
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints.hdf5 import foreign_reader
 from tracker.formats.keypoints.picture_table import PictureTable, check_size
 from tracker.validation import MAX_FRAMES, MAX_NUMBER
-
-SUFFIXES = (".slp", ".nwb", ".h5")
 
 
 def read_sleap(path: Path) -> list[tuple[Path, PictureTable]]:
     """Read the key points of each video of a file, with the video's path.
 
     Raises:
-        FormatError: sleap-io is not installed, or the file is malformed or without key points.
+        FormatError: the file has no key points, or several skeletons.
+        ImportError: sleap-io is not installed. The library raises other errors for a damaged file.
     """
     where = f"file {path}"
-    with foreign_reader(path, where, "sleap-io"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import sleap_io
+    import sleap_io
 
-        labels = sleap_io.load_file(str(path), **({"open_videos": False} if path.suffix.lower() == ".slp" else {}))
-        out = [(_video_path(video, path), _table(labels, video, where)) for video in labels.videos]
+    labels = sleap_io.load_file(str(path), **({"open_videos": False} if path.suffix.lower() == ".slp" else {}))
+    out = [(_video_path(video, path), _table(labels, video, where)) for video in labels.videos]
     if not out:
         raise FormatError(f"{where}: expected key points of a video, found none; export it again")
     return out
