@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
-from tracker.formats.keypoints.picture_table import check_size
-from tracker.formats.number_rows import MAX_NAMES, NumberRows
+from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.text_files import TABLE_BYTES, TextKind, read_lines

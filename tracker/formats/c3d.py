@@ -7,6 +7,7 @@ ends the process on some damaged files.
 
 import struct
 from collections.abc import Iterator, Mapping
+from enum import IntEnum
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,8 +15,7 @@ import numpy as np
 
 from tracker.errors import FormatError, Remedy
 from tracker.files import IrregularFileError, read_regular
-from tracker.formats.keypoints.picture_table import check_size
-from tracker.formats.number_rows import MAX_NAMES
+from tracker.formats.number_rows import MAX_NAMES, check_size
 from tracker.formats.trc import METRES_BY_WORD, MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.text_files import TABLE_BYTES
@@ -23,10 +23,14 @@ from tracker.validation import MAX_NUMBER, FrameRate, check, quoted
 
 _BLOCK_BYTES = 512
 """Length of a block of the file (c3d.org)."""
-_INTEL, _DEC, _SGI = 84, 85, 86
-"""Codes of the orders of bytes (c3d.org)."""
-_KEY = 0x50
-"""Second byte of each C3D file (c3d.org)."""
+
+
+class _Order(IntEnum):
+    """Codes of the computers whose numbers a file has (c3d.org)."""
+
+    INTEL = 84
+    DEC = 85
+    SGI = 86
 
 
 class _Layout(NamedTuple):
@@ -45,7 +49,7 @@ class _Layout(NamedTuple):
     """Where the first frame begins, bytes."""
     rate: float
     order: int
-    """Order of bytes: `_INTEL`, `_DEC` or `_SGI`."""
+    """Order of bytes: `_Order.INTEL`, `_Order.DEC` or `_Order.SGI`."""
     parameters: Mapping[str, tuple[str, ...]]
     """Texts by GROUP:NAME."""
 
@@ -98,10 +102,10 @@ def patch_c3d(path: Path, unit_m: float | None, changes: Mapping[int, Array]) ->
     where = f"C3D file {path}"
     data = bytearray(_read(path, where))
     found = _layout(bytes(data), where)
-    if found.order == _DEC:
+    if found.order == _Order.DEC:
         raise FormatError(f"{where}: expected numbers of Intel or SGI computers, found DEC's; import it converted")
     is_real = found.scale < 0
-    order, kind, size = "<" if found.order == _INTEL else ">", "f" if is_real else "h", 4 if is_real else 2
+    order, kind, size = "<" if found.order == _Order.INTEL else ">", "f" if is_real else "h", 4 if is_real else 2
     per_unit = _metres(found, unit_m, where) * (1.0 if is_real else found.scale)
     for row, points in changes.items():
         for i, point in enumerate(points):
@@ -124,7 +128,7 @@ def _read(path: Path, where: str) -> bytes:
         raise FormatError(f"{where} cannot be read: {error.strerror}; export it again") from error
     except OSError as error:
         raise FormatError(f"{where} cannot be read: {error}; check the path") from error
-    if not _BLOCK_BYTES <= len(data) <= TABLE_BYTES or data[1] != _KEY:
+    if not _BLOCK_BYTES <= len(data) <= TABLE_BYTES or data[1] != 0x50:  # the mark of C3D
         raise FormatError(f"{where} is not a C3D file, or it is too short or too long; export it again")
     return data
 
@@ -137,9 +141,9 @@ def _layout(data: bytes, where: str) -> _Layout:
     """
     parameters_at = _BLOCK_BYTES * (data[0] - 1)
     order = data[parameters_at + 3] if parameters_at > 0 and parameters_at + 4 <= len(data) else 0
-    if order not in (_INTEL, _DEC, _SGI):
+    if order not in list(_Order):
         raise FormatError(f"{where}: expected the section of parameters, found none; copy or export it again")
-    whole = ">" if order == _SGI else "<"
+    whole = ">" if order == _Order.SGI else "<"
     n_points, n_analog, first, last = struct.unpack_from(f"{whole}4H", data, 2)
     (block,) = struct.unpack_from(f"{whole}H", data, 16)
     scale, rate = (float(_reals(data[at : at + 4], order)[0]) for at in (12, 20))
@@ -223,13 +227,13 @@ def _values(data: bytes, found: _Layout, n_frames: int) -> Array:
     if found.scale < 0:
         rows = _reals(block, found.order)
     else:
-        rows = np.frombuffer(block, ">i2" if found.order == _SGI else "<i2").astype(np.float64)
+        rows = np.frombuffer(block, ">i2" if found.order == _Order.SGI else "<i2").astype(np.float64)
     return rows.reshape(n_frames, -1)[:, : 4 * found.n_points].reshape(n_frames, found.n_points, 4)
 
 
 def _reals(data: bytes, order: int) -> Array:
     """Return the reals of some bytes; DEC's have their halves exchanged and are four times as large."""
-    if order == _DEC:
+    if order == _Order.DEC:
         halves = np.frombuffer(data, "<u2").reshape(-1, 2)[:, ::-1]
         return np.ascontiguousarray(halves).view("<f4")[:, 0].astype(np.float64) / 4
-    return np.frombuffer(data, "<f4" if order == _INTEL else ">f4").astype(np.float64)
+    return np.frombuffer(data, "<f4" if order == _Order.INTEL else ">f4").astype(np.float64)

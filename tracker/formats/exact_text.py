@@ -13,6 +13,9 @@ _MARKS = (
 )
 _CELL = re.compile(r'((?:"(?:[^"]|"")*"|[^,"])*)(?:,|$)')
 
+PIXEL_DECIMALS = 3
+"""Fewest decimals of pixels that are replaced: a thousandth of one, as COCO is written."""
+
 
 class ExactText(NamedTuple):
     """A text with the encoding of its file; a byte order mark stays a character, other bytes become surrogates."""

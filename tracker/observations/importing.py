@@ -8,7 +8,8 @@ import numpy as np
 
 from tracker.errors import FormatError, Remedy, SessionError
 from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_size, read_joint_map
-from tracker.formats.keypoints.picture_table import PictureTable, check_size
+from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import IntArray
 from tracker.observations.checks import agreement_problem, picture_problems
 from tracker.observations.observed import ObservationSet, ObservedPoints, SourceFile

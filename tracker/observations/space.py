@@ -10,7 +10,7 @@ from tracker.errors import FormatError, Remedy
 from tracker.footage.frame_rates import nominal_rate
 from tracker.formats.file_axes import remap_axes
 from tracker.formats.joint_maps import JointMap, guess_joint_map, read_joint_map
-from tracker.formats.keypoints.picture_table import check_size
+from tracker.formats.number_rows import check_size
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.observations.observed import ObservedJoints

@@ -22,7 +22,7 @@ pose elsewhere (`tracker.fitting.hypothesis`): a limb is about as thick."""
 _STEPS = 5
 """Number of Gauss-Newton steps; from the nearest point of two rays, the last ones move it by less than a micrometre."""
 _ROBUST_ROUNDS = 3
-"""Number of times that weights follow from errors; a fourth moves joints of `fast_arms` by 0.1 mm in the mean."""
+"""Number of times that weights follow from errors; a fourth moves joints of `fast_arms` by 0.25 mm."""
 _CAUCHY = 2.385
 """Scale of Cauchy's loss, standard deviations: 95% efficient if errors are Gaussian (P. Holland and R. Welsch 1977)."""
 

@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.exact_text import exact_text, replace_cells
-from tracker.formats.keypoints.picture_table import PictureTable, check_size
-from tracker.formats.number_rows import MAX_NAMES, NumberRows
+from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, replace_cells
+from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
 from tracker.geometry.arrays import Array, IntArray
 from tracker.text_files import TABLE_BYTES, TextKind, read_lines
 from tracker.validation import MAX_FRAMES, MAX_NUMBER, quoted
@@ -221,8 +221,4 @@ def patch_deeplabcut_csv(path: Path, changes: Mapping[int, Sequence[tuple[int, A
                     cell = np.nan if absent else float(value[_COORDINATES.index(column.coordinate)])
                     new.setdefault(row, {})[n_index + i] = cell
     exact = exact_text(path.read_bytes())
-    return exact.encoded(replace_cells(exact.text, ",", len(table.numbers), new, _DECIMALS))
-
-
-_DECIMALS = 3
-"""Fewest decimals of a number that is replaced: a thousandth of a pixel."""
+    return exact.encoded(replace_cells(exact.text, ",", len(table.numbers), new, PIXEL_DECIMALS))

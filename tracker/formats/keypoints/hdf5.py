@@ -17,10 +17,8 @@ from tracker.errors import FormatError, Remedy
 from tracker.files import check_regular
 from tracker.formats.keypoints.picture_table import PictureTable
 
-SECONDS = 60.0
-"""Time that a file of up to a megabyte may take, s; each more has another second. An import of sleap-io takes 2 s."""
-_BYTES_PER_SECOND = 1_000_000
-"""Growth of the time limit with the size of a file."""
+SECONDS = 300.0
+"""Time that a file may take, s. To load sleap-io takes 2 s; damaged files may take for ever."""
 
 
 class VideoHead(msgspec.Struct):
@@ -31,7 +29,7 @@ class VideoHead(msgspec.Struct):
     notes: tuple[str, ...] = ()
 
 
-class Answer(msgspec.Struct):
+class ReadAnswer(msgspec.Struct):
     """The answer of the process that reads a file."""
 
     videos: tuple[VideoHead, ...] = ()
@@ -49,9 +47,8 @@ def read_hdf5_apart(path: Path) -> list[tuple[Path, PictureTable]]:
     where = f"file {path}"
     try:
         check_regular(path)
-        limit_s = SECONDS + path.stat().st_size / _BYTES_PER_SECOND
         with tempfile.TemporaryDirectory() as folder:
-            return _answer(path, Path(folder), limit_s)
+            return _answer(path, Path(folder))
     except subprocess.TimeoutExpired as error:
         raise FormatError(
             f"{where} cannot be read: it took over {error.timeout:.0f} s, as damaged files do; export it again"
@@ -60,13 +57,13 @@ def read_hdf5_apart(path: Path) -> list[tuple[Path, PictureTable]]:
         raise FormatError(f"{where} cannot be read: {error.strerror or error}; check the path") from error
 
 
-def _answer(path: Path, folder: Path, limit_s: float) -> list[tuple[Path, PictureTable]]:
+def _answer(path: Path, folder: Path) -> list[tuple[Path, PictureTable]]:
     root = str(Path(__file__).resolve().parents[3])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
     words = [sys.executable, "-m", "tracker.formats.keypoints.hdf5_process", str(path.resolve()), str(folder)]
-    subprocess.run(words, env=environment, timeout=limit_s, capture_output=True, check=False, stdin=subprocess.DEVNULL)
+    subprocess.run(words, env=environment, timeout=SECONDS, capture_output=True, check=False, stdin=subprocess.DEVNULL)
     try:
-        answer = msgspec.json.decode((folder / "answer.json").read_bytes(), type=Answer)
+        answer = msgspec.json.decode((folder / "answer.json").read_bytes(), type=ReadAnswer)
     except (OSError, msgspec.DecodeError) as error:
         raise FormatError(f"file {path} cannot be read: its library failed; export it again") from error
     if answer.error:

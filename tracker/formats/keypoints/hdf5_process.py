@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.errors import FormatError, TrackerError
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut_hdf5, read_deeplabcut_hdf5
-from tracker.formats.keypoints.hdf5 import Answer, VideoHead
+from tracker.formats.keypoints.hdf5 import ReadAnswer, VideoHead
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.keypoints.sleap_files import read_sleap
 
@@ -41,12 +41,12 @@ def main(path: Path, folder: Path) -> None:
         found = read_hdf5(path)
         for i, (_, table) in enumerate(found):
             np.savez(folder / f"{i}.npz", numbers=table.numbers, points=table.points)
-        answer = Answer(tuple(VideoHead(str(video), table.names, table.notes) for video, table in found))
+        answer = ReadAnswer(tuple(VideoHead(str(video), table.names, table.notes) for video, table in found))
     except ImportError as error:
         package = {"sleap_io": "sleap-io"}.get(error.name or "", error.name or "sleap-io")
-        answer = Answer(error=f"file {path} needs the package {package}, which is not installed", remedy="install")
+        answer = ReadAnswer(error=f"file {path} needs the package {package}, which is not installed", remedy="install")
     except TrackerError as error:
-        answer = Answer(error=str(error))
+        answer = ReadAnswer(error=str(error))
     (folder / "answer.json").write_bytes(msgspec.json.encode(answer))
 
 

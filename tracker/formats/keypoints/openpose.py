@@ -13,8 +13,8 @@ import msgspec
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.exact_text import exact_text, number_like
-from tracker.formats.json_numbers import Span, SpanList, json_spans, replace_spans
+from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, number_like
+from tracker.formats.json_numbers import Span, json_spans, replace_spans
 from tracker.formats.keypoints.picture_table import PictureTable, stack_pictures
 from tracker.geometry.arrays import Array
 from tracker.text_files import TABLE_BYTES, TextKind, read_json
@@ -99,13 +99,15 @@ def patch_openpose(data: bytes, changes: Sequence[tuple[int, Array]]) -> bytes:
     """
     exact = exact_text(data)
     people = json_spans(exact.text)["people"]
-    with_points = [p["pose_keypoints_2d"].items for p in people.items if p.get("pose_keypoints_2d", _NOBODY).items]
+    with_points = [
+        p["pose_keypoints_2d"].items for p in people.items if "pose_keypoints_2d" in p and p["pose_keypoints_2d"].items
+    ]
     new: dict[Span, str] = {}
     is_first = not people.items
     for person, values in changes:
         if person < 0:
             rows = np.where(np.isnan(values), 0.0, values)
-            text = ", ".join(number_like(x, "", _DECIMALS) for x in rows.ravel().tolist())
+            text = ", ".join(number_like(x, "", PIXEL_DECIMALS) for x in rows.ravel().tolist())
             begin = "" if is_first else ", "
             new[people.end, people.end] = new.get((people.end, people.end), "") + (
                 f'{begin}{{"person_id": [-1], "pose_keypoints_2d": [{text}]}}'
@@ -116,10 +118,5 @@ def patch_openpose(data: bytes, changes: Sequence[tuple[int, Array]]) -> bytes:
             if row[2] == row[2]:
                 for k, value in enumerate(row if row[2] > 0 else (0.0, 0.0, 0.0)):
                     span = with_points[person][3 * i + k]
-                    new[span] = number_like(value, exact.text[slice(*span)], _DECIMALS)
+                    new[span] = number_like(value, exact.text[slice(*span)], PIXEL_DECIMALS)
     return exact.encoded(replace_spans(exact.text, new))
-
-
-_NOBODY = SpanList([], 0)
-_DECIMALS = 3
-"""Fewest decimals of a number that is replaced: a thousandth of a pixel."""

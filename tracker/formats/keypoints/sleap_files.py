@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints.picture_table import PictureTable, check_size
+from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.number_rows import check_size
 from tracker.validation import MAX_FRAMES, MAX_NUMBER
 
 
