@@ -114,6 +114,7 @@ def _send_back(arguments: ExportArguments) -> None:
     if arguments.json:
         print(format_json(found))
         return
+    print(f"wrote {arguments.out} like {observations.name}, {_count(len(done.paths), 'file')}")
     if not done.changed:
         print("all as imported")
         return

@@ -111,7 +111,7 @@ def _plan_of_pictures(session: Session, request: ImportRequest, format_name: str
 def _no_camera(session: Session, group: FileGroup) -> FormatError:
     return FormatError(
         f"expected the name of a camera ({', '.join(session.camera_names)}) in {group.place}, found "
-        f"{', '.join(filter(None, group.labels))}",
+        f"{', '.join(dict.fromkeys(filter(None, group.labels)))}",
         Remedy("name_observed_camera", camera=session.camera_names[0]),
     )
 

@@ -52,7 +52,7 @@ def place_pictures(
         span = np.setdiff1d(np.arange(placed[0], placed[-1] + 1), placed) if len(placed) else placed
         missing = span[(span >= 0) & (span < session.n_frames)]
         if len(missing):
-            notes.append(f"camera '{name}': no picture for frames {_listed(missing)}; the points are absent there")
+            notes.append(f"camera '{name}': no picture for frames {short_list(missing)}; the points are absent there")
         if first_frame is not None and not inside.all():
             notes.append(f"camera '{name}': {(~inside).sum()} pictures lie outside of the session and were left out")
         if not inside.any():
@@ -107,6 +107,7 @@ def _wrong_lengths(tables: Mapping[str, PictureTable], session: Session, base: i
     return problems
 
 
-def _listed(frames: IntArray) -> str:
+def short_list(frames: IntArray) -> str:
+    """List frames as ranges, the first few of many."""
     text = listed_frames(frames.tolist())
     return text if len(text) <= 60 else f"{text[:57]}..."

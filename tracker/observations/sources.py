@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.keypoints.openpose import numbered_name
+from tracker.session.matching import check_names
 from tracker.validation import same_form
 
 Found: TypeAlias = tuple[Path, Path]
@@ -106,6 +107,7 @@ def match_cameras(
     Raises:
         FormatError: two groups are of one camera, or a choice is not among the files.
     """
+    check_names(chosen, cameras, "camera", "the files by camera")
     places = [place for _, place in labels]
     by_choice = {i: name for name, path in chosen.items() for i, place in enumerate(places) if _lies_at(place, path)}
     for name, path in chosen.items():

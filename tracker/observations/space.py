@@ -14,6 +14,7 @@ from tracker.formats.number_rows import check_size
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.observations.observed import ObservedJoints
+from tracker.observations.placing import short_list
 from tracker.observations.readers import SPACE_FORMATS
 from tracker.observations.request import ImportRequest
 from tracker.session.clocks import Placement, place_rows
@@ -51,7 +52,10 @@ def read_space(
         tables.append(placed)
         notes += [f"{path.name}: {note}" for note in placed.notes]
         rows = rows if len(rows) else _row_frames(read, placed, session.fps)
-        problems += _outside(placed, where, session)
+        is_chosen = request.first_frame is not None or request.clock is not None
+        wrong, gaps = _outside(placed, where, session.n_frames, is_chosen)
+        problems += wrong
+        notes += [f"{path.name}: {note}" for note in gaps]
     names = tables[0].names
     check_size((session.n_frames, len(tables), len(names), 3), str(paths[0]))
     joints_world = np.full((session.n_frames, len(tables), len(names), 3), np.nan)
@@ -82,17 +86,17 @@ def _row_frames(read: MarkerTable, placed: MarkerTable, fps: float) -> Array:
     return float(placed.frames[0]) + (read.frames - read.frames[0]) * (nominal_rate(fps) / nominal_rate(read.rate))
 
 
-def _outside(placed: MarkerTable, where: str, session: Session) -> list[FormatError]:
-    """Return that rows lie outside of the session, or that it has frames without a row."""
+def _outside(placed: MarkerTable, where: str, n_frames: int, is_chosen: bool) -> tuple[list[FormatError], list[str]]:
+    """Return that rows lie outside of the session, unless the user placed them, and which frames have no row."""
     first, last = int(placed.frames[0]), int(placed.frames[-1])
-    if first >= 0 and last < session.n_frames:
-        return []
-    return [
-        FormatError(
-            f"{where}: expected rows of frames 0 to {session.n_frames - 1}, found frames {first} to {last}",
-            Remedy("choose_first_frame", frames="N"),
-        )
-    ]
+    inside = (placed.frames >= 0) & (placed.frames < n_frames)
+    missing = np.setdiff1d(np.arange(n_frames), placed.frames)
+    notes = [f"no rows for frames {short_list(missing)}; the points are absent there"] if len(missing) else []
+    if inside.all() or (is_chosen and inside.any()):
+        left_out = [f"{(~inside).sum()} rows lie outside of the session and were left out"] * (not inside.all())
+        return [], notes + left_out
+    wrong = f"{where}: expected rows of frames 0 to {n_frames - 1}, found frames {first} to {last}"
+    return [FormatError(wrong, Remedy("choose_first_frame", frames="N"))], notes
 
 
 def _not_seen(joints_world: Array, session: Session) -> list[FormatError]:

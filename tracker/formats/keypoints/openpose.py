@@ -99,9 +99,8 @@ def patch_openpose(data: bytes, changes: Sequence[tuple[int, Array]]) -> bytes:
     """
     exact = exact_text(data)
     people = json_spans(exact.text)["people"]
-    with_points = [
-        p["pose_keypoints_2d"].items for p in people.items if "pose_keypoints_2d" in p and p["pose_keypoints_2d"].items
-    ]
+    numbers = [p["pose_keypoints_2d"].items for p in people.items if "pose_keypoints_2d" in p]
+    with_points = [some for some in numbers if some]
     new: dict[Span, str] = {}
     is_first = not people.items
     for person, values in changes:
