@@ -126,7 +126,9 @@ def _mended_pictures(session: Session, observations: ObservationSet, mended: Seq
                     values = _seen(session, view, frame, person)
                     if size is not None:
                         values[:, :2] = rescaled(values[:, :2], cameras[view].size, size)
-                    changes.setdefault(row, []).append((int(detections[frame, k, view]), values))
+                    detection = int(detections[frame, k, view])
+                    if detection >= 0 or (values[:, 2] > 0).any():  # nobody is added who is not in the picture
+                        changes.setdefault(row, []).append((detection, values))
         if changes:
             out |= {
                 by_path[path]: data for path, data in _patch_pictures(observations.format, pictures, changes).items()
@@ -146,7 +148,12 @@ def _patch_pictures(format_name: str, pictures: StoredPictures, changes: Changes
 def _with_free_individuals(some: list[tuple[int, Array]], n: int) -> list[tuple[int, Array]]:
     taken = {k for k, _ in some}
     left = [k for k in range(n) if k not in taken]
-    return [(k if k >= 0 else left.pop(0), values) for k, values in some if k >= 0 or left]
+    if sum(k < 0 for k, _ in some) > len(left):
+        raise FormatError(
+            f"expected columns for a person who was not found, found those of {n} others alone",
+            Remedy("export_other_format"),
+        )
+    return [(k if k >= 0 else left.pop(0), values) for k, values in some]
 
 
 def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Array:

@@ -238,6 +238,19 @@ def test_a_person_who_was_not_found_is_added(session, tmp_path):
     assert np.isnan(person[0]).tolist() == [True, True, False]  # the nose is no joint of the body
 
 
+def test_nobody_is_added_who_is_not_in_the_picture(session, tmp_path):
+    bodies = poses(session)
+    points = seen(session, [observed(session, bodies, np.zeros(3))])
+    points[EDITED, 1] = (np.nan, np.nan, 0)
+    path = write_openpose(tmp_path / "k", session.camera_names, points)
+    model = session.people[0].model
+    away = bodies[EDITED].values.copy()
+    away[:2] += 30 * session.cameras[1].camera.T_world_camera[:2, 0]  # far to the right of that camera
+    store(session, [PosedBody(model, away) if k == EDITED else b for k, b in enumerate(bodies)])
+    export_like(session, imported(session, path), tmp_path / "back")
+    assert read_openpose(tmp_path / "back" / "cam1" / f"cam1_{EDITED:012d}_keypoints.json") == []
+
+
 def test_all_poses(session, tmp_path):
     bodies = poses(session)
     write_trc(tmp_path / "a.trc", BODY_25.points, observed(session, bodies), 30.0)
