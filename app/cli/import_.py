@@ -34,9 +34,10 @@ class ImportArguments:
 
     session: SessionArg
     """session folder."""
-    files: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER|FILE ...")]
-    """files of one format, or folders of them: OpenPose JSON, COCO, DeepLabCut, Lightning Pose, SLEAP, NWB; TRC, C3D,
-    BVH, CSV."""
+    files: Annotated[
+        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER|FILE ...", help_behavior_hint="")
+    ]
+    """files of one format, or folders of them; docs/observations.md lists the formats."""
     name: Annotated[str, tyro.conf.arg(name="as", metavar="NAME")]
     """name of the observations in the session."""
     person: Names = ()
@@ -74,6 +75,8 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
     from tracker.session.lock import SessionLock
     from tracker.session.session import load_session
 
+    if not arguments.files:
+        raise TrackerError("expected a folder or files to import after the session, found none; name them")
     session = load_session(arguments.session)
     request = ImportRequest(
         arguments.name,

@@ -85,6 +85,10 @@ def test_wrong_words(run, session, keypoints, words, expected):
     assert_refused(run("import", session.folder, keypoints, "--as", "mp", *words), [expected])
 
 
+def test_no_files(run, session):
+    assert_refused(run("import", session.folder, "--as", "mp"), ["a folder or files to import after the session"])
+
+
 def test_export_like_refuses_options_of_formats(run, session, tmp_path):
     write_trc(tmp_path / "a.trc", BODY_25.points, TRUTH, 30.0)
     assert run("import", session.folder, tmp_path / "a.trc", "--as", "trc")[0] == 0
