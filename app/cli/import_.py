@@ -34,12 +34,12 @@ class ImportArguments:
 
     session: SessionArg
     """session folder."""
+    name: Annotated[str, tyro.conf.arg(name="as", metavar="NAME")]
+    """name of the observations in the session."""
     files: Annotated[
         tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER|FILE ...", help_behavior_hint="")
     ]
     """files of one format, or folders of them; docs/observations.md lists the formats."""
-    name: Annotated[str, tyro.conf.arg(name="as", metavar="NAME")]
-    """name of the observations in the session."""
     person: Names = ()
     """people of whom they are; all people by default. Points in space have one file for each, in this order."""
     joint_map: OptionalPath = None
