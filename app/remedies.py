@@ -185,6 +185,10 @@ PHRASES = {
         "check that each folder is of the camera that it is named after, the size of the pictures, and --first-frame",
         "check that each folder is of the camera that it is named after, and the size of the pictures",
     ),
+    "say_unit": Phrases("say --units m, cm, mm, in or ft", "choose the unit"),
+    "install_import": Phrases(
+        "install it with: pip install 'quadrille[import]'", "install it with: pip install quadrille[import]"
+    ),
     "name_people_of_files": Phrases("name them with --person", "give one file for each person"),
     "count_frames": Phrases("say --clock frames", "correct Time in the file"),
     "choose_clock": Phrases(
@@ -215,6 +219,10 @@ PHRASES = {
         "give frames of one body as --frames, or another format", "choose Frames of one body, or another format"
     ),
     "name_format": Phrases("correct --format", "choose another format"),
+    "export_other_format": Phrases(
+        "export the poses with --format instead, or leave them unedited to get the files as they came",
+        "export the poses in another format",
+    ),
     "another_file": Phrases("choose another --out", "choose another file"),
     "another_file_or_overwrite": Phrases("choose another --out, or add --overwrite", "choose another file"),
 }

@@ -24,7 +24,18 @@ DATA = TESTS.parents[1] / "shared" / "data"
 WITHOUT_KERNELS = {
     *(
         f"tracker/{room}"
-        for room in ["compute", "geometry", "body", "motion", "formats", "session", "store", "evaluation", "images"]
+        for room in [
+            "compute",
+            "geometry",
+            "body",
+            "motion",
+            "formats",
+            "session",
+            "store",
+            "observations",
+            "evaluation",
+            "images",
+        ]
     ),
     *(f"app/{room}" for room in ["runtime", "state", "drawing"]),
 }

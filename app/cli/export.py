@@ -46,6 +46,12 @@ class ExportArguments:
     """mp4: body that moves as the person, beside the footage: a preset or a .toml file, and its height."""
     keypoints: Annotated[Literal["all", "coco17", "body"] | None, _choice("all|coco17|body")] = None
     """coco: the 17 keypoints of people, all points of the body, or both, which is the default."""
+    like: OptionalName = None
+    """send imported observations back in their own files; --out is a file, or the folder of several."""
+    poses: Annotated[Literal["edited", "all"] | None, _choice("edited|all")] = None
+    """with --like: replace the points of frames that were edited by hand, which is the default, or of all poses."""
+    plain_joints: bool = False
+    """with --like: place points at the joints of the body, not as far from them as the files usually do."""
     skip_lost: bool = False
     """treat poses whose status is lost as missing."""
     overwrite: bool = False
@@ -59,6 +65,9 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
 
     Ctrl+C stops it and leaves no file behind.
     """
+    if arguments.like is not None:
+        return _send_back(arguments)
+    _refuse_without_like(arguments)
     from app.export.export import check_options, export, n_ticks
     from tracker.export.motion import read_motion
 
@@ -75,6 +84,46 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
         "axes": options.axes if "axes" in chosen.options else None
     }
     print(format_json(found) if arguments.json else _format(found))
+
+
+def _refuse_without_like(arguments: ExportArguments) -> None:
+    if arguments.poses is not None or arguments.plain_joints:
+        raise TrackerError("expected --poses and --plain-joints with --like NAME, found no --like; add it")
+
+
+def _send_back(arguments: ExportArguments) -> None:
+    """Write the files of observations, with the points of mended poses replaced."""
+    from tracker.export.like import export_like
+    from tracker.observations.stored import load_observations
+    from tracker.session.session import load_session
+
+    others = ("format", "person", "frames", *OPTIONS)
+    if given := [name for name in others if getattr(arguments, name) is not None]:
+        raise TrackerError(f"expected --like without --{given[0]}: the files stay as they came; leave it out")
+    session = load_session(arguments.session)
+    observations = load_observations(session, arguments.like or "")
+    done = export_like(session, observations, arguments.out, arguments.poses or "edited", not arguments.plain_joints)
+    found = {
+        "like": observations.name,
+        "format": observations.format,
+        "out": str(arguments.out),
+        "files": len(done.paths),
+        "changed": [str(path) for path in done.changed],
+        "frames": list(done.frames),
+    }
+    if arguments.json:
+        print(format_json(found))
+        return
+    print(f"wrote {arguments.out} like {observations.name}, {_count(len(done.paths), 'file')}")
+    if not done.changed:
+        print("all as imported")
+        return
+    frames, files = _count(len(done.frames), "frame"), _count(len(done.changed), "file")
+    print(f"points of {frames} were replaced, in {files}; all else is as imported")
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n} {noun}{'s' * (n != 1)}"
 
 
 def _file(out: Path, chosen: ExportFormat, name: str) -> Path:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.cli.arguments import SessionArg
 from app.runtime.json_output import format_json
+from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
     from tracker.session.session import Session
@@ -31,6 +32,7 @@ def command(session: SessionArg, /, check: bool = True, json: bool = False) -> N
 
 def summarize(session: "Session") -> dict[str, Any]:
     """Summarize the cameras, people and poses of a session."""
+    from tracker.observations.stored import list_observations
     from tracker.session.missing_files import missing_files
     from tracker.store.annotation_store import AnnotationStore
 
@@ -70,6 +72,33 @@ def summarize(session: "Session") -> dict[str, Any]:
             }
             for p in session.people
         ],
+        "observations": [_observations(session, name) for name in list_observations(session)],
+    }
+
+
+def _observations(session: "Session", name: str) -> dict[str, Any]:
+    """Summarize imported observations; those that cannot be read are listed with the reason."""
+    import numpy as np
+
+    from tracker.observations.stored import load_observations
+
+    try:
+        found = load_observations(session, name)
+    except TrackerError as error:
+        return {"name": name, "error": str(error)}
+    if found.points is not None:
+        known = found.points.is_known
+    else:
+        assert found.joints is not None
+        known = np.isfinite(found.joints.joints_world)
+    return {
+        "name": name,
+        "format": found.format,
+        "people": list(found.people),
+        "points": len(found.point_names),
+        "in_space": found.joints is not None,
+        "frames": len(np.unique(np.nonzero(known)[0])),
+        "files": len(found.sources),
     }
 
 
@@ -84,6 +113,15 @@ def _format(summary: dict[str, Any]) -> str:
     for p in summary["people"]:
         body = f"{p['model']} of {p['height_m']:.2f} m, {p['dofs']} degrees of freedom"
         lines.append(f"  person {p['name']}: {body}, {p['poses']} poses, {p['keyframes']} keyframes")
+    for o in summary["observations"]:
+        if "error" in o:
+            lines.append(f"warning: observations {o['name']}: {o['error']}")
+            continue
+        kind = "points in space" if o["in_space"] else "key points"
+        people = ", ".join(o["people"])
+        lines.append(
+            f"  observations {o['name']}: {o['points']} {kind} of {people} in {o['frames']} frames, {o['format']}"
+        )
     if any(c["missing"] for c in summary["cameras"]):
         command = f"quadrille relink {summary['folder']} --search FOLDER"
         lines.append(f"warning: files are missing: put them back, or run {command}")

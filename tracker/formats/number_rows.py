@@ -26,6 +26,16 @@ _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+(e[+-]?\d+)?", re.I)
 _NUMBERS = msgspec.json.Decoder(list[float])
 
 
+def check_size(shape: tuple[int, ...], where: str) -> None:
+    """Check that an array is not too large; `where` names the file.
+
+    Raises:
+        FormatError: it is.
+    """
+    if np.prod([float(n) for n in shape]) > MAX_VALUES:
+        raise FormatError(f"{where}: expected at most {MAX_VALUES} values, found more; read fewer frames or people")
+
+
 class NumberRows:
     """Collects the rows of a table; checks each as it comes, so that no small file takes much memory."""
 

@@ -6,7 +6,7 @@ fields, spaces or a word such as NaN. Some writers leave blank lines in or below
 end of a row.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from tracker.errors import FormatError
 from tracker.files import write_text_atomic
+from tracker.formats.exact_text import exact_text, replace_cells
 from tracker.formats.number_rows import MAX_NAMES, NumberRows, not_a_number
 from tracker.geometry.arrays import Array
 from tracker.text_files import LOST, TABLE_BYTES, TextKind, read_lines, refuse_lost
@@ -248,3 +249,23 @@ def _number(text: str | None) -> float | str | None:
         return float(text or "")
     except ValueError:
         return text
+
+
+def patch_trc(path: Path, changes: Mapping[int, Array]) -> bytes:
+    """Return a file with some points replaced, in its unit; all other bytes stay.
+
+    Args:
+        path: the file, which has been read before.
+        changes: positions, (n_points, 3), metres, by row, from 0; points of NaN stay.
+    """
+    table = read_trc(path)
+    exact = exact_text(path.read_bytes())
+    head = [line for line in exact.text.splitlines() if line.strip()][:3]
+    header = {k.strip().lower(): v for k, v in zip(head[1].split("\t"), head[2].split("\t"), strict=False)}
+    scale = 1 / _scale(header, str(path))
+    new = {
+        row: {2 + i: float(x) for i, x in enumerate((scale * points).ravel()) if not np.isnan(x)}
+        for row, points in changes.items()
+    }
+    digits = 7 if scale < 10 else 4  # a tenth of a micrometre, as `write_trc` has it
+    return exact.encoded(replace_cells(exact.text, "\t", len(table.frames), new, digits))

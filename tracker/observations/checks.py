@@ -12,9 +12,6 @@ from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservedPoints
 from tracker.observations.triangulation import INLIER_M, Views
 
-_MAX_OUTSIDE = 0.05
-"""Largest share of a camera's points outside of the picture. Detectors place points within it, or a little beyond where
-a limb is cut off: none of the points of `walk`, `fast_arms` and `balance_real` lies outside."""
 _SIZES = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 4 / 3, 1.5, 2.0, 3.0, 4.0)
 """Ratios of usual sizes of pictures, such as 1920, 1280 and 640 px of width."""
 
@@ -37,7 +34,7 @@ def picture_problems(tables: Mapping[str, PictureTable], cameras: Mapping[str, C
             )
         elif len(points):
             outside = ((points[:, :2] < -0.5) | (points[:, :2] > np.array(size) - 0.5)).any(axis=-1)
-            if outside.mean() > _MAX_OUTSIDE:
+            if 2 * outside.sum() > len(points):  # a person who is cut off has some there
                 reach = np.quantile(points[:, :2], 0.99, axis=0)
                 found = f"{outside.mean():.0%} of the points outside of it, as far as {reach[0]:.0f}, {reach[1]:.0f}"
                 problems.append(_other_size(name, size, found, None))

@@ -8,14 +8,15 @@ import numpy as np
 
 from tracker.errors import FormatError, Remedy, SessionError
 from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_size, read_joint_map
-from tracker.formats.keypoints.picture_table import PictureTable, check_size
+from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import IntArray
 from tracker.observations.checks import agreement_problem, picture_problems
 from tracker.observations.observed import ObservationSet, ObservedPoints, SourceFile
-from tracker.observations.placing import place_pictures
+from tracker.observations.placing import place_pictures, rescaled
 from tracker.observations.readers import PICTURE_FORMATS, find_files
 from tracker.observations.request import ImportRequest
-from tracker.observations.sources import FileGroup, match_cameras
+from tracker.observations.sources import FileGroup, Found, match_cameras
 from tracker.observations.space import read_space
 from tracker.observations.stored import checksum, save_observations
 from tracker.session.session import Session
@@ -60,7 +61,7 @@ def plan_import(session: Session, request: ImportRequest) -> ImportPlan:
     format_name, files = find_files(request.paths)
     if format_name not in PICTURE_FORMATS:
         return _plan_of_space(session, request, format_name, files)
-    return _plan_of_pictures(session, request, PICTURE_FORMATS[format_name].name, files)
+    return _plan_of_pictures(session, request, format_name, files)
 
 
 def store_import(session: Session, plan: ImportPlan) -> None:
@@ -75,9 +76,7 @@ def store_import(session: Session, plan: ImportPlan) -> None:
     save_observations(session, plan.observations, plan.files)
 
 
-def _plan_of_pictures(
-    session: Session, request: ImportRequest, format_name: str, files: list[tuple[Path, Path]]
-) -> ImportPlan:
+def _plan_of_pictures(session: Session, request: ImportRequest, format_name: str, files: list[Found]) -> ImportPlan:
     groups = PICTURE_FORMATS[format_name].read(files)
     names = match_cameras([(g.labels, g.place) for g, _ in groups], session.camera_names, request.cameras)
     unmatched = [g for (g, _), name in zip(groups, names, strict=True) if not name]
@@ -112,7 +111,7 @@ def _plan_of_pictures(
 def _no_camera(session: Session, group: FileGroup) -> FormatError:
     return FormatError(
         f"expected the name of a camera ({', '.join(session.camera_names)}) in {group.place}, found "
-        f"{', '.join(filter(None, group.labels))}",
+        f"{', '.join(dict.fromkeys(filter(None, group.labels)))}",
         Remedy("name_observed_camera", camera=session.camera_names[0]),
     )
 
@@ -121,11 +120,8 @@ def _scaled(table: PictureTable, size: tuple[int, int], given: tuple[int, int] |
     """Return points in the pixels of the camera, if they are said to be of pictures of another size."""
     if given is None:
         return table
-    factors = np.array(size) / np.array(given)
-    # Pixel borders stay aligned, as in OpenCV's resize; normalized points count from the border.
-    middle = 0.0 if given == (1, 1) else 0.5
     points = table.points.copy()
-    points[..., :2] = (points[..., :2] + middle) * factors - 0.5
+    points[..., :2] = rescaled(points[..., :2], given, size)
     return PictureTable(table.names, table.numbers, points, None, table.rate, table.notes)
 
 
@@ -268,9 +264,7 @@ def _preview(
     return ViewPreview(name, chosen[name][0].place, len(table.numbers), frames, most, median)
 
 
-def _plan_of_space(
-    session: Session, request: ImportRequest, format_name: str, files: list[tuple[Path, Path]]
-) -> ImportPlan:
+def _plan_of_space(session: Session, request: ImportRequest, format_name: str, files: list[Found]) -> ImportPlan:
     if len(files) != len(request.people):
         raise SessionError(
             f"expected one file of points in space for each person ({', '.join(request.people)}), found {len(files)}",

@@ -7,7 +7,7 @@ import numpy as np
 from tracker.errors import FormatError, Remedy
 from tracker.footage.frame_rates import same_clock
 from tracker.formats.keypoints.picture_table import PictureTable
-from tracker.geometry.arrays import IntArray
+from tracker.geometry.arrays import Array, IntArray
 from tracker.session.clocks import listed_frames
 from tracker.session.session import Session
 
@@ -52,7 +52,7 @@ def place_pictures(
         span = np.setdiff1d(np.arange(placed[0], placed[-1] + 1), placed) if len(placed) else placed
         missing = span[(span >= 0) & (span < session.n_frames)]
         if len(missing):
-            notes.append(f"camera '{name}': no picture for frames {_listed(missing)}; the points are absent there")
+            notes.append(f"camera '{name}': no picture for frames {short_list(missing)}; the points are absent there")
         if first_frame is not None and not inside.all():
             notes.append(f"camera '{name}': {(~inside).sum()} pictures lie outside of the session and were left out")
         if not inside.any():
@@ -63,6 +63,15 @@ def place_pictures(
                 )
             )
     return frames, problems, notes
+
+
+def rescaled(points_px: Array, given: tuple[int, int], wanted: tuple[int, int]) -> Array:
+    """Return points, (..., 2), of pictures of one size, px, in the pixels of another; a size of 1, 1 is normalized.
+
+    Pixel borders stay aligned, as in OpenCV's resize; normalized points count from the border.
+    """
+    borders = [0.0 if size == (1, 1) else 0.5 for size in (given, wanted)]
+    return np.asarray((points_px + borders[0]) * (np.array(wanted) / np.array(given)) - borders[1])
 
 
 def _base(tables: Mapping[str, PictureTable], session: Session, lowest: int) -> int:
@@ -98,6 +107,7 @@ def _wrong_lengths(tables: Mapping[str, PictureTable], session: Session, base: i
     return problems
 
 
-def _listed(frames: IntArray) -> str:
+def short_list(frames: IntArray) -> str:
+    """List frames as ranges, the first few of many."""
     text = listed_frames(frames.tolist())
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -7,6 +7,7 @@ frames is taken (Viterbi), in which joints that leap cost.
 
 from collections.abc import Sequence
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,23 +35,56 @@ def exchanged_sides(views: Views, points_px: Array, confidence: Array, pairs: Se
     columns = np.array(pairs, dtype=np.int64).reshape(-1, 2)
     if n_views < 2 or not n_frames or not columns.size:
         return np.zeros((n_frames, n_views), dtype=bool)
-    costs, points = [], []
-    for pattern in patterns:
-        group = _exchange(columns, pattern)
-        px, weights = _gather(points_px, group), _gather(confidence, group)
-        n_points = px.shape[2]
-        found = pair_hypotheses(
-            views, np.swapaxes(px, 1, 2).reshape(-1, n_views, 2), np.swapaxes(weights, 1, 2).reshape(-1, n_views)
-        )
-        seen = np.swapaxes(weights, 1, 2).reshape(-1, n_views).sum(axis=1)
-        best = np.argmin(found.costs, axis=0)
-        rows = np.arange(len(best))
-        cost = np.minimum(found.costs[best, rows], seen)
-        at = np.where(np.isfinite(found.costs[best, rows])[:, None], found.points_world[best, rows], np.nan)
-        costs.append(cost.reshape(n_frames, n_points).sum(axis=1) + _EXCHANGE * pattern.sum())
-        points.append(at.reshape(n_frames, n_points, 3))
-    chosen = _cheapest_path(np.stack(costs), np.stack(points))
-    return patterns[chosen]
+    straight = _consensus(views, points_px, confidence, _exchange(columns, patterns[0]))
+    open_frames = _with_surroundings(straight.disagrees)
+    if not len(open_frames):
+        return np.zeros((n_frames, n_views), dtype=bool)
+    costs = np.full((len(patterns), n_frames), np.inf)
+    points = np.full((len(patterns), n_frames, 2 * len(columns), 3), np.nan)
+    costs[0], points[0] = straight.costs, straight.points_world
+    for i, pattern in enumerate(patterns[1:], 1):
+        found = _consensus(views, points_px[open_frames], confidence[open_frames], _exchange(columns, pattern))
+        costs[i, open_frames] = found.costs + _EXCHANGE * pattern.sum()
+        points[i, open_frames] = found.points_world
+    return patterns[_cheapest_path(costs, points)]
+
+
+class _Consensus(NamedTuple):
+    """The points of a group as the views agree on them best."""
+
+    costs: Array
+    """Cost of their triangulation, (n_frames,)."""
+    points_world: Array
+    """(n_frames, n_points, 3), metres; NaN where nothing agrees."""
+    disagrees: Mask
+    """Whether some view disagrees about some point, (n_frames,): otherwise none is exchanged."""
+
+
+def _consensus(views: Views, points_px: Array, confidence: Array, columns: IntArray) -> _Consensus:
+    """Triangulate points from the given columns of each view, (n_views, n_points)."""
+    n_frames, n_views = confidence.shape[:2]
+    px = np.swapaxes(_gather(points_px, columns), 1, 2).reshape(-1, n_views, 2)
+    weights = np.swapaxes(_gather(confidence, columns), 1, 2).reshape(-1, n_views)
+    found = pair_hypotheses(views, px, weights)
+    best, rows = np.argmin(found.costs, axis=0), np.arange(len(px))
+    cost = found.costs[best, rows]
+    points = np.where(np.isfinite(cost)[:, None], found.points_world[best, rows], np.nan)
+    errors_m = views.errors(points, px)[1]
+    disagrees = ((weights > 0) & ~(errors_m <= INLIER_M)).any(axis=-1)
+    return _Consensus(
+        np.minimum(cost, weights.sum(axis=1)).reshape(n_frames, -1).sum(axis=1),
+        points.reshape(n_frames, -1, 3),
+        np.asarray(disagrees.reshape(n_frames, -1).any(axis=1)),
+    )
+
+
+def _with_surroundings(disagrees: Mask) -> IntArray:
+    """Return the frames in which views disagree, and as many around each run of them: there, sides may lie together."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], disagrees, [False]]).astype(np.int8)))
+    out = np.zeros(len(disagrees), dtype=bool)
+    for start, stop in edges.reshape(-1, 2).tolist():
+        out[max(0, 2 * start - stop) : 2 * stop - start] = True
+    return np.flatnonzero(out)
 
 
 def _patterns(n_views: int) -> Mask:

@@ -4,10 +4,15 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.keypoints.openpose import numbered_name
+from tracker.session.matching import check_names
 from tracker.validation import same_form
+
+Found: TypeAlias = tuple[Path, Path]
+"""A file, and the folder that the path of its stored copy is relative to."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +32,13 @@ class FileGroup:
         return self.files[0] if len(self.files) == 1 else self.files[0].parent
 
 
-def list_files(paths: Sequence[Path], suffixes: Sequence[str]) -> list[tuple[Path, Path]]:
+def list_files(paths: Sequence[Path], suffixes: Sequence[str]) -> list[Found]:
     """Return the files of some suffixes among paths and in their folders, each with the folder it is relative to.
 
     Raises:
         FormatError: a path is missing, or there is no such file.
     """
-    found: list[tuple[Path, Path]] = []
+    found: list[Found] = []
     for path in paths:
         if path.is_dir():
             found += [
@@ -53,13 +58,19 @@ def list_files(paths: Sequence[Path], suffixes: Sequence[str]) -> list[tuple[Pat
     return found
 
 
-def numbered_groups(files: Sequence[tuple[Path, Path]]) -> list[FileGroup]:
+def folder_labels(path: Path, root: Path) -> tuple[str, ...]:
+    """Return the names after which the camera of a file may be called: its stem, and its folders from within."""
+    folders = [p.name for p in path.parents if p == root or p.is_relative_to(root)]
+    return (path.stem, *folders)
+
+
+def numbered_groups(files: Sequence[Found]) -> list[FileGroup]:
     """Group files with one picture each, by their folder and by the name before the number.
 
     Raises:
         FormatError: a name has no number, or two of a group have the same.
     """
-    groups: dict[tuple[Path, str], dict[int, tuple[Path, Path]]] = {}
+    groups: dict[tuple[Path, str], dict[int, Found]] = {}
     for path, root in files:
         named = numbered_name(path.name)
         if named is None:
@@ -75,11 +86,11 @@ def numbered_groups(files: Sequence[tuple[Path, Path]]) -> list[FileGroup]:
             )
         group[number] = (path, root)
     out = []
-    for (folder, stem), group in groups.items():
+    for (_, stem), group in groups.items():
         ordered = [group[n] for n in sorted(group)]
         root = ordered[0][1]
-        folders = [p.name for p in (folder, *folder.parents) if p.is_relative_to(root) and (p != root or not stem)]
-        out.append(FileGroup(tuple(p for p, _ in ordered), (stem, *folders, root.name), root))
+        labels = (stem, *folder_labels(ordered[0][0], root)[1:])
+        out.append(FileGroup(tuple(p for p, _ in ordered), labels, root))
     return out
 
 
@@ -96,6 +107,7 @@ def match_cameras(
     Raises:
         FormatError: two groups are of one camera, or a choice is not among the files.
     """
+    check_names(chosen, cameras, "camera", "the files by camera")
     places = [place for _, place in labels]
     by_choice = {i: name for name, path in chosen.items() for i, place in enumerate(places) if _lies_at(place, path)}
     for name, path in chosen.items():

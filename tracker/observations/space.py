@@ -10,17 +10,15 @@ from tracker.errors import FormatError, Remedy
 from tracker.footage.frame_rates import nominal_rate
 from tracker.formats.file_axes import remap_axes
 from tracker.formats.joint_maps import JointMap, guess_joint_map, read_joint_map
-from tracker.formats.keypoints.picture_table import check_size
+from tracker.formats.number_rows import check_size
 from tracker.formats.trc import MarkerTable
 from tracker.geometry.arrays import Array
 from tracker.observations.observed import ObservedJoints
+from tracker.observations.placing import short_list
 from tracker.observations.readers import SPACE_FORMATS
 from tracker.observations.request import ImportRequest
 from tracker.session.clocks import Placement, place_rows
 from tracker.session.session import Session
-
-_MIN_SEEN = 0.5
-"""Smallest share of points that lie within the pictures of two cameras: most, for footage of these people."""
 
 
 class PlacedPoints(NamedTuple):
@@ -47,14 +45,17 @@ def read_space(
     rows = np.zeros(0)
     for path in paths:
         where = f"{SPACE_FORMATS[format_name].title} file {path}"
-        read = remap_axes(SPACE_FORMATS[format_name].read(path, request.unit_m), request.axes)
+        read = remap_axes(SPACE_FORMATS[format_name].read(path, request.unit_m, session.fps), request.axes)
         if tables and tables[0].names != read.names:
             raise FormatError(f"{where}: expected the points of {paths[0].name}, found others; import them apart")
         placed = place_rows(read, where, session.fps, known)
         tables.append(placed)
         notes += [f"{path.name}: {note}" for note in placed.notes]
         rows = rows if len(rows) else _row_frames(read, placed, session.fps)
-        problems += _outside(placed, where, session)
+        is_chosen = request.first_frame is not None or request.clock is not None
+        wrong, gaps = _outside(placed, where, session.n_frames, is_chosen)
+        problems += wrong
+        notes += [f"{path.name}: {note}" for note in gaps]
     names = tables[0].names
     check_size((session.n_frames, len(tables), len(names), 3), str(paths[0]))
     joints_world = np.full((session.n_frames, len(tables), len(names), 3), np.nan)
@@ -85,17 +86,17 @@ def _row_frames(read: MarkerTable, placed: MarkerTable, fps: float) -> Array:
     return float(placed.frames[0]) + (read.frames - read.frames[0]) * (nominal_rate(fps) / nominal_rate(read.rate))
 
 
-def _outside(placed: MarkerTable, where: str, session: Session) -> list[FormatError]:
-    """Return that rows lie outside of the session, or that it has frames without a row."""
+def _outside(placed: MarkerTable, where: str, n_frames: int, is_chosen: bool) -> tuple[list[FormatError], list[str]]:
+    """Return that rows lie outside of the session, unless the user placed them, and which frames have no row."""
     first, last = int(placed.frames[0]), int(placed.frames[-1])
-    if first >= 0 and last < session.n_frames:
-        return []
-    return [
-        FormatError(
-            f"{where}: expected rows of frames 0 to {session.n_frames - 1}, found frames {first} to {last}",
-            Remedy("choose_first_frame", frames="N"),
-        )
-    ]
+    inside = (placed.frames >= 0) & (placed.frames < n_frames)
+    missing = np.setdiff1d(np.arange(n_frames), placed.frames)
+    notes = [f"no rows for frames {short_list(missing)}; the points are absent there"] if len(missing) else []
+    if inside.all() or (is_chosen and inside.any()):
+        left_out = [f"{(~inside).sum()} rows lie outside of the session and were left out"] * (not inside.all())
+        return [], notes + left_out
+    wrong = f"{where}: expected rows of frames 0 to {n_frames - 1}, found frames {first} to {last}"
+    return [FormatError(wrong, Remedy("choose_first_frame", frames="N"))], notes
 
 
 def _not_seen(joints_world: Array, session: Session) -> list[FormatError]:
@@ -110,7 +111,7 @@ def _not_seen(joints_world: Array, session: Session) -> list[FormatError]:
         known = np.isfinite(px).all(axis=-1)
         n_views[known] += source.camera.is_filmed(px[known])
     seen = n_views >= min(2, len(session.cameras))
-    if seen.mean() >= _MIN_SEEN:
+    if 2 * seen.sum() >= len(points):
         return []
     middle = ", ".join(f"{x:.2f}" for x in np.median(points, axis=0))
     return [

@@ -67,9 +67,14 @@ def list_observations(session: Session) -> list[str]:
     return sorted(p.parent.name for p in folder.glob(f"*/{_FILE}") if not p.parent.name.startswith("."))
 
 
+def files_folder(session: Session, name: str) -> Path:
+    """Return the folder of the imported files of observations."""
+    return session.folder / FOLDER / name / _FILES
+
+
 def source_path(session: Session, name: str, source: SourceFile) -> Path:
     """Return the path of an imported file within the session."""
-    return session.folder / FOLDER / name / _FILES / source.path
+    return files_folder(session, name) / source.path
 
 
 def checksum(data: bytes) -> str:

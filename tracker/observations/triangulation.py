@@ -22,7 +22,7 @@ pose elsewhere (`tracker.fitting.hypothesis`): a limb is about as thick."""
 _STEPS = 5
 """Number of Gauss-Newton steps; from the nearest point of two rays, the last ones move it by less than a micrometre."""
 _ROBUST_ROUNDS = 3
-"""Number of times that weights follow from errors; a fourth moves joints of `fast_arms` by 0.1 mm in the mean."""
+"""Number of times that weights follow from errors; a fourth moves joints of `fast_arms` by 0.25 mm."""
 _CAUCHY = 2.385
 """Scale of Cauchy's loss, standard deviations: 95% efficient if errors are Gaussian (P. Holland and R. Welsch 1977)."""
 
@@ -97,8 +97,6 @@ class Hypotheses(NamedTuple):
     costs: Array
     """Truncated squares of the errors of all views, weighted by confidence, (n_pairs, n): from 0 to the sum of the
     confidences; infinite for a pair without a point."""
-    errors_m: Array
-    """Distance of each view's observation from the position, (n_pairs, n, n_views), metres; NaN where absent."""
 
 
 def pair_hypotheses(views: Views, points_px: Array, confidence: Array) -> Hypotheses:
@@ -110,14 +108,15 @@ def pair_hypotheses(views: Views, points_px: Array, confidence: Array) -> Hypoth
         confidence: (n, n_views).
     """
     rays = views.rays(points_px)
-    pairs = list(combinations(range(len(views.cameras)), 2))
-    points = np.stack([_between(views, rays, a, b) for a, b in pairs])
-    errors_m = views.errors(points, points_px[None])[1]
-    is_known = np.isfinite(points_px).all(axis=-1)
-    share = np.where(np.isfinite(errors_m), np.minimum((errors_m / INLIER_M) ** 2, 1.0), 1.0)
-    costs = (share * (confidence * is_known)).sum(axis=-1)
-    agrees = np.stack([(errors_m[i][:, [a, b]] <= INLIER_M).all(axis=-1) for i, (a, b) in enumerate(pairs)])
-    return Hypotheses(points, np.where(agrees, costs, np.inf), errors_m)
+    weights = confidence * np.isfinite(points_px).all(axis=-1)
+    points, costs = [], []
+    for a, b in combinations(range(len(views.cameras)), 2):  # one by one: the errors of all would fill the memory
+        points.append(_between(views, rays, a, b))
+        errors_m = views.errors(points[-1], points_px)[1]
+        share = np.where(np.isfinite(errors_m), np.minimum((errors_m / INLIER_M) ** 2, 1.0), 1.0)
+        agrees = (errors_m[:, [a, b]] <= INLIER_M).all(axis=-1)
+        costs.append(np.where(agrees, (share * weights).sum(axis=-1), np.inf))
+    return Hypotheses(np.stack(points), np.stack(costs))
 
 
 def _between(views: Views, rays: Array, a: int, b: int) -> Array:
@@ -155,11 +154,12 @@ def triangulate_points(views: Views, points_px: Array, confidence: Array) -> Tri
     found = pair_hypotheses(views, flat_px, flat_confidence)
     chosen = _smooth_choice(found, n_frames, n_points)
     rows = np.arange(len(chosen))
-    errors_m = found.errors_m[chosen, rows]
+    start = found.points_world[chosen, rows]
+    errors_m = views.errors(start, flat_px)[1]
     has_point = np.isfinite(found.costs[chosen, rows])
     is_inlier = (errors_m <= INLIER_M) & has_point[:, None] & (flat_confidence > 0)
     weights = np.where(is_inlier, flat_confidence, 0.0)
-    points, information, sigma = _refine(views, found.points_world[chosen, rows], flat_px, weights)
+    points, information, sigma = _refine(views, start, flat_px, weights)
     points[~has_point] = np.nan
     px, _ = views.errors(points, flat_px)
     inverse = np.linalg.inv(information + 1e-12 * np.eye(3))

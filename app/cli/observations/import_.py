@@ -34,10 +34,12 @@ class ImportArguments:
 
     session: SessionArg
     """session folder."""
-    files: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER|FILE ...")]
-    """files of one format, or folders of them: OpenPose JSON, TRC."""
     name: Annotated[str, tyro.conf.arg(name="as", metavar="NAME")]
     """name of the observations in the session."""
+    files: Annotated[
+        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER|FILE ...", help_behavior_hint="")
+    ]
+    """files of one format, or folders of them; docs/observations.md lists the formats."""
     person: Names = ()
     """people of whom they are; all people by default. Points in space have one file for each, in this order."""
     joint_map: OptionalPath = None
@@ -73,6 +75,8 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
     from tracker.session.lock import SessionLock
     from tracker.session.session import load_session
 
+    if not arguments.files:
+        raise TrackerError("expected a folder or files to import after the session, found none; name them")
     session = load_session(arguments.session)
     request = ImportRequest(
         arguments.name,

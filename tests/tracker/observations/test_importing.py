@@ -208,6 +208,22 @@ def test_points_in_space_that_contradict_the_session(session, tmp_path, points, 
     assert expected in problems(planned(session, tmp_path / "a.trc"))
 
 
+def test_rows_that_are_missing_are_named(session, tmp_path):
+    kept = [0, 1, 5, 6, 7]
+    write_trc(tmp_path / "a.trc", BODY_25.points, TRUTH[kept], 30.0, frames=kept)
+    plan = planned(session, tmp_path / "a.trc")
+    assert "a.trc: no rows for frames 2 to 4, 8 to 11; the points are absent there" in plan.observations.notes
+    known = np.isfinite(plan.observations.joints.joints_world).all(axis=(1, 2, 3))
+    assert np.flatnonzero(known).tolist() == kept
+
+
+def test_rows_beyond_the_session_are_left_out_if_the_user_places_them(session, tmp_path):
+    write_trc(tmp_path / "a.trc", BODY_25.points, np.concatenate([TRUTH, TRUTH]), 30.0)
+    plan = planned(session, tmp_path / "a.trc", first_frame=0)
+    assert not plan.problems
+    assert "a.trc: 12 rows lie outside of the session and were left out" in plan.observations.notes
+
+
 def test_another_rate_is_resampled_and_named(session, tmp_path):
     write_trc(tmp_path / "a.trc", BODY_25.points, np.repeat(TRUTH, 4, axis=0)[:45], 120.0)
     plan = planned(session, tmp_path / "a.trc")

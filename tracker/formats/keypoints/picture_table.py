@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.errors import FormatError
-from tracker.formats.number_rows import MAX_VALUES
+from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array, IntArray, Mask
 
 
@@ -53,13 +52,3 @@ def stack_pictures(people: list[list[Array]], n_points: int, where: str) -> Arra
         for k, points in enumerate(found):
             row[k] = points
     return out
-
-
-def check_size(shape: tuple[int, ...], where: str) -> None:
-    """Check that an array is not too large; `where` names the file.
-
-    Raises:
-        FormatError: it is.
-    """
-    if np.prod([float(n) for n in shape]) > MAX_VALUES:
-        raise FormatError(f"{where}: expected at most {MAX_VALUES} values, found more; import fewer frames or people")

@@ -1,0 +1,100 @@
+"""`quadrille import`, what `info` shows of it, and `quadrille export --like`."""
+
+import json
+
+import numpy as np
+import pytest
+from command_line import assert_refused
+from observed_people import BODY_25, make_session, seen, walking, write_openpose
+
+from tracker.formats.trc import write_trc
+
+N = 6
+TRUTH = walking(N)
+
+
+@pytest.fixture
+def session(tmp_path):
+    return make_session(tmp_path / "s", N)
+
+
+@pytest.fixture
+def keypoints(session, tmp_path):
+    return write_openpose(tmp_path / "k", session.camera_names, seen(session, [TRUTH]))
+
+
+def test_import_shows_what_it_found(run, session, keypoints):
+    status, out, _ = run("import", session.folder, keypoints, "--as", "mp", "--dry-run")
+    assert status == 0
+    lines = out.splitlines()
+    assert lines[0] == "mp: openpose, of ann"
+    assert lines[1] == f"  cam0: {keypoints}/cam0, 6 rows, points in frames 0 to 5, median confidence 0.90"
+    assert "MidHip = left_hip and right_hip" in out
+    assert "  points without a joint of the body: Nose, REye," in out
+    assert lines[-1] == "nothing was stored"
+    assert not (session.folder / "observations").exists()
+
+
+def test_import_and_info_and_back(run, session, keypoints, tmp_path):
+    status, out, _ = run("import", session.folder, keypoints, "--as", "mp", "--json")
+    assert status == 0
+    found = json.loads(out)
+    assert (found["stored"], found["skeleton"], found["matched"], found["problems"]) == (True, "BODY_25", 18, [])
+    assert found["views"][1]["frames"] == [0, 5]
+    status, out, _ = run("info", session.folder, "--no-check")
+    assert "  observations mp: 25 key points of ann in 6 frames, openpose" in out
+    status, out, _ = run("export", session.folder, "--like", "mp", "--out", tmp_path / "back")
+    assert (status, out) == (0, f"wrote {tmp_path / 'back'} like mp, 24 files\nall as imported\n")
+    files = sorted(p.relative_to(keypoints) for p in keypoints.rglob("*.json"))
+    assert all((keypoints / p).read_bytes() == (tmp_path / "back" / p).read_bytes() for p in files)
+
+
+def test_a_contradiction_is_shown_with_the_preview_and_nothing_is_stored(run, session, tmp_path):
+    folder = write_openpose(tmp_path / "k", session.camera_names, seen(session, [TRUTH])[:-1])
+    status, out, err = run("import", session.folder, folder, "--as", "mp")
+    assert status == 1
+    assert "  cam0: " in out
+    assert out.count("  problem: ") == 3  # of the other cameras
+    assert "found numbers 0 to 4 (5 pictures); if they are of this footage, say --first-frame N" in err
+    assert err.count("\n") == 1
+    assert not (session.folder / "observations").exists()
+    assert run("import", session.folder, folder, "--as", "mp", "--first-frame", "0")[0] == 0
+
+
+def test_damaged_observations_are_listed_with_the_reason(run, session, keypoints):
+    run("import", session.folder, keypoints, "--as", "mp")
+    (session.folder / "observations" / "mp" / "points.npz").write_bytes(b"x")
+    status, out, _ = run("info", session.folder, "--no-check")
+    assert status == 0
+    assert "warning: observations mp: " in out
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--person", "bob"], "unknown person 'bob'"),
+        (["--person", "ann", "ann"], "each person of --person once"),
+        (["--confidence", "2"], "--confidence above 0 and at most 1, found 2"),
+        (["--picture-size", "640"], "--picture-size as WIDTHxHEIGHT"),
+        (["--cameras", "cam0"], "--cameras as NAME=VALUE"),
+        (["--joint-map", "nothing.toml"], "joint map nothing.toml not found"),
+        (["--cameras", "cam9=x"], "unknown camera 'cam9'"),
+    ],
+)
+def test_wrong_words(run, session, keypoints, words, expected):
+    assert_refused(run("import", session.folder, keypoints, "--as", "mp", *words), [expected])
+
+
+def test_no_files(run, session):
+    assert_refused(run("import", session.folder, "--as", "mp"), ["a folder or files to import after the session"])
+
+
+def test_export_like_refuses_options_of_formats(run, session, tmp_path):
+    write_trc(tmp_path / "a.trc", BODY_25.points, TRUTH, 30.0)
+    assert run("import", session.folder, tmp_path / "a.trc", "--as", "trc")[0] == 0
+    like = ["export", session.folder, "--out", tmp_path / "b.trc", "--like", "trc"]
+    assert_refused(run(*like, "--units", "mm"), ["--like without --units: the files stay as they came; leave it out"])
+    assert_refused(run(*like[:-2], "--poses", "all"), ["--poses and --plain-joints with --like NAME"])
+    assert_refused(run(*like[:-1], "no"), ["found 'no'; the session has trc"])
+    assert run(*like)[0] == 0
+    assert np.array_equal((tmp_path / "b.trc").read_bytes(), (tmp_path / "a.trc").read_bytes())

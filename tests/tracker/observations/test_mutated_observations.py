@@ -1,0 +1,137 @@
+"""Mutated observations of each format: each is imported or refused by one sentence."""
+
+import json
+import random
+import sys
+import tomllib
+import traceback
+import warnings
+
+import numpy as np
+import pytest
+from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
+from observed_files import (
+    write_c3d,
+    write_coco_images,
+    write_deeplabcut,
+    write_points_csv,
+    write_sleap,
+)
+from observed_people import BODY_25, make_session, seen, walking, write_openpose
+
+from tracker.errors import TrackerError
+from tracker.formats.bvh import BvhFrame, write_bvh
+from tracker.formats.keypoints import hdf5
+from tracker.formats.trc import write_trc
+from tracker.geometry import rigid
+from tracker.observations.importing import plan_import, store_import
+from tracker.observations.joints import observed_joints
+from tracker.observations.request import ImportRequest
+from tracker.observations.stored import load_observations
+
+N = 4
+TRUTH = walking(N)
+KINDS = {
+    "openpose": ("k/cam1/cam1_000000000002_keypoints.json", None),
+    "coco": ("c.json", None),
+    "deeplabcut csv": ("d/cam0.csv", None),
+    "deeplabcut h5": ("d/cam0.h5", "h5py"),
+    "sleap": ("s/cam0.slp", "sleap_io"),
+    "analysis": ("s/cam0.h5", "sleap_io"),
+    "nwb": ("s/cam0.nwb", "sleap_io"),
+    "trc": ("a.trc", None),
+    "csv": ("a.csv", None),
+    "bvh": ("a.bvh", None),
+    "c3d": ("a.c3d", "ezc3d"),
+    "stored text": ("observations.toml", None),
+    "stored numbers": ("points.npz", None),
+}
+"""For each kind: the file that is mutated, and the package that it needs."""
+APART = ("h5py", "sleap_io")
+"""Packages that read in a process of their own, which takes two seconds to start."""
+
+
+def write(kind, session, folder):
+    """Write the files of a kind; return the path to import."""
+    points = seen(session, [TRUTH])
+    if kind == "openpose":
+        write_openpose(folder / "k", session.camera_names, points)
+    elif kind == "coco":
+        write_coco_images(folder / "c.json", session.camera_names, BODY_25.points, points, "scores")
+    elif kind.startswith("deeplabcut"):
+        write_deeplabcut(folder / "d" / "cam0", BODY_25.points, points[:, 0], kind.split()[1])
+    elif kind in ("sleap", "analysis", "nwb"):
+        write_sleap(folder / KINDS[kind][0], BODY_25.points, points[:, 0])
+    elif kind == "trc":
+        write_trc(folder / "a.trc", BODY_25.points, TRUTH, 30.0)
+    elif kind == "csv":
+        write_points_csv(folder / "a.csv", BODY_25.points, TRUTH, 30.0, "m")
+    elif kind == "bvh":
+        model = session.people[0].model
+        upright = BvhFrame(rigid.transform(np.eye(3), np.array([0.0, 0.0, 1.14])), np.eye(3), 100.0)
+        write_bvh(folder / "a.bvh", model, np.repeat(model.neutral()[None], N, axis=0), 30.0, upright)
+    else:
+        write_c3d(folder / "a.c3d", BODY_25.points, TRUTH, 30.0)
+    return folder / KINDS[kind][0].split("/", maxsplit=1)[0]
+
+
+def mutated(rng, name, data):
+    if name.endswith((".json", ".toml")) and rng.random() < 0.5:
+        tree = tomllib.loads(data.decode()) if name.endswith(".toml") else json.loads(data)
+        return (toml_bytes if name.endswith(".toml") else json_bytes)(mutate_tree(rng, tree))
+    for _ in range(rng.choice((1, 1, 1, 1, 2, 4))):
+        data = mutate_bytes(rng, data, [data]) or b" "
+    return data
+
+
+def read(kind, session, path, case):
+    """Import, or load what was imported; return whether it was refused."""
+    if kind.startswith("stored"):
+        found = load_observations(session, "mp")
+        observed_joints(found, [c.camera for c in session.cameras])
+        return False
+    plan = plan_import(session, ImportRequest(f"m{case}", (path,), ("ann",), unit_m=0.01))
+    observed_joints(plan.observations, [c.camera for c in session.cameras])
+    if not plan.problems and case % 10 == 0:
+        store_import(session, plan)
+        load_observations(session, f"m{case}")
+    return bool(plan.problems)
+
+
+@pytest.mark.parametrize(
+    ("kind", "n"),
+    [
+        pytest.param(kind, n, marks=[pytest.mark.slow] if n > 50 or package in APART else [])
+        for kind, (_, package) in KINDS.items()
+        for n in ((100,) if package in APART else (50, 1000))
+    ],
+)
+def test_mutated_observations_are_imported_or_refused(kind, n, tmp_path, monkeypatch):
+    monkeypatch.setattr(hdf5, "SECONDS", 10.0)  # damaged files may hang
+    name, package = KINDS[kind]
+    if package is not None:
+        pytest.importorskip(package)
+    session = make_session(tmp_path / "session", N)
+    folder = tmp_path / "files"
+    folder.mkdir()
+    path = write("openpose" if kind.startswith("stored") else kind, session, folder)
+    if kind.startswith("stored"):
+        store_import(session, plan_import(session, ImportRequest("mp", (path,), ("ann",))))
+        folder = session.folder / "observations" / "mp"
+    data = (folder / name).read_bytes()
+    rng, failures, refused = random.Random(f"mutated {kind}"), [], 0
+    for case in range(n):
+        (folder / name).write_bytes(mutated(rng, name, data))
+        try:
+            with warnings.catch_warnings(), np.errstate(all="ignore"):
+                warnings.simplefilter("ignore")
+                refused += read(kind, session, path, case)
+        except TrackerError as error:
+            refused += 1
+            if len(str(error)) > 2000:
+                failures.append(f"case {case}: a message of {len(str(error))} characters: {str(error)[:300]}")
+        except Exception:
+            failures.append(f"case {case}: {traceback.format_exc(limit=-3)}")
+    sys.stderr.write(f"{kind}: {n} mutated files, {refused} refused, {len(failures)} failures\n")
+    assert not failures, "\n".join(failures[:5])
+    assert 0 < refused < n  # neither all are refused nor all are read

@@ -1,0 +1,224 @@
+"""DeepLabCut's tables of key points, CSV and HDF5, which Lightning Pose writes too: one file for each camera.
+
+The head of a CSV has the rows scorer, individuals (of several animals), bodyparts and coords (x, y, likelihood). The
+first column of a row is the number of the picture, or the path of the picture, whose name has its number.
+"""
+
+import csv
+import io
+import pickle
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tracker.errors import FormatError
+from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, replace_cells
+from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
+from tracker.geometry.arrays import Array, IntArray
+from tracker.text_files import TABLE_BYTES, TextKind, read_lines
+from tracker.validation import MAX_FRAMES, MAX_NUMBER, quoted
+
+_KIND = TextKind("DeepLabCut file", TABLE_BYTES, FormatError, "export it again")
+_HEAD = ("scorer", "individuals", "bodyparts", "coords")
+_COORDINATES = ("x", "y", "likelihood")
+
+
+class _Column(NamedTuple):
+    """The head of a column."""
+
+    individual: str
+    point: str
+    coordinate: str
+
+
+def is_deeplabcut(path: Path) -> bool:
+    """Return whether a CSV begins as DeepLabCut's do; raises as `read_lines` does."""
+    for line in read_lines(path, _KIND):
+        return line.split(",")[0].strip().strip('"').lower() == "scorer"
+    return False
+
+
+def read_deeplabcut_csv(path: Path) -> PictureTable:
+    """Read a CSV.
+
+    Raises:
+        FormatError: the file is missing or malformed; the message has the line.
+    """
+    where = f"DeepLabCut file {path}"
+    lines = enumerate(read_lines(path, _KIND), 1)
+    columns, n_index, row = _read_head(lines, where)
+    rows = NumberRows(where, ",", 1 + len(columns), n_required=1)
+    while row is not None:
+        line, cells = row
+        if len(cells) != n_index + len(columns):
+            raise FormatError(
+                f"{where}, line {line}: expected {n_index + len(columns)} columns, found {len(cells)}; export it again"
+            )
+        number = _picture_number(cells[:n_index], f"{where}, line {line}")
+        text = io.StringIO()
+        csv.writer(text).writerow([number, *cells[n_index:]])
+        rows.add(text.getvalue().strip(), line)
+        row = _next_row(lines, where)
+    numbers, values = rows.table(MAX_NUMBER)
+    return _table(columns, numbers, values, where)
+
+
+def is_deeplabcut_hdf5(path: Path) -> bool:
+    """Return whether an HDF5 file is a table of pandas. It needs h5py, which raises for a damaged file."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return any("non_index_axes" in item.attrs for item in file.values())
+
+
+def read_deeplabcut_hdf5(path: Path) -> PictureTable:
+    """Read a table that pandas wrote, in its `table` format. It needs h5py.
+
+    Raises:
+        FormatError: the file is of another kind. h5py raises other errors for a damaged file.
+    """
+    where = f"DeepLabCut file {path}"
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        groups = [g for g in file.values() if "table" in g and "non_index_axes" in g.attrs]
+        if len(groups) != 1:
+            raise FormatError(f"{where}: expected one table of pandas, found {len(groups)}; export it as CSV")
+        ((_, heads),) = _Plain(io.BytesIO(bytes(groups[0].attrs["non_index_axes"]))).load()
+        columns = [_column(head, where) for head in heads]
+        table = groups[0]["table"]
+        check_size((len(table), len(columns)), where)
+        rows = table[:]
+        blocks = [name for name in rows.dtype.names if name.startswith("values_block_")]
+        values = np.concatenate([rows[name].reshape(len(rows), -1) for name in blocks], axis=1).astype(np.float64)
+        indices = rows["index"].tolist()
+    if values.shape[1] != len(columns):
+        raise FormatError(f"{where}: expected {len(columns)} columns, found {values.shape[1]}; export it as CSV")
+    numbers = np.array([_picture_number([_text(i)], where) for i in indices], dtype=np.int64)
+    if (np.diff(numbers) <= 0).any() or not (np.abs(values[np.isfinite(values)]) <= MAX_NUMBER).all():
+        raise FormatError(f"{where}: expected rows in order and numbers within {MAX_NUMBER:g}; export it again")
+    return _table(columns, numbers, values, where)
+
+
+class _Plain(pickle.Unpickler):
+    """Reads lists, tuples, text and numbers, and nothing that could run code."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Refuse all classes and functions."""
+        raise FormatError(f"expected plain names of columns, found {quoted(f'{module}.{name}')}; export it as CSV")
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _column(head: Any, where: str) -> _Column:
+    words = [_text(w) for w in head] if isinstance(head, tuple | list) else []
+    if len(words) not in (3, 4):
+        raise FormatError(f"{where}: expected scorer, body part and coordinate of a column, found {quoted(head)}")
+    return _Column(words[1] if len(words) == 4 else "", words[-2], words[-1])
+
+
+def _read_head(lines: Iterator[tuple[int, str]], where: str) -> tuple[list[_Column], int, tuple[int, list[str]] | None]:
+    """Return the columns, the number of columns of the index, and the first row of numbers.
+
+    Raises:
+        FormatError: the head is incomplete, or names too many points.
+    """
+    head: dict[str, list[str]] = {}
+    row = _next_row(lines, where)
+    while row is not None and row[1][0].strip().lower() in _HEAD:
+        head[row[1][0].strip().lower()] = [cell.strip() for cell in row[1]]
+        row = _next_row(lines, where)
+    if not {"bodyparts", "coords"} <= head.keys() or len({len(cells) for cells in head.values()}) != 1:
+        raise FormatError(
+            f"{where}: expected the rows scorer, bodyparts and coords of equal length at its start, found "
+            f"{', '.join(head) or 'none'}; export it again"
+        )
+    n_index = 1
+    while n_index < len(head["coords"]) and not head["coords"][n_index]:
+        n_index += 1  # labels of pictures have folder and file in columns of their own
+    individuals = head.get("individuals", [""] * len(head["coords"]))
+    columns = [
+        _Column(i, p, c)
+        for i, p, c in zip(individuals[n_index:], head["bodyparts"][n_index:], head["coords"][n_index:], strict=True)
+    ]
+    if not 1 <= len(columns) <= 3 * MAX_NAMES:
+        raise FormatError(f"{where}: expected 1 to {3 * MAX_NAMES} columns, found {len(columns)}; export it again")
+    return columns, n_index, row
+
+
+def _next_row(lines: Iterator[tuple[int, str]], where: str) -> tuple[int, list[str]] | None:
+    """Return the next line that is not blank, by its number, in cells; None at the end."""
+    for number, line in lines:
+        if line.strip():
+            try:
+                return number, next(csv.reader([line]))
+            except csv.Error as error:
+                raise FormatError(f"{where}, line {number}: {error}; export it again") from error
+    return None
+
+
+def _picture_number(cells: Sequence[str], where: str) -> int:
+    """Return the number of a picture: the only cell, or the last number in the name of a file."""
+    last = cells[-1].strip()
+    found = re.fullmatch(r"(\d+)(?:\.0*)?", last) or re.search(r"(\d+)\.\w+\Z", last)
+    digits = found[1].lstrip("0") or "0" if found else ""
+    if not digits or len(digits) > len(str(MAX_FRAMES)):
+        raise FormatError(f"{where}: expected the number of a picture, or a name with one, found {quoted(last)}")
+    return int(digits)
+
+
+def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: str) -> PictureTable:
+    """Sort the columns by person, point and coordinate.
+
+    Raises:
+        FormatError: a column is there twice, x or y is missing, or a coordinate is unknown.
+    """
+    wrong = [c.coordinate for c in columns if c.coordinate not in _COORDINATES]
+    if wrong or len(set(columns)) < len(columns):
+        found = quoted(wrong[0]) if wrong else "a column twice"
+        raise FormatError(f"{where}: expected each x, y and likelihood once, found {found}; import key points in 2-D")
+    individuals, names = (
+        list(dict.fromkeys(c.individual for c in columns)),
+        list(dict.fromkeys(c.point for c in columns)),
+    )
+    check_size((len(numbers), len(individuals), len(names), 3), where)
+    points = np.full((len(numbers), len(individuals), len(names), 3), np.nan)
+    for column, of_column in zip(columns, values.T, strict=True):
+        at = individuals.index(column.individual), names.index(column.point), _COORDINATES.index(column.coordinate)
+        points[:, at[0], at[1], at[2]] = of_column
+    absent = ~np.isfinite(points[..., :2]).all(axis=-1)
+    points[absent] = (np.nan, np.nan, 0.0)
+    if not any(c.coordinate == "likelihood" for c in columns):
+        points[~absent, 2] = np.nan
+    return PictureTable(tuple(names), numbers, points)
+
+
+def patch_deeplabcut_csv(path: Path, changes: Mapping[int, Sequence[tuple[int, Array]]]) -> bytes:
+    """Return a file with points of some rows replaced; all other bytes stay.
+
+    Args:
+        path: the file, which has been read before.
+        changes: by row, from 0: number of the individual and x, y, confidence of all points, (n_points, 3); rows of
+            NaN stay, confidence 0 makes a point absent.
+    """
+    lines = enumerate(read_lines(path, _KIND), 1)
+    columns, n_index, _ = _read_head(lines, str(path))
+    table = read_deeplabcut_csv(path)
+    individuals = list(dict.fromkeys(c.individual for c in columns))
+    new: dict[int, dict[int, float]] = {}
+    for row, people in changes.items():
+        for person, values in people:
+            for i, column in enumerate(columns):
+                value = values[table.names.index(column.point)]
+                if column.individual == individuals[person] and not np.isnan(value[2]):
+                    absent = value[2] == 0 and column.coordinate != "likelihood"
+                    cell = np.nan if absent else float(value[_COORDINATES.index(column.coordinate)])
+                    new.setdefault(row, {})[n_index + i] = cell
+    exact = exact_text(path.read_bytes())
+    return exact.encoded(replace_cells(exact.text, ",", len(table.numbers), new, PIXEL_DECIMALS))

@@ -1,0 +1,72 @@
+"""Files that sleap-io reads: SLEAP's projects and analyses, and key points in NWB (ndx-pose).
+
+sleap-io is an optional package. A file may have several videos, one for each camera.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tracker.errors import FormatError
+from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.number_rows import check_size
+from tracker.validation import MAX_FRAMES, MAX_NUMBER
+
+
+def read_sleap(path: Path) -> list[tuple[Path, PictureTable]]:
+    """Read the key points of each video of a file, with the video's path.
+
+    Raises:
+        FormatError: the file has no key points, or several skeletons.
+        ImportError: sleap-io is not installed. The library raises other errors for a damaged file.
+    """
+    where = f"file {path}"
+    import sleap_io
+
+    labels = sleap_io.load_file(str(path), **({"open_videos": False} if path.suffix.lower() == ".slp" else {}))
+    out = [(_video_path(video, path), _table(labels, video, where)) for video in labels.videos]
+    if not out:
+        raise FormatError(f"{where}: expected key points of a video, found none; export it again")
+    return out
+
+
+def _video_path(video: Any, path: Path) -> Path:
+    name = video.filename
+    name = name[0] if isinstance(name, list) and name else name
+    return Path(str(name)) if name else path
+
+
+def _table(labels: Any, video: Any, where: str) -> PictureTable:
+    """Return the key points of one video of labels."""
+    if len(labels.skeletons) != 1:
+        raise FormatError(f"{where}: expected one skeleton, found {len(labels.skeletons)}; export them apart")
+    names = tuple(str(n) for n in labels.skeletons[0].node_names)
+    pictures = sorted((lf for lf in labels.labeled_frames if lf.video is video), key=lambda lf: lf.frame_idx)
+    numbers = np.array([lf.frame_idx for lf in pictures], dtype=np.int64)
+    if not len(numbers) or (np.diff(numbers) <= 0).any() or numbers[0] < 0 or numbers[-1] > MAX_FRAMES:
+        raise FormatError(f"{where}: expected each picture once, found {len(numbers)}; export it again")
+    found = [_instances(lf) for lf in pictures]
+    most = max(1, *map(len, found))
+    check_size((len(numbers), most, len(names), 3), where)
+    points = np.full((len(numbers), most, len(names), 3), np.nan)
+    for row, instances in zip(points, found, strict=True):
+        for k, instance in enumerate(instances):
+            row[k, :, :2] = instance.numpy()
+            row[k, :, 2] = instance.points["score"] if "score" in instance.points.dtype.names else np.nan
+    absent = ~np.isfinite(points[..., :2]).all(axis=-1)
+    if not (np.abs(points[~absent][:, :2]) <= MAX_NUMBER).all():
+        raise FormatError(f"{where}: expected coordinates within {MAX_NUMBER:g}; export it again")
+    points[absent] = (np.nan, np.nan, 0.0)
+    notes = []
+    by_hand = ~absent & np.isnan(points[..., 2])
+    if by_hand.any() and not by_hand[~absent].all():
+        points[by_hand, 2] = 1.0
+        notes.append(f"{by_hand.sum()} points that a person set have no confidence and were taken as certain")
+    return PictureTable(names, numbers, points, notes=tuple(notes))
+
+
+def _instances(picture: Any) -> list[Any]:
+    """Return the people of a picture: those that a person set, and predicted ones from which none was made."""
+    corrected = {id(i.from_predicted) for i in picture.user_instances}
+    return [*picture.user_instances, *(i for i in picture.predicted_instances if id(i) not in corrected)]

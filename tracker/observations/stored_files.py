@@ -1,0 +1,53 @@
+"""The imported files of stored key points, read again: where each frame and person stands in them."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.geometry.arrays import IntArray
+from tracker.observations.observed import ObservationSet
+from tracker.observations.placing import place_pictures
+from tracker.observations.readers import PICTURE_FORMATS
+from tracker.observations.sources import match_cameras
+from tracker.observations.stored import files_folder, source_path
+from tracker.session.session import Session
+
+
+class StoredPictures(NamedTuple):
+    """The files of one camera."""
+
+    camera: str
+    files: tuple[Path, ...]
+    """Within the session: one for each picture, or one for all."""
+    table: PictureTable
+    """Their content, in the pixels of the file."""
+    frames: IntArray
+    """Frame of the session of each picture, (n,)."""
+
+
+def stored_pictures(session: Session, observations: ObservationSet) -> list[StoredPictures]:
+    """Read the files of key points again, and place them as they were when they were imported.
+
+    Raises:
+        FormatError: a file was changed meanwhile, so that it cannot be read.
+    """
+    of_path = {source_path(session, observations.name, s): s for s in observations.sources}
+    root = files_folder(session, observations.name)
+    groups = PICTURE_FORMATS[observations.format].read([(path, root) for path in of_path])
+    labels = [() if of_path[g.files[0]].camera else g.labels for g, _ in groups]
+    matched = match_cameras([(n, g.place) for n, (g, _) in zip(labels, groups, strict=True)], session.camera_names, {})
+    cameras = [of_path[g.files[0]].camera or name for (g, _), name in zip(groups, matched, strict=True)]
+    tables = {name: table for name, (_, table) in zip(cameras, groups, strict=True) if name}
+    first = dict(observations.options).get("first_frame")
+    frames, _, _ = place_pictures(tables, session, None if first is None else int(first))
+    return [
+        StoredPictures(name, group.files, table, frames[name])
+        for name, (group, table) in zip(cameras, groups, strict=True)
+        if name
+    ]
+
+
+def picture_size(observations: ObservationSet) -> tuple[int, int] | None:
+    """Return the size of the pictures that key points are of, px, if it was said not to be that of the footage."""
+    width, _, height = dict(observations.options).get("picture_size", "").partition("x")
+    return (int(width), int(height)) if width else None
