@@ -63,7 +63,8 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
     """
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
-    from tracker.pipeline.calibration_check import PosedRecording, check_calibration, held_out_scores
+    from tracker.pipeline.calibration_check import check_calibration, held_out_scores
+    from tracker.pipeline.posed_recording import PosedRecording
     from tracker.session.relink import require_files
 
     require_files(session)
@@ -72,7 +73,7 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
         def report(stage: str, share: float, text: str = "", /) -> None:
             advance(share)
 
-        posed = PosedRecording(session, Observer(session.cameras, recording))
+        posed = PosedRecording.of_session(session, Observer(session.cameras, recording))
         found = check_calibration(posed, frames, n, report)
         scores = held_out_scores(posed, found, n, report) if found.named else []
     out = _as_json(found, scores)

@@ -21,11 +21,11 @@ from tracker.calibration.single_frames import score_frame
 from tracker.errors import TrackerError
 from tracker.pipeline.calibration_check import (
     CalibrationCheck,
-    PosedRecording,
     check_calibration,
     held_out_scores,
     n_better,
 )
+from tracker.pipeline.posed_recording import PosedRecording
 
 _LOG = logging.getLogger(__name__)
 _STEPS = 100
@@ -157,7 +157,7 @@ class Calibrating:
             self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
 
     def _recording(self) -> PosedRecording:
-        return PosedRecording(self._session_state.session, self._session_state.frames.observer)
+        return PosedRecording.of_session(self._session_state.session, self._session_state.frames.observer)
 
     def _report(self, stage: str, share: float, text: str = "", /) -> None:
         if self._stopping.is_set():

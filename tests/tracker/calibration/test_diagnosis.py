@@ -6,7 +6,7 @@ from rig_scenes import FPS, NAMES, nothing_seen, person_of, turned, viewed
 
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import ROTATION, TIME, with_step
-from tracker.calibration.diagnosis import diagnose
+from tracker.calibration.diagnosis import diagnose, glance
 from tracker.calibration.findings import SEEN_PX, findings, misfit, sentence
 from tracker.formats.model_toml import load_model
 
@@ -30,6 +30,13 @@ def test_a_turned_camera_is_named_and_mended():
     assert np.degrees(np.abs(left)).max() < 0.1
     assert cameras[2].misfit_px > 3
     assert "camera cam2 is turned" in sentence(cameras[2])
+
+
+def test_a_glance_names_a_turned_camera_and_no_healthy_one():
+    for off, expected in (({2: turned(yaw_deg=0.8)}, ["cam2"]), ({}, [])):
+        frames = viewed(off, range(3))
+        found = glance(frames, [SizeParameters(frames[0].bodies[0].model)], FPS)
+        assert named(findings(found, frames, NAMES)) == expected
 
 
 @pytest.mark.slow
