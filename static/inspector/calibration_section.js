@@ -9,7 +9,7 @@ import { textButton } from "./rows.js";
  */
 
 /** @type {Record<string, string>} */
-const WORDS = { rotation: "turned", position: "moved", focal: "zoomed", time: "shifted in time" };
+const WORDS = { rotation: "turned", position: "moved", focal: "zoomed", time: "shifted in time", drift: "drifting in time" };
 const AXES = "right, down, forward axis";
 
 /**
@@ -138,6 +138,7 @@ function mended(camera) {
     position: { values: camera.position_mm, sigma: sigma.position_mm, unit: "mm", digits: 0 },
     focal: { values: [camera.focal_percent], sigma: sigma.focal_percent, unit: "%", digits: 2 },
     time: { values: [camera.time_ms], sigma: sigma.time_ms, unit: "ms", digits: 1 },
+    drift: { values: [camera.drift_ms_per_s], sigma: sigma.drift_ms_per_s, unit: "ms a second", digits: 1 },
   };
   const lines = camera.kinds.map((kind) => {
     const { values, sigma: sigmas, unit, digits } = of[kind];

@@ -31,11 +31,12 @@ class _Prior(NamedTuple):
     position_m: float
     focal: float
     time_frames: float
+    drift: float
 
 
-PRIOR = _Prior(rotation_rad=float(np.radians(1.0)), position_m=0.05, focal=0.01, time_frames=1.0)
-"""A tripod that is knocked, a zoom that is touched, a camera that starts a frame late. It fixes the gauge where several
-cameras are corrected; of one camera, contours say a hundred times as much."""
+PRIOR = _Prior(rotation_rad=float(np.radians(1.0)), position_m=0.05, focal=0.01, time_frames=1.0, drift=0.01)
+"""A tripod that is knocked, a zoom that is touched, a camera that starts a frame late or loses one frame in a hundred.
+It fixes the gauge where several cameras are corrected; of one camera, contours say a hundred times as much."""
 WORTH_NATS = 4.0
 """Fall of the cost, for each number that a fault corrects, from which it is taken for real. A number that fits noise
 gains half a nat, and one of 20,000 pixels is worth 4.8 nats by the Bayesian information criterion (Schwarz 1978), of as
@@ -65,7 +66,8 @@ def prior_sigmas(fps: float) -> Array:
     """Return the standard deviations of a correction in its prior, (N_CORRECTIONS,), at a number of frames per
     second."""
     return np.array(
-        [PRIOR.rotation_rad] * 3 + [PRIOR.position_m] * 3 + [PRIOR.focal, PRIOR.time_frames / fps], dtype=np.float64
+        [PRIOR.rotation_rad] * 3 + [PRIOR.position_m] * 3 + [PRIOR.focal, PRIOR.time_frames / fps, PRIOR.drift],
+        dtype=np.float64,
     )
 
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from tracker.calibration.camera_correction import TIME, corrected
+from tracker.calibration.camera_correction import DRIFT, TIME, corrected
 from tracker.errors import SessionError
 from tracker.files import refuse_links, write_text_atomic
 from tracker.footage.camera_source import Clock
@@ -54,8 +54,8 @@ def with_corrections(session: Session, corrections: Array) -> Session:
     """Return a session with corrected cameras, (V, N_CORRECTIONS). Nothing is stored."""
     cameras = []
     for source, c in zip(session.cameras, corrections, strict=True):
-        ahead = source.clock.ahead_frames + float(c[TIME]) * session.fps
-        clock = replace(source.clock, ahead_frames=ahead) if c[TIME] else source.clock
+        before = source.clock
+        clock = Clock(before.ahead_frames + float(c[TIME]) * session.fps, before.rate + float(c[DRIFT]))
         cameras.append(replace(source, camera=corrected(source.camera, c), clock=clock))
     return replace(session, cameras=tuple(cameras))
 

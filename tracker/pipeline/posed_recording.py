@@ -97,7 +97,7 @@ class PosedRecording:
             views = self.observer.evidence(k, regions_px, None, self._static_edges)
             velocities = tuple(self._velocity(own, k) for own in self.poses)
             ahead_s = tuple(ahead / self.fps for ahead in self.observer.ahead_frames(k))
-            out.append(ViewedFrame(k, views, bodies, velocities, ahead_s))
+            out.append(ViewedFrame(k, views, bodies, velocities, k / self.fps, ahead_s))
         return out
 
     def _velocity(self, own: Mapping[int, PosedBody], frame: int) -> Array:

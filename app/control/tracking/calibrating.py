@@ -15,7 +15,7 @@ from app.state.calibration import CorrectedFrame
 from app.state.state import State
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.body.model import PosedBody
-from tracker.calibration.camera_correction import TIME, corrected
+from tracker.calibration.camera_correction import corrected, later_s
 from tracker.calibration.diagnosis import prior_sigmas
 from tracker.calibration.single_frames import score_frame
 from tracker.errors import TrackerError
@@ -201,7 +201,7 @@ class Calibrating:
         models = [p.body(s) for p, s in zip(parameters, sizes, strict=True)]
         bodies = tuple(
             tuple(
-                PosedBody(model, model.retract(values, (ahead_s + c[TIME]) * speed))
+                PosedBody(model, model.retract(values, (ahead_s + later_s(c, seen.time_s)) * speed))
                 for model, values, speed in zip(models, after.poses, seen.velocities, strict=True)
             )
             for ahead_s, c in zip(seen.ahead_s, check.corrections, strict=True)

@@ -27,7 +27,7 @@ def posed(run, session):
 def turn(session, name, yaw_deg):
     """Turn a camera in the calibration, as if it had been knocked since."""
     path = session / "calibration.toml"
-    off = np.radians([0, yaw_deg, 0, 0, 0, 0, 0, 0])
+    off = np.radians([0, yaw_deg, 0, 0, 0, 0, 0, 0, 0])
     cameras = read_calibration(path)
     assert name in [c.name for c in cameras]
     write_calibration(path, [corrected(c, off) if c.name == name else c for c in cameras])
