@@ -189,11 +189,11 @@ def calibration(found: CalibrationState, n_people: int) -> wire.CalibrationMessa
 
 def _camera(found: CameraFinding, since: int | None) -> wire.CameraCheck:
     units, sigma = in_units(found.correction), in_units(found.sigma)
-    (turned, moved, *numbers) = (tuple(np.atleast_1d(v).tolist()) for v in units.values())
+    turned, moved, zoomed, shifted, drift = (tuple(np.atleast_1d(v).tolist()) for v in units.values())
     deviations = {key: tuple(np.atleast_1d(v).tolist()) for key, v in sigma.items()}
     return wire.CameraCheck(
-        found.name, found.misfit_px, found.misfit_mm, found.kinds, found.rivals, turned, moved,
-        *(n[0] for n in numbers), deviations, since, found.is_seen,
+        found.name, found.misfit_px, found.misfit_mm, found.kinds, found.rivals, turned, moved, zoomed[0], shifted[0],
+        drift[0], deviations, since, found.is_seen,
     )  # fmt: skip
 
 
