@@ -84,7 +84,7 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
 
 def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameScore"]]) -> list[str]:
     """Correct the named cameras; return their names."""
-    from tracker.pipeline.calibration_revisions import apply_check
+    from tracker.pipeline.calibration_revisions import apply_check, follow_history
     from tracker.session.lock import SessionLock
     from tracker.store.annotation_store import AnnotationStore
 
@@ -92,6 +92,11 @@ def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["Fr
         return []
     found.require_applicable(scores)
     with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
+        if follow_history(session, store) is not session:
+            raise TrackerError(
+                "expected the calibration that was checked, found one that an interrupted correction had left; it is "
+                "restored, so check it again"
+            )
         apply_check(session, store, found)
     return list(found.named)
 
