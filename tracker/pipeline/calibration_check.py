@@ -6,13 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS
+from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, TIME
 from tracker.calibration.diagnosis import Diagnosis, diagnose, glance, prior_sigmas
 from tracker.calibration.findings import CameraFinding, findings, sentence
+from tracker.calibration.point_adjustment import NEWS
 from tracker.calibration.single_frames import FrameScore, find_change, score_frame
 from tracker.calibration.viewed_frames import ViewedFrame
 from tracker.compute.progress import Report, part_of, unreported
 from tracker.errors import Remedy, TrackerError
+from tracker.fitting.hypothesis import SAME_POSE_M
 from tracker.geometry.arrays import Array
 from tracker.pipeline.posed_recording import MIN_FRAMES, N_FRAMES, PosedRecording
 
@@ -28,6 +30,8 @@ class CalibrationCheck:
     since: Mapping[str, int]
     """Of cameras that have been off since a frame within the recording: that frame."""
     diagnosis: Diagnosis
+    notes: tuple[str, ...] = ()
+    """Sentences on what these frames cannot show."""
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -51,9 +55,8 @@ class CalibrationCheck:
 
     @property
     def sentences(self) -> list[str]:
-        """Sentences for the user: on cameras that are off, and on those that show nobody."""
-        unseen = [f"camera {c.name} shows nobody on these frames" for c in self.cameras if not c.is_seen]
-        return self.contradictions + unseen
+        """Sentences for the user: on cameras that are off, and on what these frames cannot show."""
+        return [*self.contradictions, *self.notes]
 
     def require_applicable(self, scores: Sequence[tuple[FrameScore, FrameScore]]) -> None:
         """Check that frames which the check did not use confirm its corrections.
@@ -163,7 +166,14 @@ def _judged(recording: PosedRecording, seen: Sequence[ViewedFrame], diagnosis: D
     cameras = findings(diagnosis, seen, recording.camera_names)
     if len(cameras) == 2:
         cameras = [c._replace(kinds=(), correction=np.zeros(N_CORRECTIONS)) for c in cameras]
-    return CalibrationCheck(tuple(s.frame for s in seen), tuple(cameras), {}, diagnosis)
+    notes = [f"camera {c.name} shows nobody on these frames" for c in cameras if not c.is_seen]
+    first, *others = [np.concatenate([b.points_world for b in s.bodies]) for s in seen]
+    if all(np.linalg.norm(points - first, axis=1).max() < SAME_POSE_M for points in others):
+        notes.append("people stand still on these frames: a wrong shape of a body looks like a camera that is off")
+    late = prior_sigmas(recording.fps)[TIME]
+    if all(c.sigma[TIME] > NEWS * late for c in cameras):
+        notes.append("nobody moves enough on these frames to show whether the cameras are simultaneous")
+    return CalibrationCheck(tuple(s.frame for s in seen), tuple(cameras), {}, diagnosis, tuple(notes))
 
 
 class _Changes:

@@ -113,6 +113,7 @@ def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameS
             "held_out_frames": len(scores),
             "held_out_better": n_better(scores),
             "sentences": found.sentences,
+            "notes": list(found.notes),
         },
     }
 
@@ -133,7 +134,9 @@ def _camera(finding: "CameraFinding", since: int | None) -> dict[str, Any]:
 
 
 def _format(found: dict[str, Any]) -> str:
-    lines = found["explained"]["sentences"] or ["no camera is off: the contours agree with the calibration"]
+    lines, notes = list(found["explained"]["sentences"]), found["explained"]["notes"]
+    if len(lines) == len(notes):
+        lines = ["no camera is off: the contours agree with the calibration", *notes]
     for camera in found["cameras"]:
         if camera["kind"] is not None:
             lines = [*lines, *_correction_lines(camera)]
