@@ -32,7 +32,9 @@ from tracker.pipeline.posed_recording import PosedRecording
 from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
 
-TABLES = tuple(f"calibration_repair {name}" for name in ("bumps", "time", "change", "body"))
+TABLES = (
+    "calibration_repair bumps", "calibration_repair time", "calibration_repair change", "calibration_repair body",
+)  # fmt: skip
 MAX_ROUNDS = 4
 BUMPS = {
     "yaw 0.2°": (0, 0.2, 0, 0, 0, 0, 0),
@@ -154,10 +156,14 @@ def started(footage: Footage, at: Path, body: Path | None = None, calibration: P
         "new", at, "--videos", *footage.folders.values(), "--calibration", calibration or footage.calibration,
         "--background", footage.background, "--fps", footage.fps, *words,
     )  # fmt: skip
-    joints = at.with_suffix(".trc")
+    joints = _joints(at)
     write_trc(joints, footage.joints.names, footage.joints.points, footage.fps)
     quadrille("init", at, "--joints", joints, "--clock", "frames", "--first-frame", 0)
     return at
+
+
+def _joints(at: Path) -> Path:
+    return at.with_name(f"{at.name}.trc")
 
 
 def tracked(at: Path) -> Path:
@@ -175,15 +181,19 @@ def body_of(footage: Footage, folder: Path) -> Path:
 
 def error_mm(at: Path) -> float:
     """Return the mean error of the joints."""
-    joints = at.with_suffix(".trc")
+    joints = _joints(at)
     return float(quadrille("evaluate", at, "--reference", joints, "--clock", "frames", "--first-frame", 0)["mpjpe_mm"])
 
 
 def repaired(at: Path) -> list[dict[str, Any]]:
     """Correct what is named and track again, until nothing is; return what each check that named something said."""
-    out = []
+    out = list[dict[str, Any]]()
     for _ in range(MAX_ROUNDS):
-        found = quadrille("check", at, "--apply")
+        try:
+            found = quadrille("check", at, "--apply")
+        except SystemExit as refused:
+            print(refused, flush=True)
+            break
         if not found["named"]:
             break
         out.append(found)
@@ -308,7 +318,7 @@ def change(data: Path, folder: Path) -> Measured:
             known[name] = footage, body_of(footage, folder)
         footage, body = known[name]
         camera = footage.cameras[index]
-        turned = folder / f"turned {i}"
+        turned = folder / f"turned {i}" / camera
         _turn(footage.folders[camera], _camera(footage, camera), since, np.radians(angles), turned)
         at = tracked(
             started(replace(footage, folders={**footage.folders, camera: turned}), folder / f"change {i}", body)
@@ -329,7 +339,7 @@ def _camera(footage: Footage, name: str) -> Camera:
 
 def _turn(images: Path, camera: Camera, since: int, angles: Array, out: Path) -> None:
     """Write the images of a camera, from a frame on as it would show them turned."""
-    out.mkdir()
+    out.mkdir(parents=True)
     H = camera.K @ so3_exp(angles) @ np.linalg.inv(camera.K)
     for k, path in enumerate(sorted(images.iterdir())):
         image: Image | None = cv2.imread(str(path))

@@ -48,7 +48,7 @@ class SeenPerson(NamedTuple):
     velocity: Array
     """Change of the person's pose, (n_dofs,), rad or metres per second."""
     time_s: float
-    """Time of the frame since that of frame 0, seconds."""
+    """Time of the frame, seconds, since that to which drifts are related."""
     ahead_s: Sequence[float]
     """Time by which the picture of each view was taken later than the frame, by the present clocks, seconds."""
 

@@ -26,7 +26,7 @@ class ViewedFrame(NamedTuple):
     velocities: tuple[Array, ...]
     """Change of each person's pose, (n_dofs,), rad or metres per second."""
     time_s: float
-    """Time of the frame since that of frame 0, seconds."""
+    """Time of the frame, seconds, since that to which drifts are related."""
     ahead_s: tuple[float, ...]
     """Time by which the picture of each view was taken later than the frame, by the present clocks, seconds."""
 

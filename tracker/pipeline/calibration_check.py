@@ -30,6 +30,8 @@ class CalibrationCheck:
     since: Mapping[str, int]
     """Of cameras that have been off since a frame within the recording: that frame."""
     diagnosis: Diagnosis
+    middle_s: float = 0.0
+    """Time to which offsets and drifts of clocks are related, see `PosedRecording.middle_s`."""
     notes: tuple[str, ...] = ()
     """Sentences on what these frames cannot show."""
 
@@ -173,7 +175,9 @@ def _judged(recording: PosedRecording, seen: Sequence[ViewedFrame], diagnosis: D
     late = prior_sigmas(recording.fps)[TIME]
     if all(c.sigma[TIME] > NEWS * late for c in cameras):
         notes.append("nobody moves enough on these frames to show whether the cameras are simultaneous")
-    return CalibrationCheck(tuple(s.frame for s in seen), tuple(cameras), {}, diagnosis, tuple(notes))
+    return CalibrationCheck(
+        tuple(s.frame for s in seen), tuple(cameras), {}, diagnosis, recording.middle_s, tuple(notes)
+    )
 
 
 class _Changes:

@@ -46,16 +46,20 @@ def apply_check(session: Session, store: AnnotationStore, check: CalibrationChec
     """
     if not check.named:
         raise SessionError("expected a camera that is off, found none; the calibration stays as it is")
-    corrected_session = with_corrections(session, check.corrections)
+    corrected_session = with_corrections(session, check.corrections, check.middle_s)
     return change_calibration(session, store, corrected_session, f"calibration of {', '.join(check.named)} corrected")
 
 
-def with_corrections(session: Session, corrections: Array) -> Session:
-    """Return a session with corrected cameras, (V, N_CORRECTIONS). Nothing is stored."""
+def with_corrections(session: Session, corrections: Array, middle_s: float = 0.0) -> Session:
+    """Return a session with corrected cameras, (V, N_CORRECTIONS). Nothing is stored.
+
+    Offsets of the corrections are those at the time `middle_s`, seconds; those of clocks are at frame 0.
+    """
     cameras = []
     for source, c in zip(session.cameras, corrections, strict=True):
         before = source.clock
-        clock = Clock(before.ahead_frames + float(c[TIME]) * session.fps, before.rate + float(c[DRIFT]))
+        late_s = float(c[TIME] - c[DRIFT] * middle_s)
+        clock = Clock(before.ahead_frames + late_s * session.fps, before.rate + float(c[DRIFT]))
         cameras.append(replace(source, camera=corrected(source.camera, c), clock=clock))
     return replace(session, cameras=tuple(cameras))
 

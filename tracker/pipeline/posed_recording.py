@@ -67,6 +67,13 @@ class PosedRecording:
         return cls(observer, fps, poses, {k for k, f in tracked.items() if "lost" in f.statuses})
 
     @property
+    def middle_s(self) -> float:
+        """Time of the middle of the frames with poses, seconds since frame 0. Drifts are told about it: about frame 0
+        they would look like offsets."""
+        frames = [k for own in self.poses for k in own]
+        return 0.5 * (min(frames) + max(frames)) / self.fps if frames else 0.0
+
+    @property
     def camera_names(self) -> list[str]:
         """Names of the cameras."""
         return [c.camera.name for c in self.observer.cameras]
@@ -97,7 +104,7 @@ class PosedRecording:
             views = self.observer.evidence(k, regions_px, None, self._static_edges)
             velocities = tuple(self._velocity(own, k) for own in self.poses)
             ahead_s = tuple(ahead / self.fps for ahead in self.observer.ahead_frames(k))
-            out.append(ViewedFrame(k, views, bodies, velocities, k / self.fps, ahead_s))
+            out.append(ViewedFrame(k, views, bodies, velocities, k / self.fps - self.middle_s, ahead_s))
         return out
 
     def _velocity(self, own: Mapping[int, PosedBody], frame: int) -> Array:

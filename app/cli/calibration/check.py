@@ -144,7 +144,8 @@ def _format(found: dict[str, Any]) -> str:
     if n:
         lines = [*lines, f"of {n} other frames, {found['explained']['held_out_better']} fit better with it"]
     if found.get("applied"):
-        lines = [*lines, "corrected; track again, because the poses are still those of the calibration before"]
+        before = "poses and acquired sizes are still those of the calibration before"
+        lines = [*lines, f"corrected; acquire the sizes again, if they were acquired, and track again: {before}"]
     elif found["named"]:
         lines = [*lines, "say --apply to correct it"]
     return "\n".join(lines)

@@ -11,7 +11,7 @@ from tracker.pipeline.calibration_check import check_calibration, contradiction
 class Seen:
     """A recording all of whose frames are seen."""
 
-    fps = FPS
+    fps, middle_s = FPS, 0.0
 
     def __init__(self, frames, names=NAMES):
         self.camera_names, self._frames = names[: len(frames[0].views)], frames
