@@ -199,6 +199,10 @@ PHRASES = {
     "choose_first_frame": Phrases(
         "say --first-frame {frames}", "correct Frame#, Time or OrigDataStartFrame in the file"
     ),
+    # cameras that are off
+    "check_cameras": Phrases(
+        "quadrille check measures it", "Check the cameras, in the inspector's Calibration, measures it"
+    ),
     # references and exports
     "check_reference_frames": Phrases(
         "check --frames, --person and the reference's frame numbers",

@@ -67,5 +67,6 @@ def _seen(frame: BenchFrame, poses: Mapping[int, Array], correction: Array) -> l
             views = (replace(first, camera=corrected(first.camera, correction)), *others)
             per_frame = velocity(frame.model, poses, k)
             assert per_frame is not None
-            out.append(ViewedFrame(k, views, (body,), (session.fps * per_frame,), (0.0,) * len(views)))
+            time_s = (k - session.n_frames / 2) / session.fps
+            out.append(ViewedFrame(k, views, (body,), (session.fps * per_frame,), time_s, (0.0,) * len(views)))
     return out

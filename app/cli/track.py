@@ -219,7 +219,7 @@ def track(session: "Session", plan: "ChainPlan", progress: Reporter) -> dict[str
             else:
                 run_chain(plan, opened, sink)
         except KeyboardInterrupt:
-            is_stopped = True
+            is_stopped = opened.run is None or not opened.run.finished
     if opened.run is None or opened.plan is None:
         kept = "what was found is kept; run it again to go on" if opened.is_changed else "nothing was stored"
         print(f"stopped before tracking; {kept}", file=sys.stderr)

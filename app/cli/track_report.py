@@ -5,8 +5,10 @@ from contextlib import ExitStack
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from app.remedies import command_line_text
 from app.runtime.progress import Reporter
 from tracker.compute.kernel_cache import compiled_mark
+from tracker.errors import Remedy
 from tracker.pipeline.run_repair import RepairStep
 from tracker.pipeline.track_session import AuditStep
 from tracker.tracking.estimate import BackwardStep, PoseEstimate
@@ -90,8 +92,9 @@ def summarize(session: "Session", plan: "TrackPlan", run: "TrackSession", is_sto
 
     Returns:
         `stopped_at` is the frame where it was interrupted, else None; `improved_backward` is the number of poses that
-        the backward pass improved. `first_frame` is there where the run went out from a frame. `normal_matrices` has
-        rank and conditioning by person, for methods that compute them.
+        the backward pass improved. `contradiction` is a sentence on a camera that seems off, else None. `first_frame`
+        is there where the run went out from a frame. `normal_matrices` has rank and conditioning by person, for methods
+        that compute them.
     """
     import numpy as np
 
@@ -108,6 +111,7 @@ def summarize(session: "Session", plan: "TrackPlan", run: "TrackSession", is_sto
         "mean_cost_px": float(np.mean(costs)) if costs else None,
         "statuses": {session.people[i].name: dict(statuses[i]) for i in plan.people},
         "normal_matrices": _summarize_matrices(session, plan, run),
+        "contradiction": run.contradiction or None,
         **({} if plan.start is None else {"first_frame": plan.start}),
     }
 
@@ -147,6 +151,8 @@ def format_summary(found: dict[str, Any]) -> str:
         )
     if found["improved_backward"]:
         lines.append(f"the backward pass replaced {found['improved_backward']} poses of frames with lost people")
+    if found["contradiction"] is not None:
+        lines.append(command_line_text(found["contradiction"], Remedy("check_cameras")))
     if found["stopped_at"] is not None:
         lines.append(f"stopped before frame {found['stopped_at']}; run it again to resume")
     return "\n".join(lines)

@@ -213,10 +213,11 @@ def _intervals(frames: Sequence[int]) -> tuple[tuple[int, int], ...]:
 
 def _camera(found: CameraFinding, since: int | None) -> wire.CameraCheck:
     units, sigma = in_units(found.correction), in_units(found.sigma)
-    (turned, moved, zoomed, shifted) = (tuple(np.atleast_1d(v).tolist()) for v in units.values())
+    turned, moved, zoomed, shifted, drift = (tuple(np.atleast_1d(v).tolist()) for v in units.values())
+    deviations = {key: tuple(np.atleast_1d(v).tolist()) for key, v in sigma.items()}
     return wire.CameraCheck(
         found.name, found.misfit_px, found.misfit_mm, found.kinds, found.rivals, turned, moved, zoomed[0], shifted[0],
-        {key: tuple(np.atleast_1d(v).tolist()) for key, v in sigma.items()}, since, found.is_seen,
+        drift[0], deviations, since, found.is_seen,
     )  # fmt: skip
 
 

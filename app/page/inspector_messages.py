@@ -365,7 +365,7 @@ class CameraCheck(Part, frozen=True):
     misfit_px: float
     misfit_mm: float
     kinds: tuple[str, ...]
-    """How it is off: `rotation`, `position`, `focal`, `time`; empty where it is not."""
+    """How it is off: `rotation`, `position`, `focal`, `time`, `drift`; empty where it is not."""
     rivals: tuple[str, ...]
     """Kinds that explain the contours as well."""
     rotation_deg: tuple[float, ...]
@@ -374,6 +374,7 @@ class CameraCheck(Part, frozen=True):
     """Along the same axes."""
     focal_percent: float
     time_ms: float
+    drift_ms_per_s: float
     sigma: dict[str, tuple[float, ...]]
     """Standard deviations, by the name of the field; of one number, too."""
     since_frame: int | None

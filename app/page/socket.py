@@ -223,8 +223,8 @@ class PageConnection:
                     await self._send(update)
                 if state.footage.error and (sent is None or sent.footage.error != state.footage.error):
                     await self._notice(state.footage.error)
-                if state.track.failed and (sent is None or sent.track is not state.track):
-                    await self._notice(state.track.message)
+                if state.track.notice and (sent is None or sent.track is not state.track):
+                    await self._notice(state.track.notice)
             except TrackerError as error:
                 await self._notice(page_text(error))
             if state.search.running:

@@ -41,6 +41,8 @@ class TrackState:
     """How the last run ended."""
     failed: bool = False
     """Whether it ended with an error."""
+    notice: str = ""
+    """A sentence for the user at its end: why it failed, or that a camera seems off; else empty."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import { textButton } from "./rows.js";
  */
 
 /** @type {Record<string, string>} */
-const WORDS = { rotation: "turned", position: "moved", focal: "zoomed", time: "shifted in time" };
+const WORDS = { rotation: "turned", position: "moved", focal: "zoomed", time: "shifted in time", drift: "drifting in time" };
 /** Names of the numbers of each kind, their unit and decimals. @type {Record<string, {names: [string, string][], unit: string, digits: number}>} */
 const NUMBERS = {
   rotation: {
@@ -27,6 +27,7 @@ const NUMBERS = {
   },
   focal: { names: [["zoom", "Focal length"]], unit: " %", digits: 2 },
   time: { names: [["time", "Its pictures were taken later by this"]], unit: " ms", digits: 1 },
+  drift: { names: [["drift", "Its pictures are later by this after each second"]], unit: " ms/s", digits: 1 },
 }; // prettier-ignore
 
 /**
@@ -217,6 +218,7 @@ function mended(camera) {
     position: [camera.position_mm, sigma.position_mm],
     focal: [[camera.focal_percent], sigma.focal_percent],
     time: [[camera.time_ms], sigma.time_ms],
+    drift: [[camera.drift_ms_per_s], sigma.drift_ms_per_s],
   };
   const lines = camera.kinds.flatMap((kind) => {
     const { names, unit, digits } = NUMBERS[kind];

@@ -7,7 +7,7 @@ from staging import cameras_around, own_evidence, posed, shaken
 
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.body.model import PosedBody
-from tracker.calibration.camera_correction import N_CORRECTIONS, TIME, corrected
+from tracker.calibration.camera_correction import N_CORRECTIONS, corrected, later_s
 from tracker.calibration.viewed_frames import ViewedFrame
 from tracker.formats.model_toml import load_model
 
@@ -42,11 +42,13 @@ def viewed(off, frames=range(6), model=None, person=None, cameras=CAMERAS):
         views = []
         for i, camera in enumerate(cameras):
             correction = off.get(i, np.zeros(N_CORRECTIONS))
-            then = person.clip(person.retract(pose, correction[TIME] * velocity))
+            then = person.clip(person.retract(pose, later_s(correction, k / FPS) * velocity))
             (view,) = own_evidence([PosedBody(person, then)], [corrected(camera, correction)])
             views.append(replace(view, camera=camera))
         start = shaken(model, pose, random, 0.02, 0.01)
-        out.append(ViewedFrame(k, tuple(views), (PosedBody(model, start),), (velocity,), (0.0,) * len(cameras)))
+        out.append(
+            ViewedFrame(k, tuple(views), (PosedBody(model, start),), (velocity,), k / FPS, (0.0,) * len(cameras))
+        )
     return out
 
 

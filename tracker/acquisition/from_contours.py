@@ -32,6 +32,7 @@ from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock
 from tracker.fitting.retarget import retarget_pose
 from tracker.images.static_edges import StaticEdgeModel
+from tracker.motion.velocity import velocity
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.forward_pass import update_static_edges
 from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior
@@ -116,6 +117,7 @@ def acquire_from_contours(
     """
     if not bodies:
         raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
+    bodies = _moving(observer, bodies)
     present = next(iter(bodies.values()))[person].model
     parameters = SizeParameters(typical_body(present), settings.coupled, settings.priors)
     names = ("choosing frames", "reading contours", "fitting sizes to voxels", "fitting sizes")
@@ -161,10 +163,22 @@ def acquire_from_contours(
     )  # fmt: skip
 
 
+def _moving(observer: Observer, bodies: Mapping[int, tuple[PosedBody, ...]]) -> Mapping[int, tuple[PosedBody, ...]]:
+    """Return the people with their velocities, by their poses on the frames around, where pictures need them."""
+    if not any(any(observer.ahead_frames(k)) for k in bodies):
+        return bodies
+    people = range(len(next(iter(bodies.values()))))
+    poses = [{k: own[i].values for k, own in bodies.items()} for i in people]
+    return {
+        k: tuple(replace(b, velocity=velocity(b.model, poses[i], k)) for i, b in enumerate(own))
+        for k, own in bodies.items()
+    }
+
+
 def _with_body(bodies: tuple[PosedBody, ...], person: int, body: BodyModel) -> tuple[PosedBody, ...]:
     """Return the people on a frame, one of them in another body with the joints in place."""
     own = bodies[person]
-    moved = PosedBody(body, retarget_pose(own.values, own.model, body))
+    moved = PosedBody(body, retarget_pose(own.values, own.model, body), own.velocity)
     return (*bodies[:person], moved, *bodies[person + 1 :])
 
 
@@ -194,7 +208,7 @@ def _spread(frames: Sequence[int], n: int, keep: Sequence[int]) -> list[int]:
 
 def own_views(views: Sequence[ViewEvidence], bodies: tuple[PosedBody, ...], person: int) -> Sequence[ViewEvidence]:
     """Return the evidence of a frame without the edges that other people explain."""
-    people = [PersonPrior(b.model, b.values) for b in bodies]
+    people = [PersonPrior(b.model, b.values, velocity=b.velocity) for b in bodies]
     return FrameProblem(views, people, TrackSettings()).own_evidence([person], bodies)[0]
 
 

@@ -21,7 +21,7 @@ from tracker.acquisition.part_motions import (
 from tracker.acquisition.size_parameters import SizeArrays, SizeParameters
 from tracker.body.dimensions import with_height_of_stature
 from tracker.body.kinematics import Kinematics
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import BodyModel, PosedBody, ahead
 from tracker.compute.threads import map_parallel
 from tracker.contours.surfaces import Surfaces
 from tracker.evidence.view_evidence import ViewEvidence
@@ -55,8 +55,8 @@ class SightedPerson(NamedTuple):
 
     def moved(self, model: BodyModel, pose: Array) -> "SightedPerson":
         """Return the person with another body and pose."""
-        bodies = tuple(PosedBody(model, pose) if i == self.person else b for i, b in enumerate(self.bodies))
-        return self._replace(bodies=bodies)
+        own = PosedBody(model, pose, self.bodies[self.person].velocity)
+        return self._replace(bodies=(*self.bodies[: self.person], own, *self.bodies[self.person + 1 :]))
 
     @property
     def pose(self) -> Array:
@@ -262,18 +262,12 @@ class _Problem:
 
     def _linearize_frame(self, i: int, resized: _Resized, pose: Array) -> NormalEquations:
         """Return the normal equations of a frame by the sizes, then by its pose."""
-        body, by_sizes, surfaces = resized
+        body, by_sizes, _ = resized
         kinematics, n = body.kinematics(pose), by_sizes.joints.shape[-1]
-        cost, pieces = 0.0, []
-        for residuals, view in zip(self._residuals[i], self._frames[i].views, strict=True):
-            assert surfaces is not None
-            own_cost, sums = residuals.with_surfaces(body, surfaces).piece_sums(pose)
-            cost += own_cost
-            pieces.append((view.camera, sums))
-        gradient, hessian = np.zeros(n + body.n_dofs), np.zeros((n + body.n_dofs, n + body.n_dofs))
-        if pieces:
-            sums_of_motions = sum_motions(pieces, body, kinematics, self._with_shapes)
-            gradient, hessian = to_unknowns(motions_by_unknowns(body, kinematics, by_sizes), *sums_of_motions)
+        cost, gradient, hessian = 0.0, np.zeros(n + body.n_dofs), np.zeros((n + body.n_dofs, n + body.n_dofs))
+        for time in sorted({v.ahead_frames for v in self._frames[i].views}):
+            own = self._linearize_views(i, resized, pose, time)
+            cost, gradient, hessian = cost + own.cost, gradient + own.gradient, hessian + own.hessian
         placed = self._frames[i].placed
         if placed is not None:
             own = _linearize_placed(placed, body, kinematics, by_sizes)
@@ -290,6 +284,24 @@ class _Problem:
             gradient[n:] += prior.gradient
             hessian[n:, n:] += prior.hessian
         return NormalEquations(cost, gradient, hessian)
+
+    def _linearize_views(self, i: int, resized: _Resized, pose: Array, ahead_frames: float) -> NormalEquations:
+        """Return the same of the views whose pictures were taken some frames later than the frame.
+
+        The velocity stays, so that the derivative of the later pose by the pose is the identity (`ClockedResiduals`).
+        """
+        (body, by_sizes, surfaces), frame = resized, self._frames[i]
+        then = PosedBody(body, pose, frame.bodies[frame.person].velocity).ahead(ahead_frames)
+        cost, pieces = 0.0, []
+        for residuals, view in zip(self._residuals[i], frame.views, strict=True):
+            if view.ahead_frames == ahead_frames:
+                assert surfaces is not None
+                own_cost, sums = residuals.with_surfaces(body, surfaces).piece_sums(then.values)
+                cost += own_cost
+                pieces.append((view.camera, sums))
+        sums_of_motions = sum_motions(pieces, body, then.kinematics, self._with_shapes)
+        by_unknowns = motions_by_unknowns(body, then.kinematics, by_sizes)
+        return NormalEquations(cost, *to_unknowns(by_unknowns, *sums_of_motions))
 
 
 def _linearize_placed(
@@ -310,6 +322,8 @@ def _points_by_unknowns(points: IntArray, body: BodyModel, kinematics: Kinematic
 def _residuals(person: SightedPerson, settings: SizeFitSettings, step: Round) -> list[ContourResiduals]:
     """Return the residuals of each view by itself."""
     return [
-        ContourResiduals([v], person.bodies, person.person, settings.match, step.reach * v.theta_px / v.scale)
+        ContourResiduals(
+            [v], ahead(person.bodies, v.ahead_frames), person.person, settings.match, step.reach * v.theta_px / v.scale
+        )
         for v in person.views
     ]

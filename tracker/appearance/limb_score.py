@@ -6,7 +6,7 @@ limb's own parts are tested one by one.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,13 @@ class ColorView(NamedTuple):
     """Distance to the nearest edge, (H, W), working px."""
     theta_px: float
     """Outlier distance, working px."""
+
+
+class LimbScore(Protocol):
+    """Scores one limb of an otherwise static body in many poses."""
+
+    def __call__(self, poses: Array) -> Array:
+        """See `LimbScorer`."""
 
 
 class StaticParts(NamedTuple):

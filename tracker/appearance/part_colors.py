@@ -22,10 +22,10 @@ from tracker.appearance.axis_visibility import (
     unit_balls,
 )
 from tracker.appearance.color_shares import DOUBT, smoothed
-from tracker.appearance.limb_score import ColorView, LimbScorer, StaticParts
+from tracker.appearance.limb_score import ColorView, LimbScore, LimbScorer, StaticParts
 from tracker.appearance.region_deficit import counterparts
 from tracker.body.kinematics import Kinematics, chain_poses
-from tracker.body.model import PosedBody, parts_of
+from tracker.body.model import PosedBody, ahead, parts_of
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours.occluding_contours import part_poses
@@ -87,8 +87,19 @@ class _Samples(NamedTuple):
     """See `project_axis`, (4, 3)."""
 
 
+class _Moment(NamedTuple):
+    """Views whose pictures were taken at the same time."""
+
+    ahead_frames: float
+    """Frames by which the pictures were taken later than the frame."""
+    views: IntArray
+    """Indices of the views, (n,)."""
+    Ts_world_part: Array
+    """Poses of all parts, (P, 4, 4), metres."""
+
+
 class Colors:
-    """Colours of the parts of one person in the views of one frame."""
+    """Colours of the parts of one person in the views of one frame, each at the time of its picture."""
 
     def __init__(self, views: Sequence[ViewEvidence], bodies: Sequence[PosedBody], person: int = 0) -> None:
         """Take the colours of the views.
@@ -103,6 +114,7 @@ class Colors:
             for v in views
             if v.colors is not None
         ]
+        self._ahead_frames = np.array([v.ahead_frames for v in views if v.colors is not None])
         self._shown = tuple(views)
         self._bodies, self._person = list(bodies), person
         self._shapes = np.concatenate([ellipsoids(b.model) for b in bodies])
@@ -154,17 +166,19 @@ class Colors:
 
     def nats(self, poses: Array, known: PartColors) -> Array:
         """Return `score(...).nats` of many poses, (C, n_values), (C,)."""
-        model = self._bodies[self._person].model
-        Ts, first, ratios = self._Ts_world_part.copy(), self._own.start, known.log_ratios
-        placed = chain_poses(model.tree, model.kinematics(poses[0]), np.arange(len(model.parts)), poses)
+        body, first, ratios = self._bodies[self._person], self._own.start, known.log_ratios
         samples, nats = self._buffers(self._max_samples), np.zeros(len(poses))
-        for v in self._views:
-            _add_nats(v, Ts, placed, first, self._shapes, ratios, samples, nats)
+        for moment in self._moments:
+            then, Ts = body.poses_ahead(poses, moment.ahead_frames), moment.Ts_world_part.copy()
+            model = body.model
+            placed = chain_poses(model.tree, model.kinematics(then[0]), np.arange(len(model.parts)), then)
+            for i in moment.views:
+                _add_nats(self._views[i], Ts, placed, first, self._shapes, ratios, samples, nats)
         return nats
 
     def limb_scorer(
         self, pose: Array, limb: NDArray[np.int64], known: PartColors | None, away: Sequence[int] = ()
-    ) -> LimbScorer:
+    ) -> LimbScore:
         """Return a scorer of one limb in many poses.
 
         Args:
@@ -173,35 +187,48 @@ class Colors:
             known: learnt colours; None to score edges only.
             away: indices of parts that are removed and occlude nothing.
         """
-        model = self._bodies[self._person].model
-        rest = model.kinematics(pose)
+        body = self._bodies[self._person]
         owners = np.full(len(self._shapes), -1)
-        owners[self._own] = np.arange(len(model.parts))
+        owners[self._own] = np.arange(len(body.model.parts))
         is_static = ~np.isin(owners, [*limb, *away])
-        return LimbScorer(
-            self._views, model, rest, limb,
-            StaticParts(self._Ts(rest)[is_static] @ unit_balls(self._shapes[is_static]), owners[is_static]),
-            self._shapes[self._own], None if known is None else known.log_ratios,
-        )  # fmt: skip
 
-    def _Ts(self, own: Kinematics) -> Array:
+        def at(moment: _Moment) -> LimbScorer:
+            rest = body.model.kinematics(body.poses_ahead(pose[None], moment.ahead_frames)[0])
+            return LimbScorer(
+                [self._views[i] for i in moment.views], body.model, rest, limb,
+                StaticParts(self._Ts(moment, rest)[is_static] @ unit_balls(self._shapes[is_static]), owners[is_static]),
+                self._shapes[self._own], None if known is None else known.log_ratios,
+            )  # fmt: skip
+
+        scorers = [(m.ahead_frames, at(m)) for m in self._moments]
+        return lambda poses: np.sum([score(body.poses_ahead(poses, time)) for time, score in scorers], axis=0)
+
+    def _Ts(self, moment: _Moment, own: Kinematics) -> Array:
         """Return the poses of all parts, (P, 4, 4), metres, with the person's from its kinematics."""
-        Ts = self._Ts_world_part.copy()
+        Ts = moment.Ts_world_part.copy()
         Ts[self._own] = own.Ts_world_part
         return Ts
 
     @cached_property
-    def _Ts_world_part(self) -> Array:
-        return part_poses(self._bodies)
+    def _moments(self) -> list[_Moment]:
+        """The views by the time of their pictures; there is one moment at least."""
+        times = self._ahead_frames if self._bodies[self._person].velocity is not None else 0 * self._ahead_frames
+        out = []
+        for time in np.unique(times).tolist() or [0.0]:
+            out.append(_Moment(time, np.flatnonzero(times == time), part_poses(ahead(self._bodies, time))))
+        return out
 
     def _samples(self, pose: Array) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-        """Return part, colour and view of each visible sample, (n,) each."""
-        model = self._bodies[self._person].model
-        Ts = self._Ts(model.kinematics(pose))
-        samples = self._buffers(self._max_samples * len(self._views))
-        n, first, last = 0, self._own.start, self._own.stop
+        """Return part, colour and view of each visible sample, (n,) each; the views are in their order."""
+        body = self._bodies[self._person]
+        samples, n = self._buffers(self._max_samples * len(self._views)), 0
+        first, last, Ts = self._own.start, self._own.stop, [np.empty(0)] * len(self._views)
+        for moment in self._moments:
+            placed = self._Ts(moment, body.model.kinematics(body.poses_ahead(pose[None], moment.ahead_frames)[0]))
+            for i in moment.views:
+                Ts[i] = placed
         for i, view in enumerate(self._views):
-            end = n + _list_samples(view, Ts, self._shapes, first, last, samples._replace(found=samples.found[n:]))
+            end = n + _list_samples(view, Ts[i], self._shapes, first, last, samples._replace(found=samples.found[n:]))
             samples.found[n:end, 2] = i
             n = end
         return samples.found[:n, 0], samples.found[:n, 1], samples.found[:n, 2]

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance.region_cells import CellView
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import BodyModel, PosedBody, ahead
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
 from tracker.contours.occluding_contours import part_poses
@@ -61,9 +61,9 @@ def draw(meshes: Meshes, P: Array, Ts_world_part: Array, height: int, width: int
 
 
 def draw_bodies(bodies: Sequence[PosedBody], view: CellView) -> Canvas:
-    """Draw all bodies into a view."""
-    meshes = meshes_of(tuple(b.model for b in bodies))
-    return draw(meshes, view.camera.projection, part_poses(bodies), *view.colors.shape[:2])
+    """Draw all bodies into a view, where they are at the time of its picture."""
+    meshes, then = meshes_of(tuple(b.model for b in bodies)), ahead(bodies, view.ahead_frames)
+    return draw(meshes, view.camera.projection, part_poses(then), *view.colors.shape[:2])
 
 
 def grown(canvas: Canvas, margin: float) -> Mask:

@@ -22,6 +22,8 @@ class CellView(NamedTuple):
     """Column and row of the first cell among those of the whole view."""
     colors: Image
     """Mean colour of each cell, (h, w, 3) RGB."""
+    ahead_frames: float = 0.0
+    """Frames by which the picture was taken later than the frame."""
 
 
 def cells_of(view: ViewEvidence) -> CellView | None:
@@ -37,7 +39,8 @@ def cells_of(view: ViewEvidence) -> CellView | None:
     part = view.colors[box[1] : box[3], box[0] : box[2]]
     colors = cv2.resize(part, (columns, rows), interpolation=cv2.INTER_AREA)
     camera = view.camera.cropped(box).scaled(1 / CELL_PX)
-    return CellView(camera, ((u + left) // CELL_PX, (v + top) // CELL_PX), np.asarray(colors, np.uint8))
+    corner = ((u + left) // CELL_PX, (v + top) // CELL_PX)
+    return CellView(camera, corner, np.asarray(colors, np.uint8), view.ahead_frames)
 
 
 def cells_of_image(image: Image) -> Image:

@@ -356,7 +356,13 @@ class PosedBody:
         """Return the body some frames later, or earlier if negative, by its velocity; as it is if that is unknown."""
         if frames == 0.0 or self.velocity is None:
             return self
-        return PosedBody(self.model, self.model.retract(self.values, frames * self.velocity))
+        return PosedBody(self.model, self.poses_ahead(self.values[None], frames)[0])
+
+    def poses_ahead(self, poses: Array, frames: float) -> Array:
+        """Return other poses of the body, (n, n_values), some frames later by the velocity of this one; see `ahead`."""
+        if frames == 0.0 or self.velocity is None:
+            return poses
+        return np.array([self.model.retract(pose, frames * self.velocity) for pose in poses])
 
     @cached_property
     def kinematics(self) -> "Kinematics":

@@ -5,13 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, TIME, corrected
+from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, corrected, later_s
 from tracker.calibration.diagnosis import Diagnosis, Fault
 from tracker.calibration.viewed_frames import ViewedFrame
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 
-WORDS = {"rotation": "turned", "position": "moved", "focal": "zoomed", "time": "shifted in time"}
+WORDS = {
+    "rotation": "turned", "position": "moved", "focal": "zoomed", "time": "shifted in time",
+    "drift": "drifting in time",
+}  # fmt: skip
 """How a camera is said to be off, by the kind of its correction."""
 SEEN_PX = 1.0
 """Misfit below which a camera is not named, px of the footage. Surfaces of acquired bodies are off by about 1 cm, which
@@ -76,8 +79,8 @@ def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tup
         mended = corrected(view, correction)
         for body, velocity in zip(frame.bodies, frame.velocities, strict=True):
             now, then = (
-                body.model.points_world(body.model.retract(body.values, (frame.ahead_s[camera] + later_s) * velocity))
-                for later_s in (0.0, correction[TIME])
+                body.model.points_world(body.model.retract(body.values, (frame.ahead_s[camera] + delay_s) * velocity))
+                for delay_s in (0.0, later_s(correction, frame.time_s))
             )
             moved = np.sum((mended.project(then) - view.project(now)) ** 2, axis=-1)
             px.append(moved / frame.views[camera].scale ** 2)

@@ -24,9 +24,9 @@ from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
 from tracker.geometry.triangulation import MIN_ANGLE_RAD
 
-_NEWS = 0.5
-"""Largest standard deviation of a focal length, as a share of that before, at which observations determine it. At
-a half they have added three times as much as was known."""
+NEWS = 0.5
+"""Largest standard deviation, as a share of that before, at which observations determine a number. At a half they have
+added three times as much as was known."""
 _DEPTH_QUANTILES = (0.05, 0.95)
 """Depths between which observations of a camera count as spread: the few nearest and farthest add little."""
 
@@ -86,7 +86,8 @@ def adjust_points(
         lengths: distances of points; the scale becomes that of their median.
 
     Raises:
-        CalibrationError: fewer than two cameras see a point from different sides, or no known length is determined.
+        CalibrationError: fewer than two cameras see a point from different sides, all points lie on a line, or no known
+            length is determined.
     """
     points, determined = triangulate_all(cameras, observations)
     observed = determined[observations.groups]
@@ -99,11 +100,34 @@ def adjust_points(
         observations.cameras[observed], numbers[observations.groups[observed]], observations.px[observed]
     )
     rig = Rig(tuple(cameras), points[determined])
+    _require_spread(rig, seen)
     fit, held = _fitted(rig, seen, np.full(len(cameras), intrinsics))
     scaled = _scaled(fit.rig, numbers, determined, lengths)
     out = np.full(points.shape, np.nan)
     out[determined] = scaled.own
     return AdjustedPoints(scaled.cameras, out, fit, observed, held)
+
+
+def _require_spread(rig: Rig, seen: Observations) -> None:
+    """Check that the points do not lie on a line, about which a camera could turn with all that it sees.
+
+    They do if most observations are nearer to the line than a pixel, or than their own reprojection error.
+    """
+    middle = rig.own.mean(axis=0)
+    along = np.linalg.svd(rig.own - middle, full_matrices=False)[2][0]
+    on_line = middle + np.outer((rig.own - middle) @ along, along)
+    off_px, errors_px = list[Array](), list[Array]()
+    for i, camera in enumerate(rig.cameras):
+        at = seen.of_camera(i)
+        shown = camera.project(rig.own[seen.groups[at]])
+        off_px.append(np.linalg.norm(camera.project(on_line[seen.groups[at]]) - shown, axis=1))
+        errors_px.append(np.linalg.norm(seen.px[at] - shown, axis=1))
+    off, error = (float(np.nanmedian(np.concatenate(each))) for each in (off_px, errors_px))
+    if off < max(1.0, error):
+        raise CalibrationError(
+            f"expected points that do not all lie on one line, found them {off:.1f} px from it at an error of "
+            f"{error:.1f} px; observe points beside it, or cameras could turn about it"
+        )
 
 
 def _fitted(rig: Rig, seen: Observations, has_free_lens: Mask) -> tuple[RigFit, tuple[str, ...]]:
@@ -114,7 +138,7 @@ def _fitted(rig: Rig, seen: Observations, has_free_lens: Mask) -> tuple[RigFit, 
     problem = PointProblem(seen, Prior(rig.cameras, sigmas), len(rig.own), np.ones(len(rig.cameras)))
     fit = fit_rig(problem, rig)
     after = np.sqrt(np.diag(fit.covariance))[np.array(column_ends(rig.cameras)[:-1]) + FOCAL]
-    is_determined = has_free_lens & (after < _NEWS * CALIBRATED.focal)
+    is_determined = has_free_lens & (after < NEWS * CALIBRATED.focal)
     if np.array_equal(is_determined, has_free_lens):
         return fit, ()
     ratios = depth_ratios(fit.rig, seen)

@@ -1,7 +1,7 @@
 """Fit corrections of cameras, sizes of bodies and poses to the contours of several frames at once.
 
-View c of frame k sees the pose q_k + d_c dq_k/dt. Corrections and sizes are shared unknowns, the pose of each person on
-each frame is their own (`bundle`). Residuals are those of the tracker (`contour_residuals`).
+View c of frame k sees the pose q_k + (d_c + r_c T_k) dq_k/dt. Corrections and sizes are shared unknowns, the pose of
+each person on each frame is their own (`bundle`). Residuals are those of the tracker (`contour_residuals`).
 """
 
 import itertools
@@ -18,7 +18,7 @@ from tracker.acquisition.part_motions import motions_by_unknowns
 from tracker.acquisition.size_parameters import SizeArrays, SizeParameters
 from tracker.body.kinematics import Kinematics
 from tracker.body.model import BodyModel, PosedBody
-from tracker.calibration.camera_correction import N_CORRECTIONS, ROTATION, TIME, corrected, with_step
+from tracker.calibration.camera_correction import N_CORRECTIONS, ROTATION, TIME, corrected, later_s, with_step
 from tracker.calibration.rig_kernels import N_CAMERA, N_PART, sum_pieces
 from tracker.compute.threads import map_parallel
 from tracker.contours.surfaces import Surfaces
@@ -47,6 +47,8 @@ class SeenPerson(NamedTuple):
     """All people; the others occlude."""
     velocity: Array
     """Change of the person's pose, (n_dofs,), rad or metres per second."""
+    time_s: float
+    """Time of the frame, seconds, since that to which drifts are related."""
     ahead_s: Sequence[float]
     """Time by which the picture of each view was taken later than the frame, by the present clocks, seconds."""
 
@@ -195,7 +197,8 @@ class RigProblem:
         sums = GroupSums.zeros(n_cameras, n_sizes + body.n_dofs)
         cost = prior.cost
         for delay, views in itertools.groupby(
-            self._views[group], lambda v: float(seen.ahead_s[v.camera] + state.corrections[v.camera, TIME])
+            self._views[group],
+            lambda v: float(seen.ahead_s[v.camera] + later_s(state.corrections[v.camera], seen.time_s)),
         ):
             assert surfaces is not None
             then = body.retract(pose, delay * seen.velocity) if delay else pose
@@ -210,7 +213,7 @@ class RigProblem:
                 b, M = sums_of_pieces(pieces, body, kinematics, camera, correction)
                 pulls += b[:, :N_PART]
                 of_body += M[:, :N_PART, :N_PART]
-                sums.add_camera(view.camera, b, M, J, moving)
+                sums.add_camera(view.camera, b, M, J, moving, seen.time_s)
             sums.add_body(pulls, of_body, J)
         out = sums.equations(cost)
         out.gradient[n_cameras + n_sizes :] += prior.gradient
@@ -284,7 +287,7 @@ class GroupSums(NamedTuple):
         n = n_cameras + n_body
         return cls(np.zeros(n), np.zeros((n, n)), n_cameras)
 
-    def add_camera(self, camera: int, b: Array, M: Array, J: Array, moving: Array) -> None:
+    def add_camera(self, camera: int, b: Array, M: Array, J: Array, moving: Array, time_s: float) -> None:
         """Add what a view says of its own camera.
 
         Args:
@@ -293,19 +296,21 @@ class GroupSums(NamedTuple):
             M: their normal matrices, (n_parts, k, k).
             J: derivatives of the motions by the unknowns of the body, (n_parts, N_PART, n_body).
             moving: motions of the parts in a second, (n_parts, N_PART).
+            time_s: time of the frame, seconds.
         """
         first = camera * N_CORRECTIONS
-        at, clock, body = slice(first, first + TIME), first + TIME, slice(self.n_cameras, None)
+        at, clock = slice(first, first + TIME), slice(first + TIME, first + N_CORRECTIONS)
+        body, delays_s = slice(self.n_cameras, None), np.array([1.0, time_s])  # by offset and drift
         to_body, to_camera = M[:, :N_PART, :N_PART], M[:, N_PART:, :N_PART]
         moved = np.einsum("pij,pj->pi", to_body, moving)
         self.gradient[at] += b[:, N_PART:].sum(axis=0)
-        self.gradient[clock] += np.sum(b[:, :N_PART] * moving)
+        self.gradient[clock] += np.sum(b[:, :N_PART] * moving) * delays_s
         self.hessian[at, at] += M[:, N_PART:, N_PART:].sum(axis=0)
-        self.hessian[at, clock] += np.einsum("pij,pj->i", to_camera, moving)
-        self.hessian[clock, clock] += np.sum(moved * moving)
+        self.hessian[at, clock] += np.outer(np.einsum("pij,pj->i", to_camera, moving), delays_s)
+        self.hessian[clock, clock] += np.sum(moved * moving) * np.outer(delays_s, delays_s)
         flat = J.reshape(-1, J.shape[2])
         self.hessian[at, body] += to_camera.transpose(1, 0, 2).reshape(TIME, -1) @ flat
-        self.hessian[clock, body] += moved.ravel() @ flat
+        self.hessian[clock, body] += np.outer(delays_s, moved.ravel() @ flat)
 
     def add_body(self, b: Array, M: Array, J: Array) -> None:
         """Add the sums of some views over the motions of the parts; arguments as above, without the corrections."""
@@ -327,8 +332,8 @@ def views_of(seen: SeenPerson, corrections: Array) -> list[SeenView]:
     for i, (view, correction) in enumerate(zip(seen.views, corrections, strict=True)):
         if not len(view.points_px):
             continue
-        later_s = seen.ahead_s[i] + correction[TIME]
-        then = seen.moved(seen.body.model.retract(seen.body.values, later_s * seen.velocity))
+        delay_s = seen.ahead_s[i] + later_s(correction, seen.time_s)
+        then = seen.moved(seen.body.model.retract(seen.body.values, delay_s * seen.velocity))
         evidence = replace(view, camera=corrected(view.camera, correction))
         out.append(SeenView(i, view, ContourResiduals([evidence], then.bodies, seen.person)))
     return out

@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.acquisition.from_contours import own_views
 from tracker.body.model import PosedBody
-from tracker.calibration.camera_correction import TIME, corrected
+from tracker.calibration.camera_correction import corrected, later_s
 from tracker.calibration.rig_problem import RigState, SeenPerson
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, with_all_segments, with_segments
@@ -25,6 +25,8 @@ class ViewedFrame(NamedTuple):
     """All people, as they were tracked."""
     velocities: tuple[Array, ...]
     """Change of each person's pose, (n_dofs,), rad or metres per second."""
+    time_s: float
+    """Time of the frame, seconds, since that to which drifts are related."""
     ahead_s: tuple[float, ...]
     """Time by which the picture of each view was taken later than the frame, by the present clocks, seconds."""
 
@@ -44,18 +46,18 @@ def seen_people(frames: Sequence[ViewedFrame], state: RigState | None = None) ->
         else:
             bodies = tuple(PosedBody(b.model, next(poses)) for b in seen.bodies)
             views = [
-                _accepted(view, _then(bodies, seen.velocities, ahead_s + c[TIME]), c)
+                _accepted(view, _then(bodies, seen.velocities, ahead_s + later_s(c, seen.time_s)), c)
                 for view, ahead_s, c in zip(seen.views, seen.ahead_s, state.corrections, strict=True)
             ]
         for person, velocity in enumerate(seen.velocities):
             own = own_views(views, bodies, person) if len(bodies) > 1 else views
-            out.append(SeenPerson(seen.frame, person, own, bodies, velocity, seen.ahead_s))
+            out.append(SeenPerson(seen.frame, person, own, bodies, velocity, seen.time_s, seen.ahead_s))
     return out
 
 
-def _then(bodies: Sequence[PosedBody], velocities: Sequence[Array], later_s: float) -> list[PosedBody]:
+def _then(bodies: Sequence[PosedBody], velocities: Sequence[Array], delay_s: float) -> list[PosedBody]:
     """Return people as they are some time later."""
-    return [PosedBody(b.model, b.model.retract(b.values, later_s * v)) for b, v in zip(bodies, velocities, strict=True)]
+    return [PosedBody(b.model, b.model.retract(b.values, delay_s * v)) for b, v in zip(bodies, velocities, strict=True)]
 
 
 def _accepted(view: ViewEvidence, bodies: Sequence[PosedBody], correction: Array) -> ViewEvidence:

@@ -65,9 +65,7 @@ class _Group(NamedTuple):
 
     def moved(self, model: BodyModel, poses: Array, velocity: Array) -> Array:
         """Return poses, (n, n_values), at the time of the pictures."""
-        if self.ahead_frames == 0.0:
-            return poses
-        return np.array([model.retract(pose, self.ahead_frames * velocity) for pose in poses])
+        return PosedBody(model, poses[0], velocity).poses_ahead(poses, self.ahead_frames)
 
 
 @dataclass(frozen=True, eq=False)

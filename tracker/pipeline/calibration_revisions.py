@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from tracker.calibration.camera_correction import TIME, corrected
+from tracker.calibration.camera_correction import DRIFT, TIME, corrected
 from tracker.errors import SessionError
 from tracker.files import refuse_links, write_text_atomic
 from tracker.footage.camera_source import Clock
@@ -36,16 +36,20 @@ def apply_check(session: Session, store: AnnotationStore, check: CalibrationChec
     """
     if not check.named:
         raise SessionError("expected a camera that is off, found none; the calibration stays as it is")
-    corrected_session = with_corrections(session, check.corrections)
+    corrected_session = with_corrections(session, check.corrections, check.middle_s)
     return change_calibration(session, store, corrected_session, f"calibration of {', '.join(check.named)} corrected")
 
 
-def with_corrections(session: Session, corrections: Array) -> Session:
-    """Return a session with corrected cameras, (V, N_CORRECTIONS). Nothing is stored."""
+def with_corrections(session: Session, corrections: Array, middle_s: float = 0.0) -> Session:
+    """Return a session with corrected cameras, (V, N_CORRECTIONS). Nothing is stored.
+
+    Offsets of the corrections are those at the time `middle_s`, seconds; those of clocks are at frame 0.
+    """
     cameras = []
     for source, c in zip(session.cameras, corrections, strict=True):
-        ahead = source.clock.ahead_frames + float(c[TIME]) * session.fps
-        clock = replace(source.clock, ahead_frames=ahead) if c[TIME] else source.clock
+        before = source.clock
+        late_s = float(c[TIME] - c[DRIFT] * middle_s)
+        clock = Clock(before.ahead_frames + late_s * session.fps, before.rate + float(c[DRIFT]))
         cameras.append(replace(source, camera=corrected(source.camera, c), clock=clock))
     return replace(session, cameras=tuple(cameras))
 
@@ -61,9 +65,8 @@ def change_calibration(session: Session, store: AnnotationStore, changed: Sessio
     """
     before, after = _number(store, _content(session)), _number(store, _content(changed))
     forget_unfinished(store)  # An interrupted run would go on under another calibration.
-    edit = store.commit(label, []).edit
     edits = store.setting(CALIBRATION_EDITS, {})
-    store.set_setting(CALIBRATION_EDITS, {**edits, str(edit): [before, after]})
+    store.commit(label, [], settings=lambda edit: {CALIBRATION_EDITS: {**edits, str(edit): [before, after]}})
     return _write(session, _content(changed))
 
 
@@ -76,7 +79,8 @@ def follow_history(session: Session, store: AnnotationStore) -> Session:
     known, present = store.setting(CALIBRATIONS, []), _content(session)
     if revision is None or _same(present, known[revision - 1]):
         return session
-    if not any(_same(present, content) for content in known):
+    # A change that was cut off has the cameras of one revision and the clocks of another.
+    if not all(any(_same({**c, **{part: present[part]}}, c) for c in known) for part in ("toml", "clocks")):
         return session
     return _write(session, known[revision - 1])
 

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple, Protocol
 
 from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
+from tracker.pipeline.calibration_check import contradiction
+from tracker.pipeline.posed_recording import PosedRecording
 from tracker.pipeline.run_repair import RepairStep, RunRepair
 from tracker.pipeline.smoothing import TrackedRows
 from tracker.pipeline.tracked_changes import StoredPerson, tracked_changes
@@ -41,9 +43,16 @@ class AuditStep(NamedTuple):
     total: int
 
 
-Step = PoseEstimate | BackwardStep | AuditStep | RepairStep | SmoothedRows
+class CameraStep(NamedTuple):
+    """The poses of a finished run contradict the calibration."""
+
+    contradiction: str
+    """A sentence for the user."""
+
+
+Step = PoseEstimate | BackwardStep | AuditStep | RepairStep | SmoothedRows | CameraStep
 """A step of a run: a tracked frame of the first pass, a visit to a frame of the second, a frame of the audit or of the
-repair, or all smoothed poses."""
+repair, all smoothed poses, or a camera that is off."""
 
 
 RunChange = PoseChange | AssessmentChange
@@ -150,10 +159,9 @@ def _with_starts(legs: Sequence[Leg]) -> Subjects:
 class TrackSession:
     """One run of a tracker and its results so far. It has one leg, or two that go out from a start.
 
-    `first_pass`, `backward_pass`, `audit`, `repair` and `smoothing` do the work in this order. Another thread than the
-    one that reads results may drain them. Each step is handed to `take` before the next one is asked for: its caller
-    holds whatever lock guards the results and the writer. A run stops where its steps are no longer asked for, and goes
-    on where they are again.
+    `first_pass`, `backward_pass`, `audit`, `repair`, `smoothing` and `cameras` do the work in this order. Any
+    thread may drain them. Each step is handed to `take` before the next one is asked for, under the lock of results and
+    writer. A run stops where its steps are no longer asked for, and goes on where they are again.
     """
 
     def __init__(
@@ -191,6 +199,8 @@ class TrackSession:
         """The frame that the backward pass visited last; None before it."""
         self.finished = False
         """Whether both passes and smoothing are done."""
+        self.contradiction = ""
+        """A sentence if the contours contradict the calibration; empty before the end, or if they do not."""
         self._held = _with_starts(legs)
         self._rows = {i: (rows_before or {}).get(i, TrackedRows()) for i in self.subjects.tracked}
         self._waiting: list[PoseChange] = []
@@ -218,12 +228,13 @@ class TrackSession:
         return next((a, b) for a, b in known if min(a, b) <= frame <= max(a, b))
 
     def steps(self) -> Iterator[Step]:
-        """Run both passes, audit, repair and smooth the poses."""
+        """Run both passes, audit, repair and smooth the poses, and look at the cameras."""
         yield from self.first_pass()
         yield from self.backward_pass()
         yield from self.audit()
         yield from self.repair()
         yield from self.smoothing()
+        yield from self.cameras()
 
     def first_pass(self) -> Iterator[PoseEstimate]:
         """Track the frames of each leg."""
@@ -287,6 +298,13 @@ class TrackSession:
             )
         self.finished = True
 
+    def cameras(self) -> Iterator[CameraStep]:
+        """Look whether the contours contradict the calibration; see `contradiction`."""
+        if len(self.subjects.tracked) == len(self._stored):  # Contours of other people would contradict it.
+            fps, models = self.legs[0].run.fps, self.subjects.models
+            if found := contradiction(PosedRecording.of_run(self.observer, fps, models, self.tracked)):
+                yield CameraStep(found)
+
     def _assessed_keyframes(self, person: int) -> list[AssessmentChange]:
         keyframes = {k: own[person] for k, own in self.subjects.keyframes.items() if person in own}
         name = self._stored[person].name
@@ -302,6 +320,9 @@ class TrackSession:
             return
         if isinstance(step, SmoothedRows):
             self._take_finished(step)
+            return
+        if isinstance(step, CameraStep):
+            self.contradiction = step.contradiction
             return
         if isinstance(step, AuditStep):
             for person, tracks in step.tracks.items():
@@ -359,10 +380,12 @@ class TrackSession:
     def _take_finished(self, step: SmoothedRows) -> None:
         self.save()
         for i, person in enumerate(self._stored):
-            statuses = {c.frame: c.pose.status for c in step.changes if c.person == person.name and c.pose is not None}
+            poses = {c.frame: c.pose for c in step.changes if c.person == person.name and c.pose is not None}
+            statuses = {k: pose.status for k, pose in poses.items()}
             statuses |= {c.frame: c.status for c in step.keyframes if c.person == person.name}
             for frame in statuses.keys() & self.tracked.keys():
-                self.tracked[frame] = self.tracked[frame].with_status(i, status_named(statuses[frame]))
+                values = poses[frame].values if frame in poses else None
+                self.tracked[frame] = self.tracked[frame].assessed(i, status_named(statuses[frame]), values)
         self._write([*step.changes, *step.keyframes])
         self.finished = True
 

@@ -87,7 +87,7 @@ class ChamferCost:
         self._threads = min(threads, os.cpu_count() or 1)
         self.models: tuple[BodyModel, ...] = tuple(b.model for b in predicted)
         self.outliers = outliers
-        self._velocities = [b.velocity for b in predicted]
+        self._predicted = predicted
         self._times = np.array([v.ahead_frames for v in views])
         self._surfaces = surfaces_of(self.models)
         self._scales = np.array([v.scale for v in views])
@@ -168,16 +168,13 @@ class ChamferCost:
 
         Views of other times than the frame's see the poses moved by the velocities of the predicted bodies.
         """
-        if not self._times.any() or all(v is None for v in self._velocities):
+        if not self._times.any() or all(b.velocity is None for b in self._predicted):
             return self._directed_on_frame(person, candidates, poses)
         directed = np.empty((len(candidates), len(self._seen), 2))
         for time in np.unique(self._times):
-            steps = [None if v is None else time * v for v in self._velocities]
-            then = [p if s is None else m.retract(p, s) for m, p, s in zip(self.models, poses, steps, strict=True)]
-            own = steps[person]
-            moved = candidates if own is None else [self.models[person].retract(c, own) for c in candidates]
-            at = self._times == time
-            directed[:, at] = self._directed_on_frame(person, np.asarray(moved), then)[:, at]
+            then = [b.poses_ahead(p[None], time)[0] for b, p in zip(self._predicted, poses, strict=True)]
+            at, moved = self._times == time, self._predicted[person].poses_ahead(candidates, time)
+            directed[:, at] = self._directed_on_frame(person, moved, then)[:, at]
         return directed
 
     def _directed_on_frame(self, person: int, candidates: Array, poses: Sequence[Array]) -> Array:

@@ -6,7 +6,8 @@ state and head are changed in place.
 
 import json
 import secrets
-from collections.abc import Callable, Sequence
+import sqlite3
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -135,7 +136,10 @@ class AnnotationStore:
             lambda row: rows.row_to_pin(row, f"a pin of {person!r} in frame {frame}"),
         )
 
-    def commit(self, label: str, changes: Sequence[Change], author: str = "", by_program: bool = False) -> Committed:
+    def commit(
+        self, label: str, changes: Sequence[Change], author: str = "", by_program: bool = False,
+        settings: Callable[[int], Mapping[str, Any]] = lambda edit: {},
+    ) -> Committed:  # fmt: skip
         """Make changes as one edit, which one undo reverts.
 
         Args:
@@ -143,9 +147,12 @@ class AnnotationStore:
             changes: poses and pins to set or clear.
             author: name of the person who makes it.
             by_program: leave keyframes unchanged.
+            settings: returns settings that name the number of the edit; they are stored with it or not at all.
         """
         with self._connection.transaction() as db:
             edit = self._edits.add(db, label, author)
+            for key, value in settings(edit).items():
+                _store_setting(db, key, value)
             return Committed(edit, write_changes(db, edit, changes, by_program))
 
     def amend(self, edit: int, changes: Sequence[Change], by_program: bool = False) -> tuple[tuple[str, int], ...]:
@@ -258,7 +265,7 @@ class AnnotationStore:
     def set_setting(self, key: str, value: Any) -> None:
         """Store a setting of the session. Settings are not part of the history."""
         with self._connection.transaction() as db:
-            db.execute("INSERT OR REPLACE INTO settings (key, value) VALUES (?, ?)", (key, json.dumps(value)))
+            _store_setting(db, key, value)
 
     def _records(self, sql: str, person: str, frames: range) -> dict[int, PoseRecord]:
         """Read frames and poses of a person, by frame."""
@@ -277,3 +284,7 @@ class AnnotationStore:
         return self._connection.all(
             sql, (person, frames.start, frames.stop - 1), lambda row: convert(row, rows.PoseLabel(person, row[0]))
         )
+
+
+def _store_setting(db: sqlite3.Connection, key: str, value: Any) -> None:
+    db.execute("INSERT OR REPLACE INTO settings (key, value) VALUES (?, ?)", (key, json.dumps(value)))

@@ -75,9 +75,11 @@ class TrackedFrame(NamedTuple):
         alternatives = tuple(tuple(a.values for a in of_one) for of_one in estimate.alternatives)
         return cls(estimate.frame, estimate.poses, estimate.statuses, alternatives)
 
-    def with_status(self, person: int, status: Status) -> "TrackedFrame":
-        """Return the same with another status of a person."""
-        return self._replace(statuses=(*self.statuses[:person], status, *self.statuses[person + 1 :]))
+    def assessed(self, person: int, status: Status, pose: Array | None = None) -> "TrackedFrame":
+        """Return the same with another status of a person, and with another pose, (n_values,), if one is given."""
+        statuses = (*self.statuses[:person], status, *self.statuses[person + 1 :])
+        poses = self.poses if pose is None else (*self.poses[:person], pose, *self.poses[person + 1 :])
+        return self._replace(poses=poses, statuses=statuses)
 
 
 class BackwardStep(NamedTuple):

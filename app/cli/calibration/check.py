@@ -63,7 +63,8 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
     """
     from tracker.evidence.observer import Observer
     from tracker.footage.recording import Recording
-    from tracker.pipeline.calibration_check import PosedRecording, check_calibration, held_out_scores
+    from tracker.pipeline.calibration_check import check_calibration, held_out_scores
+    from tracker.pipeline.posed_recording import PosedRecording
     from tracker.session.relink import require_files
 
     require_files(session)
@@ -72,7 +73,7 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
         def report(stage: str, share: float, text: str = "", /) -> None:
             advance(share)
 
-        posed = PosedRecording(session, Observer(session.cameras, recording))
+        posed = PosedRecording.of_session(session, Observer(session.cameras, recording))
         found = check_calibration(posed, frames, n, report)
         scores = held_out_scores(posed, found, n, report) if found.named else []
     out = _as_json(found, scores)
@@ -83,7 +84,7 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
 
 def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameScore"]]) -> list[str]:
     """Correct the named cameras; return their names."""
-    from tracker.pipeline.calibration_revisions import apply_check
+    from tracker.pipeline.calibration_revisions import apply_check, follow_history
     from tracker.session.lock import SessionLock
     from tracker.store.annotation_store import AnnotationStore
 
@@ -91,6 +92,11 @@ def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["Fr
         return []
     found.require_applicable(scores)
     with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
+        if follow_history(session, store) is not session:
+            raise TrackerError(
+                "expected the calibration that was checked, found one that an interrupted correction had left; it is "
+                "restored, so check it again"
+            )
         apply_check(session, store, found)
     return list(found.named)
 
@@ -107,6 +113,7 @@ def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameS
             "held_out_frames": len(scores),
             "held_out_better": n_better(scores),
             "sentences": found.sentences,
+            "notes": list(found.notes),
         },
     }
 
@@ -127,7 +134,9 @@ def _camera(finding: "CameraFinding", since: int | None) -> dict[str, Any]:
 
 
 def _format(found: dict[str, Any]) -> str:
-    lines = found["explained"]["sentences"] or ["no camera is off: the contours agree with the calibration"]
+    lines, notes = list(found["explained"]["sentences"]), found["explained"]["notes"]
+    if len(lines) == len(notes):
+        lines = ["no camera is off: the contours agree with the calibration", *notes]
     for camera in found["cameras"]:
         if camera["kind"] is not None:
             lines = [*lines, *_correction_lines(camera)]
@@ -135,7 +144,8 @@ def _format(found: dict[str, Any]) -> str:
     if n:
         lines = [*lines, f"of {n} other frames, {found['explained']['held_out_better']} fit better with it"]
     if found.get("applied"):
-        lines = [*lines, "corrected; track again, because the poses are still those of the calibration before"]
+        before = "poses and acquired sizes are still those of the calibration before"
+        lines = [*lines, f"corrected; acquire the sizes again, if they were acquired, and track again: {before}"]
     elif found["named"]:
         lines = [*lines, "say --apply to correct it"]
     return "\n".join(lines)
@@ -154,4 +164,8 @@ def _correction_lines(camera: dict[str, Any]) -> list[str]:
         )
     if camera["time_ms"]:
         lines.append(f"  {camera['name']} clock: {camera['time_ms']:+.1f} ± {sigma['time_ms']:.1f} ms")
+    if camera["time_ms"] or camera["drift_ms_per_s"]:
+        drift, deviation = camera["drift_ms_per_s"], sigma["drift_ms_per_s"]
+        told = f"{drift:+.2f} ± {deviation:.2f}" if drift else f"not determinable, ± {deviation:.2f}"
+        lines.append(f"  {camera['name']} drift of the clock: {told} ms a second")
     return lines

@@ -110,7 +110,7 @@ class CostLandscapes:
         key = (state.frame, person, dof, state.settings, *map(id, poses))
         if views is None or not self._pages or key == self._computed:
             return
-        found = landscape(views, state.models, poses, state.settings, person, dof)
+        found = landscape(views, state.models, poses, state.settings, person, dof, state.velocities)
         self._computed = key
         self._session_state.set(landscape=found)
 
@@ -132,6 +132,7 @@ def landscape(
     settings: TrackSettings,
     person: int,
     dof: int,
+    velocities: Sequence[Array | None] = (),
 ) -> CostLandscape:
     """Score a person at many values of one degree of freedom within its limits, with all others fixed.
 
@@ -142,6 +143,7 @@ def landscape(
         settings: outlier distance and treatment of outliers.
         person: index of the person.
         dof: index of the degree of freedom.
+        velocities: of each person, if known, see `pose_cost`.
     """
     model = models[person]
     current = current_value(model, poses[person], dof)
@@ -149,7 +151,7 @@ def landscape(
     low, high = model.limits[dof] if _is_plain(model, dof) else (-np.inf, np.inf)
     low, high = (low if np.isfinite(low) else current - reach), (high if np.isfinite(high) else current + reach)
     values = np.linspace(min(low, current), max(high, current), SAMPLES)
-    cost = pose_cost(views, models, poses, settings)
+    cost = pose_cost(views, models, poses, settings, velocities)
     totals_px, view_costs_px = cost.of_person(person, along(model, poses[person], dof, values), poses)
     return CostLandscape(person, dof, current, cost(poses).total_px, values, totals_px, view_costs_px)
 

@@ -114,7 +114,7 @@ class CostMaps:
         key = (state.frame, person, dofs, state.settings, state.revisions, *(Identity(v) for v in state.poses))
         if key == self._computed or not self._is_valid(state, person, dofs):
             return
-        bodies = tuple(PosedBody(m, v) for m, v in zip(state.models, state.poses, strict=True))
+        bodies = tuple(map(PosedBody, state.models, state.poses, map(state.velocity, range(len(state.models)))))
         found = cost_map(views, bodies, person, dofs, state.settings)
         self._computed = key
         self._session_state.set(cost_map=found)

@@ -229,7 +229,7 @@ _TRACKING = "expected no tracking run at work, found one; the reason follows at 
 
 
 def _bodies(state: State, people: Sequence[int]) -> Bodies:
-    return tuple(PosedBody(state.models[i], state.people[i].values) for i in people)
+    return tuple(PosedBody(state.models[i], state.people[i].values, state.velocity(i)) for i in people)
 
 
 def _ingredients(state: State) -> tuple[object, ...]:

@@ -197,7 +197,7 @@ class SearchRunner:
                 views = session_state.frames.evidence(frame)
                 if plan is not None:
                     return contour_steps(views, poses, plan)
-                return search_frame(views, subjects, poses, settings)
+                return search_frame(views, subjects, poses, settings, state.velocities)
 
             job: Job[SearchStep] = Job(
                 steps,

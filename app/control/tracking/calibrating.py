@@ -16,17 +16,17 @@ from app.state.calibration import CorrectedFrame
 from app.state.state import State
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.body.model import PosedBody
-from tracker.calibration.camera_correction import TIME, corrected
+from tracker.calibration.camera_correction import corrected, later_s
 from tracker.calibration.diagnosis import prior_sigmas
 from tracker.calibration.single_frames import score_frame
 from tracker.errors import TrackerError
 from tracker.pipeline.calibration_check import (
     CalibrationCheck,
-    PosedRecording,
     check_calibration,
     held_out_scores,
     n_better,
 )
+from tracker.pipeline.posed_recording import PosedRecording
 
 _LOG = logging.getLogger(__name__)
 _STEPS = 100
@@ -185,7 +185,7 @@ class Calibrating:
             self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
 
     def _recording(self) -> PosedRecording:
-        return PosedRecording(self._session_state.session, self._session_state.frames.observer)
+        return PosedRecording.of_session(self._session_state.session, self._session_state.frames.observer)
 
     def _report(self, stage: str, share: float, text: str = "", /) -> None:
         if self._stopping.is_set():
@@ -229,7 +229,7 @@ class Calibrating:
         models = [p.body(s) for p, s in zip(parameters, sizes, strict=True)]
         bodies = tuple(
             tuple(
-                PosedBody(model, model.retract(values, (ahead_s + c[TIME]) * speed))
+                PosedBody(model, model.retract(values, (ahead_s + later_s(c, seen.time_s)) * speed))
                 for model, values, speed in zip(models, after.poses, seen.velocities, strict=True)
             )
             for ahead_s, c in zip(seen.ahead_s, check.corrections, strict=True)

@@ -15,7 +15,7 @@ from app.state.people import ShownPose
 from app.state.progress import TrackState
 from app.state.run_choices import RunChoices
 from app.state.state import StateChanges, finite_or_none
-from tracker.errors import TrackerError
+from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.pipeline.methods import make_tracker
@@ -284,7 +284,7 @@ class Tracking:
                 elif isinstance(step, BackwardStep):
                     self._show_improved(run, step, seconds)
                     self._session_state.refresh_saving()
-                else:
+                elif isinstance(step, PoseEstimate):
                     self._show_tracked(run, step, seconds)
 
     def _show_finished(self, run: _Run) -> None:
@@ -391,9 +391,10 @@ class Tracking:
         run.job.discard()
         if tracked:
             self.after_run(range(min(tracked), max(tracked) + 1))
-        self._session_state.set(
-            track=TrackState(message=f"{how}: {_summary(len(run.session.tracked), track)}", failed=failed)
-        )
+        message = f"{how}: {_summary(len(run.session.tracked), track)}"
+        text = run.session.contradiction
+        notice = f"{page_text(text[:1].upper() + text[1:], Remedy('check_cameras'))}." if text else failed * message
+        self._session_state.set(track=TrackState(message=message, failed=failed, notice=notice))
         run.on_end(how == "done")
 
 

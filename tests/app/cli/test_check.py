@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from command_line import SAMPLE, assert_refused
 
+from app.cli.track_report import format_summary
 from tracker.calibration.camera_correction import corrected
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.store.annotation_store import AnnotationStore
@@ -26,7 +27,7 @@ def posed(run, session):
 def turn(session, name, yaw_deg):
     """Turn a camera in the calibration, as if it had been knocked since."""
     path = session / "calibration.toml"
-    off = np.radians([0, yaw_deg, 0, 0, 0, 0, 0, 0])
+    off = np.radians([0, yaw_deg, 0, 0, 0, 0, 0, 0, 0])
     cameras = read_calibration(path)
     assert name in [c.name for c in cameras]
     write_calibration(path, [corrected(c, off) if c.name == name else c for c in cameras])
@@ -52,6 +53,19 @@ def test_a_turned_camera_is_named_corrected_and_undone(run, posed):
     with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
         assert store.history(1)[0].label == "calibration of LEFT corrected"
     assert json.loads(run("check", posed, "--json")[1])["named"] == []
+
+
+@pytest.mark.slow
+def test_the_end_of_a_run_says_that_a_camera_is_off_and_nothing_of_healthy_ones(run, posed):
+    words = ("track", posed, "--frames", "10:44", "--no-audit", "--json")
+    assert json.loads(run(*words)[1])["contradiction"] is None
+    turn(posed, "LEFT", 1.5)
+    summary = json.loads(run(*words)[1])
+    assert "camera LEFT is" in summary["contradiction"]
+    assert "px off in its pictures" in format_summary(summary)
+    assert "quadrille check measures it" in format_summary(summary)
+    few = (*words[:3], "10:30", *words[4:])  # not 20 frames with two on both sides
+    assert json.loads(run(*few)[1])["contradiction"] is None
 
 
 @pytest.mark.slow

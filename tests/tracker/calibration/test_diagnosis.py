@@ -5,8 +5,8 @@ import pytest
 from rig_scenes import FPS, NAMES, nothing_seen, person_of, turned, viewed
 
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.calibration.camera_correction import ROTATION, TIME, with_step
-from tracker.calibration.diagnosis import diagnose
+from tracker.calibration.camera_correction import DRIFT, N_CORRECTIONS, ROTATION, TIME, with_step
+from tracker.calibration.diagnosis import diagnose, glance
 from tracker.calibration.findings import SEEN_PX, findings, misfit, sentence
 from tracker.formats.model_toml import load_model
 
@@ -32,10 +32,33 @@ def test_a_turned_camera_is_named_and_mended():
     assert "camera cam2 is turned" in sentence(cameras[2])
 
 
+def test_a_glance_names_a_turned_camera_and_no_healthy_one():
+    for off, expected in (({2: turned(yaw_deg=0.8)}, ["cam2"]), ({}, [])):
+        frames = viewed(off, range(3))
+        found = glance(frames, [SizeParameters(frames[0].bodies[0].model)], FPS)
+        assert named(findings(found, frames, NAMES)) == expected
+
+
+@pytest.mark.slow
+def test_a_clock_that_runs_at_another_rate_is_told_from_one_that_is_late():
+    off = np.zeros(N_CORRECTIONS)
+    off[TIME], off[DRIFT] = 0.01, 0.03
+    diagnosis, cameras = check(viewed({1: off}, range(0, 60, 6)))
+    assert cameras[1].kinds in (("time", "drift"), ("drift", "time"))
+    found, sigma = diagnosis.corrections[1], diagnosis.sigmas(1)
+    assert found[DRIFT] == pytest.approx(0.03, abs=0.003)
+    assert np.abs(found - off)[[TIME, DRIFT]] == pytest.approx(0, abs=4 * sigma[[TIME, DRIFT]].max())
+    assert "drifting in time" in sentence(cameras[1])
+    late = np.zeros(N_CORRECTIONS)
+    late[TIME] = 0.02
+    _, cameras = check(viewed({1: late}, range(0, 60, 6)))
+    assert cameras[1].kinds == ("time",)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["position", "focal", "time"])
 def test_other_faults_are_named_by_their_kind(kind):
-    off = np.zeros(8)
+    off = np.zeros(N_CORRECTIONS)
     off[{"position": 3, "focal": 6, "time": TIME}[kind]] = {"position": 0.04, "focal": 0.05, "time": 0.02}[kind]
     _, cameras = check(viewed({1: off}))
     assert named(cameras) == ["cam1"]

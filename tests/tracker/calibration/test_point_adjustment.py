@@ -132,3 +132,14 @@ def test_points_of_one_camera_are_refused():
     points, determined = triangulate_all(cameras, seen)
     assert determined.all()
     np.testing.assert_allclose(points, cloud(5), atol=0.02)
+
+
+@pytest.mark.parametrize("sigma_px", [0.0, 0.5])
+def test_points_on_a_line_are_refused(sigma_px):
+    cameras = ring_of(3)
+    line = np.linspace([-0.5, -0.2, 0.9], [0.6, 0.3, 1.4], 30)
+    for start in (cameras, moved_rig(cameras, degrees=0.3, metres=0.01)):
+        with pytest.raises(CalibrationError, match="do not all lie on one line"):
+            adjust_points(start, seen_points(cameras, line, sigma_px))
+    beside = np.concatenate([line[::5], line[::5] + np.array([0.0, 0.0, 0.3])])
+    assert len(adjust_points(cameras, seen_points(cameras, beside, sigma_px)).cameras) == 3

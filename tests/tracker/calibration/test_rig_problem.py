@@ -7,14 +7,14 @@ from rig_scenes import CAMERAS, viewed
 
 from tracker.acquisition.part_motions import motions_by_unknowns, rows_of_pieces
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.calibration.camera_correction import N_CORRECTIONS, corrected
+from tracker.calibration.camera_correction import DRIFT, N_CORRECTIONS, TIME, corrected
 from tracker.calibration.diagnosis import prior_sigmas
 from tracker.calibration.rig_kernels import N_PART
 from tracker.calibration.rig_problem import GroupSums, RigProblem, RigState, sums_of_pieces
 from tracker.calibration.viewed_frames import seen_people
 from tracker.fitting.contour_residuals import ContourResiduals
 
-CORRECTION = np.array([0.004, -0.003, 0.002, 0.01, -0.005, 0.01, 0.003, 0.0])
+CORRECTION = np.array([0.004, -0.003, 0.002, 0.01, -0.005, 0.01, 0.003, 0.0, 0.0])
 
 
 @pytest.fixture(scope="module")
@@ -45,13 +45,14 @@ def test_sums_are_converted_as_all_columns_at_once(pieces):
     b, M = sums_of_pieces(sums, body.model, body.kinematics, camera, CORRECTION)
     moving = J[:, :, -len(velocity) :] @ velocity
     found = GroupSums.zeros(2 * N_CORRECTIONS, J.shape[2])
-    found.add_camera(1, b, M, J, moving)
+    found.add_camera(1, b, M, J, moving, 0.7)
     found.add_body(b[:, :N_PART], M[:, :N_PART, :N_PART], J)
     n_parts, n = len(J), 2 * N_CORRECTIONS + J.shape[2]
     whole = np.zeros((n_parts, M.shape[1], n))
     whole[:, :N_PART, 2 * N_CORRECTIONS :] = J
-    whole[:, N_PART:, N_CORRECTIONS : 2 * N_CORRECTIONS - 1] = np.eye(N_CORRECTIONS - 1)
-    whole[:, :N_PART, 2 * N_CORRECTIONS - 1] = moving
+    whole[:, N_PART:, N_CORRECTIONS : N_CORRECTIONS + TIME] = np.eye(TIME)
+    whole[:, :N_PART, N_CORRECTIONS + TIME] = moving
+    whole[:, :N_PART, N_CORRECTIONS + DRIFT] = 0.7 * moving
     equations = found.equations(0.0)
     np.testing.assert_allclose(equations.gradient, np.einsum("pik,pi->k", whole, b), atol=1e-6)
     expected = np.sum(whole.transpose(0, 2, 1) @ M @ whole, axis=0)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from rig_scenes import FPS
 
+from tracker.calibration.camera_correction import N_CORRECTIONS
 from tracker.calibration.diagnosis import prior_sigmas
 from tracker.calibration.single_frames import FrameScore, find_change
 from tracker.calibration.viewed_frames import spread_poses
@@ -17,10 +18,10 @@ def scores(since, n=20, shift=0.01, sharpness=1e6, seed=0):
     """Scores of frames with one camera, turned by an angle from a frame on, as its contours would show with noise."""
     random, out = np.random.default_rng(seed), []
     for k in range(n):
-        true = np.zeros(8)
+        true = np.zeros(N_CORRECTIONS)
         true[1] = shift * (k >= since)
-        H = np.eye(8) * sharpness
-        out.append(FrameScore(k, 0.0, -H @ (true + random.normal(scale=sharpness**-0.5, size=8)), H))
+        H = np.eye(N_CORRECTIONS) * sharpness
+        out.append(FrameScore(k, 0.0, -H @ (true + random.normal(scale=sharpness**-0.5, size=N_CORRECTIONS)), H))
     return out
 
 

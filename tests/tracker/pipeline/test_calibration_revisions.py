@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from command_line import SAMPLE
 
-from tracker.calibration.camera_correction import N_CORRECTIONS
+from tracker.calibration.camera_correction import DRIFT, N_CORRECTIONS, TIME
 from tracker.errors import SessionError
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model
@@ -65,6 +65,14 @@ def test_a_changed_calibration_follows_undo_and_redo(session, store):
     changed = follow_history(changed, store)
     np.testing.assert_allclose(changed.cameras[0].camera.T_world_camera, after, atol=1e-9)
     np.testing.assert_allclose(stands(session), after, atol=1e-9)
+
+
+def test_a_drift_that_was_told_about_the_middle_is_stored_from_frame_0(session):
+    corrections = np.zeros((len(session.cameras), N_CORRECTIONS))
+    corrections[1, [TIME, DRIFT]] = 0.01, 0.004
+    clock = with_corrections(session, corrections, middle_s=2.0).cameras[1].clock
+    late_s = [clock.ahead(t * session.fps) / session.fps for t in (0.0, 2.0, 3.0)]
+    assert late_s == pytest.approx([0.002, 0.01, 0.014])
 
 
 def test_poses_name_the_calibration_that_they_were_made_with(session, store):

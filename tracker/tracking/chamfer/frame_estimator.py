@@ -38,7 +38,7 @@ class ChamferEstimator(FrameEstimator):
         residuals = problem.residuals(person, bodies)
         evaluations, pose = self._search(person, bodies[person].values, self._track_settings.search)
         blocks = [residuals, *problem.priors(person, bodies)]
-        body = PosedBody(bodies[person].model, pose)
+        body = PosedBody(bodies[person].model, pose, bodies[person].velocity)
         fit = problem.solve(person, pose, blocks, max_iterations=0)
         return PersonFit(residuals, with_body(bodies, person, body), fit, body, evaluations=evaluations, trace=None)
 
@@ -50,6 +50,7 @@ class ChamferEstimator(FrameEstimator):
         poses = [b.values for b in around]
         poses[index] = start
         evaluations, found = 0, start
-        for step in search_frame(self.problem.views, subjects, poses, replace(self._track_settings, search=how)):
+        velocities, settings = [b.velocity for b in around], replace(self._track_settings, search=how)
+        for step in search_frame(self.problem.views, subjects, poses, settings, velocities):
             found, evaluations = step.best[index], step.evaluations
         return evaluations, with_locked_dofs(self.bodies[person].model, found, start, active)

@@ -35,10 +35,14 @@ class TrackSettings(EstimationSettings):
 
 
 def pose_cost(
-    views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array], settings: TrackSettings
-) -> ChamferCost:
-    """Return the cost function around given poses, (n_values,) each: a search from them minimizes it."""
-    return chamfer_cost(views, [PosedBody(m, p) for m, p in zip(models, poses, strict=True)], settings)
+    views: Sequence[ViewEvidence], models: Sequence[BodyModel], poses: Sequence[Array], settings: TrackSettings,
+    velocities: Sequence[Array | None] = (),
+) -> ChamferCost:  # fmt: skip
+    """Return the cost function around given poses, (n_values,) each: a search from them minimizes it.
+
+    The velocities of the people, if given, move them to the time of each picture.
+    """
+    return chamfer_cost(views, list(map(PosedBody, models, poses, velocities or [None] * len(poses))), settings)
 
 
 def search_frame(
@@ -46,6 +50,7 @@ def search_frame(
     subjects: Subjects,
     predicted: Sequence[Array],
     settings: TrackSettings,
+    velocities: Sequence[Array | None] = (),
 ) -> Iterator[SearchStep]:
     """Search the poses of one frame best first, step by step; see `search`.
 
@@ -54,8 +59,9 @@ def search_frame(
         subjects: bodies, whom to search, and what may move; keyframes are not used.
         predicted: the pose of each person to begin from, (n_values,).
         settings: of the tracker.
+        velocities: of each person, if known, see `pose_cost`.
     """
-    cost = pose_cost(views, subjects.models, predicted, settings)
+    cost = pose_cost(views, subjects.models, predicted, settings, velocities)
     active = [
         np.ones(m.n_dofs, dtype=bool) if a is None else a
         for m, a in zip(subjects.models, subjects.active_dofs, strict=True)

@@ -6,7 +6,7 @@ frames. Therefore the candidates of both are propagated to neighbouring frames, 
 interval is selected (`pose_paths`).
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import takewhile
@@ -30,6 +30,7 @@ from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cos
 from tracker.tracking.subjects import Keyframes
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.view_regions import regions
+from tracker.tracking.view_tracks import velocities_of
 
 _TRUSTED_FRAMES = 3
 """Number of good frames in a row that end an interval, and from which its motion is predicted. A lost limb may look
@@ -157,6 +158,9 @@ class _PathSelection:
         self._person, (first, end) = interval.person, (interval.frames.start, interval.frames.stop)
         self._model, self._active_dofs = self._models[self._person], run.subjects.active_dofs[self._person]
         self._before, self._after = tracked[max(0, first - 2) : first], tracked[end : end + 2]
+        self._velocities: Callable[[int], list[Array | None]] = lambda frame: [None] * len(self._models)
+        if any(any(run.observer.ahead_frames(f.frame)) for f in tracked[first : end + 1]):
+            self._velocities = velocities_of(self._models, {f.frame: f.poses for f in tracked})
         self._forward, self._backward = tracked[first:end], backward
         self._part_colors: PartColors | None = None
         for good in (*self._before[-1:], self._after[0]):
@@ -195,7 +199,7 @@ class _PathSelection:
     def _bodies(self, i: int, pose: Array) -> Bodies:
         """Return all people on a frame of the interval, the person in a pose, (n_values,)."""
         poses = [pose if p == self._person else v for p, v in enumerate(self._forward[i].poses)]
-        return tuple(PosedBody(m, p) for m, p in zip(self._models, poses, strict=True))
+        return tuple(map(PosedBody, self._models, poses, self._velocities(self._forward[i].frame)))
 
     def _make_scorer(self, i: int) -> PoseScorer:
         bodies = self._bodies(i, self._forward[i].poses[self._person])
@@ -213,7 +217,7 @@ class _PathSelection:
         candidates, views, settings = self._candidates[i], self._views(i), self._settings
         bodies = self._bodies(i, candidates.poses[chosen])
         people = [
-            PersonPrior(b.model, b.values, colors=self._part_colors if p == self._person else None)
+            PersonPrior(b.model, b.values, None, self._part_colors if p == self._person else None, b.velocity)
             for p, b in enumerate(bodies)
         ]
         problem = FrameProblem(views, people, settings)
@@ -237,6 +241,6 @@ class _PathSelection:
 
     def _colors(self, frame: TrackedFrame) -> Colors:
         """Return the colours under the person on a frame on which they were not lost."""
-        bodies = [PosedBody(m, p) for m, p in zip(self._models, frame.poses, strict=True)]
+        bodies = list(map(PosedBody, self._models, frame.poses, self._velocities(frame.frame)))
         views = self._observer.evidence(frame.frame, regions(self._observer.working_cameras, bodies))
         return Colors(views, bodies, self._person)

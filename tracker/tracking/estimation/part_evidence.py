@@ -22,7 +22,7 @@ from tracker.body.model import BodyModel, PosedBody, parts_of
 from tracker.compute.progress import Report, unreported
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, with_colors_only
-from tracker.fitting.contour_residuals import ContourResiduals
+from tracker.fitting.clocked_residuals import person_residuals
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.frame_problem import Bodies
 from tracker.tracking.estimation.limb_repair import MIN_GAIN_NATS
@@ -202,7 +202,7 @@ def _outside(view: ViewEvidence, bodies: Sequence[PosedBody]) -> Array:
 
 def _contours_px(views: Sequence[ViewEvidence], bodies: Bodies, person: int) -> Array:
     """Return the mean distance of the contour of each part of a person, (V, n_parts), px of the footage."""
-    costs = ContourResiduals(views, bodies, person).part_costs(bodies[person].values)
+    costs = person_residuals(views, bodies, person).part_costs(bodies[person].values)
     has_edges = np.array([len(v.points_px) > 0 for v in views])[:, None]
     return np.where(has_edges, costs.forward_px / np.array([v.scale for v in views])[:, None], np.nan)
 

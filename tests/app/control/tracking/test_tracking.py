@@ -13,6 +13,7 @@ from gestures import FRONT, PAGE, drag, wait_for
 
 from app.state.run_choices import RunChoices
 from tracker.errors import SessionError, TrackerError
+from tracker.pipeline import track_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.tracking.estimate import BackwardStep
 
@@ -53,6 +54,16 @@ def test_a_run_goes_out_from_a_frame_in_both_directions_and_keeps_its_pose(place
     placed.history.undo()
     assert [row.frame for row in store.frames("person")] == [2]
     store.close()
+
+
+def test_a_camera_that_seems_off_is_a_notice_at_the_end_of_a_run(placed, tracker, monkeypatch):
+    monkeypatch.setattr(track_session, "contradiction", lambda recording: "camera LEFT is turned")
+    placed.tracking.start(backward=False, until=4)
+    tracker.let_go(2)
+    wait_for(lambda: placed.state.track.message)
+    measures = "Check the cameras, in the inspector's Calibration, measures it."
+    assert placed.state.track.notice == f"Camera LEFT is turned; {measures}"
+    assert not placed.state.track.failed
 
 
 @pytest.mark.slow

@@ -1,0 +1,78 @@
+"""The sentences of a check on what its frames cannot show, and on two cameras."""
+
+import numpy as np
+import pytest
+from rig_scenes import CAMERAS, FPS, NAMES, nothing_seen, turned, viewed
+
+from tracker.errors import TrackerError
+from tracker.pipeline.calibration_check import check_calibration, contradiction
+
+
+class Seen:
+    """A recording all of whose frames are seen."""
+
+    fps, middle_s = FPS, 0.0
+
+    def __init__(self, frames, names=NAMES):
+        self.camera_names, self._frames = names[: len(frames[0].views)], frames
+
+    def credible_frames(self, within=None):
+        return list(range(len(self._frames)))
+
+    def diverse(self, frames, n):
+        return list(frames)[:n]
+
+    def seen(self, frames, report=None):
+        return [self._frames[k] for k in frames]
+
+
+def still(frames):
+    return [f._replace(velocities=tuple(np.zeros_like(v) for v in f.velocities)) for f in frames]
+
+
+def test_people_who_move_before_healthy_cameras_need_no_sentence():
+    check = check_calibration(Seen(viewed({}, range(3))))
+    assert check.sentences == []
+
+
+def test_poses_without_motion_tell_no_time():
+    check = check_calibration(Seen(still(viewed({}, range(3)))))
+    assert check.sentences == ["nobody moves enough on these frames to show whether the cameras are simultaneous"]
+    assert check.named == ()
+
+
+def test_a_person_who_stands_still_is_said_to():
+    check = check_calibration(Seen(still(viewed({}, [1, 1, 1]))))
+    assert any(s.startswith("people stand still on these frames") for s in check.sentences)
+    assert check.named == ()
+
+
+@pytest.mark.slow
+def test_a_camera_that_sees_nothing_is_said_to():
+    frames = [f._replace(views=(nothing_seen(f.views[0]), *f.views[1:])) for f in viewed({}, range(3))]
+    check = check_calibration(Seen(frames))
+    assert check.sentences == ["camera cam0 shows nobody on these frames"]
+    assert check.named == ()
+
+
+@pytest.mark.slow
+def test_two_cameras_contradict_each_other_without_a_name():
+    check = check_calibration(Seen(viewed({0: turned(pitch_deg=1.5)}, range(4), cameras=CAMERAS[:2])))
+    (sentence,) = check.contradictions
+    assert sentence.startswith("the two cameras contradict each other by")
+    assert sentence.endswith("nothing shows which is off")
+    assert check.named == ()
+    assert not check.corrections.any()
+
+
+def test_a_correction_without_other_frames_is_refused():
+    check = check_calibration(Seen(viewed({1: turned(yaw_deg=1.0)}, range(3))))
+    assert check.named == ("cam1",)
+    with pytest.raises(TrackerError, match="other frames with poses to confirm the correction, found none"):
+        check.require_applicable([])
+
+
+def test_a_glance_says_nothing_of_few_frames():
+    frames = viewed({1: turned(yaw_deg=1.0)}, [0, 1, 2])
+    assert contradiction(Seen(frames)) == ""
+    assert "camera cam1 is" in contradiction(Seen(frames * 7))
