@@ -7,7 +7,6 @@ such entry before its own.
 
 import math
 import tomllib
-from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -22,12 +21,13 @@ from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.stored_run import forget_unfinished
 from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_cameras
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.calibration_revisions import (
+    CALIBRATION_EDITS,
+    CALIBRATIONS,
+    present_revision,
+    revisions_of_poses,
+)
 from tracker.store.edit_tree import now
-
-CALIBRATIONS = "calibrations"
-"""Setting of the session: the revisions, in order, each with its cameras as `toml`, their `clocks` and its `time`."""
-CALIBRATION_EDITS = "calibration_edits"
-"""Setting of the session: by entry of the history, the revisions before and after it."""
 
 
 def apply_check(session: Session, store: AnnotationStore, check: CalibrationCheck) -> Session:
@@ -91,29 +91,6 @@ def follow_history(session: Session, store: AnnotationStore) -> Session:
     return _write(session, known[revision - 1])
 
 
-def present_revision(store: AnnotationStore) -> int | None:
-    """Return the number of the present calibration; None if it has never been changed."""
-    edits = _edits(store)
-    done = set(store.done_edits())
-    applied = [after for edit, (_, after) in edits.items() if edit in done]
-    return applied[-1] if applied else min((before for before, _ in edits.values()), default=None)
-
-
-def revisions_of_poses(store: AnnotationStore, person: str) -> dict[int, int]:
-    """Return the revision of the calibration that each pose of a person was made with, by frame.
-
-    It is empty if the calibration has never been changed.
-    """
-    edits = _edits(store)
-    if not edits:
-        return {}
-    done = set(store.done_edits())
-    applied = [edit for edit in edits if edit in done]
-    first = min(before for before, _ in edits.values())
-    of_entries = [first, *(edits[edit][1] for edit in applied)]
-    return {frame: of_entries[bisect_right(applied, edit)] for frame, edit in store.pose_edits(person).items()}
-
-
 def outdated_frames(session: Session, store: AnnotationStore) -> dict[str, list[int]]:
     """Return the frames on which people have poses of an earlier calibration, by name; nobody without such frames."""
     present, out = present_revision(store), {}
@@ -122,12 +99,6 @@ def outdated_frames(session: Session, store: AnnotationStore) -> dict[str, list[
         if found:
             out[person.name] = found
     return out
-
-
-def _edits(store: AnnotationStore) -> dict[int, tuple[int, int]]:
-    """Return the revisions before and after each entry of the history that changed the calibration, ascending."""
-    stored: Mapping[str, tuple[int, int]] = store.setting(CALIBRATION_EDITS, {})
-    return {int(edit): (int(stored[edit][0]), int(stored[edit][1])) for edit in sorted(stored, key=int)}
 
 
 def _number(store: AnnotationStore, content: Mapping[str, Any]) -> int:
