@@ -184,6 +184,10 @@ PHRASES = {
     "frames_of_one_body": Phrases(
         "give frames of one body as --frames, or another format", "choose Frames of one body, or another format"
     ),
+    "export_all_poses": Phrases(
+        "leave out --keyframes-only and --reviewed-only, or review poses first",
+        "choose all poses, or review poses first",
+    ),
     "name_format": Phrases("correct --format", "choose another format"),
     "another_file": Phrases("choose another --out", "choose another file"),
     "another_file_or_overwrite": Phrases("choose another --out, or add --overwrite", "choose another file"),

@@ -9,7 +9,7 @@ from tracker.errors import Remedy, TrackerError
 
 if TYPE_CHECKING:
     from tracker.export.motion import ExportedMotion
-    from tracker.export.options import AxesName, ExportOptions
+    from tracker.export.options import AxesName, ExportOptions, UnitName
 
 Writer = Callable[["ExportedMotion", "ExportOptions", Sequence[Path], Callable[[], None]], None]
 """Writes a motion to the files of one format, and calls the function after each frame."""
@@ -27,17 +27,25 @@ class ExportFormat:
     """End of the name of each file; the first names the format."""
     write: Writer
     options: frozenset[str] = frozenset()
-    """Options that it has: `axes`, `units`, `keypoints`, `view`, `character`."""
+    """Options that it has, some of `OPTIONS`."""
     one_person: bool = False
     """Whether each person gets files of their own."""
     axes: "AxesName" = "calibration"
     """Axes by default, as programs that read it expect them."""
+    units: "UnitName" = "m"
+    """Unit of lengths by default."""
     gaps: str = "left empty"
     """Treatment of frames without a pose."""
     numbering: str = ""
     """Sentence on its frame numbers where they are not the session's, of `{frame}` and `{number}`, 1 more."""
     one_body: bool = False
     """Whether all poses of a person are of one body; those of earlier sizes are refitted."""
+    has_rate: bool = False
+    """Whether its frames have a constant rate; those between the exported ones are then like frames without a pose."""
+    is_folder: bool = False
+    """Whether it is a folder of files; the first suffix ends its name if it is named after the session."""
+    holds_provenance: bool = False
+    """Whether its own files hold the provenance of the poses."""
 
 
 def _by_writer(name: str) -> Writer:
@@ -60,7 +68,7 @@ def _mp4(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Pat
     write_overlay_video(motion, options, paths[0], tick)
 
 
-OPTIONS = ("axes", "units", "view", "keypoints", "character")
+OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "character")
 """Options that a format may have, the fields of `ExportOptions`."""
 _PLACE = frozenset(("axes", "units"))
 FORMATS: Mapping[str, ExportFormat] = {
@@ -73,6 +81,7 @@ FORMATS: Mapping[str, ExportFormat] = {
             _by_writer("write_person_trc"),
             _PLACE,
             one_person=True,
+            has_rate=True,
             numbering="Frame# counts from 1: frame {frame} of the session is Frame# {number}",
         ),
         ExportFormat(
@@ -107,6 +116,7 @@ FORMATS: Mapping[str, ExportFormat] = {
             axes="y-up",
             gaps="interpolated",
             one_body=True,
+            has_rate=True,
         ),
         ExportFormat(
             "mp4",

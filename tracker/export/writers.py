@@ -131,7 +131,7 @@ def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Seque
             image = name.image(len(images) + 1, frame)
             images.append(image)
             for (person, body), seen in zip(people, found, strict=True):
-                if person.index in motion.chosen and seen.box_px is not None:
+                if motion.is_exported(person, frame) and seen.box_px is not None:
                     status = person.poses[frame].record.status
                     annotations += _annotations(categories, person, body, seen, image.id, status, len(annotations))
         tick()
