@@ -88,9 +88,9 @@ $(VENV)/.tested: $(VENV)/.installed tests/support/chromium.py
 	$(BIN)/python tests/support/chromium.py
 	touch $@
 
-# .slow: the programs that exported files are read by; OpenSim is big.
+# .slow: the programs that write and read exported files; OpenSim is big.
 $(VENV)/.slow: $(VENV)/.tested
-	$(PIP_INSTALL) '.[dev,slow]'
+	$(PIP_INSTALL) '.[dev,slow,export]'
 	touch $@
 
 # The path is for npm's own scripts, which look for node there.

@@ -188,6 +188,7 @@ PHRASES = {
         "leave out --keyframes-only and --reviewed-only, or review poses first",
         "choose all poses, or review poses first",
     ),
+    "fewer_frames": Phrases("choose fewer as --frames, or another format", "choose fewer Frames, or another format"),
     "name_format": Phrases("correct --format", "choose another format"),
     "another_file": Phrases("choose another --out", "choose another file"),
     "another_file_or_overwrite": Phrases("choose another --out, or add --overwrite", "choose another file"),

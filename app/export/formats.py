@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,15 +49,13 @@ class ExportFormat:
     """Whether its own files hold the provenance of the poses."""
 
 
-def _by_writer(name: str) -> Writer:
-    """Return a function of `tracker.export.writers`, which is imported at the first export: help is quick without."""
+def _by_writer(name: str, module: str = "writers") -> Writer:
+    """Return a function of a module of `tracker.export`, imported at the first export: help is quick without."""
 
     def write(
         motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]
     ) -> None:
-        from tracker.export import writers
-
-        writer: Writer = getattr(writers, name)
+        writer: Writer = getattr(import_module(f"tracker.export.{module}"), name)
         writer(motion, options, paths, tick)
 
     return write
@@ -71,6 +70,7 @@ def _mp4(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Pat
 OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "character")
 """Options that a format may have, the fields of `ExportOptions`."""
 _PLACE = frozenset(("axes", "units"))
+_FROM_1 = "counts from 1: frame {frame} of the session is"
 FORMATS: Mapping[str, ExportFormat] = {
     f.name: f
     for f in (
@@ -82,7 +82,7 @@ FORMATS: Mapping[str, ExportFormat] = {
             _PLACE,
             one_person=True,
             has_rate=True,
-            numbering="Frame# counts from 1: frame {frame} of the session is Frame# {number}",
+            numbering=f"Frame# {_FROM_1} Frame# {{number}}",
         ),
         ExportFormat(
             "csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _by_writer("write_tables"), _PLACE
@@ -117,6 +117,17 @@ FORMATS: Mapping[str, ExportFormat] = {
             gaps="interpolated",
             one_body=True,
             has_rate=True,
+        ),
+        ExportFormat(
+            "c3d",
+            "joint centers for biomechanics (C3D)",
+            (".c3d",),
+            _by_writer("write_person_c3d", "array_writers"),
+            _PLACE,
+            one_person=True,
+            units="mm",
+            has_rate=True,
+            numbering=f"C3D {_FROM_1} {{number}} there",
         ),
         ExportFormat(
             "mp4",

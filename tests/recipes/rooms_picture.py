@@ -45,7 +45,7 @@ HOUSE = {
         ["evidence"],
         ["contours", "images", "store"],
         ["session"],
-        ["footage", "calibrations", "motion"],
+        ["footage", "calibrations", "motion", "formats/interchange"],
         ["formats"],
         ["body"],
         ["geometry"],

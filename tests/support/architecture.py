@@ -14,6 +14,7 @@ ROOMS = [
     "tracker.body",
     "tracker.motion",
     "tracker.formats",
+    "tracker.formats.interchange",
     "tracker.calibrations",
     "tracker.footage",
     "tracker.session",
