@@ -119,6 +119,15 @@ FORMATS: Mapping[str, ExportFormat] = {
             has_rate=True,
         ),
         ExportFormat(
+            "glb",
+            "animated skeleton with its shapes (glTF, GLB)",
+            (".glb",),
+            _by_writer("write_animation"),
+            axes="y-up",
+            gaps="interpolated by viewers",
+            one_body=True,
+        ),
+        ExportFormat(
             "c3d",
             "joint centers for biomechanics (C3D)",
             (".c3d",),

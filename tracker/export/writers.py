@@ -23,6 +23,7 @@ from tracker.formats.coco import (
     write_coco,
 )
 from tracker.formats.file_names import identifier
+from tracker.formats.interchange.gltf import AnimatedBody, write_glb
 from tracker.formats.motion_csv import MotionRow, write_motion_csv
 from tracker.formats.opensim_model import write_osim
 from tracker.formats.opensim_mot import write_mot
@@ -109,6 +110,19 @@ def write_person_bvh(motion: ExportedMotion, options: ExportOptions, paths: Sequ
     upright = UPRIGHT_Y if options.axes == "y-up" else up_rotation(session.up, session.floor)
     frame = BvhFrame(file_from_world(session, options.axes), upright, options.per_metre)
     write_bvh(paths[0], person.model, person.without_gaps(motion.frames), session.fps, frame, tick)
+
+
+def write_animation(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
+    """Write the motion of all people as glTF, with the shapes of their parts. Viewers interpolate frames between."""
+    bodies = []
+    for person in motion.exported:
+        poses = person.in_one_body()
+        frames = sorted(poses)
+        times = np.array([motion.time_s(f) for f in frames])
+        bodies.append(AnimatedBody(person.person.name, person.model, np.array([poses[f] for f in frames]), times))
+    write_glb(paths[0], motion.session.name, bodies, file_from_world(motion.session, options.axes))
+    for _ in motion.frames:
+        tick()
 
 
 def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:

@@ -75,7 +75,7 @@ def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--format", "fbx"], ["a format among trc, csv, mot, coco, bvh, c3d", "found 'fbx'", "--format"]),
+        (["--format", "fbx"], ["a format among trc, csv, mot, coco, bvh, glb", "found 'fbx'", "--format"]),
         (["--format", "trc", "--out", "{}/a.csv"], ["--out to end in .trc", "'a.csv'", "rename it to a.trc"]),
         (["--out", "{}/a"], ["a format among", "no known suffix in 'a'"]),
         (["--out", "{}/none/a.trc"], ["in a folder that exists", "none"]),

@@ -1,5 +1,5 @@
 """Files of poses and labels that other programs read and this one only writes; one module for each format.
 
 Imports `geometry`, `body` and modules of `formats`. `optional_packages.require` imports what only one format needs.
-Callers use `c3d.write_c3d`.
+Callers use `c3d.write_c3d` and `gltf.write_glb`.
 """

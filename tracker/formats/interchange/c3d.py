@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -64,11 +64,11 @@ def write_c3d(
     _check(c3d(str(path)), values, rate, first_frame)
 
 
-def _check(found: dict[str, dict[str, dict[str, Array]]], values: Array, rate: float, first_frame: int) -> None:
+def _check(found: Any, values: Array, rate: float, first_frame: int) -> None:
     """Check what was read back.
 
     Args:
-        found: the file.
+        found: the file, of ezc3d.
         values: points as given to it, (4, m, n).
         rate: frames per second.
         first_frame: from 0.
