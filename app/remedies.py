@@ -188,6 +188,7 @@ PHRASES = {
         "leave out --keyframes-only and --reviewed-only, or review poses first",
         "choose all poses, or review poses first",
     ),
+    "fewer_people": Phrases("export one --person at a time", "export one of People at a time"),
     "fewer_frames": Phrases("choose fewer as --frames, or another format", "choose fewer Frames, or another format"),
     "name_format": Phrases("correct --format", "choose another format"),
     "another_file": Phrases("choose another --out", "choose another file"),

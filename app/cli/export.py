@@ -51,7 +51,7 @@ class ExportArguments:
     keypoints: Annotated[Literal["all", "coco17", "body"] | None, _choice("all|coco17|body")] = None
     """coco: the 17 keypoints of people, all points of the body, or both, which is the default."""
     pixels: Annotated[Literal["original", "undistorted"] | None, _choice("original|undistorted")] = None
-    """openpose, masks, dataset: of the footage (default), or without distortion, with such pictures and cameras."""
+    """openpose, masks: of the footage (default), or without distortion, with such pictures and cameras."""
     skip_lost: bool = False
     """treat poses whose status is lost as missing."""
     provenance: bool = True

@@ -72,7 +72,9 @@ class Provenance:
         revision = self._revisions[person.person.name].get(frame, self.calibration_revision)
         sources = sources_of_points(model, record.sources)
         is_earlier = revision != self.calibration_revision
-        return PoseProvenance(record, stored.source, sources, _lost(model, record.limbs_lost), revision, is_earlier)
+        return PoseProvenance(
+            record, stored.source, sources, point_lost(model, record.limbs_lost), revision, is_earlier
+        )
 
 
 def read_provenance(motion: ExportedMotion) -> Provenance:
@@ -104,7 +106,7 @@ def sources_of_points(model: BodyModel, sources: Sequence[str]) -> tuple[str, ..
     return tuple(out)
 
 
-def _lost(model: BodyModel, limbs_lost: Sequence[float]) -> Array:
+def point_lost(model: BodyModel, limbs_lost: Sequence[float]) -> Array:
     """Return the probability that the limb of each point is lost, (n_points,); NaN where not known."""
     of_part = np.full(len(model.parts), np.nan)
     for limb, lost in zip(limbs(model), limbs_lost, strict=False):

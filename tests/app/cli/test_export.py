@@ -9,8 +9,12 @@ from bodies import MODELS
 from command_line import assert_refused
 from stored_motions import store_motion
 
+from app.export.export import export
 from app.export.formats import FORMATS
+from tracker.export.motion import read_motion
+from tracker.export.options import ExportOptions
 from tracker.formats.trc import read_trc
+from tracker.session.session import load_session
 
 
 @pytest.fixture
@@ -75,7 +79,7 @@ def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--format", "fbx"], ["a format among trc, csv, mot, coco, bvh, glb", "found 'fbx'", "--format"]),
+        (["--format", "fbx"], ["a format among trc, csv, mot, coco, bvh, glb, c3d", "found 'fbx'", "--format"]),
         (["--format", "trc", "--out", "{}/a.csv"], ["--out to end in .trc", "'a.csv'", "rename it to a.trc"]),
         (["--out", "{}/a"], ["a format among", "no known suffix in 'a'"]),
         (["--out", "{}/none/a.trc"], ["in a folder that exists", "none"]),
@@ -105,6 +109,35 @@ def test_what_cannot_be_written_leaves_nothing(run, couple, tmp_path, monkeypatc
     monkeypatch.setattr("app.export.export.os.replace", full)
     result = run("export", couple, "--out", tmp_path / "a.mot", "--person", "ann")
     assert_refused(result, [f"cannot write {tmp_path / 'a.mot'}: No space left on device", "choose a folder"])
+    assert [p.name for p in tmp_path.iterdir()] == ["s"]
+
+
+def test_a_folder_is_replaced_only_if_an_export_made_it(run, couple, tmp_path):
+    words = ("export", couple, "--format", "openpose", "--frames", "1,2", "--json")
+    status, out, _ = run(*words, "--out", tmp_path)
+    assert (status, json.loads(out)["files"]) == (0, [str(tmp_path / "s_openpose")])
+    labels = tmp_path / "s_openpose"
+    assert len([*labels.rglob("*_keypoints.json")]) == 3 * 2
+    assert_refused(run(*words, "--out", tmp_path), ["s_openpose not to exist, found a folder", "--overwrite"])
+    (labels / "old").touch()
+    assert run(*words, "--out", labels, "--overwrite")[0] == 0  # the folder itself may be named
+    assert not (labels / "old").exists()
+    (labels / "provenance.json").unlink()
+    (labels / "mine").touch()
+    found = run(*words, "--out", tmp_path, "--overwrite")
+    assert_refused(found, ["s_openpose not to exist, found a folder", "choose another --out"])
+    assert (labels / "mine").exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["s", "s_openpose"]
+
+
+@pytest.mark.parametrize("name", ["trc", "openpose", "masks"])
+def test_an_interrupted_export_leaves_nothing(couple, tmp_path, name):
+    def interrupt():
+        raise KeyboardInterrupt
+
+    motion = read_motion(load_session(couple), (0,), range(2))
+    with pytest.raises(KeyboardInterrupt):
+        export(FORMATS[name], motion, ExportOptions(), tmp_path / f"a{FORMATS[name].suffixes[0]}", tick=interrupt)
     assert [p.name for p in tmp_path.iterdir()] == ["s"]
 
 

@@ -62,6 +62,9 @@ async def test_files_are_made_sent_and_deleted(client, temporary):
     assert sorted(archive.namelist()) == ["dance_ann.mot", "dance_ann.osim", "dance_bob.mot", "dance_bob.osim"]
     async with client.get("/export/progress") as response:
         assert await response.json() == {"done": 0, "total": 0}
+    async with client.get("/export/openpose?frames=1,2&pixels=original") as response:
+        archive = zipfile.ZipFile(io.BytesIO(await response.read()))
+    assert "dance_openpose/cam0_json/cam0_000000000002_keypoints.json" in archive.namelist()
     async with client.get("/export/trc?person=ann&only=keyframes&provenance=1") as response:
         archive = zipfile.ZipFile(io.BytesIO(await response.read()))
     assert sorted(archive.namelist()) == ["dance_ann.trc", "dance_ann.trc.provenance.json"]
