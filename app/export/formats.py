@@ -157,6 +157,16 @@ FORMATS: Mapping[str, ExportFormat] = {
             is_folder=True,
         ),
         ExportFormat(
+            "movement",
+            "datasets of movement, in space and in the views (netCDF)",
+            (".nc", "_views.nc"),
+            _by_writer("write_movement", "array_writers"),
+            frozenset(("axes",)),
+            gaps="left as NaN",
+            has_rate=True,
+            holds_provenance=True,
+        ),
+        ExportFormat(
             "npz",
             "arrays of poses, joints, covariances and cameras (NumPy)",
             (".npz",),

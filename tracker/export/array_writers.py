@@ -9,8 +9,10 @@ import numpy as np
 from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions, file_from_world
 from tracker.export.pose_arrays import pose_arrays
+from tracker.export.view_arrays import view_arrays
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.interchange.c3d import write_c3d
+from tracker.formats.interchange.movement_netcdf import PER_POSE, PoseDataset, Variable, per_point, write_dataset
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 
@@ -46,12 +48,7 @@ def write_npz(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Pa
         "covariance": found.covariances,
         "point_source": found.point_sources,
         "point_lost": found.point_lost,
-        **found.texts,
-        "keyframe": found.keyframe,
-        "reviewed": found.reviewed,
-        "body_revision": found.body_revision,
-        "calibration_revision": found.calibration_revision,
-        "earlier_calibration": found.earlier_calibration,
+        **found.by_pose,
     }
     arrays |= _values(motion) | _cameras(motion.session.cameras)
     plain = {name: np.asarray(values) for name, values in arrays.items()}
@@ -97,3 +94,34 @@ def _cameras(sources: Sequence[CameraSource]) -> dict[str, Any]:
         "camera_clock": [(source.clock.ahead_frames, source.clock.rate) for source in sources],
         "camera_footage": [source.footage.name for source in sources],
     }
+
+
+def write_movement(
+    motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
+) -> None:
+    """Write a dataset of `movement` with the joint centers in space, and another one with the points in all views.
+
+    Raises:
+        FormatError: a package is missing.
+    """
+    found = pose_arrays(motion, options)
+    seen = view_arrays(motion, options, found.points, tick)
+    attributes = {"fps": motion.session.fps, "session": motion.session.name}
+    poses = PoseDataset(found.joints, found.confidence, found.times_s, found.people, found.points)
+    in_space = attributes | {"space_unit": "metres", "axes": options.axes}
+    variables: dict[str, Variable] = {
+        "covariance": (
+            ("time", "space", "space_of", "keypoints", "individuals"),
+            found.covariances.transpose(0, 3, 4, 2, 1),
+        ),
+        "point_source": per_point(found.point_sources),
+        "point_lost": per_point(found.point_lost),
+        "frame": (("time",), found.frames),
+        **{name: (PER_POSE, values) for name, values in found.by_pose.items()},
+    }
+    write_dataset(paths[0], poses, in_space, variables)
+    confidence = np.where(np.isnan(seen.points_px[..., 0]), np.nan, found.confidence)
+    views = tuple(source.camera.name for source in motion.session.cameras)
+    in_views = poses._replace(position=seen.points_px, confidence=confidence, views=views)
+    pixels = attributes | {"space_unit": "pixels", "pixels": options.pixels}
+    write_dataset(paths[1], in_views, pixels, {"visibility": per_point(seen.visibility), "frame": variables["frame"]})

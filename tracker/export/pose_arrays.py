@@ -1,6 +1,7 @@
 """Exported poses as arrays over frames, people and points, for files that are arrays."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from tracker.export.provenance import PoseProvenance, read_provenance
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 
-POSE_FIELDS = ("status", "source", "annotator", "time", "program", "remark")
+POSE_FIELDS = ("status", "source", "annotator", "edit_time", "program", "remark")
 """Texts of a pose in `PoseArrays.texts`."""
 
 
@@ -49,6 +50,18 @@ class PoseArrays:
     """(F, P); 0 without a pose, and if the session has only had one calibration."""
     earlier_calibration: NDArray[np.bool_]
     """Whether the session has another calibration now, (F, P)."""
+
+    @property
+    def by_pose(self) -> dict[str, NDArray[Any]]:
+        """The values of each pose by name, (F, P)."""
+        return {
+            **self.texts,
+            "keyframe": self.keyframe,
+            "reviewed": self.reviewed,
+            "body_revision": self.body_revision,
+            "calibration_revision": self.calibration_revision,
+            "earlier_calibration": self.earlier_calibration,
+        }
 
     @property
     def errors_m(self) -> Array:

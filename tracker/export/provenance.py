@@ -167,7 +167,7 @@ def _pose_document(found: PoseProvenance, R_file_world: Array) -> dict[str, Any]
         "status": record.status,
         "source": found.source,
         "annotator": record.author,
-        "time": record.time,
+        "edit_time": record.time,
         "program": record.program,
         "keyframe": record.keyframe,
         "reviewed": found.is_reviewed,

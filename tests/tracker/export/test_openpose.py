@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from bodies import MODELS, with_center
+from foreign import projected
 from stored_motions import K1, store_motion
 
 from tracker.errors import RecordingError
@@ -14,7 +15,6 @@ from tracker.export.label_writers import write_points
 from tracker.export.motion import read_motion
 from tracker.export.options import ExportOptions
 from tracker.formats.anipose import read_calibration
-from tracker.geometry.cameras import Camera
 
 LIMBS = {
     "RElbow": "right_elbow",
@@ -47,13 +47,6 @@ def filmed(session, tmp_path):
 def written(folder, camera, number):
     text = (folder / f"{camera}_json" / f"{camera}_{number:012d}_keypoints.json").read_text()
     return [(p, np.array(p["pose_keypoints_2d"]).reshape(25, 3)) for p in json.loads(text)["people"]]
-
-
-def projected(camera: Camera, place):
-    """Project a point by OpenCV."""
-    pose = cv2.Rodrigues(camera.T_camera_world[:3, :3])[0], camera.T_camera_world[:3, 3], camera.K, camera.distortion
-    project = cv2.fisheye.projectPoints if camera.fisheye else cv2.projectPoints
-    return project(place.reshape(1, 1, 3), *pose)[0].ravel()
 
 
 def test_points_are_where_the_footage_shows_them(tmp_path):
