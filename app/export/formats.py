@@ -167,6 +167,16 @@ FORMATS: Mapping[str, ExportFormat] = {
             holds_provenance=True,
         ),
         ExportFormat(
+            "nwb",
+            "poses for neuroscience (NWB, ndx-pose)",
+            (".nwb",),
+            _by_writer("write_poses_nwb", "nwb_writer"),
+            frozenset(("axes",)),
+            gaps="left as NaN",
+            has_rate=True,
+            holds_provenance=True,
+        ),
+        ExportFormat(
             "npz",
             "arrays of poses, joints, covariances and cameras (NumPy)",
             (".npz",),
