@@ -188,6 +188,7 @@ PHRASES = {
         "leave out --keyframes-only and --reviewed-only, or review poses first",
         "choose all poses, or review poses first",
     ),
+    "export_images": Phrases("leave out --pictures video, or --pixels", "choose Images, or Pixels as filmed"),
     "fewer_people": Phrases("export one --person at a time", "export one of People at a time"),
     "fewer_frames": Phrases("choose fewer as --frames, or another format", "choose fewer Frames, or another format"),
     "name_format": Phrases("correct --format", "choose another format"),

@@ -48,10 +48,12 @@ class ExportArguments:
     """mp4: name of the camera; a grid of all views by default."""
     character: Annotated[str | None, tyro.conf.arg(metavar="BODY[:METRES]")] = None
     """mp4: body that moves as the person, beside the footage: a preset or a .toml file, and its height."""
+    pictures: Annotated[Literal["images", "video"] | None, _choice("images|video")] = None
+    """dataset: an image of each exported frame, by default, or the footage as it is."""
     keypoints: Annotated[Literal["all", "coco17", "body"] | None, _choice("all|coco17|body")] = None
-    """coco: the 17 keypoints of people, all points of the body, or both, which is the default."""
+    """coco, dataset: the 17 keypoints of people, all points of the body, or both, which is the default."""
     pixels: Annotated[Literal["original", "undistorted"] | None, _choice("original|undistorted")] = None
-    """openpose, masks: of the footage (default), or without distortion, with such pictures and cameras."""
+    """openpose, masks, dataset: of the footage (default), or without distortion, with such pictures and cameras."""
     skip_lost: bool = False
     """treat poses whose status is lost as missing."""
     provenance: bool = True

@@ -47,7 +47,7 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
     Raises:
         TrackerError: the format has no such option, or a value is not allowed.
     """
-    from tracker.export.options import AXES, KEYPOINT_SETS, PIXELS, UNITS, load_character
+    from tracker.export.options import AXES, KEYPOINT_SETS, PICTURES, PIXELS, UNITS, load_character
 
     values = {name: value for name, value in given.items() if value is not None}
     allowed: dict[str, Sequence[str]] = {
@@ -55,6 +55,7 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
         "units": UNITS,
         "keypoints": KEYPOINT_SETS,
         "pixels": PIXELS,
+        "pictures": PICTURES,
         "view": _camera_names(session),
     }
     for name, value in values.items():
@@ -132,7 +133,7 @@ def export(
             for files in groups:
                 part = replace(motion, chosen=files.people)
                 chosen.write(part, options, [folder / name for name in files.names], tick)
-                if has_side_files or chosen.is_folder:
+                if (has_side_files or chosen.is_folder) and not (folder / files.side_file).exists():
                     write_provenance(folder / files.side_file, part, options)
     except OSError as error:
         reason = error.strerror or str(error)

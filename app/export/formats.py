@@ -67,7 +67,7 @@ def _mp4(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Pat
     write_overlay_video(motion, options, paths[0], tick)
 
 
-OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "character")
+OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "pictures", "character")
 """Options that a format may have, the fields of `ExportOptions`."""
 _PLACE = frozenset(("axes", "units"))
 _FROM_1 = "counts from 1: frame {frame} of the session is"
@@ -184,6 +184,15 @@ FORMATS: Mapping[str, ExportFormat] = {
             frozenset(("axes",)),
             gaps="left as NaN",
             holds_provenance=True,
+        ),
+        ExportFormat(
+            "dataset",
+            "dataset: pictures, labels, calibration, poses, card",
+            ("_dataset",),
+            _by_writer("write_dataset", "dataset"),
+            frozenset(("keypoints", "pixels", "pictures")),
+            gaps="left without people",
+            is_folder=True,
         ),
         ExportFormat(
             "mp4",

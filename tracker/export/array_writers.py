@@ -10,11 +10,13 @@ from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions, file_from_world
 from tracker.export.pose_arrays import pose_arrays
 from tracker.export.view_arrays import view_arrays
+from tracker.export.views import exported_cameras
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.interchange.c3d import write_c3d
 from tracker.formats.interchange.movement_netcdf import PER_POSE, PoseDataset, Variable, per_point, write_dataset
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera
 
 
 def write_person_c3d(
@@ -50,7 +52,7 @@ def write_npz(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Pa
         "point_lost": found.point_lost,
         **found.by_pose,
     }
-    arrays |= _values(motion) | _cameras(motion.session.cameras)
+    arrays |= _values(motion) | _cameras(motion.session.cameras, exported_cameras(motion, options))
     plain = {name: np.asarray(values) for name, values in arrays.items()}
     assert not any(values.dtype.hasobject for values in plain.values()), "readers refuse pickled objects"
     np.savez_compressed(paths[0], **plain)  # type: ignore[arg-type]
@@ -78,9 +80,8 @@ def _values(motion: ExportedMotion) -> dict[str, Any]:
     }
 
 
-def _cameras(sources: Sequence[CameraSource]) -> dict[str, Any]:
+def _cameras(sources: Sequence[CameraSource], cameras: Sequence[Camera]) -> dict[str, Any]:
     """Return the cameras as arrays; distortion coefficients that a lens lacks are 0."""
-    cameras = [source.camera for source in sources]
     n_coefficients = max(camera.distortion.size for camera in cameras)
     distortion: list[Array] = [np.pad(c.distortion, (0, n_coefficients - c.distortion.size)) for c in cameras]
     return {

@@ -1,7 +1,6 @@
 """Write labels of each view and frame to folders: points as OpenPose's JSON, masks of parts and people."""
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from tracker.export.keypoints import project_through_lens
 from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions
 from tracker.export.provenance import point_lost
-from tracker.export.views import CALIBRATION, Pictures, exported_cameras, write_cameras
+from tracker.export.views import Pictures, exported_cameras, undistorted_pictures
 from tracker.formats.interchange.openpose import COUNTERPARTS, POINTS, OpenPosePerson, file_name, write_openpose
 from tracker.geometry.cameras import Camera
 
@@ -28,28 +27,32 @@ def write_points(motion: ExportedMotion, options: ExportOptions, paths: Sequence
         RecordingError: the footage cannot be read.
     """
     cameras = exported_cameras(motion, options)
-    write = OpenPoseFiles(motion, cameras, paths[0]).write
-    write_views(motion, options, paths[0], write, tick)
+    files = OpenPoseFiles(motion, cameras, paths[0])
+    with undistorted_pictures(motion, options, paths[0]) as pictures:
+        write_views(motion, cameras, pictures, files.write, tick)
 
 
-def write_views(motion: ExportedMotion, options: ExportOptions, folder: Path, write: WriteView, tick: Tick) -> None:
-    """Write the labels of all frames in all views; in undistorted pixels with such pictures and cameras.
+def write_views(
+    motion: ExportedMotion, cameras: Sequence[Camera], pictures: Pictures | None, write: WriteView, tick: Tick
+) -> None:
+    """Write the labels of all frames in all views, and their pictures if they are wanted.
+
+    Args:
+        motion: what is exported.
+        cameras: in the pixels of the labels.
+        pictures: writes a picture; that of a damaged frame is left out with its labels.
+        write: writes the labels of a frame in a view.
+        tick: called after each frame.
 
     Raises:
         RecordingError: the footage cannot be read.
     """
-    cameras = exported_cameras(motion, options)
-    with ExitStack() as stack:
-        pictures = None
-        if options.pixels == "undistorted":
-            pictures = stack.enter_context(Pictures(motion, cameras, folder))
-            write_cameras(folder / CALIBRATION, cameras)
-        for frame in motion.frames:
-            views = FrameViews(motion, cameras, frame)
-            for view in range(len(cameras)):
-                if pictures is None or pictures.write(view, frame):
-                    write(views, view, frame)
-            tick()
+    for frame in motion.frames:
+        views = FrameViews(motion, cameras, frame)
+        for view in range(len(cameras)):
+            if pictures is None or pictures.write(view, frame):
+                write(views, view, frame)
+        tick()
 
 
 class OpenPoseFiles:

@@ -11,7 +11,7 @@ from tracker.export.frame_views import FrameViews
 from tracker.export.label_writers import write_views
 from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions
-from tracker.export.views import exported_cameras
+from tracker.export.views import exported_cameras, undistorted_pictures
 from tracker.files import write_text_atomic
 from tracker.formats.interchange.indexed_png import write_indexed_png
 from tracker.geometry.cameras import Camera
@@ -30,8 +30,10 @@ def write_masks(
         FormatError: there are more people or parts than labels.
         RecordingError: the footage cannot be read.
     """
-    masks = Masks(motion, exported_cameras(motion, options), paths[0])
-    write_views(motion, options, paths[0], masks.write, tick)
+    cameras = exported_cameras(motion, options)
+    masks = Masks(motion, cameras, paths[0])
+    with undistorted_pictures(motion, options, paths[0]) as pictures:
+        write_views(motion, cameras, pictures, masks.write, tick)
 
 
 class Masks:

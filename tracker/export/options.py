@@ -20,6 +20,8 @@ UnitName = Literal["m", "mm"]
 UNITS: tuple[UnitName, ...] = get_args(UnitName)
 KeypointSet = Literal["all", "coco17", "body"]
 KEYPOINT_SETS: tuple[KeypointSet, ...] = get_args(KeypointSet)
+PicturesName = Literal["images", "video"]
+PICTURES: tuple[PicturesName, ...] = get_args(PicturesName)
 PixelsName = Literal["original", "undistorted"]
 PIXELS: tuple[PixelsName, ...] = get_args(PixelsName)
 
@@ -41,6 +43,8 @@ class ExportOptions:
 
     pixels: PixelsName = "original"
     """Pixels of points and masks: those of the footage, or without lens distortion, with such pictures and cameras."""
+    pictures: PicturesName = "images"
+    """Dataset: an image of each exported frame, or the footage as it is."""
     provenance: bool = False
     """Whether a file beside one that cannot hold it has the provenance of the poses."""
 

@@ -1,6 +1,7 @@
 """The views of an export: their cameras in its pixels, their pictures, and the labels of their pixels."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
@@ -29,15 +30,6 @@ def exported_cameras(motion: ExportedMotion, options: ExportOptions) -> tuple[Ca
     """Return the cameras of all views in the pixels of an export."""
     cameras = (c.camera for c in motion.session.cameras)
     return tuple(c.pinhole if options.pixels == "undistorted" else c for c in cameras)
-
-
-def write_cameras(path: Path, cameras: Sequence[Camera]) -> None:
-    """Write cameras in the layout of Pose2Sim and anipose.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
-    write_text_atomic(path, format_calibration(cameras))
 
 
 class Pictures:
@@ -84,6 +76,23 @@ class Pictures:
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         self._recording.close()
+
+
+@contextmanager
+def undistorted_pictures(motion: ExportedMotion, options: ExportOptions, folder: Path) -> Iterator[Pictures | None]:
+    """Write the cameras of undistorted pixels, and yield the writer of such pictures; None in original pixels.
+
+    Raises:
+        RecordingError: the footage cannot be read.
+        OSError: the cameras cannot be written.
+    """
+    if options.pixels == "original":
+        yield None
+        return
+    cameras = exported_cameras(motion, options)
+    write_text_atomic(folder / CALIBRATION, format_calibration(cameras))
+    with Pictures(motion, cameras, folder) as pictures:
+        yield pictures
 
 
 def view_labels(bodies: Sequence[PosedBody], camera: Camera) -> NDArray[np.uint8]:

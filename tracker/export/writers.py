@@ -127,12 +127,7 @@ def write_animation(motion: ExportedMotion, options: ExportOptions, paths: Seque
 
 def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
     """Write the keypoints of people in all views as COCO."""
-    categories: list[CocoCategory] = []
-    if options.keypoints != "body":
-        categories.append(person_category(1))
-    if options.keypoints != "coco17":
-        for model in {m.name: m for p in motion.exported for m in p.models}.values():
-            categories.append(body_category(len(categories) + 1, model))
+    categories = coco_categories(motion, options)
     cameras = [c.camera for c in motion.session.cameras]
     names = [_FileNames(source) for source in motion.session.cameras]
     images: list[CocoImage] = []
@@ -147,12 +142,23 @@ def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Seque
             for (person, body), seen in zip(people, found, strict=True):
                 if motion.is_exported(person, frame) and seen.box_px is not None:
                     status = person.poses[frame].record.status
-                    annotations += _annotations(categories, person, body, seen, image.id, status, len(annotations))
+                    annotations += coco_annotations(categories, person, body, seen, image.id, status, len(annotations))
         tick()
     write_coco(paths[0], f"{motion.session.name}, exported by Quadrille", categories, images, annotations)
 
 
-def _annotations(
+def coco_categories(motion: ExportedMotion, options: ExportOptions) -> list[CocoCategory]:
+    """Return the sets of keypoints of an export."""
+    categories: list[CocoCategory] = []
+    if options.keypoints != "body":
+        categories.append(person_category(1))
+    if options.keypoints != "coco17":
+        for model in {m.name: m for p in motion.exported for m in p.models}.values():
+            categories.append(body_category(len(categories) + 1, model))
+    return categories
+
+
+def coco_annotations(
     categories: Sequence[CocoCategory],
     person: PersonMotion,
     body: PosedBody,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from bodies import MODELS, with_center
 from foreign import projected
-from stored_motions import K1, store_motion
+from stored_motions import K1, filmed, store_motion
 
 from tracker.errors import RecordingError
 from tracker.export.label_writers import write_points
@@ -28,20 +28,6 @@ NAMES = [
     "RAnkle", "LHip", "LKnee", "LAnkle", "REye", "LEye", "REar", "LEar", "LBigToe", "LSmallToe", "LHeel", "RBigToe",
     "RSmallToe", "RHeel",
 ]  # fmt: skip
-
-
-def filmed(session, tmp_path):
-    """Give each camera three gray pictures with a bright dot; their first frame is that of number 5."""
-    cameras = []
-    for source in session.cameras:
-        folder = tmp_path / f"shots_{source.camera.name}"
-        folder.mkdir()
-        for i in range(5 + session.n_frames):
-            picture = np.full((*source.camera.size[::-1], 3), 90, np.uint8)
-            cv2.circle(picture, (150, 120), 4, (255, 255, 255), -1)
-            cv2.imwrite(str(folder / f"{i:03d}.png"), picture)
-        cameras.append(replace(source, footage=folder, offset=5))
-    return replace(session, cameras=tuple(cameras))
 
 
 def written(folder, camera, number):
