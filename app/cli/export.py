@@ -41,9 +41,9 @@ class ExportArguments:
     reviewed_only: bool = False
     """export poses that a person has checked, and no others; keyframes are."""
     axes: Annotated[Literal["calibration", "y-up"] | None, _choice("calibration|y-up")] = None
-    """trc, csv, mot, bvh: calibration, the session's world (default of trc and csv); y-up, with the floor at y = 0."""
+    """calibration, the session's world; y-up, with the floor at y = 0, default of mot and bvh. glb is always y-up."""
     units: Annotated[Literal["m", "mm"] | None, _choice("m|mm")] = None
-    """trc, csv, bvh: unit of lengths; m by default."""
+    """trc, csv, bvh, c3d: unit of lengths; m by default, mm in c3d."""
     view: OptionalName = None
     """mp4: name of the camera; a grid of all views by default."""
     character: Annotated[str | None, tyro.conf.arg(metavar="BODY[:METRES]")] = None

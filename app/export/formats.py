@@ -120,7 +120,7 @@ FORMATS: Mapping[str, ExportFormat] = {
         ),
         ExportFormat(
             "glb",
-            "animated skeleton with its shapes (glTF, GLB)",
+            "animated skeleton (glTF)",
             (".glb",),
             _by_writer("write_animation"),
             axes="y-up",
@@ -129,18 +129,18 @@ FORMATS: Mapping[str, ExportFormat] = {
         ),
         ExportFormat(
             "c3d",
-            "joint centers for biomechanics (C3D)",
+            "joint centers (C3D)",
             (".c3d",),
             _by_writer("write_person_c3d", "array_writers"),
             _PLACE,
             one_person=True,
             units="mm",
             has_rate=True,
-            numbering=f"C3D {_FROM_1} {{number}} there",
+            numbering=f"C3D {_FROM_1} frame {{number}} of the file",
         ),
         ExportFormat(
             "openpose",
-            "keypoints in each view (OpenPose)",
+            "keypoints (OpenPose)",
             ("_openpose",),
             _by_writer("write_points", "label_writers"),
             frozenset(("pixels",)),
@@ -149,7 +149,7 @@ FORMATS: Mapping[str, ExportFormat] = {
         ),
         ExportFormat(
             "masks",
-            "masks of parts and people in each view (PNG)",
+            "masks of parts (PNG)",
             ("_masks",),
             _by_writer("write_masks", "mask_writers"),
             frozenset(("pixels",)),
@@ -158,7 +158,7 @@ FORMATS: Mapping[str, ExportFormat] = {
         ),
         ExportFormat(
             "movement",
-            "datasets of movement, in space and in the views (netCDF)",
+            "poses (movement, netCDF)",
             (".nc", "_views.nc"),
             _by_writer("write_movement", "array_writers"),
             frozenset(("axes",)),
@@ -168,7 +168,7 @@ FORMATS: Mapping[str, ExportFormat] = {
         ),
         ExportFormat(
             "nwb",
-            "poses for neuroscience (NWB, ndx-pose)",
+            "poses (NWB, ndx-pose)",
             (".nwb",),
             _by_writer("write_poses_nwb", "nwb_writer"),
             frozenset(("axes",)),
@@ -178,7 +178,7 @@ FORMATS: Mapping[str, ExportFormat] = {
         ),
         ExportFormat(
             "npz",
-            "arrays of poses, joints, covariances and cameras (NumPy)",
+            "poses and cameras (NPZ)",
             (".npz",),
             _by_writer("write_npz", "array_writers"),
             frozenset(("axes",)),
@@ -187,7 +187,7 @@ FORMATS: Mapping[str, ExportFormat] = {
         ),
         ExportFormat(
             "dataset",
-            "dataset: pictures, labels, calibration, poses, card",
+            "dataset of pictures and labels",
             ("_dataset",),
             _by_writer("write_dataset", "dataset"),
             frozenset(("keypoints", "pixels", "pictures")),
