@@ -30,6 +30,7 @@ from app.cli import (
 )
 from app.cli import open as open_
 from app.cli.calibration import calibrate, check, sync
+from app.cli.observations import import_, judge
 from app.remedies import command_line_text
 from app.runtime import process_exit
 from app.runtime.log_limit import limit_log
@@ -41,6 +42,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "open": open_.command,
     "new": new.command,
     "calibrate": calibrate.command,
+    "import": import_.command,
     "info": info.command,
     "relink": relink.command,
     "sync": sync.command,
@@ -50,6 +52,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "acquire": acquire.command,
     "track": track.command,
     "audit": audit.command,
+    "judge": judge.command,
     "check": check.command,
     "evaluate": evaluate.command,
     "observability": observability.command,

@@ -156,6 +156,36 @@ PHRASES = {
         "(docs/recordings.md has an example)",
         "rename the markers as one of these conventions does",
     ),
+    "name_observed_camera": Phrases(
+        "rename it after its camera, leave it out, or say --cameras {camera}=PATH",
+        "rename it after its camera, or leave it out",
+    ),
+    "give_point_order": Phrases(
+        "give a --joint-map FILE.toml whose 'points' lists the names of the {n} points in order "
+        "(docs/observations.md has an example)",
+        "list the names of the points in a joint map",
+    ),
+    "place_first_picture": Phrases(
+        "if they are of this footage, say --first-frame N with the frame of the session that the lowest number shows",
+        "choose the frame of the session that the lowest number shows",
+    ),
+    "export_at_rate": Phrases(
+        "export it again at {fps} per second, or say --first-frame N if each picture is a frame of the session",
+        "export it again at {fps} per second",
+    ),
+    "scale_normalized": Phrases("say --picture-size 1x1 to scale them", "export them in pixels"),
+    "give_picture_size": Phrases(
+        "export them from this footage, or say --picture-size {size} if it shows the same, to scale them",
+        "export them from this footage",
+    ),
+    "say_confidence": Phrases(
+        "export them with it, or say --confidence 1 to trust all points alike", "export them with a confidence"
+    ),
+    "check_views": Phrases(
+        "check that each folder is of the camera that it is named after, the size of the pictures, and --first-frame",
+        "check that each folder is of the camera that it is named after, and the size of the pictures",
+    ),
+    "name_people_of_files": Phrases("name them with --person", "give one file for each person"),
     "count_frames": Phrases("say --clock frames", "correct Time in the file"),
     "choose_clock": Phrases(
         "say --clock frames if each Frame# is one frame of the session (at {fps} per second), or --clock time if the "

@@ -9,7 +9,7 @@ from collections import Counter
 import pytest
 from architecture import FILES, trees
 
-MAX_CONSTANTS, MAX_UNDOCUMENTED = 571, 0
+MAX_CONSTANTS, MAX_UNDOCUMENTED = 586, 0
 """Present numbers; calibration added 80. Each constant has its unit, and its source or the benchmark that fixed it;
 CONTRIBUTING.md names the benchmarks."""
 MAX_HIDDEN_SUBJECTS = 25

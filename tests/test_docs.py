@@ -74,7 +74,19 @@ def test_commands_are_understood(words, monkeypatch, capsys):
     """Each word of a documented command is one that the program knows: its help would list it."""
     names = [w for w in words[1:] if not w.startswith("-")]
     commands = {"open", "new", "info", "index", "init", "track", "evaluate", "export", "simulate", "bench"}
-    commands |= {"relink", "restore", "acquire", "observability", "experiment", "body", "calibrate", "check", "sync"}
+    commands |= {
+        "relink",
+        "restore",
+        "acquire",
+        "observability",
+        "experiment",
+        "body",
+        "calibrate",
+        "check",
+        "sync",
+        "import",
+        "judge",
+    }
     command = names[0] if names and names[0] in commands else "open"
     monkeypatch.setattr(sys, "argv", ["quadrille", command, "--help"])
     with pytest.raises(SystemExit) as end:

@@ -20,7 +20,7 @@ import msgspec
 from rich.console import Console
 from rich.table import Table
 
-from app.bench import acquisition_rows, audit_rows, calibration_rows, contour_rows, voxel_rows
+from app.bench import acquisition_rows, audit_rows, calibration_rows, contour_rows, diagnosis_rows, voxel_rows
 from app.bench import rows as bench_rows
 from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import FRAME, read_crowd, read_frame
@@ -33,7 +33,7 @@ from tracker.text_files import TextKind, read_json
 from tracker.validation import Number, check
 
 BASELINE = Path(__file__).with_name("baseline.json")
-N_ROWS = 30
+N_ROWS = 32
 """Number of rows that `measure` yields if `cma` is installed."""
 _KIND = TextKind("baseline", 1_000_000, TrackerError, "make one with --save")
 _PACKAGES = ("numpy", "opencv-python-headless", "numba", "scipy", "av", "cma")
@@ -65,6 +65,7 @@ def measure() -> Iterator[Row]:
         yield from bench_rows.crowds(read_crowd(Path(folder) / "crowd", 0), yardstick)
     with _one_thread():
         yield from calibration_rows.adjustment(yardstick)
+        yield from diagnosis_rows.diagnoses(frame.with_model(DEFAULT_MODEL), yardstick)
     yield voxel_rows.voxel_frame(frame, yardstick)
     yield bench_rows.pipeline(frame, yardstick)
     yield from contour_rows.pipelines(frame.with_model("gavrila34"), yardstick)

@@ -123,6 +123,8 @@ def _summary(motion: "ExportedMotion", chosen: ExportFormat, paths: list[Path], 
         "missing": motion.n_missing,
         "lost": motion.n_lost,
         "lost_skipped": skip_lost,
+        "calibration": motion.calibrations.present,
+        "earlier_calibration": motion.n_earlier,
         "refitted": sum(p.n_refitted for p in motion.exported) if chosen.one_body else 0,
     }
 
@@ -140,6 +142,11 @@ def _format(found: dict[str, Any]) -> str:
     if found["lost"]:
         advice = "treated as missing" if found["lost_skipped"] else "written as they are; --skip-lost leaves them out"
         lines.append(f"{found['lost']} poses are lost, {advice}")
+    if found["earlier_calibration"]:
+        lines.append(
+            f"{found['earlier_calibration']} poses were made before the cameras were corrected (calibration revision "
+            f"{found['calibration']}); track them again"
+        )
     if found["refitted"]:
         lines.append(f"{found['refitted']} poses of earlier body sizes were refitted to the present body")
     return "\n".join(lines)

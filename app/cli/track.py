@@ -1,13 +1,14 @@
 """`quadrille track`: track people and store the poses; the same command resumes an interrupted run."""
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field, make_dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
 from app.cli.arguments import Names, OptionalName, OptionalNumber, OptionalRange, OptionalWhole, SessionArg
-from app.cli.target import check_stride, load_target, parse_frames
+from app.cli.target import Target, check_stride, load_target, parse_frames
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
@@ -31,6 +32,12 @@ class TrackWords:
     init: Literal["auto"] | None = None
     """auto finds people who have no pose first, on the frame where they track best, and tracks from there in both
     directions."""
+    of: OptionalName = None
+    """name of imported observations: their key points show --init auto the people, and are the evidence that --evidence
+    says."""
+    evidence: Literal["contours", "keypoints", "both"] = "contours"
+    """both: key points of --of too; contours overrule them where they contradict. keypoints: the body is fitted to them
+    alone, frame by frame, and smoothed; pictures are not looked at."""
     acquire: bool = False
     """acquire sizes from the contours before tracking, of people whose body has the sizes of its preset; then track
     from the frame where people are placed in both directions."""
@@ -102,16 +109,53 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     if arguments.paper and paper is not None:
         paper.require_body({p.name: p.model for p in (at.session.people[i] for i in at.people)})
     used = check_names(arguments.cameras, [c.camera.name for c in at.session.cameras], "camera", "--cameras")
-    find = None if arguments.init is None else FindSettings()
-    plan = ChainPlan(TrackPlan(frames, at.people, settings, tuple(used)), find, at.people if arguments.acquire else ())
+    if arguments.evidence == "keypoints":
+        found = _track_keypoints(at, frames, arguments)
+        print(format_json(found) if arguments.json else _format_keypoints(found))
+        return
+    find = None if arguments.init is None else FindSettings(keypoints=arguments.of)
+    keypoints = arguments.of if arguments.evidence == "both" else None
+    track_plan = TrackPlan(frames, at.people, settings, tuple(used), keypoints=keypoints)
+    plan = ChainPlan(track_plan, find, at.people if arguments.acquire else ())
     found = track(at.session, plan, Reporter(silent=arguments.json))
     print(format_json(found) if arguments.json else format_summary(found))
     if found["stopped_at"] is not None:
         sys.exit(130)
 
 
+def _track_keypoints(at: Target, frames: Sequence[int], arguments: TrackArguments) -> dict[str, Any]:
+    """Store poses by key points alone; return `people` with the number of poses of each."""
+    from tracker.pipeline.chain import open_stored_session, unplaced
+    from tracker.pipeline.keypoint_evidence import find_by_keypoints
+
+    assert arguments.of is not None
+    with open_stored_session(at.session) as opened:
+        missing = unplaced(opened, at.people)
+        if missing and arguments.init is not None:
+            opened.store_found(find_by_keypoints(opened.session, missing, frames, arguments.of))
+        counts = opened.store_keypoint_poses(at.people, frames, arguments.of)
+        names = [p.name for p in opened.session.people]
+    return {"of": arguments.of, "people": {names[i]: n for i, n in counts.items()}}
+
+
+def _format_keypoints(found: dict[str, Any]) -> str:
+    return "\n".join(f"{name}: {n} poses by the key points of {found['of']}" for name, n in found["people"].items())
+
+
 def _check_chain(arguments: TrackArguments) -> None:
-    """Raise a `TrackerError` where `--backward` contradicts a run in both directions."""
+    """Raise a `TrackerError` where arguments contradict one another."""
+    if arguments.evidence != "contours" and arguments.of is None:
+        raise TrackerError(
+            f"expected --of NAME with --evidence {arguments.evidence}, found none; name the imported observations"
+        )
+    if arguments.of is not None and arguments.evidence == "contours" and arguments.init is None:
+        raise TrackerError(
+            "expected --init auto or --evidence with --of, found neither; say what the key points are for"
+        )
+    if arguments.evidence == "keypoints" and arguments.acquire:
+        raise TrackerError(
+            "expected --evidence both with --acquire, found keypoints: sizes are acquired from the contours"
+        )
     for option, is_used in (("--init", arguments.init is not None), ("--acquire", arguments.acquire)):
         if is_used and arguments.backward:
             raise TrackerError(

@@ -110,7 +110,7 @@ class Controller:
         """Edits the sizes of bodies."""
         self.body_acquisition = BodyAcquisition(session_state)
         """Acquires the sizes of bodies from the footage."""
-        self.calibrating = Calibrating(session_state, activities)
+        self.calibrating = Calibrating(session_state, activities, self.tracking)
         """Checks and corrects the cameras."""
         self.history = History(session_state, activities, (self.body_sizes.follow, self.calibrating.follow))
         """Moves along the history."""

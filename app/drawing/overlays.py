@@ -136,7 +136,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             continue
         if not view.layers.isdisjoint(("contours", "hidden")):
             out += _model(session, bodies, camera, index, view) if mended is None else _corrected(mended, index)
-        if "contours" in view.layers:
+        if "contours" in view.layers and mended is None:
             out += _facing(session, bodies, camera, index)
         if state.draft is not None:
             out += _some({state.draft.person}, drafted, camera, index, "new_sizes")
@@ -167,7 +167,12 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
 
 
 def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
-    """Project the joints of all visible people into some views, given by index; joints behind a camera are left out."""
+    """Project the joints of all visible people into some views, given by index; joints behind a camera are left out.
+
+    There are none while corrected cameras are previewed: the people are drawn elsewhere, and cannot be dragged.
+    """
+    if state.calibration.shown_on(state.frame) is not None:
+        return []
     found: dict[int, list[Handle]] = {}
     for time, group in at_one_time(picture_times(session, state.frame, cameras)):
         found |= _handles(session, state, ahead(bodies_in(session, state), time), group)

@@ -58,7 +58,7 @@ def write_overlay_video(
     even = (size[0] + size[0] % 2, size[1] + size[1] % 2)  # as H.264 requires
     with ExitStack() as stack:
         recording = stack.enter_context(Recording(session.cameras, indices=footage_indices()))
-        writer = stack.enter_context(VideoWriter(path, even, session.fps))
+        writer = stack.enter_context(VideoWriter(path, even, session.fps, motion.calibration_note))
         for frame in motion.frames:
             picture = np.zeros((even[1], even[0], 3), np.uint8)
             drawn = _drawn_paths(motion, frame, shown)

@@ -85,6 +85,16 @@ class SetView(Command, frozen=True, tag="view"):
     """Whether contours have the colours of the parts instead of those of the people."""
 
 
+class CheckEpipolar(Command, frozen=True, tag="epipolar"):
+    """Ask for the line of sight of a pixel in the other views, and how far another pixel is from it.
+
+    The answer is `epipolar`, again whenever cameras or poses change. Without points it ends.
+    """
+
+    points: Annotated[list[tuple[Index, Number, Number]], Meta(max_length=2)]
+    """Camera, u and v of each."""
+
+
 class ShowPerson(Command, frozen=True, tag="people"):
     """Show or hide a person in all views and in the 3-D view. No pose changes."""
 
@@ -239,7 +249,8 @@ class Save(Command, frozen=True, tag="save"):
 
 
 ClientMessage: TypeAlias = Union[  # noqa: UP007
-    Seek, Select, SetView, ShowPerson, Solo, ShowBefore, ShowCurves, WatchTab, ShowHistory, LookThrough, Pause3d,
+    Seek, Select, SetView, CheckEpipolar, ShowPerson, Solo, ShowBefore, ShowCurves, WatchTab, ShowHistory,
+    LookThrough, Pause3d,
     Drag, PoseEdit, DragPin, RemovePins, FitPose, TakeLimbBack,
     RunSearch, RepeatSearch, SetSearchSpeed, SetSearchSettings, ReplayStep, CompareRun, PreviewCandidate,
     TakeCandidate, ShowLandscape, SetLandscapeDof, ShowCostMap, SetCostMapPlace, AskReason,

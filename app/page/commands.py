@@ -35,10 +35,21 @@ def check_indices(controller: Controller, message: wire.ClientMessage) -> None:
     Raises:
         MessageError: it has not.
     """
-    for name, count in (("camera", len(controller.session.cameras)), ("person", len(controller.models))):
+    for name in ("camera", "person"):
         index = getattr(message, name, None)
-        if index is not None and index >= count:
-            raise MessageError(f"an index below {count} as '{name}'", str(index))
+        if index is not None:
+            check_index(controller, name, index)
+
+
+def check_index(controller: Controller, name: str, index: int) -> None:
+    """Check that the session has a `camera` or `person`.
+
+    Raises:
+        MessageError: it has not.
+    """
+    count = len(controller.session.cameras if name == "camera" else controller.models)
+    if index >= count:
+        raise MessageError(f"an index below {count} as '{name}'", str(index))
 
 
 def _drag(controller: Controller, page: int, message: pose_wire.Drag) -> None:

@@ -88,6 +88,7 @@ def _calibration(controller: Controller, _: int, message: wire.CheckCalibration)
         "preview": lambda: calibrating.preview(True),
         "leave": lambda: calibrating.preview(False),
         "apply": calibrating.apply,
+        "track_again": calibrating.track_again,
     }
     actions[message.action]()
 

@@ -7,6 +7,7 @@ import numpy as np
 from app.control.controller import Controller
 from app.control.tracking import track_settings
 from app.drawing import dof_labels
+from app.drawing.misfit_field import NO_MISFITS, MisfitField, misfit_field
 from app.page import inspector_messages as wire
 from app.page.message_types import Message
 from app.page.search_messages import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
@@ -24,6 +25,7 @@ from tracker.calibration.camera_correction import in_units
 from tracker.calibration.findings import CameraFinding
 from tracker.formats.model_toml import PRESETS
 from tracker.geometry.arrays import Array
+from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.methods import METHODS
 from tracker.posing.grab import minor_points
 from tracker.tracking.chamfer.settings import TrackSettings
@@ -36,6 +38,7 @@ class InspectorFeed:
         """Begin with nothing sent."""
         self._made_from: tuple[Identity, ...] = ()
         self._sent: list[Message] = []
+        self._drawn: tuple[CalibrationCheck | None, MisfitField] = None, NO_MISFITS
 
     def is_behind(self, state: State) -> bool:
         """Return whether there may be updates; quick, because during drags a state follows every few milliseconds."""
@@ -47,12 +50,19 @@ class InspectorFeed:
         now: list[Message] = [
             settings(state.settings, state.run_choices), view_3d(controller, state), body_sizes(controller, state),
             acquisition(state.acquisition), finding(state.finding, [c.camera.name for c in controller.session.cameras]),
-            calibration(state.calibration, len(state.people)),
+            calibration(state.calibration, len(state.people), self._misfits(controller, state.calibration.check)),
             reason(state, controller.session.camera_names), *cost_map(state),
         ]  # fmt: skip
         changed = [message for message in now if message not in self._sent]
         self._sent = now
         return changed
+
+    def _misfits(self, controller: Controller, check: CalibrationCheck | None) -> MisfitField:
+        """Return where the contours of a check miss the edges; summed up once."""
+        if self._drawn[0] is not check:
+            sizes = [c.camera.pinhole.size for c in controller.session.cameras]
+            self._drawn = check, NO_MISFITS if check is None else misfit_field(check.residuals, sizes)
+        return self._drawn[1]
 
 
 def _ingredients(state: State) -> tuple[Identity, ...]:
@@ -174,17 +184,31 @@ def finding(found: FindState, cameras: Sequence[str]) -> wire.FindingMessage:
     )  # fmt: skip
 
 
-def calibration(found: CalibrationState, n_people: int) -> wire.CalibrationMessage:
-    """Describe the check of the cameras."""
+def calibration(found: CalibrationState, n_people: int, field: MisfitField) -> wire.CalibrationMessage:
+    """Describe the check of the cameras.
+
+    Args:
+        found: its state.
+        n_people: number of people in the session.
+        field: see `misfit_field`, of its result.
+    """
     check, preview = found.check, found.preview
     rows = () if check is None else tuple(_camera(c, check.since.get(c.name)) for c in check.cameras)
     return wire.CalibrationMessage(
         found.running, found.stage, found.share, found.message, found.failed, check is not None,
         () if check is None else check.frames, rows, () if check is None else tuple(check.sentences),
-        found.n_others, found.n_better, found.refused, found.is_previewed, None if preview is None else preview.frame,
+        field.arrows, field.factor, found.n_others, found.n_better, found.refused, found.is_previewed,
+        None if preview is None else preview.frame,
         0.0 if preview is None else round(preview.cost_before - preview.cost_after, 1),
-        tuple(found.outdated.get(i, ()) for i in range(n_people)),
+        found.revision, tuple(_intervals(found.outdated.get(i, ())) for i in range(n_people)),
     )  # fmt: skip
+
+
+def _intervals(frames: Sequence[int]) -> tuple[tuple[int, int], ...]:
+    """Return the first and last frames of the intervals that frames, ascending, make up."""
+    found = np.asarray(frames, dtype=int)
+    parts = np.split(found, np.flatnonzero(np.diff(found) > 1) + 1)
+    return tuple((int(part[0]), int(part[-1])) for part in parts if len(part))
 
 
 def _camera(found: CameraFinding, since: int | None) -> wire.CameraCheck:

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, TypeAlias
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
+from app.drawing.misfit_field import MisfitArrow
 from app.page.message_types import Command, Index, Message, Name, Part
 from app.page.search_messages import OutlierMode
 from app.state.run_choices import MAX_STRIDE
@@ -136,9 +137,9 @@ class FindPeople(Command, frozen=True, tag="find_people"):
 
 
 class CheckCalibration(Command, frozen=True, tag="calibration_check"):
-    """Check the cameras by the tracked people, preview the corrections, or apply them."""
+    """Check the cameras by the tracked people, preview the corrections, apply them, or track again what is older."""
 
-    action: Literal["start", "stop", "preview", "leave", "apply"]
+    action: Literal["start", "stop", "preview", "leave", "apply", "track_again"]
 
 
 # --- to the page ----------------------------------------------------------------------------------------------------
@@ -400,6 +401,10 @@ class CalibrationMessage(Message, frozen=True, tag="calibration"):
     cameras: tuple[CameraCheck, ...]
     sentences: tuple[str, ...]
     """Sentences for the user; empty where no camera is off."""
+    misfits: tuple[MisfitArrow, ...]
+    """Mean shifts from contours to edges in cells of the pictures, over the frames that the check used."""
+    misfit_factor: int
+    """Factor by which they are drawn longer, the same in all pictures."""
     others: int
     """Number of other frames on which the corrections were compared."""
     better: int
@@ -412,5 +417,7 @@ class CalibrationMessage(Message, frozen=True, tag="calibration"):
     """The frame that is previewed; null until it is ready."""
     preview_fall_nats: float
     """Fall of the cost of that frame by the corrections."""
-    outdated: tuple[tuple[int, ...], ...]
-    """Frames of each person with poses of an earlier calibration."""
+    revision: int
+    """Number of the present calibration, from 1 on; each correction makes another."""
+    outdated: tuple[tuple[tuple[int, int], ...], ...]
+    """Of each person, the first and last frames of intervals with poses of an earlier calibration."""

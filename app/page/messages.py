@@ -9,10 +9,12 @@ import numpy as np
 
 from app.drawing import dof_labels, overlays, part_outlines, pin_marks
 from app.drawing.curves import CurveGroup, plots_of, samples
+from app.drawing.epipolar_check import epipolar_check
 from app.drawing.error_ellipses import error_ellipses
 from app.drawing.floor_lines import floor_lines
 from app.drawing.former_limbs import former_limb_lines
 from app.drawing.ghosts import ghost_lines
+from app.drawing.seen_bodies import bodies_in
 from app.page import search_messages
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
@@ -329,6 +331,15 @@ def inconsistent(state: State) -> search_messages.InconsistentMessage:
         for doubt in state.keyframe_doubts
     )  # fmt: skip
     return search_messages.InconsistentMessage(state.inconsistent_frames, doubts)
+
+
+def epipolar(session: Session, state: State, points: Sequence[tuple[int, float, float]]) -> wire.EpipolarMessage:
+    """Describe the line of sight of a pixel, by the corrected cameras while they are previewed."""
+    mended = state.calibration.shown_on(state.frame)
+    cameras = [c.camera for c in session.cameras] if mended is None else mended.cameras
+    bodies = [b for i, b in enumerate(bodies_in(session, state)) if i not in state.undrawn]
+    found = epipolar_check(cameras, [(c, np.array([u, v])) for c, u, v in points], bodies)
+    return wire.EpipolarMessage(found.lines, found.distance)
 
 
 def range_comparison(found: RangeComparison | None) -> search_messages.RangeComparisonMessage:

@@ -69,4 +69,5 @@ def _dof(found: Observability, dof: int, sentence: str) -> DofObservability:
 
 def _ingredients(state: State) -> tuple[object, ...]:
     """Return what the message is made from, for comparison. Poses are compared by identity."""
-    return (state.frame, state.person, tuple(Identity(p.values) for p in state.people), state.revisions)
+    shown = tuple(Identity(p.values) for p in state.people)
+    return (state.frame, state.person, shown, state.revisions, state.calibration.n_changes)

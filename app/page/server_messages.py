@@ -7,6 +7,7 @@ from them.
 
 from typing import Literal, TypeAlias, Union, get_args
 
+from app.drawing.epipolar_check import EpipolarDistance, EpipolarLine
 from app.page.inspector_messages import (
     AcquisitionMessage,
     BodySizesMessage,
@@ -389,9 +390,17 @@ class ObservabilityMessage(Message, frozen=True, tag="observability"):
     """In the order of the person's degrees of freedom; empty where the person has no pose."""
 
 
+class EpipolarMessage(Message, frozen=True, tag="epipolar"):
+    """The line of sight of a pixel in the other views; only for the page that asks for it."""
+
+    lines: tuple[EpipolarLine, ...]
+    distance: EpipolarDistance | None
+    """Of the other pixel; null without one, or where its view does not show the line."""
+
+
 TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
-    RangeComparisonMessage, ObservabilityMessage,
+    RangeComparisonMessage, ObservabilityMessage, EpipolarMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
     AcquisitionMessage, FindingMessage, CalibrationMessage, ReasonMessage, CostMapMessage,
 ]  # fmt: skip

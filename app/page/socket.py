@@ -40,7 +40,7 @@ _MAX_HISTORY = 2000
 """Largest number of history entries, in each direction, that a page may request."""
 _EDGES = ("accepted", "rejected")
 """Layers of lines that are drawn from the evidence."""
-_COALESCED = (wire.Seek, wire.SetView, ReplayStep, PreviewCandidate, SetSearchSpeed)
+_COALESCED = (wire.Seek, wire.SetView, wire.CheckEpipolar, ReplayStep, PreviewCandidate, SetSearchSpeed)
 """Messages of which only the newest in the queue is carried out."""
 
 
@@ -85,6 +85,8 @@ class PageConnection:
         self._sent_overlay: tuple[object, ...] = ()  # what it was drawn from
         self._view: View | None = None  # nothing is drawn before the page's first view
         self._pictures = picture_sets.PictureSets(controller)
+        self._epipolar: tuple[tuple[int, float, float], ...] = ()
+        self._sent_epipolar: tuple[object, ...] = ((),)  # what the lines were drawn from
         self._curves: CurveGroup | None = None
         self._sent_curves: tuple[CurveGroup, int, int] | None = None  # group, person, version of the timeline
         self._feed = SearchFeed()
@@ -176,6 +178,10 @@ class PageConnection:
                 self._sent_history = None
             case wire.SetView():
                 self._view = view_of(message, len(self._controller.session.cameras))
+            case wire.CheckEpipolar(points=points):
+                for camera, _, _ in points:
+                    commands.check_index(self._controller, "camera", camera)
+                self._epipolar = tuple(points)
             case _:
                 commands.dispatch(self._controller, self._number, message)
                 return
@@ -208,6 +214,7 @@ class PageConnection:
                     await self._send_timeline(0 if sent is None else sent.timeline_version)
                 if self._view is not None and self._view.cameras:
                     await self._send_drawn(state, self._view)
+                await self._send_epipolar(state)
                 await self._send_checks(sent, state)
                 await self._send_curves(state)
                 await self._send_observability(state)
@@ -313,6 +320,17 @@ class PageConnection:
             await self._send(messages.inconsistent(state))
         if sent is None or sent.range_comparison is not state.range_comparison:
             await self._send(messages.range_comparison(state.range_comparison))
+
+    async def _send_epipolar(self, state: State) -> None:
+        """Send the lines of the pixel that the page asks about, if they changed."""
+        made_from: tuple[object, ...] = (self._epipolar,)
+        if self._epipolar:
+            shown = tuple(Identity(p.values) for p in state.people)
+            preview = Identity(state.calibration.shown_on(state.frame))
+            made_from += (state.frame, shown, state.calibration.n_changes, preview)
+        if made_from != self._sent_epipolar:
+            self._sent_epipolar = made_from
+            await self._send(messages.epipolar(self._controller.session_of(state), state, self._epipolar))
 
     async def _send_observability(self, state: State) -> None:
         """Send how well the views constrain the shown pose, if the page shows that layer."""

@@ -9,6 +9,7 @@ import numpy as np
 from app.control.controller import Controller
 from app.drawing import thumbnails
 from app.session.footage_crops import FootageCrops
+from app.state.identity import Identity
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 
@@ -30,6 +31,8 @@ class _Wanted(NamedTuple):
     poses: tuple[bytes, ...]
     """Their values as float64, which can be hashed."""
     colors: tuple[str, ...]
+    cameras: Identity
+    """Of the session: corrected ones make another thumbnail."""
 
 
 class Thumbnails:
@@ -42,7 +45,7 @@ class Thumbnails:
             controller: of the session.
             footage: gives the images.
         """
-        self._controller, self._footage = controller, footage
+        self._controller, self._footage, self._cameras = controller, footage, controller.session.cameras
         self._drawn = lru_cache(_CACHED)(self._draw)
 
     def jpeg(self, person: int, frame: int, limb: int | None) -> bytes | None:
@@ -66,7 +69,7 @@ class Thumbnails:
         return self._drawn(
             _Wanted(
                 frame, list(stored).index(person), limb, tuple(b.model for b in bodies),
-                tuple(b.values.tobytes() for b in bodies), colors,
+                tuple(b.values.tobytes() for b in bodies), colors, Identity(self._controller.session.cameras),
             )
         )  # fmt: skip
 
@@ -84,6 +87,7 @@ class Thumbnails:
         if camera >= len(session.cameras) or frame >= session.n_frames:
             return None
         self._give_way()
+        self._follow_cameras()
         found = self._controller.frames.evidence(frame)[camera].silhouette
         if found is None:
             return None
@@ -96,6 +100,7 @@ class Thumbnails:
     def _draw(self, wanted: _Wanted) -> bytes | None:
         bodies = [PosedBody(m, np.frombuffer(v)) for m, v in zip(wanted.bodies, wanted.poses, strict=True)]
         self._give_way()
+        self._follow_cameras()
         cameras = self._footage.cameras
         crop = thumbnails.choose_crop(bodies, wanted.person, wanted.limb, cameras)
         if crop is None:
@@ -104,6 +109,13 @@ class Thumbnails:
         self._give_way()
         limb = thumbnails.limb_parts(bodies, wanted.person, wanted.limb)
         return thumbnails.thumbnail(image, cameras[crop.camera], crop.region, bodies, wanted.colors, limb)
+
+    def _follow_cameras(self) -> None:
+        """Draw with the cameras of the session, which a correction or undo may have exchanged."""
+        cameras = self._controller.session.cameras
+        if cameras is not self._cameras:
+            self._cameras = cameras
+            self._footage.set_cameras(cameras)
 
     def _give_way(self) -> None:
         """Wait while pictures of the shown frame are made or a pose is dragged, for a second at most."""

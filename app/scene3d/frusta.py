@@ -18,6 +18,8 @@ _SCALE_M = 0.25
 _COLOR = (120, 130, 140)
 _CORRECTED_COLOR = (230, 130, 30)
 """Of a camera as a preview corrects it: it stands out from the others and from both backgrounds."""
+_CORRECTED_SCALE_M = 0.5
+"""A frustum of the same size would lie on that of the present camera, which is turned by a degree or less."""
 _WIDTH_PX = 192
 _JPEG_QUALITY = 75
 _REST_S = 0.35
@@ -64,19 +66,21 @@ class Frusta:
                 handle.remove()
             changed = () if preview is None else zip(self._cameras, preview.cameras, strict=True)
             self._corrected = [
-                self._frustum(f"/corrected/{after.name}", after, _CORRECTED_COLOR)
+                self._frustum(f"/corrected/{after.name}", after, _CORRECTED_COLOR, _CORRECTED_SCALE_M)
                 for before, after in changed
                 if not np.array_equal(before.T_world_camera, after.T_world_camera)
                 or not np.array_equal(before.K, after.K)
             ]
 
-    def _frustum(self, name: str, camera: Camera, color: tuple[int, int, int]) -> viser.CameraFrustumHandle:
+    def _frustum(
+        self, name: str, camera: Camera, color: tuple[int, int, int], scale_m: float = _SCALE_M
+    ) -> viser.CameraFrustumHandle:
         aspect = aspect_around(camera)
         return self._server.scene.add_camera_frustum(
             name,
             fov=field_of_view(camera, aspect),
             aspect=aspect,
-            scale=_SCALE_M,
+            scale=scale_m,
             thickness=1.5,
             thickness_units="screen",
             color=color,

@@ -15,6 +15,7 @@ from app.state.state import State
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.evidence.silhouettes import SilhouetteFinder
+from tracker.footage.camera_source import CameraSource
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
 from tracker.tracking.voxel.body_pose import state_of
@@ -38,7 +39,7 @@ class VoxelLayer:
     def __init__(self, server: viser.ViserServer, controller: Controller) -> None:
         """Follow the controller's state; silhouettes are found once the layer is switched on."""
         self._server, self._controller = server, controller
-        self._finder: SilhouetteFinder | None = None
+        self._finder: tuple[Sequence[CameraSource], SilhouetteFinder] | None = None  # with the cameras that it is of
         self._drawn: tuple[object, ...] = ()
         latest = LatestWinsWorker(self._show, "voxels", _REST_S)
         controller.subscribe(latest.offer)
@@ -50,7 +51,7 @@ class VoxelLayer:
                 self._drawn = ()
                 self._draw(np.zeros((0, 3)), np.zeros((0, 3), np.uint8), "")
             return
-        wanted = (state.frame, *map(Identity, state.poses), state.models)
+        wanted = (state.frame, state.calibration.n_changes, *map(Identity, state.poses), state.models)
         if wanted == self._drawn:
             return
         self._drawn = wanted
@@ -64,9 +65,12 @@ class VoxelLayer:
     def _carved(self, frame: int) -> Array:
         """Return the surface voxels of all people on a frame, (N, 3), metres."""
         session = self._controller.session
-        if self._finder is None:
-            self._finder = SilhouetteFinder(session.cameras, self._controller.frames.observer.recording)
-        silhouettes, floor = self._finder.silhouettes(frame), floor_plane(session.up, session.floor)
+        if self._finder is None or self._finder[0] is not session.cameras:
+            recording = self._controller.frames.observer.recording
+            if self._finder is not None:
+                self._finder[1].close()
+            self._finder = session.cameras, SilhouetteFinder(session.cameras, recording)
+        silhouettes, floor = self._finder[1].silhouettes(frame), floor_plane(session.up, session.floor)
         hull = carve_people(recover_from_shadows(silhouettes, floor, _VOXEL_M), _VOXEL_M)
         return np.concatenate([f.points_world[f.is_surface] for f in hull.figures])
 

@@ -31,11 +31,16 @@ class FootageCrops:
             cameras: footage of each camera.
             indices: folder in which the lists of frames are cached.
         """
-        self._sources, self._indices = tuple(cameras), indices
-        self._scales = [min(1.0, float(np.sqrt(_AREA_PX / (c.camera.width * c.camera.height)))) for c in self._sources]
-        self._views = lru_cache(_N_VIEWS)(self._view)
+        self._indices = indices
+        self.set_cameras(cameras)
+        self._scales = [min(1.0, float(np.sqrt(_AREA_PX / (c.camera.width * c.camera.height)))) for c in cameras]
         self._recording: Recording | None = None
         self._lock = threading.Lock()
+
+    def set_cameras(self, cameras: Sequence[CameraSource]) -> None:
+        """Continue with other calibrations of the same cameras."""
+        self._sources = tuple(cameras)
+        self._views = lru_cache(_N_VIEWS)(self._view)
 
     @property
     def cameras(self) -> list[Camera]:

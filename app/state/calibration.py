@@ -50,6 +50,8 @@ class CalibrationState:
     """The last frame that was refitted for the preview."""
     n_changes: int = 0
     """Number of times that the cameras of the open session were exchanged."""
+    revision: int = 1
+    """Number of the present calibration; 1 if it has never been changed."""
     outdated: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
     """Frames with poses of an earlier calibration, ascending, by index of the person."""
 

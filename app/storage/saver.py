@@ -23,6 +23,7 @@ from tracker.pipeline.seen_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.calibration_log import present_revision
 from tracker.store.records import (
     SEEN,
     SOURCES,
@@ -108,6 +109,11 @@ class Saver:
     def _with_cameras(self, found: Session) -> Session:
         self._session = replace(self._session, cameras=found.cameras)
         return self._session
+
+    @property
+    def calibration_revision(self) -> int:
+        """Number of the present calibration; 1 if it has never been changed."""
+        return present_revision(self._store) or 1
 
     def frames_of_earlier_calibration(self) -> dict[int, tuple[int, ...]]:
         """Return the frames with poses that were made with an earlier calibration, by index of the person."""

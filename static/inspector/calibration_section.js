@@ -1,5 +1,8 @@
 /** Calibration: check the cameras by the tracked people, preview the corrections, apply them, and track again. */
 
+import { KEYFRAME } from "../model/cells.js";
+import { earlierCalibration, hasTrack } from "../model/selectors.js";
+import { count } from "../widgets/text.js";
 import { textButton } from "./rows.js";
 
 /**
@@ -10,13 +13,27 @@ import { textButton } from "./rows.js";
 
 /** @type {Record<string, string>} */
 const WORDS = { rotation: "turned", position: "moved", focal: "zoomed", time: "shifted in time" };
-const AXES = "right, down, forward axis";
+/** Names of the numbers of each kind, their unit and decimals. @type {Record<string, {names: [string, string][], unit: string, digits: number}>} */
+const NUMBERS = {
+  rotation: {
+    names: [["pitch", "Turn about the axis to the right"], ["yaw", "Turn about the axis down"], ["roll", "Turn about the axis forward"]],
+    unit: "°",
+    digits: 2,
+  },
+  position: {
+    names: [["right", "Along the axis to the right"], ["down", "Along the axis down"], ["forward", "Along the line of sight"]],
+    unit: " mm",
+    digits: 0,
+  },
+  focal: { names: [["zoom", "Focal length"]], unit: " %", digits: 2 },
+  time: { names: [["time", "Its pictures were taken later by this"]], unit: " ms", digits: 1 },
+}; // prettier-ignore
 
 /**
  * @param {import("../model/index.js").Context} context
- * @returns {import("./inspector.js").Section}
+ * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Binding[]}}
  */
-export function calibrationSection({ store, send }) {
+export function calibrationSection({ store, send, notify }) {
   const act = (/** @type {Action} */ action) => send({ type: "calibration_check", action });
   const start = textButton("Check the cameras", "Compare contours of the tracked people with the calibration; changes nothing", () => act("start"));
   start.className = "is-primary";
@@ -32,26 +49,25 @@ export function calibrationSection({ store, send }) {
     act(store.facts.calibration?.is_previewed ? "leave" : "preview"),
   );
   const apply = textButton("Apply", "Correct the cameras; undo restores them. Poses stay until they are tracked again", () => act("apply"));
+  const misfits = textButton("Misfits", "Show in each view how the edges lie off the contours, magnified: all one way for a turned camera, round for a rolled one, outwards or inwards for a zoomed one", () =>
+    store.set({ showsMisfits: !store.facts.showsMisfits }),
+  ); // prettier-ignore
   const buttons = document.createElement("div");
   buttons.className = "acquisition-work";
-  buttons.append(preview, apply);
+  buttons.append(misfits, preview, apply);
   const fit = note();
   const outdated = note();
-  const again = textButton("Track again", "Track all frames with the present calibration, from a frame with a pose: keyframes stay", () =>
-    retrack(),
-  );
+  const again = textButton("Track again", "Track the frames of an earlier calibration with the present one; keyframes stay", () => act("track_again"));
   const body = document.createElement("div");
   body.className = "acquisition";
   body.append(start, work, status, result, buttons, fit, outdated, again);
 
-  function retrack() {
-    const { session, state } = store.facts;
-    if (session && state) send({ type: "range", action: "track_forward", first: 0, last: session.n_frames - 1 });
-  }
+  let wasCurrent = true;
+  const isNamed = () => !!store.facts.calibration?.cameras.some(({ kinds }) => kinds.length);
 
   /** @param {Calibration} found */
   const show = (found) => {
-    const named = found.cameras.some(({ kinds }) => kinds.length);
+    const named = isNamed();
     start.hidden = found.running;
     work.hidden = !found.running;
     progress.value = found.share;
@@ -60,14 +76,22 @@ export function calibrationSection({ store, send }) {
     status.classList.toggle("is-failed", found.failed);
     result.hidden = !found.is_checked;
     if (found.is_checked) result.replaceChildren(...describe(found));
-    buttons.hidden = !named;
+    buttons.hidden = !found.is_checked;
+    preview.hidden = apply.hidden = !named;
+    misfits.setAttribute("aria-pressed", String(store.facts.showsMisfits));
+    misfits.disabled = found.is_previewed;
     preview.setAttribute("aria-pressed", String(found.is_previewed));
     apply.disabled = found.refused !== "";
     fit.hidden = !named;
     fit.textContent = found.refused ? capital(found.refused) : fitText(found, store.facts.state?.frame ?? -1);
-    const n = new Set(found.outdated.flat()).size;
-    outdated.hidden = again.hidden = n === 0;
-    outdated.textContent = `${n} frame${n === 1 ? " has a pose" : "s have poses"} of an earlier calibration.`;
+    const { tracked, keyframes } = earlierPoses(store.facts);
+    outdated.hidden = tracked + keyframes === 0;
+    again.hidden = tracked === 0;
+    again.disabled = hasTrack(store.facts.state);
+    outdated.textContent = sentences(tracked, keyframes).join(" ");
+    const isNews = tracked > 0 && wasCurrent && store.facts.timeline.size > 0; // cells tell keyframes from the others
+    if (isNews || tracked === 0) wasCurrent = !isNews;
+    if (isNews) notify({ type: "notice", level: "info", text: `${sentences(tracked, 0)[0]} Track them again in the inspector (Alt+I), section Calibration.` });
   };
 
   return {
@@ -77,9 +101,64 @@ export function calibrationSection({ store, send }) {
     body,
     update(changed) {
       const { calibration } = store.facts;
-      if (calibration && (changed.has("calibration") || changed.has("state"))) show(calibration);
+      if (calibration && ["calibration", "showsMisfits", "state", "timeline", "lanes"].some((f) => changed.has(/** @type {"state"} */ (f)))) show(calibration);
+    },
+    bindings(reveal) {
+      const noCamera = () => (isNamed() ? null : "No camera is known to be off. Check the cameras first.");
+      const binding = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) => ({
+        keys: [],
+        label,
+        words: `${words} calibration`,
+        matches: () => false,
+        why,
+        run: () => {
+          reveal();
+          run();
+        },
+      });
+      const notChecked = () => (store.facts.calibration?.is_checked ? null : "There is no check. Check the cameras first.");
+      /** @type {[string, string, Action | (() => Action), () => string | null][]} */
+      const actions = [
+        ["Check the cameras", "contours body wrong moved turned", "start", () => (store.facts.calibration?.running ? "The check is at work." : null)],
+        ["Preview the corrected cameras (toggle)", "", () => (store.facts.calibration?.is_previewed ? "leave" : "preview"), noCamera],
+        ["Apply the correction of the cameras", "repair", "apply", () => noCamera() ?? (capital(store.facts.calibration?.refused ?? "") || null)],
+        ["Track again what is of an earlier calibration", "retrack", "track_again", () =>
+          earlierPoses(store.facts).tracked ? null : "No tracked pose is of an earlier calibration."],
+      ]; // prettier-ignore
+      return [
+        ...actions.map(([label, words, action, why]) => binding(label, words, why, () => act(typeof action === "string" ? action : action()))),
+        binding("Show where contours miss the edges (toggle)", "misfits residuals arrows field", notChecked, () =>
+          store.set({ showsMisfits: !store.facts.showsMisfits }),
+        ),
+      ];
     },
   };
+}
+
+/**
+ * Number of tracked poses and of keyframes that are of an earlier calibration.
+ *
+ * @param {import("../model/store.js").Facts} facts
+ */
+function earlierPoses(facts) {
+  const { lanes, timeline } = facts;
+  const found = { tracked: 0, keyframes: 0 };
+  earlierCalibration(facts).forEach((frames, person) => {
+    const { marks } = lanes[person] ?? timeline;
+    for (const frame of frames) found[marks[frame] & KEYFRAME ? "keyframes" : "tracked"] += 1;
+  });
+  return found;
+}
+
+/**
+ * @param {number} tracked
+ * @param {number} keyframes
+ */
+function sentences(tracked, keyframes) {
+  const said = [];
+  if (tracked) said.push(`${count(tracked)} ${tracked === 1 ? "pose is" : "poses are"} of an earlier calibration.`);
+  if (keyframes) said.push(`${count(keyframes)} ${keyframes === 1 ? "keyframe was" : "keyframes were"} set under it and ${keyframes === 1 ? "stays" : "stay"}.`);
+  return said;
 }
 
 /**
@@ -114,8 +193,8 @@ function describe(found) {
     const row = rows.insertRow();
     row.classList.toggle("is-off", camera.kinds.length > 0);
     row.append(Object.assign(document.createElement("th"), { textContent: camera.name, scope: "row" }));
-    row.insertCell().textContent = camera.misfit_px.toFixed(1);
-    row.insertCell().textContent = camera.misfit_mm.toFixed(0);
+    row.insertCell().textContent = camera.is_seen ? camera.misfit_px.toFixed(1) : "–";
+    row.insertCell().textContent = camera.is_seen ? camera.misfit_mm.toFixed(0) : "–";
     const cell = row.insertCell();
     const lines = mended(camera);
     cell.replaceChildren(...lines.map(({ text, title }) => Object.assign(document.createElement("div"), { textContent: text, title })));
@@ -132,21 +211,29 @@ function mended(camera) {
   if (!camera.is_seen) return [{ text: "shows nobody", title: "Camera without contours of the people on these frames" }];
   if (!camera.kinds.length) return [{ text: "–", title: "Nothing to correct: the misfit is that of the likeliest correction" }];
   const { sigma } = camera;
-  /** @type {Record<string, {values: number[], sigma: number[], unit: string, digits: number}>} */
+  /** @type {Record<string, [number[], number[]]>} */
   const of = {
-    rotation: { values: camera.rotation_deg, sigma: sigma.rotation_deg, unit: "°", digits: 2 },
-    position: { values: camera.position_mm, sigma: sigma.position_mm, unit: "mm", digits: 0 },
-    focal: { values: [camera.focal_percent], sigma: sigma.focal_percent, unit: "%", digits: 2 },
-    time: { values: [camera.time_ms], sigma: sigma.time_ms, unit: "ms", digits: 1 },
+    rotation: [camera.rotation_deg, sigma.rotation_deg],
+    position: [camera.position_mm, sigma.position_mm],
+    focal: [[camera.focal_percent], sigma.focal_percent],
+    time: [[camera.time_ms], sigma.time_ms],
   };
-  const lines = camera.kinds.map((kind) => {
-    const { values, sigma: sigmas, unit, digits } = of[kind];
-    const numbers = values.map((value, i) => `${value.toFixed(digits)} ± ${sigmas[i].toFixed(digits)}`);
-    return { text: `${WORDS[kind]}: ${numbers.join(", ")} ${unit}`, title: values.length > 1 ? AXES : "" };
+  const lines = camera.kinds.flatMap((kind) => {
+    const { names, unit, digits } = NUMBERS[kind];
+    const [values, sigmas] = of[kind];
+    return names.map(([name, title], i) => ({ text: `${name} ${signed(values[i], digits)} ± ${sigmas[i].toFixed(digits)}${unit}`, title }));
   });
   if (camera.since_frame !== null) lines.push({ text: `since frame ${camera.since_frame}`, title: "" });
   if (camera.rivals.length) lines.push({ text: `or ${camera.rivals.map((kind) => WORDS[kind]).join(" or ")}`, title: "Explains the contours as well" });
   return lines;
+}
+
+/**
+ * @param {number} value
+ * @param {number} digits
+ */
+function signed(value, digits) {
+  return value.toFixed(digits).replace("-", "−");
 }
 
 function note() {
@@ -157,6 +244,7 @@ function note() {
 
 /** @param {string} text */
 function capital(text) {
+  if (!text) return "";
   const end = text.endsWith(".") ? "" : ".";
   return `${text[0].toUpperCase()}${text.slice(1)}${end}`;
 }

@@ -34,6 +34,7 @@ const THEMES = [
  */
 export function mount(context, { panes, posing, scene }) {
   const joint = jointSection(context, posing);
+  const calibration = calibrationSection(context);
   const sections = [
     joint,
     reasonSection(context, panes, posing),
@@ -41,7 +42,7 @@ export function mount(context, { panes, posing, scene }) {
     new BodySection(context),
     trackSection(context),
     searchSection(context),
-    calibrationSection(context),
+    calibration,
     viewSection(context, scene, panes),
   ];
   const inspector = new Inspector(context.store, sections);
@@ -62,9 +63,9 @@ export function mount(context, { panes, posing, scene }) {
     },
     {
       keys: ["Alt W"],
-      label: "Why this pose is in doubt: parts by views",
+      label: "Why this pose is in doubt",
       area: "Views",
-      words: "reason explain evidence colours outside silhouette contour nats",
+      words: "reason explain evidence colours outside silhouette contour nats parts views",
       matches: alt("KeyW", false),
       run: () => inspector.reveal("reason"),
     },
@@ -85,6 +86,7 @@ export function mount(context, { panes, posing, scene }) {
       matches: () => false,
       run: findPeople,
     },
+    ...calibration.bindings(() => inspector.reveal("calibration")),
     ...sections.filter(({ id }) => id !== "find" && id !== "reason").map(({ id, title, hint }) => ({
       keys: [],
       label: id === "view" ? "View settings: theme, 3-D view" : title,

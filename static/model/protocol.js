@@ -19,6 +19,7 @@
  * @typedef {{type: "seek", frame: number}} Seek
  * @typedef {{type: "select", person: number, point?: string | null}} Select
  * @typedef {{type: "view", layers: Layer[], reductions: number[], by_part: boolean}} SetView
+ * @typedef {{type: "epipolar", points: [number, number, number][]}} CheckEpipolar
  * @typedef {{type: "people", action: "show", person: number, shown: boolean}} ShowPerson
  * @typedef {{type: "people", action: "solo", on: boolean}} Solo
  * @typedef {{type: "before", shown: boolean}} ShowBefore
@@ -90,7 +91,8 @@
  * @typedef {{type: "body_sizes", action: "discard" | "previous", person: number}} DraftSizes
  * @typedef {{type: "acquire", action: "start" | "stop", person: number, method?: "contours" | "voxels"}} AcquireSizes
  * @typedef {{type: "find_people", action: "start" | "stop"}} FindPeople
- * @typedef {{type: "calibration_check", action: "start" | "stop" | "preview" | "leave" | "apply"}} CheckCalibration
+ * @typedef {{type: "calibration_check", action: "start" | "stop" | "preview" | "leave" | "apply" | "track_again"}}
+ *   CheckCalibration
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo
@@ -149,6 +151,9 @@
  *   Stretch[], run: number | null}} RangeComparisonMessage
  * @typedef {{level: "known" | "weak" | "unknown", sigma: number, sentence: string}} DofObservability
  * @typedef {{type: "observability", frame: number, person: number, dofs: DofObservability[]}} ObservabilityMessage
+ * @typedef {{camera: number, x0: number, y0: number, x1: number, y1: number}} EpipolarLine
+ * @typedef {{camera: number, px: number, mm: number | null}} EpipolarDistance
+ * @typedef {{type: "epipolar", lines: EpipolarLine[], distance: EpipolarDistance | null}} EpipolarMessage
  * @typedef {{person: number, name: string, dofs: string[], bound_rad: number | null, step_rad: number | null, bound_m:
  *   number | null, step_m: number | null, angles: number, lengths: number, own: boolean}} SearchLeaf
  * @typedef {{type: "search_setup", speed: number | null, leaves: SearchLeaf[]}} SearchSetupMessage
@@ -193,10 +198,11 @@
  * @typedef {{name: string, misfit_px: number, misfit_mm: number, kinds: string[], rivals: string[], rotation_deg:
  *   number[], position_mm: number[], focal_percent: number, time_ms: number, sigma: Record<string, number[]>,
  *   since_frame: number | null, is_seen: boolean}} CameraCheck
+ * @typedef {{camera: number, u: number, v: number, du: number, dv: number}} MisfitArrow
  * @typedef {{type: "calibration", running: boolean, stage: string, share: number, message: string, failed: boolean,
- *   is_checked: boolean, frames: number[], cameras: CameraCheck[], sentences: string[], others: number, better: number,
- *   refused: string, is_previewed: boolean, preview_frame: number | null, preview_fall_nats: number, outdated:
- *   number[][]}} CalibrationMessage
+ *   is_checked: boolean, frames: number[], cameras: CameraCheck[], sentences: string[], misfits: MisfitArrow[],
+ *   misfit_factor: number, others: number, better: number, refused: string, is_previewed: boolean, preview_frame:
+ *   number | null, preview_fall_nats: number, revision: number, outdated: [number, number][][]}} CalibrationMessage
  * @typedef {{name: string, parts: number[]}} LimbReason
  * @typedef {{below_nats: (number | null)[], outside: (number | null)[], usual_outside: (number | null)[], contour_px:
  *   (number | null)[], usual_contour_px: (number | null)[], below_in_all_nats: number}} PartReason
@@ -235,18 +241,18 @@
  *   current_px: number | null, count: number}} LandscapeHeader
  * @typedef {SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative | ResetLimb | LockDofs |
  *   HoldPoint} PoseEdit
- * @typedef {Seek | Select | SetView | ShowPerson | Solo | ShowBefore | ShowCurves | WatchTab | ShowHistory |
- *   LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson | TakeAlternative |
- *   ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | TakeLimbBack | RunSearch | RepeatSearch |
- *   SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate | ShowLandscape |
- *   SetLandscapeDof | ShowCostMap | SetCostMapPlace | AskReason | StartTracking | ControlTracking | EditRange |
- *   CompareRange | StopRange | ToggleMark | ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d | SetHeight
- *   | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | ChangeBody | DraftSizes | AcquireSizes | FindPeople |
- *   CheckCalibration | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ * @typedef {Seek | Select | SetView | CheckEpipolar | ShowPerson | Solo | ShowBefore | ShowCurves | WatchTab |
+ *   ShowHistory | LookThrough | Pause3d | Drag | SetDof | TurnDof | Nudge | Mirror | CopyFrame | CopyPerson |
+ *   TakeAlternative | ResetLimb | LockDofs | HoldPoint | DragPin | RemovePins | FitPose | TakeLimbBack | RunSearch |
+ *   RepeatSearch | SetSearchSpeed | SetSearchSettings | ReplayStep | CompareRun | PreviewCandidate | TakeCandidate |
+ *   ShowLandscape | SetLandscapeDof | ShowCostMap | SetCostMapPlace | AskReason | StartTracking | ControlTracking |
+ *   EditRange | CompareRange | StopRange | ToggleMark | ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d
+ *   | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | ChangeBody | DraftSizes | AcquireSizes |
+ *   FindPeople | CheckCalibration | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
- *   RangeComparisonMessage | ObservabilityMessage | SearchSetupMessage | SearchRunsMessage | SettingsMessage |
- *   View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | CalibrationMessage | ReasonMessage |
- *   CostMapMessage} TextMessage
+ *   RangeComparisonMessage | ObservabilityMessage | EpipolarMessage | SearchSetupMessage | SearchRunsMessage |
+ *   SettingsMessage | View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | CalibrationMessage |
+ *   ReasonMessage | CostMapMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

@@ -81,6 +81,9 @@ export class Receiver {
       case "observability":
         this.#store.set({ observability: message });
         break;
+      case "epipolar":
+        this.#store.set({ epipolarLines: message });
+        break;
       case "reason":
         this.#store.set({ reason: message });
         break;

@@ -47,6 +47,36 @@ export function personCells({ lanes, timeline, state }) {
   return (state && lanes[state.person]) ?? timeline;
 }
 
+/** @type {WeakMap<number[][][], Set<number>[]>} */
+const EARLIER = new WeakMap();
+
+/**
+ * Frames of each person with poses of an earlier calibration.
+ *
+ * @param {import("./store.js").Facts} facts
+ * @returns {Set<number>[]}
+ */
+export function earlierCalibration({ calibration }) {
+  if (!calibration) return [];
+  let found = EARLIER.get(calibration.outdated);
+  if (!found) {
+    found = calibration.outdated.map(
+      (intervals) => new Set(intervals.flatMap(([first, last]) => Array.from({ length: last - first + 1 }, (_, i) => first + i))),
+    );
+    EARLIER.set(calibration.outdated, found);
+  }
+  return found;
+}
+
+/**
+ * Arrows of the last check of the cameras that the views show: none while its correction is previewed.
+ *
+ * @param {import("./store.js").Facts} facts
+ */
+export function shownMisfits({ calibration, showsMisfits }) {
+  return showsMisfits && calibration && !calibration.is_previewed ? calibration.misfits : [];
+}
+
 /**
  * Whether a search is running, or paused between two steps.
  *

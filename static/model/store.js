@@ -9,6 +9,7 @@ import { defaultLayers } from "./layers.js";
  * @typedef {{camera: number, person: number, point: string}} Joint
  * @typedef {Joint & {overlapping?: {person: number, point: string}[]}} HoveredJoint overlapping: the joints at the same
  *   place, itself included
+ * @typedef {{camera: number, u: number, v: number}} ViewPoint undistorted px
  * @typedef {{frame: number, pictures: import("./pictures.js").Pictures}} Shown
  *
  * @typedef {Map<string, {bitmap: OffscreenCanvas, limitPx: null}>} PlaceholderPictures like `Pictures`, of images only
@@ -40,6 +41,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("./protocol.js").AcquisitionMessage | null} acquisition of sizes from the footage
  * @property {import("./protocol.js").FindingMessage | null} finding the search for people whom nobody has placed
  * @property {import("./protocol.js").CalibrationMessage | null} calibration the check of the cameras
+ * @property {boolean} showsMisfits whether the views show where the contours of the last check miss the edges
  * @property {number | null} exporting share of an export that is done, 0 to 1; null without one
  * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
  * @property {import("./protocol.js").SearchRunsMessage | null} searchRuns
@@ -59,6 +61,8 @@ import { defaultLayers } from "./layers.js";
  * @property {number | null} active the camera whose pane the pointer was in last; arrow keys move parallel to its image
  * @property {number | null} dof the degree of freedom that keys change, one of the selected joint
  * @property {boolean} pinning whether each click pins the selected joint
+ * @property {{kept: ViewPoint[], pointer: ViewPoint | null} | null} epipolar places of the epipolar check; null without one
+ * @property {import("./protocol.js").EpipolarMessage | null} epipolarLines of the first of them
  * @property {boolean} livePins whether the body follows a dragged pin
  * @property {Joint | null} pinHover the pin under the pointer
  * @property {import("./protocol.js").PinMark | null} heldPin the pin that is dragged or was just released
@@ -105,6 +109,7 @@ export class Store {
     acquisition: null,
     finding: null,
     calibration: null,
+    showsMisfits: false,
     exporting: null,
     searchSetup: null,
     searchRuns: null,
@@ -124,6 +129,8 @@ export class Store {
     active: null,
     dof: null,
     pinning: false,
+    epipolar: null,
+    epipolarLines: null,
     livePins: true,
     pinHover: null,
     heldPin: null,

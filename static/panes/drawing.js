@@ -195,7 +195,7 @@ function tracePath(view, segments, first, count) {
  * @param {number} width
  * @param {boolean} hasOutline
  */
-function stroke(context, line, color, width, hasOutline = true) {
+export function stroke(context, line, color, width, hasOutline = true) {
   context.lineJoin = context.lineCap = "round";
   if (hasOutline) {
     context.strokeStyle = imageColor("outline");

@@ -6,7 +6,7 @@ import { decluttered } from "./declutter.js";
 import { ofJoint } from "../model/observability.js";
 import { jointLabel } from "./joint_label.js";
 import { drawObservability } from "./observability_marks.js";
-import { drawAxes } from "./axis_lines.js";
+import { drawAxes, drawEpipolar, drawMisfits } from "./measured_lines.js";
 import { isDimmed, isInSight, isStoredDrawn, alternativesOf } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
@@ -219,6 +219,8 @@ export class Pane {
     drawAxes(context, this.view, this.#store.facts, this.#camera);
     this.#drawJoints(context, state, session.people);
     drawPins(context, this.view, this.#store.facts, this.#camera, width);
+    drawMisfits(context, this.view, this.#store.facts, this.#camera);
+    drawEpipolar(context, this.view, this.#store.facts, this.#camera);
   }
 
   showCost() {

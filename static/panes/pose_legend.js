@@ -1,6 +1,7 @@
 /** Legend of the poses that the panes show besides the stored ones: replayed, tested, compared, previewed, alternative. */
 
 import { byId } from "../widgets/elements.js";
+import { shownMisfits } from "../model/selectors.js";
 import { LINE_STYLES } from "./drawing.js";
 
 /**
@@ -10,12 +11,14 @@ import { LINE_STYLES } from "./drawing.js";
 
 const SAMPLE_PX = 30;
 
-/** Kinds of outlines in the legend, with their names. @type {Partial<Record<Kind, (state: StateMessage) => string>>} */
+/** @typedef {import("../model/protocol.js").CalibrationMessage} Calibration */
+/** Kinds of outlines in the legend, with their names. @type {Partial<Record<Kind, (state: StateMessage, calibration: Calibration | null) => string>>} */
 const NAMES = {
   candidate: () => "tested pose",
   compared: ({ compared_run, replay }) =>
     compared_run !== null ? `run ${compared_run}` : replay ? "start of the fit" : "replaced pose",
-  preview: ({ preview }) => (preview ? `candidate ${preview.candidate + 1} of run ${preview.run}` : "candidate"),
+  preview: ({ preview }, calibration) =>
+    calibration?.is_previewed ? "with corrected cameras" : preview ? `candidate ${preview.candidate + 1} of run ${preview.run}` : "candidate",
   alternative: () => "alternative pose",
   result: ({ compared }) => `result of the ${compared?.work}`,
   new_sizes: () => "new body sizes",
@@ -31,12 +34,12 @@ export class PoseLegend {
   constructor(store) {
     this.#store = store;
     store.subscribe((changed) => {
-      if (changed.has("state") || changed.has("overlay") || changed.has("layers")) this.#show();
+      if (changed.has("state") || changed.has("overlay") || changed.has("calibration") || changed.has("showsMisfits") || changed.has("layers")) this.#show();
     });
   }
 
   #show() {
-    const { state, overlay, layers, session } = this.#store.facts;
+    const { state, overlay, layers, session, calibration } = this.#store.facts;
     if (!state || !overlay) return;
     const replay = state.replay && `Replay of run ${state.replay.run}, step ${state.replay.step + 1} of ${state.replay.steps}`;
     /** @type {Map<Kind, string>} colours of the kinds that are visible */
@@ -47,16 +50,17 @@ export class PoseLegend {
     }
     const lines = Object.entries(NAMES).flatMap(([name, label]) => {
       const [kind, color] = [/** @type {Kind} */ (name), colors.get(/** @type {Kind} */ (name))];
-      return color ? [{ kind, color, text: label(state) }] : [];
+      return color ? [{ kind, color, text: label(state, calibration) }] : [];
     });
     if (replay && colors.has("model")) {
       lines.unshift({ kind: "model", color: session?.people[state.person].color ?? "#fff", text: "best pose so far" });
     }
-    const texts = [replay, ...(replay && !colors.has("model") ? ["contours are hidden"] : []), replay && "Esc exits"];
+    const misfits = shownMisfits(this.#store.facts).length > 0 ? `misfit × ${calibration?.misfit_factor}` : "";
+    const texts = [misfits, replay, ...(replay && !colors.has("model") ? ["contours are hidden"] : []), replay && "Esc exits"];
     const described = JSON.stringify([texts, lines]);
     if (described === this.#shown) return;
     this.#shown = described;
-    this.#element.hidden = !replay && lines.length === 0;
+    this.#element.hidden = !replay && !misfits && lines.length === 0;
     this.#element.replaceChildren(...texts.filter(Boolean).map((text) => entry(text ?? "")), ...lines.map((line) => entry(line.text, line)));
   }
 }

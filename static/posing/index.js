@@ -5,13 +5,14 @@
  */
 
 import { byId } from "../widgets/elements.js";
+import { EpipolarCheck } from "./epipolar_check.js";
 import { FrameCard } from "./frame_card.js";
 import { JointBar } from "./joint_bar.js";
 import { PoseNotes } from "./pose_notes.js";
 import { PinBar } from "./pin_bar.js";
 import { Pinning } from "./pinning.js";
 import { Posing } from "./posing.js";
-import { noteBindings, pinBindings, posingBindings } from "./posing_keys.js";
+import { epipolarBindings, noteBindings, pinBindings, posingBindings } from "./posing_keys.js";
 
 /** @typedef {ReturnType<typeof mount>} PosingRoom */
 
@@ -24,11 +25,13 @@ import { noteBindings, pinBindings, posingBindings } from "./posing_keys.js";
 export function mount({ store, send, notify, reasons, actions }, { grid }) {
   const pinning = new Pinning(store, send, notify);
   grid.addPointerTarget(pinning);
+  const epipolar = new EpipolarCheck(store, send);
+  grid.addPointerTarget(epipolar); // before pins and joints
   const posing = new Posing(store, send);
   const jointBar = new JointBar(byId("joint-bar", HTMLElement), store, posing, notify);
   new FrameCard(store, posing);
   new PinBar(store, pinning);
   const notes = new PoseNotes({ store, actions, pinning, grid });
-  const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...noteBindings(notes, reasons.away)];
-  return { posing, pinning, bindings };
+  const bindings = [...posingBindings(posing, jointBar, reasons.away), ...pinBindings(pinning, reasons.away), ...epipolarBindings(epipolar, reasons.away), ...noteBindings(notes, reasons.away)];
+  return { posing, pinning, epipolar, bindings };
 }

@@ -132,3 +132,18 @@ export function noteBindings(notes, away) {
     },
   ]);
 }
+
+/**
+ * @param {import("./epipolar_check.js").EpipolarCheck} check
+ * @param {() => string | null} why
+ */
+export function epipolarBindings(check, why) {
+  const binding = {
+    keys: ["Alt X"],
+    label: "Epipolar lines (toggle)",
+    words: "calibration check cameras line of sight distance pointer",
+    matches: alt("KeyX", false),
+    run: () => check.toggle(),
+  };
+  return inArea("Views", [binding], why);
+}

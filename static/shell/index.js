@@ -65,7 +65,7 @@ export function mount(context, rooms) {
   const own = [
     ...helpBindings({ actions, history, notices, palette, keyList, firstSteps, reasons }),
     ...rooms.sessions.bindings,
-    escapeBinding({ store, actions, notices, grid, gestures, pinning, floor: rooms.scene.floor }),
+    escapeBinding({ store, actions, notices, grid, gestures, pinning, epipolar: rooms.posing.epipolar, floor: rooms.scene.floor }),
     ...peopleBindings({ actions, posing, people, reasons }),
     ...workspace.bindings,
   ];

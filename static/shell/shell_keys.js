@@ -51,12 +51,12 @@ export function helpBindings({ actions, history, notices, palette, keyList, firs
  * @param {{store: import("../model/store.js").Store, actions: import("../model/actions.js").Actions,
  *   notices: import("./notices.js").Notices, grid: import("../panes/pane_grid.js").PaneGrid,
  *   gestures: import("../panes/gestures.js").Gestures, pinning: import("../posing/pinning.js").Pinning,
- *   floor: import("../scene/floor.js").Floor}} parts
+ *   epipolar: import("../posing/epipolar_check.js").EpipolarCheck, floor: import("../scene/floor.js").Floor}} parts
  * @returns {Binding}
  */
-export function escapeBinding({ store, actions, notices, grid, gestures, pinning, floor }) {
+export function escapeBinding({ store, actions, notices, grid, gestures, pinning, epipolar, floor }) {
   const run = () => {
-    if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel()) return;
+    if (gestures.cancel() || closePopover() || floor.cancel() || pinning.cancel() || epipolar.cancel()) return;
     if (store.facts.bare) return store.set({ bare: false });
     if (actions.leaveReplay() || actions.leaveBefore()) return;
     const { state, range, filled } = store.facts;

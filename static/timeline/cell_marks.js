@@ -25,6 +25,8 @@ export const SOURCE_MARKS = {
 export const STATUSES = /** @type {const} */ (["good", "doubtful", "lost"]);
 export const STATUS_COLORS = { good: "--good", doubtful: "--warning", lost: "--bad" };
 export const STATUS_HEIGHTS = { good: 3, doubtful: 7, lost: 12 };
+/** Dotted line above poses of an earlier calibration. */
+export const EARLIER_DASH = [2, 2];
 /** Dark stripes on the colour of a person. */
 export const DARK_INK = "rgb(0 0 0 / 72%)";
 
@@ -69,6 +71,13 @@ export function sourceSwatch(source) {
 export function statusSwatch(status) {
   const mark = document.createElement("i");
   mark.className = `status-mark is-${status}`;
+  return mark;
+}
+
+/** Sample of a pose of an earlier calibration for the legend. */
+export function earlierSwatch() {
+  const mark = document.createElement("i");
+  mark.className = "earlier-mark";
   return mark;
 }
 

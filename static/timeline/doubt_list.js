@@ -123,7 +123,7 @@ export class DoubtList {
    * @returns {HTMLLIElement}
    */
   #row(doubt) {
-    const { session } = this.#store.facts;
+    const { session, calibration } = this.#store.facts;
     const { person, first, last, spans, worst, status, limbs, limb, keyframe } = doubt;
     const info = session?.people[person];
     const row = document.createElement("li");
@@ -135,7 +135,7 @@ export class DoubtList {
     image.alt = "";
     image.draggable = false;
     const cost = this.#cellsOf(person)?.costs[worst] ?? 0;
-    this.#loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}`);
+    this.#loader.watch(image, `thumbnail/${person}/${worst}?${limb === null ? "" : `limb=${limb}&`}v=${cost}-${calibration?.revision ?? 1}`);
     const text = document.createElement("span");
     text.className = "doubt-text";
     const frames = `${first === last ? `frame ${first}` : `frames ${first}–${last}`}${spans.length > 1 ? `, in ${spans.length} stretches` : ""}`;

@@ -1,8 +1,9 @@
 /** Frames to go to, by kind: their number, and the next one in either direction. */
 
 import { AMBIGUOUS, KEYFRAME, NO_POSE, REVIEWED, STATUSES, keyframesOf } from "../model/cells.js";
+import { earlierCalibration } from "../model/selectors.js";
 
-/** @typedef {"doubt" | "ambiguous" | "unreviewed" | "disagreeing" | "keyframe" | "empty"} Kind */
+/** @typedef {"doubt" | "ambiguous" | "unreviewed" | "disagreeing" | "earlier" | "keyframe" | "empty"} Kind */
 
 /** @type {{kind: Kind, label: string, title: string, key: string, more: string}[]} */
 export const KINDS = [
@@ -34,6 +35,13 @@ export const KINDS = [
     key: "D",
     more: "frame inconsistent with its neighbours",
   },
+  {
+    kind: "earlier",
+    label: "Earlier calibration",
+    title: "Frames with a pose that was made before the cameras were corrected",
+    key: "",
+    more: "frame of an earlier calibration",
+  },
   { kind: "keyframe", label: "Keyframes", title: "Frames whose pose a person has set or confirmed", key: "W", more: "keyframe" },
   { kind: "empty", label: "Without a pose", title: "Frames that have no pose", key: "", more: "frame without a pose" },
 ];
@@ -58,10 +66,10 @@ export class Jumps {
 
   /** @param {Kind} kind */
   count(kind) {
-    const { timeline, disagreeing } = this.#store.facts;
-    if (kind === "disagreeing") return disagreeing.length;
+    const { facts } = this.#store;
+    const { timeline } = facts;
     if (kind === "empty") return timeline.frames - timeline.size;
-    const is = tests(timeline)[kind];
+    const is = tests(facts)[kind];
     let count = 0;
     for (let frame = 0; frame < timeline.frames; frame += 1) if (is(frame)) count += 1;
     return count;
@@ -74,9 +82,9 @@ export class Jumps {
    * @param {1 | -1} way
    */
   go(kind, way) {
-    const { timeline, target, disagreeing } = this.#store.facts;
-    const among = kind === "disagreeing" ? new Set(disagreeing) : null;
-    const is = kind === "disagreeing" ? (/** @type {number} */ frame) => among?.has(frame) : tests(timeline)[kind];
+    const { facts } = this.#store;
+    const { timeline, target } = facts;
+    const is = tests(facts)[kind];
     this.#navigation.pause();
     for (let frame = target + way; frame >= 0 && frame < timeline.frames; frame += way) {
       if (!is(frame)) continue;
@@ -122,11 +130,16 @@ export class Jumps {
 }
 
 /**
- * @param {import("../model/cells.js").Cells} cells
- * @returns {Record<Exclude<Kind, "disagreeing">, (frame: number) => boolean>}
+ * @param {import("../model/store.js").Facts} facts
+ * @returns {Record<Kind, (frame: number) => boolean>}
  */
-function tests({ sources, statuses, marks }) {
+function tests(facts) {
+  const { sources, statuses, marks } = facts.timeline;
+  const disagreeing = new Set(facts.disagreeing);
+  const earlier = earlierCalibration(facts);
   return {
+    disagreeing: (frame) => disagreeing.has(frame),
+    earlier: (frame) => earlier.some((own) => own.has(frame)),
     doubt: (frame) => statuses[frame] >= DOUBT && !(marks[frame] & REVIEWED),
     ambiguous: (frame) => (marks[frame] & AMBIGUOUS) !== 0,
     unreviewed: (frame) => sources[frame] !== NO_POSE && !(marks[frame] & REVIEWED),

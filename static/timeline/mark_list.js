@@ -2,7 +2,7 @@
 
 import { sampleOf } from "../panes/pose_legend.js";
 import { SOURCES } from "../model/cells.js";
-import { STATUSES, diamondSwatch, sourceSwatch, statusSwatch } from "./cell_marks.js";
+import { STATUSES, diamondSwatch, earlierSwatch, sourceSwatch, statusSwatch } from "./cell_marks.js";
 
 /** @typedef {import("../model/protocol.js").Path["kind"]} Kind */
 
@@ -40,6 +40,7 @@ export function markSection() {
     ...STATUSES.map((status) => row(statusSwatch(status), STATUS_MEANINGS[status])),
     row(diamondSwatch(), "keyframe; larger with an exclamation mark: check it"),
     ...SOURCES.map((source) => row(sourceSwatch(source), SOURCE_MEANINGS[source])),
+    row(earlierSwatch(), "of an earlier calibration"),
     ...LINES.map(([kind, color, meaning]) => row(sampleOf(kind, `var(--image-${color})`), meaning)),
   );
   section.append(heading, list);

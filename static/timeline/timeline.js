@@ -4,6 +4,7 @@
  */
 
 import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
+import { earlierCalibration } from "../model/selectors.js";
 import { prepare } from "../panes/drawing.js";
 import { describeFrame } from "./cell_text.js";
 import { CellTip } from "./cell_tip.js";
@@ -49,9 +50,9 @@ export class Timeline {
     store.subscribe((changed) => {
       const has = (/** @type {(keyof import("../model/store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
       if (has("session")) element.style.height = `${this.#layout.height}px`;
-      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts")) this.#drawCells();
+      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts", "calibration")) this.#drawCells();
       if (has("target", "session", "range", "visible")) this.#drawCursor();
-      if (has("target", "timeline", "lanes", "session", "keyframeDoubts")) this.#describe();
+      if (has("target", "timeline", "lanes", "session", "keyframeDoubts", "calibration")) this.#describe();
     });
     new ResizeObserver(() => this.#drawAll()).observe(element);
     store.subscribe((changed) => changed.has("theme") && this.#drawAll());
@@ -190,11 +191,13 @@ export class Timeline {
     context.beginPath();
     context.rect(axis.left, 0, axis.right - axis.left + 2, overview.top);
     context.clip();
+    const earlier = earlierCalibration(this.#store.facts);
     for (const [lane, band] of bands.entries()) {
       const cells = bands.length > 1 ? lanes[lane] : timeline;
       if (!cells) continue; // arrives shortly
       if (bands.length > 1) drawing.drawPerson(context, axis, cells, style, band, session.people[lane].color);
       else drawing.drawSources(context, axis, cells, style, band);
+      if (earlier[lane]?.size) drawing.drawEarlier(context, axis, earlier[lane], style, band);
       drawing.drawKeyframes(context, axis, keyframesOf(cells), band);
       const doubted = keyframeDoubts.filter(({ person }) => bands.length === 1 || person === lane).map(({ frame }) => frame);
       drawing.drawDoubtedKeyframes(context, axis, doubted, style, band);

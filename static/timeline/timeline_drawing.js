@@ -6,7 +6,7 @@
 import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
 import { trace } from "../model/series.js";
 import { shortened } from "../widgets/text.js";
-import { DARK_INK, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, fillBands, hatch } from "./cell_marks.js";
+import { DARK_INK, EARLIER_DASH, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, fillBands, hatch } from "./cell_marks.js";
 
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
@@ -164,6 +164,29 @@ export function drawPerson(context, axis, cells, style, { top, bottom }, color) 
       context.fillRect(x, split - 1, wide, 1);
     });
   }
+}
+
+/**
+ * Draw a dotted line above cells with poses of an earlier calibration.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Set<number>} frames
+ * @param {CSSStyleDeclaration} style
+ * @param {Band} lane
+ */
+export function drawEarlier(context, axis, frames, style, { top }) {
+  context.save();
+  context.strokeStyle = style.getPropertyValue("--text");
+  context.setLineDash(EARLIER_DASH);
+  context.lineWidth = 1;
+  context.beginPath();
+  eachRun(axis, (frame) => (frames.has(frame) ? 0 : -1), 0, (_, x, width) => {
+    context.moveTo(x, top - 1.5);
+    context.lineTo(x + width, top - 1.5);
+  });
+  context.stroke();
+  context.restore();
 }
 
 /**

@@ -2,10 +2,10 @@
 
 import { button, byId } from "../widgets/elements.js";
 import { clock } from "../widgets/text.js";
-import { personCells } from "../model/selectors.js";
+import { earlierCalibration, personCells } from "../model/selectors.js";
 import { SOURCES, STATUSES as CELL_STATUSES } from "../model/cells.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
-import { STATUSES, sourceSwatch, statusSwatch } from "./cell_marks.js";
+import { STATUSES, earlierSwatch, sourceSwatch, statusSwatch } from "./cell_marks.js";
 import { markSection } from "./mark_list.js";
 
 export class Transport {
@@ -64,7 +64,7 @@ export class Transport {
       if (["state", "calibration", "timeline", "lanes", "target", "connected"].some((f) => changed.has(/** @type {"state"} */ (f)))) {
         this.#showSource();
       }
-      if (changed.has("timeline")) this.#showLegend();
+      if (changed.has("timeline") || changed.has("calibration")) this.#showLegend();
     });
   }
 
@@ -98,13 +98,14 @@ export class Transport {
     const { target, connected, state, session } = this.#store.facts;
     const source = state?.source ?? null;
     const other = state?.other_sizes ?? false;
-    const isOutdated = !!state && !!this.#store.facts.calibration?.outdated[state.person]?.includes(state.frame);
+    const isOutdated = !!state && !!earlierCalibration(this.#store.facts)[state.person]?.has(state.frame);
     const name = session && session.people.length > 1 && state ? session.people[state.person].name : "";
     const what = state?.replay ? "replay" : `${source}${other ? ", earlier sizes" : ""}${isOutdated ? ", earlier calibration" : ""}`;
     this.#source.textContent = source === null && !state?.replay ? `${name && `${name}: `}No pose` : `${name || "Pose"}: ${what}`;
     const converted = "Track again to use the present ones; a keyframe is refitted by Body sizes, Apply, in the inspector";
     const made = `This pose was made with earlier body sizes and is shown with them. ${converted}`;
-    this.#source.title = other ? made : `Source of the pose${name && ` of ${name}`}, as stored: the most manual one of its values`;
+    const stale = "This pose was made before the cameras were corrected. Track it again in the inspector, section Calibration";
+    this.#source.title = other ? made : isOutdated ? stale : `Source of the pose${name && ` of ${name}`}, as stored: the most manual one of its values`;
     const cell = personCells(this.#store.facts).get(target);
     this.#keyframe.disabled = !connected || !state;
     this.#reviewed.disabled = !connected || !cell || cell.keyframe;
@@ -117,11 +118,12 @@ export class Transport {
     const sources = new Set(SOURCES.filter((_, index) => timeline.sources.includes(index)));
     const statuses = new Set(CELL_STATUSES.filter((_, index) => timeline.statuses.includes(index)));
     const shown = STATUSES.filter((status) => statuses.has(status));
+    const earlier = earlierCalibration(this.#store.facts).some(({ size }) => size) ? ["earlier calibration"] : [];
     const rows = [
-      shown.map((status) => entry(status, statusSwatch(status))),
+      [...shown.map((status) => entry(status, statusSwatch(status))), ...earlier.map((text) => entry(text, earlierSwatch()))],
       SOURCES.filter((source) => sources.has(source)).map((source) => entry(source, sourceSwatch(source))),
     ];
-    this.#legend.title = `${[...shown, ...sources].join(", ")}. Click for all marks and lines`;
+    this.#legend.title = `${[...shown, ...earlier, ...sources].join(", ")}. Click for all marks and lines`;
     this.#legend.replaceChildren(
       ...rows.map((swatches) => {
         const row = document.createElement("span");

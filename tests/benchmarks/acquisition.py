@@ -62,7 +62,7 @@ class Recording:
     name: str
     videos: Sequence[Path]
     calibration: Path
-    background: Path
+    background: Path | None
     references: dict[str, Path]
     """Reference joints of each person."""
     height_m: float | None = None
@@ -161,9 +161,10 @@ def measure(recording: Recording, folder: Path) -> list[Outcome]:
 def new_session(recording: Recording, folder: Path) -> Path:
     """Make a session of a recording in a folder."""
     at = folder / recording.name
+    background = () if recording.background is None else ("--background", recording.background)
     quadrille(
-        "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, "--background",
-        recording.background, "--people", *recording.references,
+        "new", at, "--videos", *recording.videos, "--calibration", recording.calibration, *background, "--people",
+        *recording.references,
     )  # fmt: skip
     return at
 

@@ -22,7 +22,6 @@ from tracker.boards.board_description import read_board
 from tracker.boards.corner_detection import CornerDetector
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import TrackerError
-from tracker.evaluation.clocks import place_rows
 from tracker.formats.anipose import read_calibration
 from tracker.formats.joint_maps import guess_joint_map, read_joint_map
 from tracker.formats.model_toml import format_model, load_model, parse_model
@@ -30,6 +29,7 @@ from tracker.formats.pose_csv import read_pose_table
 from tracker.formats.trc import read_trc
 from tracker.geometry.ground_plane import up_rotation
 from tracker.session import lock
+from tracker.session.clocks import place_rows
 from tracker.session.session import load_session, save_floor
 
 pytestmark = pytest.mark.slow

@@ -53,12 +53,17 @@ class _Effort(NamedTuple):
     """Cameras that the selection may begin with."""
     faults: int
     """Most faults that are taken."""
+    heat: int
+    """Gauss-Newton steps after which faults that cannot be the best any more are left out."""
     steps: int
     """Gauss-Newton steps of a fit; the next goes on from there."""
 
 
-EFFORT = _Effort(cameras=2, kinds=2, beginnings=3, faults=8, steps=8)
+EFFORT = _Effort(cameras=2, kinds=2, beginnings=3, faults=8, heat=2, steps=8)
 """With one camera fitted, a camera opposite the one that is off was blamed on one of nine recordings."""
+
+_LEAST_GAIN = 0.5
+"""Fall of the cost that a further step must promise, nats: as much as a number gains that fits noise."""
 
 
 def prior_sigmas(fps: float) -> Array:
@@ -142,7 +147,7 @@ def diagnose(
     )  # fmt: skip
     search = _Search(frames, parameters, prior_sigmas(fps))
     report("fitting poses to the contours", 0.0)
-    start = search.fitted(state, (), accepts=False)
+    start = search.fitted(state, (), accepts=False, steps=EFFORT.heat)
     state = search.fitted(start.state, ()).state
     best, tried = search.selected(state, (), partial(report, "judging the cameras")), set[int]()
     # One camera that is off can look like two others that are: begin with other cameras as well.
@@ -171,6 +176,12 @@ class _Fitted(NamedTuple):
     """By them, (n,)."""
     free: NDArray[np.bool_]
     """Which of them were fitted, (n,)."""
+
+    @property
+    def promise(self) -> float:
+        """Fall of the cost that a further step promises."""
+        at = np.flatnonzero(self.free)
+        return 0.5 * float(self.gradient[at] @ np.linalg.solve(self.hessian[np.ix_(at, at)], self.gradient[at]))
 
 
 class _Selection(NamedTuple):
@@ -209,19 +220,23 @@ class _Search:
         faults = [k.fault for k in selection.kept]
         return self.refitted(problem, selection.fit.state, faults).cost + sum(map(_needed, faults))
 
-    def fitted(self, state: RigState, chosen: Collection[Fault], accepts: bool = True) -> _Fitted:
+    def fitted(
+        self, state: RigState, chosen: Collection[Fault], accepts: bool = True, steps: int = EFFORT.steps
+    ) -> _Fitted:
         """Fit poses, sizes and chosen corrections, on the evidence that the state accepts or on all."""
         seen = seen_people(self._frames, state if accepts else None)
         problem = RigProblem(seen, self._parameters, self._sigmas, state.corrections)
-        return self.refitted(problem, state, chosen)
+        return self.refitted(problem, state, chosen, steps)
 
-    def refitted(self, problem: RigProblem, state: RigState, chosen: Collection[Fault]) -> _Fitted:
-        """Fit poses, sizes and chosen corrections on the evidence of a problem."""
+    def refitted(
+        self, problem: RigProblem, state: RigState, chosen: Collection[Fault], steps: int = EFFORT.steps
+    ) -> _Fitted:
+        """Fit poses, sizes and chosen corrections on the evidence of a problem, in some Gauss-Newton steps at most."""
         free = np.zeros(state.corrections.size, np.bool_)
         for h in chosen:
             free[h.columns] = True
         problem = problem.with_free(free.reshape(state.corrections.shape))
-        found = solve_bundle(problem, state, EFFORT.steps)
+        found = solve_bundle(problem, state, steps, least_gain=_LEAST_GAIN)
         shared, own = problem.free(found.state, found.equations)
         every = np.concatenate([np.ones(free.size, np.bool_), shared[free.size :]])
         with one_blas_thread():
@@ -243,13 +258,22 @@ class _Search:
         promising = sorted(promise, key=lambda h: -promise[h])
         cameras = list(dict.fromkeys(h.camera for h in promising))[: EFFORT.cameras]
         tried = [h for c in cameras for h in [p for p in promising if p.camera == c][: EFFORT.kinds]]
-        fits = {h: self.refitted(fit.problem, fit.state, {*chosen, h}) for h in tried}
+        fits = self._raced(fit, {h: {*chosen, h} for h in tried})
         worth = {h: fit.cost - found.cost - _needed(h) for h, found in fits.items()}
         best = max(worth, key=lambda h: worth[h], default=None)
         if best is None or worth[best] <= 0:
             return None
         rivals = [h for h in worth if h != best and worth[h] > worth[best] - CLEAR_NATS]
         return FoundFault(best, fit.cost - fits[best].cost, tuple(rivals)), fits[best].state
+
+    def _raced(self, fit: _Fitted, faults: Mapping[Fault, Collection[Fault]]) -> dict[Fault, _Fitted]:
+        """Fit each fault with those that go with it; not to the end where it cannot become the best or a rival."""
+        fits = {h: self.refitted(fit.problem, fit.state, chosen, EFFORT.heat) for h, chosen in faults.items()}
+        least = min((f.cost + _needed(h) for h, f in fits.items()), default=0.0) + CLEAR_NATS
+        return {
+            h: self.refitted(fit.problem, f.state, faults[h]) if f.cost + _needed(h) - f.promise < least else f
+            for h, f in fits.items()
+        }
 
     def without_idle(self, fit: _Fitted, kept: Sequence[FoundFault]) -> _Selection:
         """Drop faults that later ones have made superfluous; return the others with their fit."""

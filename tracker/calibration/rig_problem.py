@@ -72,7 +72,7 @@ class RigState(NamedTuple):
     """Of each person on each frame, (n_values,)."""
 
 
-class _View(NamedTuple):
+class SeenView(NamedTuple):
     """Evidence of one view for a person on a frame."""
 
     camera: int
@@ -99,7 +99,7 @@ class RigProblem:
         self._seen, self._parameters = seen, parameters
         self._sigmas = np.tile(sigmas, (len(corrections), 1))
         self._free_corrections, self._has_free_sizes = np.zeros(self._sigmas.shape, np.bool_), True
-        self._views = map_parallel(lambda s: _views_of(s, corrections), seen)
+        self._views = map_parallel(lambda s: views_of(s, corrections), seen)
         self._priors = [PosePrior.of_spreads(p.base) for p in parameters]
 
     def with_free(self, corrections: NDArray[np.bool_], sizes: bool = True) -> "RigProblem":
@@ -315,13 +315,13 @@ class GroupSums(NamedTuple):
 
     def equations(self, cost: float) -> NormalEquations:
         """Return the normal equations, whose hessian is symmetric."""
-        lower = np.tril_indices(len(self.gradient), -1)
-        hessian = self.hessian.copy()
-        hessian[lower] = hessian.T[lower]
+        upper = np.triu(self.hessian)
+        hessian = upper + upper.T
+        np.fill_diagonal(hessian, upper.diagonal())
         return NormalEquations(cost, self.gradient, hessian)
 
 
-def _views_of(seen: SeenPerson, corrections: Array) -> list[_View]:
+def views_of(seen: SeenPerson, corrections: Array) -> list[SeenView]:
     """Return the views that show anything of a person, with the residuals of each."""
     out = []
     for i, (view, correction) in enumerate(zip(seen.views, corrections, strict=True)):
@@ -330,5 +330,5 @@ def _views_of(seen: SeenPerson, corrections: Array) -> list[_View]:
         later_s = seen.ahead_s[i] + correction[TIME]
         then = seen.moved(seen.body.model.retract(seen.body.values, later_s * seen.velocity))
         evidence = replace(view, camera=corrected(view.camera, correction))
-        out.append(_View(i, view, ContourResiduals([evidence], then.bodies, seen.person)))
+        out.append(SeenView(i, view, ContourResiduals([evidence], then.bodies, seen.person)))
     return out

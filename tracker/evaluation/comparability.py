@@ -6,7 +6,8 @@ from itertools import permutations, product
 import numpy as np
 
 from tracker.errors import Remedy
-from tracker.evaluation.metrics import LOST_M, axes_matrix, best_rigid, gather_joints
+from tracker.evaluation.metrics import LOST_M, best_rigid, gather_joints
+from tracker.formats.file_axes import axes_matrix
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid

@@ -9,13 +9,14 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.errors import FormatError, SessionError
-from tracker.evaluation.clocks import Clock, Placement, place_rows
-from tracker.evaluation.metrics import Motion, PoseDoubt, joints_of_poses, remap_axes
+from tracker.evaluation.metrics import Motion, PoseDoubt, joints_of_poses
+from tracker.formats.file_axes import remap_axes
 from tracker.formats.joint_maps import joints_of, read_joint_map
 from tracker.formats.model_toml import PRESETS, load_model
 from tracker.formats.pose_csv import PoseTable, read_pose_table
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.geometry.arrays import Array
+from tracker.session.clocks import Clock, Placement, place_rows
 from tracker.session.folder import SESSION_FILE
 from tracker.session.session import Session, load_session
 from tracker.store.records import PoseRecord

@@ -8,12 +8,14 @@ import threading
 from collections import OrderedDict
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from tracker.evidence.foreground import Foreground, Prepared
+from tracker.evidence.keypoints import KeypointEvidence
 from tracker.evidence.view_evidence import (
     DEFAULT_EDGES,
     EdgeSettings,
@@ -57,7 +59,7 @@ class Observer:
 
     def __init__(
         self, cameras: Sequence[CameraSource], recording: Recording, in_recording: Sequence[int] | None = None,
-        views: Sequence[Foreground] | None = None,
+        views: Sequence[Foreground] | None = None, keypoints: KeypointEvidence | None = None,
     ) -> None:  # fmt: skip
         """Read the backgrounds.
 
@@ -66,6 +68,7 @@ class Observer:
             recording: their footage.
             in_recording: index of each view in the recording, if it has others too.
             views: the foreground of each view, if another observer has read the backgrounds.
+            keypoints: of all people in these views, if they are evidence, too.
 
         Raises:
             RecordingError: a background is missing, unreadable or of the wrong size.
@@ -73,7 +76,7 @@ class Observer:
         self.cameras = tuple(cameras)
         self.recording = recording
         """Footage of the views."""
-        self._in_recording = in_recording
+        self._in_recording, self.keypoints = in_recording, keypoints
         # OpenCV's own threads would compete with the threads of other views.
         self._pool, self._pool_ahead = (
             ThreadPoolExecutor(FRAMES_AHEAD, name, initializer=cv2.setNumThreads, initargs=(1,))
@@ -88,11 +91,19 @@ class Observer:
         """Return an observer of some of the views, by their indices, of the same footage."""
         return Observer(*self._of(chosen))
 
-    def _of(self, chosen: Sequence[int]) -> tuple[list[CameraSource], Recording, list[int], list[Foreground]]:
+    def with_keypoints(self, keypoints: KeypointEvidence | None) -> "Observer":
+        """Return an observer of the same views to which key points are evidence, too; None: to which they are not."""
+        cameras, recording, in_recording, views, _ = self._of(range(len(self.cameras)))
+        return Observer(cameras, recording, in_recording, views, keypoints)
+
+    def _of(
+        self, chosen: Sequence[int]
+    ) -> tuple[list[CameraSource], Recording, list[int], list[Foreground], KeypointEvidence | None]:
         """Return the arguments of an observer of some of the views."""
         known = range(len(self.cameras)) if self._in_recording is None else self._in_recording
         cameras = [self.cameras[i] for i in chosen]
-        return cameras, self.recording, [known[i] for i in chosen], [self._views[i] for i in chosen]
+        keypoints = None if self.keypoints is None else self.keypoints.of_views(chosen)
+        return cameras, self.recording, [known[i] for i in chosen], [self._views[i] for i in chosen], keypoints
 
     @property
     def working_cameras(self) -> tuple[Camera, ...]:
@@ -182,7 +193,10 @@ class Observer:
             if predicted_px is not None:
                 predicted_px = predicted_px - np.array([*seen.corner_px, *seen.corner_px], np.float32)
             model = model if seen.silhouette is None else None
-            return select_evidence(seen, predicted_px, model, edges.max_angle_rad)
+            found = select_evidence(seen, predicted_px, model, edges.max_angle_rad)
+            if self.keypoints is None or prepared[i] is None:
+                return found
+            return replace(found, keypoints=self.keypoints.in_view(k, i, found.camera))
 
         return tuple(
             self._pool.map(

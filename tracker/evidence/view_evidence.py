@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
+from tracker.evidence.keypoints import ViewKeypoints
 from tracker.geometry.arrays import FloatArray, Image, Mask
 from tracker.geometry.cameras import Camera, Region
 from tracker.images.color_histogram import BINS, count_colors
@@ -114,6 +115,8 @@ class ViewEvidence:
     """Silhouette in the region; None without masks and background."""
     ahead_frames: float = 0.0
     """Frames by which the picture was taken later than the frame; see `Clock.ahead`."""
+    keypoints: tuple[ViewKeypoints | None, ...] = ()
+    """Key points of each person in px of the region; None of one without any, empty where there are none at all."""
 
     @cached_property
     def color_counts(self) -> NDArray[np.int64]:

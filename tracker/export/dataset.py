@@ -29,12 +29,12 @@ from tracker.export.frame_views import FrameViews
 from tracker.export.label_writers import OpenPoseFiles, write_views
 from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions
-from tracker.export.provenance import read_provenance, write_provenance
+from tracker.export.provenance import write_provenance
 from tracker.export.views import IMAGES, Pictures, exported_cameras
 from tracker.export.writers import coco_annotations, coco_categories
 from tracker.files import write_text_atomic
-from tracker.formats.coco import CocoAnnotation, CocoImage, segmentation, write_coco
 from tracker.formats.file_names import identifier
+from tracker.formats.keypoints.coco import CocoAnnotation, CocoImage, segmentation, write_coco
 from tracker.geometry.cameras import Camera
 
 CHECKSUMS = "SHA256SUMS"
@@ -74,7 +74,7 @@ def write_dataset(
     splits = {"train": [name], "validation": [], "test": []}
     write_text_atomic(folder / "splits.json", json.dumps(splits, indent=1) + "\n")
     write_provenance(folder / "provenance.json", motion, options)
-    card = format_card(read_provenance(motion), options, labels.counts)
+    card = format_card(motion, options, labels.counts)
     write_text_atomic(folder / "README.md", card)
     _write_checksums(folder)
 
@@ -108,9 +108,9 @@ class _Labels:
             rows, columns = mask.any(axis=1).nonzero()[0], mask.any(axis=0).nonzero()[0]
             left, top = int(columns[0]), int(rows[0])
             box = (left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top)
-            status, n = person.poses[frame].record.status, len(self._annotations)
+            n = len(self._annotations)
             visible = {"segmentation": segmentation(mask), "bbox": box, "area": float(mask.sum())}
-            for one in coco_annotations(self._categories, person, body, keypoints, image.id, status, n):
+            for one in coco_annotations(self._motion, self._categories, person, body, keypoints, image, n):
                 self._annotations.append(msgspec.structs.replace(one, **visible))
         labelled = shown & {person.index for person, _, _ in seen}
         self._n_labelled += len(labelled)
@@ -124,7 +124,8 @@ class _Labels:
     def finish(self) -> None:
         """Write the labels of all pictures."""
         name = f"{self._motion.session.name}, exported by Quadrille; licence: {TO_FILL_IN}"
-        write_coco(self._folder / "coco.json", name, self._categories, self._images, self._annotations)
+        revision = self._motion.calibrations.present
+        write_coco(self._folder / "coco.json", name, revision, self._categories, self._images, self._annotations)
 
 
 def _copy_footage(motion: ExportedMotion, folder: Path) -> None:

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.export.motion import frames_text
+from tracker.export.motion import ExportedMotion, frames_text
 from tracker.export.options import ExportOptions
-from tracker.export.provenance import PoseProvenance, Provenance
+from tracker.export.provenance import PoseProvenance, pose_provenance
 from tracker.store.edit_tree import program_version
 
 TO_FILL_IN = "TO BE FILLED IN"
@@ -36,11 +36,10 @@ class LabelCounts(NamedTuple):
     """People who are visible in an image without a label, over all images: their poses are not exported."""
 
 
-def format_card(provenance: Provenance, options: ExportOptions, counts: LabelCounts) -> str:
+def format_card(motion: ExportedMotion, options: ExportOptions, counts: LabelCounts) -> str:
     """Return the card as Markdown."""
-    motion = provenance.motion
     session = motion.session
-    found = [provenance.of(p, f) for p in motion.exported for f in sorted(p.poses)]
+    found = [pose_provenance(motion, p, f) for p in motion.exported for f in sorted(p.poses)]
     where = {"images": "recordings/*/images", "video": "recordings/*/videos, whole"}[options.pictures]
     lines = [
         f"# {session.name}",

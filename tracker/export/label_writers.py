@@ -11,7 +11,8 @@ from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions
 from tracker.export.provenance import point_lost
 from tracker.export.views import Pictures, exported_cameras, undistorted_pictures
-from tracker.formats.interchange.openpose import COUNTERPARTS, POINTS, OpenPosePerson, file_name, write_openpose
+from tracker.formats.joint_maps import known_joint_maps
+from tracker.formats.keypoints.openpose import OpenPosePerson, file_name, write_openpose
 from tracker.geometry.cameras import Camera
 
 Tick = Callable[[], None]
@@ -74,18 +75,22 @@ class OpenPoseFiles:
     def write(self, views: FrameViews, view: int, frame: int) -> None:
         """Write the points of a frame in a view."""
         camera = self._cameras[view]
-        figures = [_figure(seen, camera, frame) for seen in views.seen(view)]
-        write_openpose(self._folders[view] / file_name(camera.name, frame + self._offsets[view]), figures)
+        people = [_openpose_person(seen, camera, frame) for seen in views.seen(view)]
+        write_openpose(self._folders[view] / file_name(camera.name, frame + self._offsets[view]), people)
 
 
-def _figure(seen: PersonInView, camera: Camera, frame: int) -> OpenPosePerson:
-    """Return a person's points in OpenPose's order. A mean is that in space, as visible as the best of its points."""
+def _openpose_person(seen: PersonInView, camera: Camera, frame: int) -> OpenPosePerson:
+    """Return a person's points in the order of BODY_25.
+
+    A mean of points is that in space, as visible as the best one.
+    """
+    skeleton = next(known for known in known_joint_maps() if known.name == "BODY_25")
+    counterparts = skeleton.counterparts(skeleton.points)
     model, keypoints = seen.body.model, seen.keypoints
     found = 1.0 - np.nan_to_num(point_lost(model, seen.person.around[frame].record.limbs_lost))
-    points_px, confidence = np.full((len(POINTS), 2), np.nan), np.zeros(len(POINTS))
-    visibility = np.zeros(len(POINTS), np.int64)
-    for i, name in enumerate(POINTS):
-        own = COUNTERPARTS.get(name, ())
+    points_px, confidence = np.full((len(counterparts), 2), np.nan), np.zeros(len(counterparts))
+    visibility = np.zeros(len(counterparts), np.int64)
+    for i, own in enumerate(counterparts.values()):
         if not own or not set(own) <= set(model.point_names):
             continue
         at = [model.point_names.index(one) for one in own]

@@ -14,6 +14,7 @@ from tracker.geometry.arrays import Array
 from tracker.motion.interpolation import interpolate_pose
 from tracker.motion.velocity import velocity
 from tracker.session.session import Person, Session
+from tracker.store.calibration_log import PosedRevisions, read_posed_revisions
 from tracker.store.stored_poses import StoredPose, read_stored_poses
 
 Checked = Literal["keyframes", "reviewed"]
@@ -105,6 +106,8 @@ class ExportedMotion:
     """Indices of those who are exported; each has a pose."""
     n_lost: int
     """Number of poses of exported people whose status is lost; they are in `people` unless they were left out."""
+    calibrations: PosedRevisions = field(default_factory=PosedRevisions)
+    """The present calibration, and those that the poses were made with."""
 
     @property
     def exported(self) -> tuple[PersonMotion, ...]:
@@ -120,6 +123,23 @@ class ExportedMotion:
     def n_missing(self) -> int:
         """Number of frames without a pose, over the people who are exported."""
         return sum(len(self.frames) - len(p.poses) for p in self.exported)
+
+    def calibration_of(self, person: PersonMotion, frame: int) -> int:
+        """Return the revision of the calibration that a pose was made with."""
+        return self.calibrations.of(person.person.name, frame)
+
+    @property
+    def n_earlier(self) -> int:
+        """Number of poses of exported people that were made with another calibration than the present one."""
+        present = self.calibrations.present
+        return sum(self.calibration_of(p, frame) != present for p in self.exported for frame in p.poses)
+
+    @property
+    def calibration_note(self) -> str:
+        """Sentence on the calibration, for files that hold text."""
+        total = sum(len(p.poses) for p in self.exported)
+        earlier = f"; {self.n_earlier} of {total} poses are of an earlier one" if self.n_earlier else ""
+        return f"calibration revision {self.calibrations.present} of the session{earlier}"
 
     def time_s(self, frame: int) -> float:
         """Return the time of a frame of the session, s."""
@@ -180,7 +200,8 @@ def read_motion(
         within = found
     elif frames is None:
         within = range(found[0], found[-1] + 1)
-    return ExportedMotion(session, within, tuple(people), having, n_lost)
+    calibrations = read_posed_revisions(session.annotations_path, [p.name for p in session.people])
+    return ExportedMotion(session, within, tuple(people), having, n_lost, calibrations)
 
 
 def _is_checked(pose: StoredPose, only: Checked | None) -> bool:

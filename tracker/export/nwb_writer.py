@@ -29,7 +29,7 @@ _COLUMNS = {
     "keyframe": "whether a person set or verified the pose",
     "reviewed": "whether a person has checked it",
     "body_revision": "body that the pose was made with, from 1; 0 without a pose",
-    "calibration_revision": "calibration that it was made with, from 1; 0 if there has only been one",
+    "calibration_revision": "calibration that it was made with, from 1; 0 without a pose",
     "earlier_calibration": "whether the session has another calibration now",
 }
 """Descriptions of `PoseArrays.by_pose`."""

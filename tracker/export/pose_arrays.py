@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from tracker.export.motion import ExportedMotion
 from tracker.export.options import ExportOptions, file_from_world
-from tracker.export.provenance import PoseProvenance, read_provenance
+from tracker.export.provenance import PoseProvenance, pose_provenance
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 
@@ -47,7 +47,7 @@ class PoseArrays:
     body_revision: IntArray
     """(F, P); 0 without a pose."""
     calibration_revision: IntArray
-    """(F, P); 0 without a pose, and if the session has only had one calibration."""
+    """(F, P); 0 without a pose."""
     earlier_calibration: NDArray[np.bool_]
     """Whether the session has another calibration now, (F, P)."""
 
@@ -75,11 +75,7 @@ class PoseArrays:
 
 
 def pose_arrays(motion: ExportedMotion, options: ExportOptions) -> PoseArrays:
-    """Return the exported poses and their provenance as arrays, in the axes of a file.
-
-    Raises:
-        SessionError: the annotations cannot be read.
-    """
+    """Return the exported poses and their provenance as arrays, in the axes of a file."""
     models = [model for person in motion.exported for model in person.models]
     names = tuple(dict.fromkeys(name for model in models for name in model.point_names))
     bones = tuple(dict.fromkeys(bone for model in models for bone in model.bones))
@@ -104,12 +100,12 @@ def pose_arrays(motion: ExportedMotion, options: ExportOptions) -> PoseArrays:
         earlier_calibration=np.zeros(shape, bool),
     )
     texts = {name: np.full(shape, "", object) for name in POSE_FIELDS}
-    T_file_world, provenance = file_from_world(motion.session, options.axes), read_provenance(motion)
+    T_file_world = file_from_world(motion.session, options.axes)
     for i, frame in enumerate(motion.frames):
         for j, person in enumerate(people):
             if frame not in person.poses:
                 continue
-            body, found = person.poses[frame].body, provenance.of(person, frame)
+            body, found = person.poses[frame].body, pose_provenance(motion, person, frame)
             _set_pose(out, (i, j), columns[body.model], found, T_file_world)
             out.joints[i, j, columns[body.model]] = rigid.apply(T_file_world, body.joint_centers_world)
             for name, text in _texts(found).items():
@@ -131,7 +127,7 @@ def _set_pose(
     out.point_lost[at][columns] = found.point_lost
     out.keyframe[at], out.reviewed[at] = found.record.keyframe, found.is_reviewed
     out.body_revision[at] = found.record.model_revision
-    out.calibration_revision[at] = found.calibration_revision or 0
+    out.calibration_revision[at] = found.calibration_revision
     out.earlier_calibration[at] = found.is_earlier_calibration
 
 

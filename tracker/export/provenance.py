@@ -1,7 +1,6 @@
 """Provenance of exported poses: who made each, how, in which body and calibration, and how sure its joints are."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import closing
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,8 +14,6 @@ from tracker.export.motion import ExportedMotion, PersonMotion
 from tracker.export.options import ExportOptions, file_from_world
 from tracker.files import write_text_atomic
 from tracker.geometry.arrays import Array
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_revisions import present_revision, revisions_of_poses
 from tracker.store.edit_tree import program_version
 from tracker.store.records import SOURCES, PoseRecord
 
@@ -36,8 +33,8 @@ class PoseProvenance:
     """The source of each point of the body, in the order of its `point_names`: see `sources_of_points`."""
     point_lost: Array
     """Probability that the limb of each point is lost, (n_points,); NaN where not assessed, and for the trunk."""
-    calibration_revision: int | None
-    """The calibration that the pose was made with, from 1; None if the session has only had one."""
+    calibration_revision: int
+    """The calibration that the pose was made with, from 1."""
     is_earlier_calibration: bool
     """Whether the session has another calibration now."""
 
@@ -55,37 +52,14 @@ class PoseProvenance:
         return np.asarray(R_file_world @ errors @ R_file_world.T)
 
 
-@dataclass(frozen=True, eq=False)
-class Provenance:
-    """Provenance of the poses of an export."""
-
-    motion: ExportedMotion
-    calibration_revision: int | None
-    """The present calibration, from 1; None if the session has only had one."""
-    _revisions: Mapping[str, Mapping[int, int]]
-    """Calibration of each pose, by person and frame; without an entry it is the present one."""
-
-    def of(self, person: PersonMotion, frame: int) -> PoseProvenance:
-        """Return the provenance of an exported pose."""
-        stored = person.poses[frame]
-        model, record = stored.body.model, stored.record
-        revision = self._revisions[person.person.name].get(frame, self.calibration_revision)
-        sources = sources_of_points(model, record.sources)
-        is_earlier = revision != self.calibration_revision
-        return PoseProvenance(
-            record, stored.source, sources, point_lost(model, record.limbs_lost), revision, is_earlier
-        )
-
-
-def read_provenance(motion: ExportedMotion) -> Provenance:
-    """Read the provenance of exported poses.
-
-    Raises:
-        SessionError: the annotations cannot be read.
-    """
-    with closing(AnnotationStore(motion.session.annotations_path, read_only=True)) as store:
-        revisions = {p.person.name: revisions_of_poses(store, p.person.name) for p in motion.exported}
-        return Provenance(motion, present_revision(store), revisions)
+def pose_provenance(motion: ExportedMotion, person: PersonMotion, frame: int) -> PoseProvenance:
+    """Return the provenance of the exported pose of a person in a frame."""
+    stored = person.poses[frame]
+    model, record = stored.body.model, stored.record
+    revision = motion.calibration_of(person, frame)
+    sources = sources_of_points(model, record.sources)
+    is_earlier = revision != motion.calibrations.present
+    return PoseProvenance(record, stored.source, sources, point_lost(model, record.limbs_lost), revision, is_earlier)
 
 
 def sources_of_points(model: BodyModel, sources: Sequence[str]) -> tuple[str, ...]:
@@ -123,23 +97,21 @@ def write_provenance(path: Path, motion: ExportedMotion, options: ExportOptions)
         options: `axes` are those in which covariances are stated.
 
     Raises:
-        SessionError: the annotations cannot be read.
         OSError: the file cannot be written.
     """
-    text = msgspec.json.encode(provenance_document(read_provenance(motion), options)).decode()
+    text = msgspec.json.encode(provenance_document(motion, options)).decode()
     write_text_atomic(path, text + "\n")
 
 
-def provenance_document(provenance: Provenance, options: ExportOptions) -> dict[str, Any]:
+def provenance_document(motion: ExportedMotion, options: ExportOptions) -> dict[str, Any]:
     """Return the provenance of exported poses as it is written to JSON. docs/export.md describes the keys."""
-    motion = provenance.motion
     R_file_world = file_from_world(motion.session, options.axes)[:3, :3]
     bodies: dict[str, Any] = {}
     people: dict[str, Any] = {}
     for person in motion.exported:
         poses = []
         for frame, stored in sorted(person.poses.items()):
-            found = provenance.of(person, frame)
+            found = pose_provenance(motion, person, frame)
             poses.append({"frame": frame, "time_s": motion.time_s(frame), **_pose_document(found, R_file_world)})
             model = stored.body.model
             bodies[str(stored.record.model_revision)] = {
@@ -153,7 +125,7 @@ def provenance_document(provenance: Provenance, options: ExportOptions) -> dict[
         "session": motion.session.name,
         "fps": motion.session.fps,
         "axes": options.axes,
-        "calibration_revision": provenance.calibration_revision,
+        "calibration_revision": motion.calibrations.present,
         "bodies": bodies,
         "people": people,
     }

@@ -13,7 +13,9 @@ from tracker.export.options import ExportOptions, file_from_world, up_in_file
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_folder import ImageFolder
 from tracker.formats.bvh import UPRIGHT_Y, BvhFrame, write_bvh
-from tracker.formats.coco import (
+from tracker.formats.file_names import identifier
+from tracker.formats.interchange.gltf import AnimatedBody, write_glb
+from tracker.formats.keypoints.coco import (
     CocoAnnotation,
     CocoCategory,
     CocoImage,
@@ -22,8 +24,6 @@ from tracker.formats.coco import (
     person_category,
     write_coco,
 )
-from tracker.formats.file_names import identifier
-from tracker.formats.interchange.gltf import AnimatedBody, write_glb
 from tracker.formats.motion_csv import MotionRow, write_motion_csv
 from tracker.formats.opensim_model import write_osim
 from tracker.formats.opensim_mot import write_mot
@@ -96,7 +96,7 @@ def write_person_opensim(motion: ExportedMotion, options: ExportOptions, paths: 
     values = np.array([poses[f] for f in frames])
     times = np.array([motion.time_s(f) for f in frames])
     title = identifier(f"{motion.session.name}_{person.person.name}")
-    write_mot(paths[0], person.model, values, times, title)
+    write_mot(paths[0], person.model, values, times, title, motion.calibration_note)
     T_ground_world = file_from_world(motion.session, options.axes)
     write_osim(paths[1], person.model, title, T_ground_world, up_in_file(motion.session, options.axes).tolist())
     for _ in motion.frames:
@@ -141,10 +141,10 @@ def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Seque
             images.append(image)
             for (person, body), seen in zip(people, found, strict=True):
                 if motion.is_exported(person, frame) and seen.box_px is not None:
-                    status = person.poses[frame].record.status
-                    annotations += coco_annotations(categories, person, body, seen, image.id, status, len(annotations))
+                    annotations += coco_annotations(motion, categories, person, body, seen, image, len(annotations))
         tick()
-    write_coco(paths[0], f"{motion.session.name}, exported by Quadrille", categories, images, annotations)
+    description = f"{motion.session.name}, exported by Quadrille, {motion.calibration_note}"
+    write_coco(paths[0], description, motion.calibrations.present, categories, images, annotations)
 
 
 def coco_categories(motion: ExportedMotion, options: ExportOptions) -> list[CocoCategory]:
@@ -159,16 +159,19 @@ def coco_categories(motion: ExportedMotion, options: ExportOptions) -> list[Coco
 
 
 def coco_annotations(
+    motion: ExportedMotion,
     categories: Sequence[CocoCategory],
     person: PersonMotion,
     body: PosedBody,
     seen: Keypoints,
-    image: int,
-    status: str,
+    image: CocoImage,
     n_before: int,
 ) -> list[CocoAnnotation]:
     """Return the annotations of a person in an image, one for each category that the body has."""
     out: list[CocoAnnotation] = []
+    status = person.poses[image.frame].record.status
+    calibration = motion.calibration_of(person, image.frame)
+    is_earlier = calibration != motion.calibrations.present
     for category in categories:
         if category.name not in ("person", body.model.name):
             continue
@@ -177,8 +180,8 @@ def coco_annotations(
         assert seen.box_px is not None
         out.append(
             CocoAnnotation(
-                n_before + len(out) + 1, image, category.id, triples, n, seen.box_px, seen.area_px, person.person.name,
-                person.index, status,
+                n_before + len(out) + 1, image.id, category.id, triples, n, seen.box_px, seen.area_px,
+                person.person.name, person.index, status, calibration, is_earlier,
             )
         )  # fmt: skip
     return out
@@ -208,7 +211,11 @@ def _row(motion: ExportedMotion, person: PersonMotion, frame: int) -> MotionRow:
         return row
     record = stored.record
     costs = (record.cost_px, *record.view_costs_px)
-    return replace(row, status=record.status, source=stored.source, is_keyframe=record.keyframe, costs_px=costs)
+    calibration = motion.calibration_of(person, frame)
+    return replace(
+        row, status=record.status, source=stored.source, is_keyframe=record.keyframe, calibration=calibration,
+        is_earlier=calibration != motion.calibrations.present, costs_px=costs,
+    )  # fmt: skip
 
 
 def _errors(record: PoseRecord) -> Array:

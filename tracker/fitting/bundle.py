@@ -142,6 +142,7 @@ def solve_bundle(
     max_iterations: int = 50,
     tolerance: float = 1e-4,
     report: Callable[[int], None] = lambda iteration: None,
+    least_gain: float = 0.0,
 ) -> BundleFit[S]:
     """Minimize the cost of a problem (Levenberg-Marquardt).
 
@@ -151,21 +152,23 @@ def solve_bundle(
         max_iterations: largest number of steps.
         tolerance: smallest relative decrease of the cost that a step must promise.
         report: is given the number of each iteration before it begins. An exception that it raises ends the fit.
+        least_gain: smallest decrease that a step must promise, in units of the cost.
     """
     with one_blas_thread():
-        return _solve(problem, state, max_iterations, tolerance, report)
+        return _solve(problem, state, max_iterations, lambda cost: max(tolerance * cost, least_gain), report)
 
 
 def _solve(
-    problem: BundleProblem[S], state: S, max_iterations: int, tolerance: float, report: Callable[[int], None]
-) -> BundleFit[S]:
+    problem: BundleProblem[S], state: S, max_iterations: int, enough: Callable[[float], float],
+    report: Callable[[int], None],
+) -> BundleFit[S]:  # fmt: skip
     here, damping, evaluations = problem.linearize(state), DAMPING.first, 1
     for iteration in range(max_iterations):
         report(iteration)
         equations = here.held(*problem.free(state, here))
         while True:
             step = equations.step(damping)
-            if equations.promised(*step, damping) <= tolerance * here.cost:
+            if equations.promised(*step, damping) <= enough(here.cost):
                 return BundleFit(state, here, evaluations)
             trial = problem.moved(state, *step)
             there = problem.linearize(trial)

@@ -33,10 +33,11 @@ from tracker.fitting.interpenetration import (
     SelfPenetration,
     add_penetration,
 )
+from tracker.fitting.keypoints import NO_KEYPOINTS, KeypointBlock, KeypointTerm, add_keypoints
 from tracker.fitting.twists import twists_to_dofs
 from tracker.geometry.arrays import Array, IntArray
 
-_KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration)
+_KNOWN = (ContourResiduals, PosePrior, SelfPenetration, BodyPenetration, KeypointBlock)
 
 
 Solver: TypeAlias = Callable[..., Fit]
@@ -65,6 +66,8 @@ class _Blocks(NamedTuple):
     """Penetration between parts of the body."""
     between: PenetrationTerm
     """Penetration between bodies."""
+    keypoints: KeypointTerm
+    """Key points."""
 
 
 class _Linear(NamedTuple):
@@ -126,8 +129,12 @@ def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks:
     priors = [b for b in blocks if isinstance(b, PosePrior)]
     within = [b.term(model) for b in blocks if isinstance(b, SelfPenetration)]
     between = [b.term(model) for b in blocks if isinstance(b, BodyPenetration)]
-    if len(contours) != 1 or len(within) > 1 or len(between) > 1:
-        found = f"{len(contours)} ContourResiduals, {len(within)} SelfPenetration and {len(between)} BodyPenetration"
+    keypoints = [b.arrays for b in blocks if isinstance(b, KeypointBlock)]
+    if len(contours) != 1 or max(len(within), len(between), len(keypoints)) > 1:
+        found = (
+            f"{len(contours)} ContourResiduals, {len(within)} SelfPenetration, {len(between)} BodyPenetration and "
+            f"{len(keypoints)} KeypointBlock"
+        )
         raise TypeError(
             f"expected one ContourResiduals and at most one of the others, found {found}; call gauss_newton.solve"
         )
@@ -136,6 +143,7 @@ def _compiled(model: BodyModel, blocks: Sequence[ResidualBlock]) -> _Blocks:
         np.array([p.pose for p in priors], np.float64).reshape(-1, model.n_dofs),
         np.array([p.weights for p in priors], np.float64).reshape(-1, model.n_dofs),
         within[0] if within else NO_PENETRATION, between[0] if between else NO_PENETRATION,
+        keypoints[0] if keypoints else NO_KEYPOINTS,
     )  # fmt: skip
 
 
@@ -193,6 +201,7 @@ def _linearize(blocks: _Blocks, pose: Array, out: _Linear) -> float:
     Ts = term.Ts[first:last]
     forward_kinematics(pose, blocks.tree, Ts, out.axes, out.origins)
     cost = accumulate_normal_equations(term, WITH_JACOBIAN)
+    cost += add_keypoints(blocks.keypoints, Ts, sums.M[first:last], sums.b[first:last])
     twists_to_dofs(
         sums.M[first:last], sums.b[first:last], out.axes, out.origins, blocks.is_length, blocks.parts,
         blocks.tree.parents, blocks.moves, out.gradient, out.hessian,

@@ -18,10 +18,12 @@ RATE_FACTOR = 19
 class VideoWriter:
     """An MP4 file that takes one image after the other. Use it in a `with` statement."""
 
-    def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
-        """Open a video of a width and height in pixels, both even, and a frame rate, 1/s."""
+    def __init__(self, path: Path, size: tuple[int, int], fps: float, comment: str = "") -> None:
+        """Open a video of a width and height in pixels, both even, a frame rate, 1/s, and a comment in its metadata."""
         # The same bytes on every run: no encoder threads, no date, no version of the muxer.
         self._file = av.open(str(path), "w", options={"fflags": "+bitexact"})
+        if comment:
+            self._file.metadata["comment"] = comment
         self._stream = self._file.add_stream("libx264", rate=Fraction(fps).limit_denominator(1001))
         self._stream.width, self._stream.height = size
         self._stream.pix_fmt = "yuv420p"

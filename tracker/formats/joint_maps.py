@@ -1,19 +1,21 @@
 """Map the markers of a foreign file to the joints of the body.
 
-The project's own names are those of `BodyModel.point_names`: `left_shoulder`, `left_wrist`, `neck`, ...
+The project's own names are those of `BodyModel.point_names`: `left_shoulder`, `left_wrist`, `neck`, ... The conventions
+of other programs are the files of `tracker/formats/skeletons`, in the layout of a user's own joint map.
 """
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import resources
 from pathlib import Path
-from typing import NamedTuple
 
 import msgspec
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.trc import MarkerTable
-from tracker.text_files import DOCUMENT_BYTES, TextKind, read_toml
+from tracker.text_files import DOCUMENT_BYTES, TextKind, parse_toml, read_toml
 from tracker.validation import Name, check
 
 LIMB_JOINTS = tuple(
@@ -21,65 +23,52 @@ LIMB_JOINTS = tuple(
 )
 """The joints over which errors are averaged."""
 JOINTS = (*LIMB_JOINTS, "neck", "head")
+FOOT_POINTS = tuple(f"{side}_{point}" for side in ("left", "right") for point in ("heel", "toe"))
+"""Points of the feet, which some bodies have."""
+_BODY_POINTS = (*JOINTS, *FOOT_POINTS)
 
 _KIND = TextKind("joint map", DOCUMENT_BYTES, FormatError)
 _JointMapFile = msgspec.defstruct(
-    "_JointMapFile", [(joint, Name | None, None) for joint in JOINTS], forbid_unknown_fields=True
+    "_JointMapFile",
+    [
+        *((point, Name | None, None) for point in _BODY_POINTS),
+        ("points", tuple[Name, ...], ()),
+        ("means", dict[Name, tuple[Name, ...]], msgspec.field(default_factory=dict)),
+    ],
+    forbid_unknown_fields=True,
 )
-"""A joint map file: the name of a marker for each joint that the file has."""
+"""A joint map file: the name of a marker for each joint that the file has; see `JointMap` for the rest."""
 
 
-class JointMap(NamedTuple):
+@dataclass(frozen=True)
+class JointMap:
     """A naming convention."""
 
     name: str
     markers: Mapping[str, str]
-    """Name of the marker for each joint that the convention knows."""
+    """Name of the marker for each joint or point of the body that the convention knows."""
+    means: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Points of the body whose mean a marker is, by marker, such as the middle of the hips."""
+    points: tuple[str, ...] = ()
+    """Markers in the order of files that name none; empty if unknown."""
+
+    def counterparts(self, markers: Sequence[str]) -> dict[str, tuple[str, ...]]:
+        """Return the points of the body whose mean each marker is, by marker; empty for one without a counterpart."""
+        single = {marker: (point,) for point, marker in self.markers.items()}
+        return {m: single.get(m) or tuple(self.means.get(m, ())) for m in markers}
 
 
-def _sided(**parts: str) -> dict[str, str]:
-    """Expand patterns in which `{long}` is Left or Right, `{short}` L or R, to the markers of both sides."""
-    sides = {"left": ("Left", "L"), "right": ("Right", "R")}
-    return {
-        f"{side}_{joint}": pattern.format(long=long, short=short)
-        for joint, pattern in parts.items()
-        for side, (long, short) in sides.items()
-    }
+OWN = JointMap("our own", {j: j for j in _BODY_POINTS})
 
 
-OWN = JointMap("our own", {j: j for j in JOINTS})
-CMU = JointMap(
-    "CMU",
-    {
-        **_sided(
-            shoulder="{long}Arm",
-            elbow="{long}ForeArm",
-            wrist="{long}Hand",
-            hip="{long}UpLeg",
-            knee="{long}Leg",
-            ankle="{long}Foot",
-        ),
-        "neck": "Neck",
-        "head": "Head",
-    },
-)
-BODY_25 = JointMap(
-    "BODY_25",
-    {
-        **_sided(
-            shoulder="{short}Shoulder",
-            elbow="{short}Elbow",
-            wrist="{short}Wrist",
-            hip="{short}Hip",
-            knee="{short}Knee",
-            ankle="{short}Ankle",
-        ),
-        "neck": "Neck",
-        "head": "Head",
-    },
-)
-# COCO's own names of the limbs equal the project's; tools that write COCO joints as TRC use the names of BODY_25.
-KNOWN = (OWN, CMU, BODY_25)
+@cache
+def known_joint_maps() -> tuple[JointMap, ...]:
+    """Return the conventions that the program knows."""
+    folder = resources.files("tracker") / "formats" / "skeletons"
+    files = sorted((f for f in folder.iterdir() if f.name.endswith(".toml")), key=lambda f: f.name)
+    texts = {f.name.removesuffix(".toml"): f.read_text("utf-8") for f in files}
+    return (OWN, *(parse_joint_map(name, parse_toml(text, name, _KIND), name) for name, text in texts.items()))
+
 
 _MIN_JOINTS = 4
 """Fewest limb joints under the names of a convention by which a file follows it."""
@@ -88,17 +77,40 @@ _MIN_JOINTS = 4
 def guess_joint_map(markers: Sequence[str], source: str) -> JointMap:
     """Guess the naming convention of a file from its markers; `source` names the file in messages.
 
+    It is the one under whose names the file has most limb joints, and among those most points of any kind.
+
     Raises:
         FormatError: the markers follow no known convention.
     """
-    present = [sum(m.markers[j] in markers for j in LIMB_JOINTS) for m in KNOWN]
-    if max(present) < _MIN_JOINTS:
+
+    def fit(known: JointMap) -> tuple[int, int]:
+        names = {*known.markers.values(), *known.points, *known.means}
+        return sum(known.markers.get(j) in markers for j in LIMB_JOINTS), len(names.intersection(markers))
+
+    best = max(known_joint_maps(), key=fit)
+    if fit(best)[0] < _MIN_JOINTS:
         raise FormatError(
-            f"the markers of {source} follow no known convention (our own, COCO, CMU, BODY_25): found "
-            f"{', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}",
+            f"the markers of {source} follow no known convention ({', '.join(m.name for m in known_joint_maps())}): "
+            f"found {', '.join(markers[:8])}{', ...' if len(markers) > 8 else ''}",
             Remedy("give_joint_map", marker=_quoted(markers[0])),
         )
-    return KNOWN[present.index(max(present))]
+    return best
+
+
+def joint_map_of_size(n_points: int, source: str) -> JointMap:
+    """Return the known convention of a file that names no points, by their number.
+
+    Raises:
+        FormatError: no convention has so many points.
+    """
+    for known in known_joint_maps():
+        if len(known.points) == n_points:
+            return known
+    sizes = ", ".join(f"{len(m.points)} ({m.name})" for m in known_joint_maps() if m.points)
+    raise FormatError(
+        f"{source}: expected the number of points of a known skeleton, {sizes}, found {n_points}",
+        Remedy("give_point_order", n=n_points),
+    )
 
 
 def _quoted(marker: str) -> str:
@@ -109,17 +121,42 @@ def _quoted(marker: str) -> str:
 def read_joint_map(path: str | Path) -> JointMap:
     """Read a convention from TOML: one line `left_shoulder = "LSHO"` for each joint that a file has.
 
+    `points = ["LSHO", ...]` lists the markers of files without names, in order. `[means]` has a line
+    `MidHip = ["left_hip", "right_hip"]` for each marker that is a mean.
+
     Raises:
         FormatError: the file is missing or malformed, or names an unknown joint.
     """
-    found = check(read_toml(Path(path), _KIND), _JointMapFile, f"joint map {path}", FormatError)
-    markers = {j: m for j, m in msgspec.to_builtins(found).items() if m is not None}
+    return parse_joint_map(Path(path).name, read_toml(Path(path), _KIND), str(path))
+
+
+def format_joint_map(joint_map: JointMap) -> dict[str, object]:
+    """Return the content of the file from which `read_joint_map` reads a convention."""
+    out: dict[str, object] = {"points": list(joint_map.points)} if joint_map.points else {}
+    means = {marker: list(points) for marker, points in joint_map.means.items()}
+    return out | dict(joint_map.markers) | ({"means": means} if means else {})
+
+
+def parse_joint_map(name: str, data: object, source: str) -> JointMap:
+    """Return the convention of a file's content; `source` names it in messages. Raises as `read_joint_map` does."""
+    found = msgspec.to_builtins(check(data, _JointMapFile, f"joint map {source}", FormatError))
+    markers = {p: found[p] for p in _BODY_POINTS if found[p] is not None}
     if not markers:
         raise FormatError(
-            f'joint map {path}: expected lines such as left_shoulder = "LSHO" for {", ".join(JOINTS)}, found none; '
+            f'joint map {source}: expected lines such as left_shoulder = "LSHO" for {", ".join(JOINTS)}, found none; '
             "add them"
         )
-    return JointMap(Path(path).name, markers)
+    means = {marker: tuple(points) for marker, points in found["means"].items()}
+    for marker, points in means.items():
+        if unknown := [p for p in points if p not in _BODY_POINTS] or (["nothing"] if not points else []):
+            raise FormatError(
+                f"joint map {source}: expected '{marker}' to be a mean of {', '.join(_BODY_POINTS)}, found "
+                f"{unknown[0]}; correct it"
+            )
+    points = tuple(found["points"])
+    if len(set(points)) < len(points):
+        raise FormatError(f"joint map {source}: expected each of 'points' once, found one twice; correct it")
+    return JointMap(name, markers, means, points)
 
 
 def joints_of(table: MarkerTable, source: str, joint_map: JointMap | None = None) -> MarkerTable:

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,6 +70,7 @@ def acquire_body(
     settings: AcquisitionSettings | TwoViewSettings,
     report: Report = unreported,
     known: PosedFrames | None = None,
+    joints: Mapping[int, PointTargets] = MappingProxyType({}),
 ) -> Acquisition:
     """Acquire the body of a person from stored poses; where they are too few, from frames tracked for it.
 
@@ -82,25 +84,30 @@ def acquire_body(
         settings: of the acquisition; their type is the method.
         report: shows progress. An exception that it raises ends the acquisition.
         known: poses to begin from, in the present bodies; those that the session stores by default.
+        joints: by frame, joints that another program found. They count where nobody has placed any.
 
     Raises:
         TrackerError: the person has no pose on these frames, or the views show nothing of them.
     """
     known = known or posed_frames(session, person, frames)
     if not len(known.bodies) < settings.n_frames < len(frames):
-        return _acquire(observer, known, settings, report)
+        return _acquire(observer, _with_joints(known, joints), settings, report)
     rounds = settings.rounds if isinstance(settings, AcquisitionSettings) else 1
     body = session.people[person].model
     for number in range(rounds):
         begin, end = number / rounds, (number + 1) / rounds
         between = (begin + end) / 2  # tracking takes about half of a round
         tracked = _tracked_with(body, session, observer, person, frames, known, part_of(report, begin, between))
-        found = _acquire(observer, tracked, settings, part_of(report, between, end))
+        found = _acquire(observer, _with_joints(tracked, joints), settings, part_of(report, between, end))
         body = found.body
         is_enough = len(tracked.bodies) > _ENOUGH * min(len(frames), _MOST_TRACKED)
         if is_enough or not found.is_better:
             break
     return found
+
+
+def _with_joints(known: PosedFrames, joints: Mapping[int, PointTargets]) -> PosedFrames:
+    return known._replace(placed={**{k: t for k, t in joints.items() if k in known.bodies}, **known.placed})
 
 
 def _acquire(

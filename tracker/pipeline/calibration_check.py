@@ -11,6 +11,7 @@ from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS
 from tracker.calibration.diagnosis import Diagnosis, diagnose, prior_sigmas
 from tracker.calibration.findings import CameraFinding, findings, sentence
+from tracker.calibration.residual_pieces import ResidualPieces, residual_pieces
 from tracker.calibration.single_frames import FrameScore, find_change, score_frame
 from tracker.calibration.viewed_frames import ViewedFrame, spread_poses
 from tracker.compute.progress import Report, part_of, unreported
@@ -42,6 +43,8 @@ class CalibrationCheck:
     since: Mapping[str, int]
     """Of cameras that have been off since a frame within the recording: that frame."""
     diagnosis: Diagnosis
+    residuals: tuple[ResidualPieces, ...]
+    """Of each camera as it is, on the frames that were used."""
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -214,7 +217,8 @@ def _checked(recording: PosedRecording, seen: Sequence[ViewedFrame], report: Rep
     cameras = findings(diagnosis, seen, [c.camera.name for c in session.cameras])
     if len(cameras) == 2:
         cameras = [c._replace(kinds=(), correction=np.zeros(N_CORRECTIONS)) for c in cameras]
-    return CalibrationCheck(tuple(s.frame for s in seen), tuple(cameras), {}, diagnosis)
+    residuals = residual_pieces(seen, [SizeParameters(b.model) for b in seen[0].bodies], diagnosis.state)
+    return CalibrationCheck(tuple(s.frame for s in seen), tuple(cameras), {}, diagnosis, residuals)
 
 
 class _Changes:

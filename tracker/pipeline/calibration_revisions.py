@@ -1,9 +1,4 @@
-"""Revisions of the calibration of a session: corrections are entries of the history, and poses name theirs.
-
-A revision is a calibration with a number from 1 on, stored for good. The session's calibration is that of the last
-entry of the history that changed it. A pose belongs to the revision that was present when it was made: that of the last
-such entry before its own.
-"""
+"""Change the calibration of a session: corrections are entries of the history (`tracker.store.calibration_log`)."""
 
 import math
 import tomllib
@@ -21,12 +16,7 @@ from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.stored_run import forget_unfinished
 from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_cameras
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_revisions import (
-    CALIBRATION_EDITS,
-    CALIBRATIONS,
-    present_revision,
-    revisions_of_poses,
-)
+from tracker.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, present_revision, revisions_of_poses
 from tracker.store.edit_tree import now
 
 

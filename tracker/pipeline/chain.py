@@ -7,18 +7,28 @@ shows them. Each stage is stored when it is done. The same plan goes on where it
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 from tracker.acquisition.from_contours import Acquisition, AcquisitionSettings
+from tracker.body.model import PosedBody
 from tracker.compute.progress import Report, part_of
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
+from tracker.fitting.gauss_newton import PointTargets
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.initialization.first_pose import FirstPoses
 from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
 from tracker.pipeline.calibration_revisions import follow_history
 from tracker.pipeline.find_people import FindSettings, find_people, sentences, store_found
+from tracker.pipeline.keypoint_evidence import (
+    SEEN_BODIES,
+    learn_seen_bodies,
+    seen_bodies_record,
+    seen_joints,
+    with_keypoints,
+)
+from tracker.pipeline.keypoint_poses import store_keypoint_poses
 from tracker.pipeline.stored_run import TrackPlan, is_interrupted, stored_run
 from tracker.pipeline.track_session import Step, TrackSession
 from tracker.session.lock import SessionLock
@@ -77,6 +87,12 @@ class OpenSession(Protocol):
     def store_body(self, person: int, acquired: Acquisition, start: int) -> None:
         """Make an acquired body the present one of a person, and retarget the pose of the start to it."""
 
+    def store_setting(self, name: str, value: Any) -> None:
+        """Store a setting of the session."""
+
+    def setting(self, name: str, default: Any) -> Any:
+        """Return a setting of the session."""
+
     def is_interrupted(self, plan: TrackPlan) -> bool:
         """Return whether this run was interrupted, so that it goes on there."""
 
@@ -118,24 +134,39 @@ def run_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
     track = replace(track, people=people, start=start)
     if not opened.is_interrupted(track):  # a run goes on in the bodies in which it was begun
         of_sizes = part_of(sink.report, end if missing else 0.0, 1.0, "acquiring sizes")
-        _acquire([i for i in plan.acquire if i in people], track, opened, of_sizes)
+        acquired = _acquire([i for i in plan.acquire if i in people], track, opened, of_sizes)
+        if track.keypoints is not None:
+            session, before = opened.session, opened.setting(SEEN_BODIES, {})
+            seen = learn_seen_bodies(session, track.keypoints, acquired)
+            opened.store_setting(SEEN_BODIES, seen_bodies_record(session, track.keypoints, seen, before))
     sink.report("tracking", 1.0, f"tracking from frame {start} to {track.frames[0]}, and to {track.frames[-1]}")
     return opened.track(track, sink)
 
 
-def _acquire(people: Sequence[int], track: TrackPlan, opened: OpenSession, report: Report) -> None:
-    """Acquire the sizes of those people who have none of their own, one after the other, and store each."""
+def _acquire(
+    people: Sequence[int], track: TrackPlan, opened: OpenSession, report: Report
+) -> dict[int, dict[int, PosedBody]]:
+    """Acquire the sizes of those people who have none of their own, one after the other, and store each; return their
+    bodies by frame."""
     assert track.start is not None
+    out = dict[int, dict[int, PosedBody]]()
     people = [i for i in people if has_preset_proportions(opened.session.people[i].model)]
     settings = AcquisitionSettings(rounds=2)  # again with acquired sizes where few frames were good with the preset's
     whole = range(track.frames[0], track.frames[-1] + 1)
     for number, person in enumerate(people):
         session, part = opened.session, part_of(report, number / len(people), (number + 1) / len(people))
         known = posed_frames(session, person, whole, track.start)
-        acquired = acquire_body(session, opened.observer, person, whole, settings, part, known)
+        observer, joints = opened.observer, dict[int, PointTargets]()
+        if track.keypoints is not None:
+            observer = with_keypoints(session, observer, track.keypoints)
+            joints = seen_joints(session, track.keypoints, person, settings.n_frames)
+        acquired = acquire_body(session, observer, person, whole, settings, part, known, joints)
         if acquired.is_better:
             opened.store_body(person, acquired, track.start)
+            poses = zip(acquired.frames, acquired.poses, strict=True)
+            out[person] = {k: PosedBody(acquired.body, pose) for k, pose in poses}
         part("", 1.0, f"{session.people[person].name}: {acquisition_sentence(acquired)}")
+    return out
 
 
 def unplaced(opened: OpenSession, people: Sequence[int]) -> tuple[int, ...]:
@@ -193,9 +224,21 @@ class StoredSession:
         self.session = store_body(self.session, self._store, person, acquired.body, poses, label, [start])
         self.is_changed = True
 
+    def store_setting(self, name: str, value: Any) -> None:
+        """See `OpenSession.store_setting`."""
+        self._store.set_setting(name, value)
+
+    def setting(self, name: str, default: Any) -> Any:
+        """See `OpenSession.setting`."""
+        return self._store.setting(name, default)
+
     def is_interrupted(self, plan: TrackPlan) -> bool:
         """See `OpenSession.is_interrupted`."""
         return is_interrupted(self._store, plan)
+
+    def store_keypoint_poses(self, people: Sequence[int], frames: Sequence[int], name: str) -> dict[int, int]:
+        """Store poses by key points alone; see `keypoint_poses.store_keypoint_poses`."""
+        return store_keypoint_poses(self.session, self._store, people, frames, name)
 
     def track(self, plan: TrackPlan, sink: Sink) -> TrackPlan:
         """See `OpenSession.track`."""

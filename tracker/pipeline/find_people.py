@@ -19,6 +19,7 @@ from tracker.initialization.first_pose import (
     find_first_poses_anywhere,
 )
 from tracker.pipeline.body_acquisition import MEASURED, SIZES_EDITS, with_sizes_changed
+from tracker.pipeline.keypoint_evidence import SOURCE, find_by_keypoints
 from tracker.session.session import Session, save_model
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
@@ -41,6 +42,8 @@ class FindSettings:
     """The generator of starts, which is tried on that frame alone; None for all on several frames."""
     voxel_m: float = VOXEL_M
     """Edge of a voxel, metres."""
+    keypoints: str | None = None
+    """Name of the observations whose key points show the people; None to find them in the silhouettes."""
 
 
 def frames_to_try(frames: Sequence[int], first: int | None) -> list[int]:
@@ -92,6 +95,9 @@ def find_people(
     Raises:
         TrackerError: no frame shows the people well enough.
     """
+    if settings.keypoints is not None:
+        report("finding first poses", 0.0)
+        return find_by_keypoints(session, people, frames, settings.keypoints)
     if settings.generator is not None and settings.frame is not None:
         by = (settings.generator,)
         return find_first_poses(session, observer, people, [settings.frame], by, settings.voxel_m)
@@ -168,6 +174,9 @@ def sentences(session: Session, found: FirstPoses) -> list[str]:
     out = []
     for person, first in found.poses.items():
         name = session.people[person].name
+        if first.start.source == SOURCE:
+            out.append(f"{name}: started on frame {found.frame} by key points, {first.model.height_m:.2f} m tall")
+            continue
         out.append(
             f"{name}: started on frame {found.frame} by {first.start.source}, "
             f"{first.model.height_m:.2f} m tall, {first.status}, "

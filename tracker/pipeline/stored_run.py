@@ -12,6 +12,7 @@ from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
+from tracker.pipeline.keypoint_evidence import stored_seen_bodies, with_keypoints
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.smoothing import TrackedRows, resumed_rows
 from tracker.pipeline.track_session import Leg, StoreWriter, TrackSession, outward
@@ -48,6 +49,8 @@ class TrackPlan:
     """Names of the cameras to track with; all if empty."""
     start: int | None = None
     """Frame from which the run goes out in both directions; None for a run from the first frame to the last."""
+    keypoints: str | None = None
+    """Name of the observations whose key points are evidence, too; None for contours alone."""
 
     @property
     def legs(self) -> list[Sequence[int]]:
@@ -62,7 +65,9 @@ class TrackPlan:
         """Return the plan as the store keeps it."""
         frames, settings = self.frames, settings_record(self.settings)
         cameras = [sorted(self.cameras)] if self.cameras else []
-        start = [] if self.start is None else [{"start": self.start}]
+        named = {"start": self.start, "keypoints": self.keypoints}
+        chosen = {k: v for k, v in named.items() if v is not None}
+        start = [chosen] if chosen else []
         what = [frames[0], frames[-1], len(frames), self.people, *cameras, *start, settings]
         found: list[Any] = json.loads(json.dumps(what))
         return found
@@ -84,6 +89,9 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, pla
         SessionError: a person has no pose at or before the first frame.
     """
     people = session.people
+    if plan.keypoints is not None:
+        seen = stored_seen_bodies(session, store, plan.keypoints)
+        observer = with_keypoints(session, observer, plan.keypoints, seen)
     locks = load_locks(people, store.setting)
     active = [active_dofs(p.model, locked) for p, locked in zip(people, locks, strict=True)]
     keyframes = keyframes_of(store, people, frozenset(plan.frames))

@@ -105,7 +105,7 @@ class AnnotationStore:
 
     def pose_edits(self, person: str) -> dict[int, int]:
         """Return the entry of the history that made each pose of a person, by frame, ascending."""
-        sql = f"SELECT p.frame, c.edit {rows.CURRENT_POSES} WHERE p.person = ? ORDER BY p.frame"
+        sql = f"SELECT p.frame, coalesce(c.made_in, c.edit) {rows.CURRENT_POSES} WHERE p.person = ? ORDER BY p.frame"
         return dict(self._connection.all(sql, (person,), lambda row: (int(row[0]), int(row[1]))))
 
     def alternatives(self, person: str, frame: int) -> tuple[Alternative, ...]:

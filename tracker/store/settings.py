@@ -48,6 +48,17 @@ class _Floor(msgspec.Struct):
             raise ValueError("expected a unit vector as 'normal' with 'offset_m', found another plane")
 
 
+class _SeenBody(msgspec.Struct):
+    body: str
+    points: _Names
+    offsets_m: list[Vector]
+    sigmas: list[Number]
+
+    def __post_init__(self) -> None:
+        if not len(self.points) == len(self.offsets_m) == len(self.sigmas):
+            raise ValueError("expected an offset and a sigma for each point, found other numbers of them")
+
+
 class _Unfinished(msgspec.Struct):
     task: Annotated[list[int | list[Any] | dict[str, Any]], Meta(min_length=5, max_length=6)]
     next: _Frame | None
@@ -69,6 +80,7 @@ _DECLARATIONS: Mapping[str, Any] = {
     "find people": _Chain | None,
     "former_floor": _Floor | None,
     "unfinished track": _Unfinished | None,
+    "seen bodies": dict[Name, dict[Name, _SeenBody]],
 }
 """By name; others are any JSON."""
 

@@ -19,6 +19,7 @@ from tracker.appearance.region_learning import learning_frames
 from tracker.body.limbs import limb_display_name
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
+from tracker.evidence.observer import Observer
 from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.alternative_poses import alternative_poses, limbs_in_doubt
@@ -46,11 +47,13 @@ class _Learnt:
     people: tuple[int, ...]
     poses: Mapping[int, tuple[Array, ...]]
     """Of these people in their present bodies by frame, (n_values,) each."""
+    observer: Observer
+    """Of the cameras that it was learnt with."""
 
-    def holds(self, people: tuple[int, ...], poses: Mapping[int, tuple[Array, ...]]) -> bool:
-        """Return whether most poses of a run are still those that it was learnt from."""
+    def holds(self, people: tuple[int, ...], poses: Mapping[int, tuple[Array, ...]], observer: Observer) -> bool:
+        """Return whether most poses of a run, and the cameras, are still those that it was learnt from."""
         same = [k for k in poses.keys() & self.poses.keys() if all(map(np.array_equal, poses[k], self.poses[k]))]
-        return people == self.people and 2 * len(same) > len(poses)
+        return people == self.people and observer is self.observer and 2 * len(same) > len(poses)
 
 
 class Reasons:
@@ -193,8 +196,8 @@ class Reasons:
     def _run(self, people: tuple[int, ...]) -> RunEvidence:
         """Return what is usual in the run, learnt if that is to do."""
         session_state = self._session_state
-        poses = self._poses(people)
-        if self._learnt is None or not self._learnt.holds(people, poses):
+        poses, observer = self._poses(people), session_state.frames.observer
+        if self._learnt is None or not self._learnt.holds(people, poses, observer):
             if len(poses) < MIN_SEEN:
                 raise TrackerError(
                     f"expected {MIN_SEEN} frames with poses or more, to learn what is usual in each view, found "
@@ -205,8 +208,8 @@ class Reasons:
                 (k, tuple(PosedBody(models[i], values) for i, values in zip(people, own, strict=True)))
                 for k, own in poses.items()
             ]
-            run = learn_run(session_state.frames.observer, frames, self._report)
-            self._learnt = _Learnt(run, people, poses)
+            run = learn_run(observer, frames, self._report)
+            self._learnt = _Learnt(run, people, poses, observer)
         return self._learnt.run
 
     def _poses(self, people: tuple[int, ...]) -> dict[int, tuple[Array, ...]]:
@@ -232,4 +235,5 @@ def _bodies(state: State, people: Sequence[int]) -> Bodies:
 def _ingredients(state: State) -> tuple[object, ...]:
     """Return what a reason is made from, for comparison. Poses are compared by identity."""
     shown = tuple(Identity(p.values) for p in state.people)
-    return state.frame, state.person, shown, state.revisions, state.track.running, state.compiling
+    cameras = state.calibration.n_changes
+    return state.frame, state.person, shown, state.revisions, cameras, state.track.running, state.compiling

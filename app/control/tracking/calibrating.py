@@ -9,6 +9,7 @@ import numpy as np
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
+from app.control.tracking.tracking import Tracking
 from app.remedies import page_text
 from app.runtime.jobs import LatestWinsWorker
 from app.state.calibration import CorrectedFrame
@@ -39,14 +40,15 @@ class _StoppedError(Exception):
 class Calibrating:
     """At most one check of the cameras at a time. It changes nothing until its corrections are applied."""
 
-    def __init__(self, session_state: SessionState, activities: Activities) -> None:
+    def __init__(self, session_state: SessionState, activities: Activities, tracking: Tracking) -> None:
         """Check nothing yet.
 
         Args:
             session_state: holds the state.
             activities: ends jobs and gestures before the cameras change.
+            tracking: tracks again what is of an earlier calibration.
         """
-        self._session_state, self._activities = session_state, activities
+        self._session_state, self._activities, self._tracking = session_state, activities, tracking
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
         self._version: tuple[int, int] | None = None
@@ -108,6 +110,32 @@ class Calibrating:
             session_state.set_cameras(session_state.saver.correct_cameras(check))
             self._set(check=None, is_previewed=False, preview=None, message=f"Corrected: {', '.join(check.named)}.")
             self._show_cameras()
+
+    def track_again(self) -> None:
+        """Track the frames again on which somebody has a pose of an earlier calibration. Keyframes stay.
+
+        The run covers the frames from the first such pose to the last, keyframes included. It goes out from the
+        keyframe in its middle, or else from its first pose, which is tracked, too.
+
+        Raises:
+            TrackerError: all such poses are keyframes, or there are none.
+        """
+        session_state = self._session_state
+        with self._activities.editing():
+            found = session_state.saver.frames_of_earlier_calibration()
+            every, people = sorted(set().union(*found.values())), set(found)
+            keyframes = session_state.saver.keyframes(range(every[0], every[-1] + 1)) if every else {}
+            if all(i in keyframes.get(k, {}) for i, frames in found.items() for k in frames):
+                raise TrackerError(
+                    "expected tracked poses of an earlier calibration, found none; keyframes stay as they were set"
+                )
+            starts = sorted(k for k, own in keyframes.items() if people <= own.keys())
+            if starts:
+                start, within = starts[len(starts) // 2], range(every[0], every[-1] + 1)
+                self._tracking.start_outward(start, tuple(sorted(people)), None, lambda _: None, within)
+            else:
+                session_state.show_frame(every[0])
+                self._tracking.start(False, every[-1], from_shown=True)
 
     def follow(self) -> None:
         """Restore the cameras that belong to the present entry of the history, after a move.
@@ -216,6 +244,7 @@ class Calibrating:
     def _find_outdated(self, _: State) -> None:
         session_state = self._session_state
         with session_state.lock:
-            found = session_state.saver.frames_of_earlier_calibration()
-            if found != session_state.state.calibration.outdated:
-                self._set(outdated=found)
+            saver, before = session_state.saver, session_state.state.calibration
+            found, revision = saver.frames_of_earlier_calibration(), saver.calibration_revision
+            if (found, revision) != (before.outdated, before.revision):
+                self._set(outdated=found, revision=revision)

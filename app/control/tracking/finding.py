@@ -134,6 +134,14 @@ class FindingPeople:
         """See `OpenSession.sources`."""
         return {row.frame: row.source for row in self._session_state.saver.rows(person, range(self.session.n_frames))}
 
+    def setting(self, name: str, default: Any) -> Any:
+        """See `OpenSession.setting`."""
+        return self._session_state.saver.setting(name, default)
+
+    def store_setting(self, name: str, value: Any) -> None:
+        """See `OpenSession.store_setting`."""
+        self._session_state.saver.store_setting(name, value)
+
     def report(self, stage: str, share: float, text: str = "", /) -> None:
         """See `Sink.report`."""
         if self._stopping.is_set():

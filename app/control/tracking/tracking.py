@@ -98,19 +98,21 @@ class Tracking:
         """Choose method, frames and cameras of the next run."""
         self._session_state.set(run_choices=choices)
 
-    def start(self, backward: bool, until: int | None) -> None:
+    def start(self, backward: bool, until: int | None, from_shown: bool = False) -> None:
         """Begin a run from the shown poses; a former run must have been ended.
 
         Args:
             backward: towards the first frame.
             until: last frame to track; None for the end of the recording.
+            from_shown: whether to track the shown frame, too, even if everybody has a pose there.
 
         Raises:
             TrackerError: no person has been placed, or there is no frame to track.
         """
         with self._activities.editing():
             people = self._placed()
-            frames = self._frames(backward, until, people)
+            shown = self._session_state.state.people
+            frames = self._frames(backward, until, from_shown or any(shown[i].source is None for i in people))
             run = TrackingRun(
                 self._observer(),
                 self._subjects(people, frames),
@@ -122,21 +124,28 @@ class Tracking:
             self._begin([Leg(run)], f"track {way} from frame {frames[0]}", None, lambda is_done: None)
 
     def start_outward(
-        self, start: int, people: tuple[int, ...], edit: int | None, on_end: Callable[[bool], None]
+        self,
+        start: int,
+        people: tuple[int, ...],
+        edit: int | None,
+        on_end: Callable[[bool], None],
+        within: range | None = None,
     ) -> None:
-        """Begin a run over all frames that goes out from the poses of one frame in both directions.
+        """Begin a run over all frames, or some, that goes out from the poses of one frame in both directions.
 
         Args:
             start: the frame.
             people: indices of those to track; they have a pose there.
             edit: entry of the history that the run belongs to; None for one of its own.
             on_end: called at the end with whether the run did all its work; must return quickly.
+            within: frames that it may track; None for all.
         """
         session_state = self._session_state
         with self._activities.editing():
             session_state.show_frame(start)
             stride = session_state.state.run_choices.stride
-            frames = range(start % stride, session_state.session.n_frames, stride)
+            every = range(session_state.session.n_frames) if within is None else within
+            frames = range(start - (start - every.start) // stride * stride, every.stop, stride)
             observer, subjects, poses = self._observer(), self._subjects(people, frames), session_state.present_poses()
             trusted: Status = "good"
             known = TrackedFrame(start, tuple(poses), (trusted,) * len(poses))
@@ -247,14 +256,14 @@ class Tracking:
         chosen = [i for i, c in enumerate(observer.cameras) if c.camera.name in cameras]
         return observer.with_cameras(chosen) if chosen else observer
 
-    def _frames(self, backward: bool, until: int | None, people: Sequence[int]) -> range:
-        """Return the frames to track, from the shown one if a person has no stored pose there, else the next."""
+    def _frames(self, backward: bool, until: int | None, from_shown: bool) -> range:
+        """Return the frames to track, from the shown one on or from the next."""
         session_state = self._session_state
         step = session_state.state.run_choices.stride * (-1 if backward else 1)
         last = session_state.session.n_frames - 1
         end = (0 if backward else last) if until is None else min(max(0, until), last)
         state = session_state.state
-        first = state.frame if any(state.people[i].source is None for i in people) else state.frame + step
+        first = state.frame if from_shown else state.frame + step
         frames = range(first, end + (-1 if backward else 1), step)
         if not frames:
             raise TrackerError(

@@ -8,12 +8,13 @@ import pytest
 from command_line import SAMPLE
 
 from app.__main__ import main
-from app.bench import acquisition_rows, calibration_rows, contour_rows, report, voxel_rows
+from app.bench import acquisition_rows, calibration_rows, contour_rows, diagnosis_rows, report, voxel_rows
 from app.bench import rows as bench_rows
 from app.bench.opencv_oracle import PaintedCost
 from app.bench.rows import Row, Yardstick
 from app.bench.sample_frames import read_crowd, read_frame
 from tracker.errors import TrackerError
+from tracker.session.assemble import DEFAULT_MODEL
 
 
 @pytest.fixture(scope="module")
@@ -92,6 +93,7 @@ def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
     monkeypatch.setattr(Yardstick, "beside", beside)
     monkeypatch.setattr(Yardstick, "beside_difference", beside_difference)
     monkeypatch.setattr(bench_rows, "_PIPELINE_FRAMES", range(5, 8))
+    monkeypatch.setattr(diagnosis_rows, "_N_FRAMES", 3)
     cones = frame.with_model("gavrila22_cones")
     rows = [
         *bench_rows.candidates(frame, cones, Yardstick()),
@@ -103,11 +105,14 @@ def test_every_kind_of_row_can_be_measured(frame, monkeypatch):
         *bench_rows.evolution(cones, Yardstick()),
         *acquisition_rows.acquisitions(frame, Yardstick()),
         *calibration_rows.adjustment(Yardstick()),
+        *diagnosis_rows.diagnoses(frame.with_model(DEFAULT_MODEL), Yardstick()),
         *bench_rows.crowds(read_crowd(SAMPLE.with_name("tango"), 25), Yardstick()),
     ]
     names = [r.name for r in rows]
     assert len(set(names)) == len(names) == report.N_ROWS - 5  # all but the pipelines and the audited run
     assert {r.ratio for r in rows} == {2.0}
+    notes = {r.name: r.note for r in rows}
+    assert (notes["diagnosis"], notes["diagnosis_turned"]) == ("names no camera", "names FRONT")
     assert all(r.must is not None and r.aim < r.must for r in rows if r.aim is not None)
 
 

@@ -16,7 +16,7 @@ from gestures import wait_for
 from app.cli.track import TrackArguments, settings_of
 from app.server import address
 from tracker.compute.kernel_cache import compiled_mark
-from tracker.evaluation.metrics import axes_matrix
+from tracker.formats.file_axes import axes_matrix
 from tracker.formats.model_toml import load_model
 from tracker.formats.pose_csv import read_pose_table, write_pose_table
 from tracker.formats.trc import read_trc, write_trc

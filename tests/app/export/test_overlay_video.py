@@ -41,6 +41,8 @@ def test_one_view_has_the_footage_with_the_body_over_it(session, tmp_path):
     ticks = []
     overlay_video.write_overlay_video(motion, ExportOptions(view="FRONT"), tmp_path / "a.mp4", lambda: ticks.append(1))
     rate, images = frames_of(tmp_path / "a.mp4")
+    with av.open(str(tmp_path / "a.mp4")) as file:
+        assert file.metadata["comment"] == "calibration revision 1 of the session"
     assert len(images) == len(ticks) == 3
     assert rate == loaded.fps
     camera = next(c.camera for c in loaded.cameras if c.camera.name == "FRONT")

@@ -29,6 +29,12 @@ def test_only_a_page_that_shows_the_layer_receives_it_and_once_for_a_pose(contro
     assert feed.is_due(state, SHOWN)  # a layer that is shown again
 
 
+def test_corrected_cameras_have_other_figures(controller):
+    feed, state = ObservabilityFeed(), controller.state
+    feed.update(controller, state)
+    assert feed.is_due(replace(state, calibration=replace(state.calibration, n_changes=1)), SHOWN)
+
+
 def test_not_during_a_search_nor_before_contours_can_be_traced(controller):
     feed, state = ObservabilityFeed(), controller.state
     assert not feed.is_due(replace(state, search=replace(state.search, running=True)), SHOWN)

@@ -11,7 +11,8 @@ from app.page.commands import COMMANDS
 from app.page.message_parsing import MessageError, parse
 
 SUBSCRIPTIONS = {
-    client_messages.SetView, client_messages.ShowCurves, client_messages.WatchTab, client_messages.ShowHistory
+    client_messages.SetView, client_messages.CheckEpipolar, client_messages.ShowCurves, client_messages.WatchTab,
+    client_messages.ShowHistory,
 }  # fmt: skip
 
 DRAG = '{"type":"drag","phase":"move","frame":2,"camera":0,"person":0,"point":"torso","seq":1,"u":%s,"v":2}'

@@ -427,3 +427,21 @@ async def test_a_page_connects_again_where_a_person_gets_other_joints(controller
     async with visiting(controller) as page:
         assert len((await page.hear("session"))["people"][0]["parts"]) == 16
         assert len((await page.hear("state"))["dofs"]) == 38
+
+
+async def test_a_page_asks_for_epipolar_lines_until_it_asks_no_more(controller):
+    async with visiting(controller) as page:
+        await page.hear("timeline")
+        await page.send("epipolar", points=[[0, 320.0, 240.0]])
+        found = await page.hear("epipolar")
+        assert {line["camera"] for line in found["lines"]} == {1, 2, 3}
+        assert found["distance"] is None
+        line = found["lines"][0]
+        middle = [line["camera"], (line["x0"] + line["x1"]) / 2, (line["y0"] + line["y1"]) / 2]
+        await page.send("epipolar", points=[[0, 320.0, 240.0], middle])
+        distance = (await page.hear("epipolar"))["distance"]
+        assert (distance["camera"], distance["px"]) == (middle[0], pytest.approx(0, abs=0.02))
+        await page.send("epipolar", points=[[99, 0.0, 0.0]])
+        assert (await page.hear("notice"))["text"] == MISUNDERSTOOD
+        await page.send("epipolar", points=[])
+        assert (await page.hear("epipolar"))["lines"] == []

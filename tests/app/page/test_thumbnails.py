@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -11,6 +12,7 @@ from gestures import drag, pixel_of
 from app.drawing import overlay_colors
 from app.page import thumbnails
 from app.session.footage_crops import FootageCrops
+from tracker.calibration.camera_correction import N_CORRECTIONS, ROTATION, corrected
 
 
 @pytest.fixture
@@ -62,6 +64,21 @@ def test_a_silhouette_is_shown_over_its_view(made):
     assert np.abs(image - (footage + color) / 2)[core].mean() < 8
     assert found.silhouette(99, 0) is None
     assert found.silhouette(0, 10**6) is None
+
+
+def test_corrected_cameras_are_followed(made):
+    controller, found, drawn = made
+    first, cameras = found.jpeg(0, 0, 1), controller.session.cameras
+    turn = np.full(N_CORRECTIONS, 0.0)
+    turn[ROTATION] = np.radians([0.0, 0.0, 5.0])
+    turned = [replace(c, camera=corrected(c.camera, turn)) for c in cameras]
+    controller.frames.set_cameras = lambda _: None  # the observer is shared by other tests
+    controller._session_state.set_cameras(replace(controller.session, cameras=tuple(turned)))
+    assert found.jpeg(0, 0, 1) != first
+    used = drawn[-1][1].T_world_camera
+    assert any(np.array_equal(used, c.camera.T_world_camera) for c in turned)
+    controller._session_state.set_cameras(replace(controller.session, cameras=cameras))
+    assert found.jpeg(0, 0, 1) == first
 
 
 def test_pictures_and_drags_go_first(made):

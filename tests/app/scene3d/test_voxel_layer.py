@@ -65,7 +65,8 @@ class Controller:
     def of(voxels, frame=0, **changes):
         view = SimpleNamespace(voxels=voxels)
         values = {"view_3d": view, "drag": None, "is_3d_throttled": False, "frame": frame, "poses": (POSE,)}
-        return SimpleNamespace(**(values | {"models": (MODEL,)} | changes))
+        calibration = SimpleNamespace(n_changes=0)
+        return SimpleNamespace(**(values | {"models": (MODEL,), "calibration": calibration} | changes))
 
     def subscribe(self, offer):
         self.offer = offer
@@ -76,7 +77,7 @@ def views(monkeypatch):
     """Silhouettes by frame: a person on frame 0, nobody on frame 1."""
     seen = silhouettes_of_figure(VOXELS, cameras_about_a_figure())
     frames = [seen, [s._replace(mask=np.zeros_like(s.mask)) for s in seen]]
-    finder = SimpleNamespace(silhouettes=lambda k: frames[k])
+    finder = SimpleNamespace(silhouettes=lambda k: frames[k], close=lambda: None)
     monkeypatch.setattr(voxel_layer, "SilhouetteFinder", lambda cameras, recording: finder)
     monkeypatch.setattr(voxel_layer, "_REST_S", 0.0)
 
@@ -96,6 +97,18 @@ def test_voxels_are_drawn_while_they_are_switched_on(views):
     wait_for(lambda: len(scene.clouds) > 1)
     assert [len(c) for c in scene.clouds[1:]] == [0]
     assert scene.notes == ["", ""]
+
+
+def test_voxels_are_carved_again_by_corrected_cameras(views, monkeypatch):
+    scene, controller, made, finder = Scene(), Controller(), [], voxel_layer.SilhouetteFinder
+    monkeypatch.setattr(voxel_layer, "SilhouetteFinder", lambda c, r: made.append(c) or finder(c, r))
+    VoxelLayer(scene, controller)
+    controller.offer(controller.of(voxels=True, frame=1))
+    wait_for(lambda: scene.clouds)
+    controller.session.cameras = ("corrected",)
+    controller.offer(controller.of(voxels=True, frame=1, calibration=SimpleNamespace(n_changes=1)))
+    wait_for(lambda: len(scene.clouds) == 2)
+    assert made == [(), ("corrected",)]
 
 
 def test_a_note_says_why_there_are_no_voxels(views):

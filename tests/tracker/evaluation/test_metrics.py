@@ -10,8 +10,8 @@ from tracker.evaluation.metrics import (
     evaluate_joints,
     evaluate_poses,
     joints_of_poses,
-    remap_axes,
 )
+from tracker.formats.file_axes import remap_axes
 from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.formats.trc import MarkerTable

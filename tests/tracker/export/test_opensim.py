@@ -91,6 +91,14 @@ def test_coordinates_have_the_limits_of_the_joints(tmp_path, opensim):
         assert not coordinate.getDefaultClamped()
 
 
+def test_opensim_reads_a_motion_with_a_note_on_the_calibration(tmp_path, opensim):
+    session, _ = store_motion(tmp_path / "s", [MODELS["gavrila34"]])
+    motion = read_motion(session, (0,), range(1, 8))
+    writers.write_person_opensim(motion, ExportOptions("y-up"), [tmp_path / "a.mot", tmp_path / "a.osim"], lambda: None)
+    assert opensim.TimeSeriesTable(str(tmp_path / "a.mot")).getNumRows() == 7
+    assert opensim.Storage(str(tmp_path / "a.mot")).getSize() == 7
+
+
 def test_opensim_reads_a_trc_file_with_gaps(tmp_path, opensim):
     session, truth = store_motion(tmp_path / "s", [MODELS["gavrila34"]], gaps={(0, 3), (0, 7)})
     motion = read_motion(session, (0,), range(1, 8))

@@ -1,6 +1,7 @@
 """Files of an export, read by other programs."""
 
 import csv
+import json
 from contextlib import closing
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from pycocotools.coco import COCO
 from staging import cameras_around
 from stored_motions import FPS, distorted_cameras, store_motion
 
+from tracker.calibration.camera_correction import N_CORRECTIONS
 from tracker.contours.label_image import part_labels
 from tracker.errors import Remedy, SessionError
 from tracker.export import writers
@@ -23,6 +25,7 @@ from tracker.formats.model_toml import format_model
 from tracker.formats.trc import read_trc
 from tracker.geometry import rigid
 from tracker.geometry.ground_plane import GroundPlane
+from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import MarkChange, PoseChange, PoseRecord
@@ -220,6 +223,42 @@ def test_the_area_is_that_of_the_silhouette(couple):
         assert seen.area_px == pytest.approx(len(rows), rel=0.04)
         box = [columns.min(), rows.min(), np.ptp(columns), np.ptp(rows)]
         np.testing.assert_allclose(seen.box_px, box, atol=3)
+
+
+def test_files_name_the_calibration_and_the_poses_of_an_earlier_one(tmp_path):
+    """The pose of frame 2 was made again after a camera was corrected, that of frame 1 before."""
+    session, _ = store_motion(tmp_path / "s", [MODELS["gavrila22"]], n_frames=3)
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        pose = store.pose("ann", 2)
+        corrections = np.zeros((3, N_CORRECTIONS))
+        corrections[0, 0] = 0.01
+        session = change_calibration(session, store, with_corrections(session, corrections), "corrected")
+        store.commit("again", [PoseChange("ann", 2, pose)])
+    motion = read_motion(session, (0,), range(1, 3))
+    paths = [tmp_path / name for name in ("m.csv", "m_angles.csv", "m.mot", "m.osim", "m.json")]
+    writers.write_tables(motion, ExportOptions(), paths[:2], no_tick)
+    for path in paths[:2]:
+        rows = list(csv.DictReader(path.open()))
+        assert [(r["calibration"], r["earlier_calibration"]) for r in rows] == [("1", "true"), ("2", "false")]
+    note = "calibration revision 2 of the session; 1 of 2 poses are of an earlier one"
+    writers.write_person_opensim(motion, ExportOptions(), paths[2:4], no_tick)
+    assert note in paths[2].read_text().partition("endheader")[0].splitlines()
+    writers.write_keypoints(motion, ExportOptions(), paths[4:], no_tick)
+    found = json.loads(paths[4].read_text())
+    assert found["info"]["calibration"] == 2
+    assert note in found["info"]["description"]
+    frames = {image["id"]: image["frame"] for image in found["images"]}
+    told = {(frames[a["image_id"]], a["calibration"], a["earlier_calibration"]) for a in found["annotations"]}
+    assert told == {(1, 1, True), (2, 2, False)}
+
+
+def test_without_a_correction_the_calibration_is_the_first(tmp_path, couple):
+    session, _ = couple
+    motion = read_motion(session, (0, 1), range(1, 3))
+    assert motion.calibration_note == "calibration revision 1 of the session"
+    writers.write_tables(motion, ExportOptions(), [tmp_path / "m.csv", tmp_path / "m_angles.csv"], no_tick)
+    rows = list(csv.DictReader((tmp_path / "m.csv").open()))
+    assert {(r["calibration"], r["earlier_calibration"]) for r in rows} == {("1", "false")}
 
 
 @pytest.mark.parametrize(("keypoints", "names"), [("coco17", ["person"]), ("body", ["gavrila34"])])

@@ -6,11 +6,13 @@ from staging import cameras_around, own_evidence, posed, shaken
 
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
+from tracker.evidence.keypoints import ViewKeypoints
 from tracker.fitting import gauss_newton, gauss_newton_compiled
 from tracker.fitting.contour_residuals import ContourResiduals
 from tracker.fitting.gauss_newton import PointTargets, PosePrior
 from tracker.fitting.gauss_newton_compiled import solve_compiled, solver_of
 from tracker.fitting.interpenetration import BodyPenetration, SelfPenetration
+from tracker.fitting.keypoints import KeypointBlock
 from tracker.formats.model_toml import load_model
 
 CAMERAS = cameras_around(4)
@@ -44,7 +46,20 @@ class Staged:
             *priors,
             SelfPenetration(),
             BodyPenetration(self.bodies, 0, 1.0),
+            self.keypoints(),
         ]
+
+    def keypoints(self):
+        """Every joint in every view, from 0 to 5 standard deviations off."""
+        model, rng = self.model, np.random.default_rng(1)
+        parts = model.proximal_parts
+        places = rng.normal(0, 0.1, (len(parts), 3))
+        T = PosedBody(model, self.start).kinematics.Ts_world_part[parts]
+        world = np.einsum("nij,nj->ni", T[:, :3, :3], places) + T[:, :3, 3]
+        off = np.linspace(0, 50, len(parts))[:, None] / np.sqrt(2)
+        return KeypointBlock.of(
+            [(c, ViewKeypoints(parts, places, c.project(world) + off, np.full(len(parts), 10.0))) for c in CAMERAS]
+        )
 
 
 def assert_same(found, expected):
@@ -69,7 +84,7 @@ def both(staged, blocks, start=None, active_dofs=None, **how):
         return solve_compiled(staged.model, start, blocks, active_dofs, **how), expected
 
 
-@pytest.mark.parametrize("n_blocks", [1, 2, 3, 4, 5])
+@pytest.mark.parametrize("n_blocks", [1, 2, 3, 4, 5, 6])
 def test_every_kind_of_block_counts(staged, n_blocks):
     """At one pose: each adds what it adds by itself."""
     blocks = staged.blocks()

@@ -12,18 +12,16 @@ from tracker.errors import SessionError
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.calibration_revisions import (
-    CALIBRATION_EDITS,
     apply_check,
     change_calibration,
     follow_history,
     outdated_frames,
-    present_revision,
-    revisions_of_poses,
     with_corrections,
 )
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.calibration_log import CALIBRATION_EDITS, present_revision, revisions_of_poses
+from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 
 
 @pytest.fixture
@@ -121,3 +119,12 @@ def test_nothing_is_corrected_where_no_camera_is_named(session, store):
     with pytest.raises(SessionError, match="expected a camera that is off, found none"):
         apply_check(session, store, Healthy())
     assert store.history() == []
+
+
+def test_a_keyframe_that_was_only_assessed_stays_of_its_calibration(session, store):
+    set_pose(session, store, 3)
+    change_calibration(session, store, turned(session), "corrected")
+    name, values = session.people[0].name, store.pose(session.people[0].name, 3).values
+    store.commit("audit", [AssessmentChange(name, 3, values, "good", "", (), None)], by_program=True)
+    assert store.pose(name, 3).status == "good"
+    assert outdated_frames(session, store) == {name: [3]}

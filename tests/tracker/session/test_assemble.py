@@ -10,7 +10,6 @@ import pytest
 from clips import SIZE, encode, encode_stamped, write_images
 
 from tracker.errors import CalibrationError, ModelError, RecordingError, Remedy, SessionError
-from tracker.evaluation.clocks import place_rows
 from tracker.evaluation.references import placement
 from tracker.footage.recording import Recording
 from tracker.formats.anipose import write_calibration
@@ -18,6 +17,7 @@ from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
 from tracker.session.assemble import NewSession, assemble, unfilmed_cameras
+from tracker.session.clocks import place_rows
 from tracker.session.session import load_session
 
 K = np.array([[50.0, 0.0, 32.0], [0.0, 50.0, 24.0], [0.0, 0.0, 1.0]])

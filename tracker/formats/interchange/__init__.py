@@ -2,5 +2,5 @@
 
 Imports `geometry`, `body` and modules of `formats`. `optional_packages.require` imports what only one format needs.
 Callers use `c3d.write_c3d`, `gltf.write_glb`,
-`openpose.write_openpose` and `indexed_png.write_indexed_png`.
+`movement_netcdf.write_dataset`, `nwb.write_nwb` and `indexed_png.write_indexed_png`.
 """

@@ -8,6 +8,7 @@ import json
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,22 @@ from tracker.body.model import BodyModel
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 
-_FLOAT, _UNSIGNED_INT = 5126, 5125
-"""Types of components (glTF 2.0 Sect. 5.1.3)."""
-_VERTICES, _INDICES = 34962, 34963
-"""Targets of the views of meshes (glTF 2.0 Sect. 5.11.5)."""
 _MAGIC, _JSON_CHUNK, _BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 """Names in the binary container (glTF 2.0 Sect. 4.4)."""
+
+
+class ComponentType(IntEnum):
+    """Types of components (glTF 2.0 Sect. 5.1.3)."""
+
+    UNSIGNED_INT = 5125
+    FLOAT = 5126
+
+
+class BufferTarget(IntEnum):
+    """Targets of the views of meshes (glTF 2.0 Sect. 5.11.5)."""
+
+    VERTICES = 34962
+    INDICES = 34963
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,22 +70,25 @@ class _Document:
             self.nodes[parent].setdefault("children", []).append(len(self.nodes) - 1)
         return len(self.nodes) - 1
 
-    def add_array(self, values: NDArray[Any], kind: str, target: int | None = None, bounds: bool = False) -> int:
+    def add_array(
+        self, values: NDArray[Any], kind: str, target: BufferTarget | None = None, bounds: bool = False
+    ) -> int:
         """Add an array, (n,) or (n, m), as an accessor, and return its index.
 
         Args:
             values: floats or whole numbers.
             kind: `SCALAR`, `VEC3` or `VEC4`.
-            target: see `_VERTICES`; None for an animation.
+            target: one of `BufferTarget`; None for an animation.
             bounds: whether to state the least and largest values.
         """
         is_float = values.dtype.kind == "f"
         data = np.ascontiguousarray(values, np.float32 if is_float else np.uint32)
+        component = ComponentType.FLOAT if is_float else ComponentType.UNSIGNED_INT
         view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": data.nbytes}
         self.views.append(view if target is None else view | {"target": target})
         self.binary += data.tobytes()
         accessor: dict[str, Any] = {
-            "bufferView": len(self.views) - 1, "componentType": _FLOAT if is_float else _UNSIGNED_INT,
+            "bufferView": len(self.views) - 1, "componentType": component,
             "count": len(data), "type": kind,
         }  # fmt: skip
         if bounds:
@@ -178,8 +192,10 @@ def _add_meshes(document: _Document, model: BodyModel, nodes: Sequence[int]) -> 
     """Add the shape of each part below the node of its joint."""
     for i, (part, shape) in enumerate(zip(model.parts, model.shapes, strict=True)):
         points, triangles = shape.triangles()
-        attributes = {"POSITION": document.add_array(points + model.centers_part[i], "VEC3", _VERTICES, bounds=True)}
-        indices = document.add_array(triangles.ravel().astype(np.uint32), "SCALAR", _INDICES)
+        attributes = {
+            "POSITION": document.add_array(points + model.centers_part[i], "VEC3", BufferTarget.VERTICES, bounds=True)
+        }
+        indices = document.add_array(triangles.ravel().astype(np.uint32), "SCALAR", BufferTarget.INDICES)
         document.materials.append({"name": part.name, "pbrMetallicRoughness": _finish(part.color)})
         primitive = {"attributes": attributes, "indices": indices, "material": len(document.materials) - 1}
         document.meshes.append({"name": part.name, "primitives": [primitive]})

@@ -18,8 +18,6 @@ from tracker.formats.interchange.optional_packages import require
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 
-UNKNOWN_START = datetime.fromtimestamp(0, UTC)
-"""Start of a recording whose date is not known, which NWB requires nevertheless."""
 _CONFIDENCE = "probability that the limb of the point is not lost; 1 where not assessed"
 
 
@@ -81,7 +79,7 @@ def write_nwb(path: Path, recording: NwbRecording) -> None:
     file = pynwb.NWBFile(
         session_description=f"{recording.name}, exported by Quadrille. The date of the recording is not known.",
         identifier=str(uuid4()),
-        session_start_time=UNKNOWN_START,
+        session_start_time=datetime.fromtimestamp(0, UTC),  # NWB requires one
         session_id=identifier(recording.name),
         source_script_file_name="quadrille export",
         source_script=f"quadrille {recording.version}",

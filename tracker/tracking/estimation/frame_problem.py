@@ -22,6 +22,7 @@ from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import SETTLED_M, Hypothesis, distance_m
 from tracker.fitting.interpenetration import BodyPenetration
+from tracker.fitting.keypoints import keypoint_blocks
 from tracker.geometry.arrays import Array
 from tracker.motion.prediction import PredictSettings, unwrapped
 from tracker.tracking.confidence import PoseQuality
@@ -197,12 +198,17 @@ class FrameProblem:
         return trust(self.people[person].model, self.settings)
 
     def priors(self, person: int, bodies: Bodies, untrusted: Sequence[Limb] = ()) -> list[ResidualBlock]:
-        """Build the prior terms: prediction (first, weak for untrusted limbs), joint spread, penetration."""
+        """Build the terms beside the contours: prediction (first, weak for untrusted limbs), joint spread, penetration,
+        key points."""
         settings, model, sigma = self.settings, self.people[person].model, self.sigma(person)
         for limb in untrusted:
             assert settings.recover is not None
             sigma[limb.dofs] = settings.recover.trust_rad
-        return [*prior_blocks(model, self.people[person].predicted, sigma), *penetration(bodies, person, settings)]
+        return [
+            *prior_blocks(model, self.people[person].predicted, sigma),
+            *penetration(bodies, person, settings),
+            *keypoint_blocks(self.views, person, bodies[person].velocity),
+        ]
 
     def residuals(self, person: int, bodies: Bodies, everywhere: bool = False) -> PersonResiduals:
         """Build the residuals of a person's contours against the evidence assigned to them.

@@ -20,6 +20,7 @@ from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.fitting.interpenetration import SelfPenetration
+from tracker.fitting.keypoints import keypoint_blocks
 from tracker.geometry.arrays import Array
 from tracker.tracking.estimation.frame_problem import Bodies, penetration
 from tracker.tracking.estimation.settings import (
@@ -151,6 +152,7 @@ def scorer_without_prediction(
         PosePrior.of_spreads(bodies[person].model),
         SelfPenetration(),
         *penetration(bodies, person, settings),
+        *keypoint_blocks(views, person, bodies[person].velocity),
     ]
     known = None if settings.recover is None else part_colors
     recover = settings.recover or RecoverSettings()

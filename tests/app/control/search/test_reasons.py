@@ -63,6 +63,14 @@ def test_the_run_is_learnt_once_and_again_when_its_poses_change(doubted, monkeyp
     assert len(learnt) == 2
 
 
+def test_what_other_cameras_have_shown_is_not_usual():
+    """The same poses and people, but corrected cameras."""
+    poses, observer = {0: (np.zeros(3),)}, object()
+    learnt = reasons._Learnt(None, (0,), poses, observer)
+    assert learnt.holds((0,), poses, observer)
+    assert not learnt.holds((0,), poses, object())
+
+
 def test_a_numbered_alternative_is_taken_assessed_and_undone_at_once(doubted):
     wrong = doubted.state.poses[0]
     explained(doubted)

@@ -7,7 +7,9 @@ import pytest
 from gestures import drag, wait_for
 
 from app.control.tracking import calibrating
+from tracker.calibration.camera_correction import N_CORRECTIONS
 from tracker.errors import TrackerError
+from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 
 
 @pytest.fixture
@@ -39,6 +41,50 @@ def test_a_check_can_be_stopped(controller, monkeypatch):
         controller.calibrating.start()
     controller.calibrating.stop()
     assert controller.state.calibration.message == "Stopped; nothing was changed."
+
+
+def corrected(controller):
+    """Turn a camera, as a check would, by an entry of the history."""
+    saver, session = controller._session_state.saver, controller.session
+    corrections = np.zeros((len(session.cameras), N_CORRECTIONS))
+    corrections[0, 1] = 0.02
+    change_calibration(session, saver._store, with_corrections(session, corrections), "corrected")
+    controller.calibrating._show_cameras()
+    wait_for(lambda: controller.state.calibration.revision == 2)
+
+
+def tracked(controller, tracker, until):
+    controller.tracking.start(backward=False, until=until)
+    tracker.let_go(until + 1)
+    wait_for(lambda: controller.state.track.message)
+
+
+def test_what_is_of_an_earlier_calibration_is_tracked_again_and_no_more(placed, tracker):
+    tracked(placed, tracker, 9)
+    corrected(placed)
+    wait_for(lambda: placed.state.calibration.outdated == {0: (2, 3, 4, 5, 6, 7, 8, 9)})
+    tracker.seen.clear()
+    placed.calibrating.track_again()
+    tracker.let_go(20)
+    wait_for(lambda: placed.state.track.message)
+    assert tracker.seen == [2, 3, 4, 5, 6, 7, 8, 9]
+    wait_for(lambda: placed.state.calibration.outdated == {0: (2,)})  # the keyframe
+    with pytest.raises(TrackerError, match="keyframes stay as they were set"):
+        placed.calibrating.track_again()
+    placed.history.undo()
+    wait_for(lambda: placed.state.calibration.outdated == {0: (2, 3, 4, 5, 6, 7, 8, 9)})
+
+
+def test_without_a_keyframe_the_first_pose_is_tracked_again_too(placed, tracker):
+    tracked(placed, tracker, 5)
+    placed.ranges.mark(2, 2, "none")
+    corrected(placed)
+    wait_for(lambda: placed.state.calibration.outdated == {0: (2, 3, 4, 5)})
+    tracker.seen.clear()
+    placed.calibrating.track_again()
+    tracker.let_go(20)
+    wait_for(lambda: placed.state.calibration.outdated == {})
+    assert tracker.seen == [2, 3, 4, 5]
 
 
 def test_nothing_found_cannot_be_applied(controller):

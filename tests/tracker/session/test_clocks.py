@@ -8,8 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from tracker.errors import FormatError, Remedy
-from tracker.evaluation.clocks import Placement, listed_frames, place_rows
 from tracker.formats.trc import MarkerTable, read_trc, write_trc
+from tracker.session.clocks import Placement, listed_frames, place_rows
 
 NTSC = {24: 24000 / 1001, 30: 30000 / 1001, 60: 60000 / 1001, 120: 120000 / 1001}
 

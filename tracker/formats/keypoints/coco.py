@@ -93,6 +93,10 @@ class CocoAnnotation(msgspec.Struct, frozen=True):
     track_id: int
     """Number of the person in the session, from 0."""
     status: str
+    calibration: int
+    """Revision of the calibration that the pose was made with."""
+    earlier_calibration: bool
+    """Whether that is another one than that of the file."""
     iscrowd: int = 0
     segmentation: Segmentation | msgspec.UnsetType = msgspec.UNSET
     """Its visible pixels."""
@@ -131,13 +135,14 @@ def keypoint_triples(
 def write_coco(
     path: str | Path,
     description: str,
+    calibration: int,
     categories: Sequence[CocoCategory],
     images: Sequence[CocoImage],
     annotations: Sequence[CocoAnnotation],
 ) -> None:
-    """Write a dataset."""
+    """Write a dataset; `calibration` is the revision of the session's cameras."""
     data: dict[str, Any] = {
-        "info": {"description": description, "version": "1.0"},
+        "info": {"description": description, "version": "1.0", "calibration": calibration},
         "licenses": [],
         "categories": categories,
         "images": images,

@@ -1,0 +1,1 @@
+"""The commands that import observations and judge them."""

@@ -1,0 +1,176 @@
+"""`quadrille import`: bring key points and joints of other programs into a session."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from app.cli.arguments import (
+    NamedPaths,
+    Names,
+    OptionalClock,
+    OptionalName,
+    OptionalNumber,
+    OptionalPath,
+    OptionalWhole,
+    SessionArg,
+    parse_pairs,
+)
+from app.remedies import command_line_text
+from app.runtime.json_output import format_json
+from tracker.errors import TrackerError
+
+if TYPE_CHECKING:
+    from tracker.observations.importing import ImportPlan
+    from tracker.session.session import Session
+
+Unit = Literal["m", "cm", "mm", "in", "ft"]
+
+
+@dataclass(frozen=True)
+class ImportArguments:
+    """Arguments of `quadrille import`."""
+
+    session: SessionArg
+    """session folder."""
+    files: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER|FILE ...")]
+    """files of one format, or folders of them: OpenPose JSON, TRC."""
+    name: Annotated[str, tyro.conf.arg(name="as", metavar="NAME")]
+    """name of the observations in the session."""
+    person: Names = ()
+    """people of whom they are; all people by default. Points in space have one file for each, in this order."""
+    joint_map: OptionalPath = None
+    """TOML file with the names of the points; guessed by default. docs/observations.md has an example."""
+    cameras: NamedPaths = ()
+    """files or folder of a camera, where names do not tell."""
+    first_frame: OptionalWhole = None
+    """frame of the session at which the first picture or row lies; by the numbers of the files by default."""
+    clock: OptionalClock = None
+    """points in space: whether each Frame# is a frame of the session, or rows lie at their Time."""
+    axes: Annotated[str, tyro.conf.arg(metavar="X,Y,Z")] = "x,y,z"
+    """points in space: the file's axes that are the session's x, y, z, e.g. x,-z,y if the file's y points up."""
+    units: Annotated[Unit | None, tyro.conf.arg(metavar="m|cm|mm|in|ft", help_behavior_hint="")] = None
+    """points in space: unit of a file that states none."""
+    confidence: OptionalNumber = None
+    """confidence of all points, 0 to 1, where the files have none."""
+    picture_size: OptionalName = None
+    """WIDTHxHEIGHT of the pictures that the points are of, if not the footage's; 1x1 for normalized points."""
+    dry_run: bool = False
+    """show what would be imported, and store nothing."""
+    json: bool = False
+    """print one JSON object."""
+
+
+def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> None:
+    """Import key points or joints of another program. docs/observations.md describes formats and checks.
+
+    It shows which view, frames and points were found. Files that contradict the session are refused.
+    """
+    from tracker.formats.trc import METRES_BY_WORD
+    from tracker.observations.importing import plan_import, store_import
+    from tracker.observations.request import ImportRequest
+    from tracker.session.lock import SessionLock
+    from tracker.session.session import load_session
+
+    session = load_session(arguments.session)
+    request = ImportRequest(
+        arguments.name,
+        arguments.files,
+        _people(session, arguments.person),
+        arguments.joint_map,
+        parse_pairs(arguments.cameras, "--cameras", Path),
+        arguments.first_frame,
+        arguments.clock,
+        arguments.axes,
+        METRES_BY_WORD[arguments.units] if arguments.units is not None else None,
+        _confidence(arguments.confidence),
+        _size(arguments.picture_size),
+    )
+    plan = plan_import(session, request)
+    summary = _summary(session, plan)
+    if not (plan.problems or arguments.dry_run):
+        with SessionLock(session.folder):
+            store_import(session, plan)
+        summary["stored"] = True
+    print(format_json(summary) if arguments.json else _format(summary))
+    if plan.problems:
+        raise plan.problems[0]
+
+
+def _people(session: "Session", names: tuple[str, ...]) -> tuple[str, ...]:
+    from tracker.session.matching import check_names
+
+    known = [p.name for p in session.people]
+    found = check_names(names, known, "person", "the people of --person") if names else known
+    if len(set(found)) < len(found):
+        raise TrackerError(f"expected each person of --person once, found {', '.join(names)}")
+    return tuple(found)
+
+
+def _confidence(value: float | None) -> float | None:
+    if value is not None and not 0 < value <= 1:
+        raise TrackerError(f"expected --confidence above 0 and at most 1, found {value:g}")
+    return value
+
+
+def _size(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal() and 0 < int(width) < 100_000 and 0 < int(height) < 100_000):
+        raise TrackerError(f"expected --picture-size as WIDTHxHEIGHT, such as 1920x1080, found '{text}'")
+    return int(width), int(height)
+
+
+def _summary(session: "Session", plan: "ImportPlan") -> dict[str, Any]:
+    found = plan.observations
+    body_points = {points for points in found.counterparts.values() if points}
+    return {
+        "name": found.name,
+        "format": found.format,
+        "people": list(found.people),
+        "frames": session.n_frames,
+        "views": [
+            {
+                "view": v.camera,
+                "place": str(v.place) if v.place is not None else None,
+                "rows": v.n_rows,
+                "frames": list(v.frames) if v.frames is not None else None,
+                "most_people": v.n_people,
+                "confidence": v.confidence,
+            }
+            for v in plan.views
+        ],
+        "skeleton": found.joint_map.name,
+        "points": {name: list(points) for name, points in found.counterparts.items()},
+        "matched": len(body_points),
+        "notes": list(found.notes),
+        "problems": [command_line_text(p) for p in plan.problems],
+        "stored": False,
+    }
+
+
+def _format(summary: dict[str, Any]) -> str:
+    lines = [f"{summary['name']}: {summary['format']}, of {', '.join(summary['people'])}"]
+    for v in summary["views"]:
+        if v["place"] is None:
+            lines.append(f"  {v['view']}: no files")
+            continue
+        frames = "no points" if v["frames"] is None else f"points in frames {v['frames'][0]} to {v['frames'][1]}"
+        people = f", up to {v['most_people']} people" if v["most_people"] > 1 else ""
+        confidence = f", median confidence {v['confidence']:.2f}" if v["confidence"] == v["confidence"] else ""
+        lines.append(f"  {v['view']}: {v['place']}, {v['rows']} rows, {frames}{people}{confidence}")
+    named = {name: " and ".join(points) for name, points in summary["points"].items()}
+    matched = ", ".join(f"{name} = {points}" for name, points in named.items() if points)
+    others = ", ".join(name for name, points in named.items() if not points)
+    lines.append(f"  points as {summary['skeleton']} names them: {matched or 'none'}")
+    if others:
+        lines.append(f"  points without a joint of the body: {others}")
+    lines += [f"  note: {note}" for note in summary["notes"]]
+    lines += [f"  problem: {problem}" for problem in summary["problems"][1:]]
+    if summary["stored"]:
+        lines.append(f"stored as {summary['name']}")
+    elif not summary["problems"]:
+        lines.append("nothing was stored")
+    return "\n".join(lines)

@@ -1,0 +1,105 @@
+"""Judgement of imported joints by poses that are known: every kind of error is found, named, and nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from stored_motions import random_poses
+
+from tracker.body.limbs import limbs
+from tracker.body.model import PosedBody
+from tracker.formats.model_toml import load_model
+from tracker.judging.judge import DOUBTED, judge_person
+from tracker.judging.verdicts import LIMBS
+from tracker.observations.body_points import BodyPoints
+from tracker.store.records import PoseRecord
+from tracker.store.stored_poses import StoredPose
+
+MODEL, N = load_model("gavrila38", 1.7), 24
+NAMES = tuple(j for joints in LIMBS.values() for j in joints)
+POINTS = [MODEL.point_names.index(n) for n in NAMES]
+AT = {n: i for i, n in enumerate(NAMES)}
+
+
+@pytest.fixture(scope="module")
+def tracked():
+    """Poses of a slow motion, with errors of 15 mm."""
+    errors = np.broadcast_to(0.015**2 * np.eye(3), (len(MODEL.point_names), 3, 3))
+    poses = random_poses(MODEL, N, 3)
+    records = [PoseRecord(p, ("tracked",) * len(p), 1, errors=errors, limbs_lost=(0.01,) * 5) for p in poses]
+    return {k: StoredPose(PosedBody(MODEL, r.values), r) for k, r in enumerate(records)}
+
+
+@pytest.fixture
+def joints(tracked):
+    """Joints of a detector: 12 mm of noise, and hips that lie 4 cm low throughout."""
+    true = np.array([t.body.joint_centers_world[POINTS] for t in tracked.values()])
+    found = true + np.random.default_rng(1).normal(0.0, 0.012, true.shape)
+    for k, t in tracked.items():
+        for hip in ("left_hip", "right_hip"):
+            part = MODEL.proximal_parts[POINTS[AT[hip]]]
+            found[k, AT[hip]] -= 0.04 * t.body.kinematics.Ts_world_part[part, :3, 2]
+    return found
+
+
+def judged(joints, tracked):
+    points = BodyPoints(NAMES, joints, np.empty((N, 0, len(NAMES), 2)), np.empty((N, 0, len(NAMES))))
+    return judge_person("ann", points, tracked, None)
+
+
+def doubts(judgement):
+    return {(k, limb) for k, own in judgement.frames.items() for limb, v in own.items() if v.probability_off >= DOUBTED}
+
+
+def test_nothing_is_off_where_nothing_is(joints, tracked):
+    found = judged(joints, tracked)
+    assert doubts(found) == set()
+    assert found.share_in_order == 1.0
+    assert all(v.reason == "" for own in found.frames.values() for v in own.values())
+
+
+def test_an_offset_throughout_is_a_sentence_and_no_doubt(joints, tracked):
+    found = judged(joints, tracked)
+    assert len(found.sentences) == 2
+    assert "left hip off by 4 cm throughout: 4 cm down" in found.sentences
+    assert found.spread_m["left_hip"] < 0.03
+
+
+def test_exchanged_legs_are_named(joints, tracked):
+    for joint in ("hip", "knee", "ankle"):
+        a, b = AT[f"left_{joint}"], AT[f"right_{joint}"]
+        joints[5:9, [a, b]] = joints[5:9, [b, a]]
+    found = judged(joints, tracked)
+    assert doubts(found) == {(k, f"{side} leg") for k in range(5, 9) for side in ("left", "right")}
+    assert {d.verdict.reason for d in found.worst[:8]} == {"legs exchanged"}
+    assert found.share_in_order == pytest.approx(1 - 4 / N)
+
+
+def test_a_jump_is_named_on_its_frame(joints, tracked):
+    joints[12, AT["left_wrist"]] += (0.0, 0.2, 0.1)
+    found = judged(joints, tracked)
+    assert doubts(found) == {(12, "left arm")}
+    assert found.worst[0].frame == 12
+    assert "left arm jumps" in found.worst[0].verdict.reason
+
+
+def test_a_drift_is_found_from_where_it_is_large(joints, tracked):
+    joints[10:, AT["right_ankle"]] += np.linspace(0, 0.3, N - 10)[:, None] * (1.0, 0.0, 0.0)
+    found = doubts(judged(joints, tracked))
+    assert {limb for _, limb in found} == {"right leg"}
+    assert 14 <= min(k for k, _ in found) <= 16
+
+
+def test_a_tracked_limb_that_is_not_known_makes_no_verdict(joints, tracked):
+    joints[12, AT["left_wrist"]] += (0.0, 0.5, 0.1)
+    lost = tuple(1.0 if limb.name == "left_forearm" else 0.01 for limb in limbs(MODEL))
+    unsure = {k: replace(t, record=replace(t.record, limbs_lost=lost)) for k, t in tracked.items()}
+    assert judged(joints, unsure).frames[12]["left arm"].probability_off == pytest.approx(0.5)
+
+
+def test_limbs_without_joints_are_left_out(joints, tracked):
+    joints[3, [AT[j] for j in LIMBS["right arm"]]] = np.nan
+    joints[4, AT["right_wrist"]] = np.nan
+    found = judged(joints, tracked).frames
+    assert "right arm" not in found[3]
+    assert "right arm" in found[4]

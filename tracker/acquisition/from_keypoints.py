@@ -1,0 +1,168 @@
+"""Learn how a detector sees a body: the offset of each key point from its joint, and its standard deviation.
+
+Detectors are consistently off, at hips and shoulders by some centimetres. A body that is posed by other evidence, or by
+all key points together, shows by how much.
+"""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tracker.body.model import BodyModel, PosedBody
+from tracker.evidence.keypoints import PersonKeypoints
+from tracker.fitting.gauss_newton import (
+    OTHER_BODY_M,
+    PointTargets,
+    PosePrior,
+    ResidualBlock,
+    fit_to_points,
+    solve,
+    weak_pull,
+)
+from tracker.fitting.keypoints import GROSS_SIGMAS
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.cameras import NEAR_PLANE_M, Camera
+from tracker.geometry.triangulation import sigma_px
+from tracker.observations.body_points import BodyPoints
+
+_NORMAL_MAD = 1.4826
+"""Standard deviations in a median absolute deviation, of normal errors."""
+_LEAST = 1e-3
+"""Smallest confidence that counts."""
+_ROUNDS = 3
+"""Fits to the key points, each with the offsets learnt from the one before."""
+
+
+def fit_to_keypoints(model: BodyModel, seen: BodyPoints) -> dict[int, PosedBody]:
+    """Fit a body to the triangulated points of each frame that has four or more, without looking at pictures.
+
+    Args:
+        model: the body; its sizes stay.
+        seen: the points.
+
+    Returns:
+        The body by frame.
+    """
+    points, out, near = _points(model, seen), dict[int, PosedBody](), None
+    for k in range(len(seen.joints_world)):
+        if len(seen.places(k)) >= 4:
+            near = fit_to_points(model, seen.places(k), near, centers=True).pose
+            out[k] = PosedBody(model, near)
+    for _ in range(_ROUNDS - 1 if out else 0):
+        offsets = learn_offsets(out, seen)
+        out = {k: _refitted(b, points, seen.joints_world[k] - _turned(b, points, offsets)) for k, b in out.items()}
+    return out
+
+
+def _refitted(body: PosedBody, points: IntArray, targets_world: Array) -> PosedBody:
+    """Return a body that is fitted to points from near, (N, 3), metres; NaN is ignored."""
+    known = np.isfinite(targets_world).all(axis=1)
+    weights = np.full(np.count_nonzero(known), 1 / OTHER_BODY_M)
+    block = PointTargets(points[known], targets_world[known], weights, centers=True)
+    blocks: list[ResidualBlock] = [block, PosePrior.of_spreads(body.model), weak_pull(body.model, body.values)]
+    return PosedBody(body.model, solve(body.model, body.values, blocks).pose)
+
+
+def learn_offsets(bodies: Mapping[int, PosedBody], seen: BodyPoints) -> Array:
+    """Return from each joint to its key point in the frame of the joint's proximal part, (N, 3), metres.
+
+    It is the median over the frames, in which a detector is usually right; 0 for a point that is never known.
+
+    Args:
+        bodies: by frame, one at least.
+        seen: the points.
+    """
+    model = next(iter(bodies.values())).model
+    points, found = _points(model, seen), []
+    for k, body in bodies.items():
+        R = body.kinematics.Ts_world_part[model.proximal_parts[points], :3, :3]
+        off = seen.joints_world[k] - body.joint_centers_world[points]
+        found.append(np.einsum("nji,nj->ni", R, off))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return np.nan_to_num(np.nanmedian(np.array(found), axis=0))
+
+
+class SeenBody(NamedTuple):
+    """How a detector sees the body of a person."""
+
+    names: tuple[str, ...]
+    """Points of the body, (N,)."""
+    offsets_part: Array
+    """From each joint to its key point in the frame of the joint's proximal part, (N, 3), metres."""
+    sigmas: Array
+    """Standard deviation of each at confidence 1, (N,), in normalized image coordinates."""
+
+    def keypoints(self, model: BodyModel, seen: BodyPoints) -> PersonKeypoints:
+        """Return the key points of a recording as evidence for a body; the variance falls with the confidence."""
+        parts, places = _places(model, seen, self.offsets_part)
+        return PersonKeypoints(parts, places, seen.seen, self.sigmas / np.sqrt(np.maximum(seen.confidence, _LEAST)))
+
+    def costs(self, bodies: Mapping[int, PosedBody], seen: BodyPoints, cameras: Sequence[Camera]) -> dict[int, float]:
+        """Return by frame the robust cost of the key points, nats, in which one that is absent counts as grossly off.
+
+        Args:
+            bodies: by frame.
+            seen: the points on all frames.
+            cameras: of the session, in its order.
+        """
+        out = dict[int, float]()
+        for k, body in bodies.items():
+            parts, places = _places(body.model, seen, self.offsets_part)
+            errors = _errors(body, parts, places, seen.seen[k], cameras) / self.sigmas[:, None]
+            squares = np.nan_to_num(seen.confidence[k] * (errors**2).sum(axis=-1), nan=np.inf)
+            out[k] = 0.5 * float(np.sum(GROSS_SIGMAS**2 / (1 + GROSS_SIGMAS**2 / np.maximum(squares, 1e-12))))
+        return out
+
+
+def learn_seen_body(bodies: Mapping[int, PosedBody], seen: BodyPoints, cameras: Sequence[Camera]) -> SeenBody:
+    """Learn how a detector sees a body, from frames on which its pose is known.
+
+    Args:
+        bodies: by frame, one at least.
+        seen: the points on all frames.
+        cameras: of the session, in its order.
+    """
+    offsets = learn_offsets(bodies, seen)
+    parts, places = _places(next(iter(bodies.values())).model, seen, offsets)
+    errors = np.array([_errors(body, parts, places, seen.seen[k], cameras) for k, body in bodies.items()])
+    errors *= np.sqrt(seen.confidence)[list(bodies), ..., None]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a point that is never seen has no errors
+        sigmas = _NORMAL_MAD * np.nanmedian(np.abs(errors), axis=(0, 1, 3))
+    least = min(sigma_px(c) / c.pinhole.K[0, 0] for c in cameras)
+    return SeenBody(seen.names, offsets, np.maximum(np.nan_to_num(sigmas), least))
+
+
+def _places(model: BodyModel, seen: BodyPoints, offsets_part: Array) -> tuple[IntArray, Array]:
+    """Return the proximal part of each key point, (N,), and its place there, (N, 3), metres."""
+    points, neutral = _points(model, seen), PosedBody(model, model.neutral())
+    parts = model.proximal_parts[points]
+    T = neutral.kinematics.Ts_world_part[parts]
+    joints = np.einsum("nji,nj->ni", T[:, :3, :3], neutral.joint_centers_world[points] - T[:, :3, 3])
+    return parts, joints + offsets_part
+
+
+def _errors(body: PosedBody, parts: IntArray, places: Array, seen: Array, cameras: Sequence[Camera]) -> Array:
+    """Return from the points of a body to where views have them, (V, N, 2), in normalized image coordinates."""
+    T = body.kinematics.Ts_world_part[parts]
+    X = np.einsum("nij,nj->ni", T[:, :3, :3], places) + T[:, :3, 3]
+    out = np.full(seen.shape, np.nan)
+    for v, camera in enumerate(cameras):
+        eye = rigid.apply(camera.T_camera_world, X)
+        in_front = eye[:, 2] > NEAR_PLANE_M
+        out[v, in_front] = seen[v, in_front] - eye[in_front, :2] / eye[in_front, 2:]
+    return out
+
+
+def _points(model: BodyModel, seen: BodyPoints) -> IntArray:
+    return np.array([model.point_names.index(n) for n in seen.names], dtype=np.int64)
+
+
+def _turned(body: PosedBody, points: IntArray, offsets: Array) -> Array:
+    """Return offsets in the frames of the proximal parts, (N, 3), in the world."""
+    R = body.kinematics.Ts_world_part[body.model.proximal_parts[points], :3, :3]
+    return np.einsum("nij,nj->ni", R, offsets)

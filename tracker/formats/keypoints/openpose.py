@@ -1,0 +1,127 @@
+"""OpenPose JSON: one file for each picture with the key points of its people, as Pose2Sim writes them too.
+
+`people` is a list, empty where nobody was found; each has `pose_keypoints_2d`, a flat list of x, y, confidence in
+pixels of the picture. 0, 0, 0 is an absent point. Files are named `CAMERA_000000000012_keypoints.json`.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from tracker.errors import FormatError
+from tracker.formats.keypoints.picture_table import PictureTable, stack_pictures
+from tracker.geometry.arrays import Array, IntArray
+from tracker.text_files import TABLE_BYTES, TextKind, read_json
+from tracker.validation import MAX_FRAMES, Number, check
+
+_KIND = TextKind("OpenPose file", TABLE_BYTES, FormatError, "export it again")
+_NUMBERED = re.compile(r"(?P<stem>.*?)[_.-]?(?P<number>\d{1,20})(?:_keypoints)?\.json", re.IGNORECASE | re.DOTALL)
+MAX_PEOPLE = 100
+"""Largest number of people in a picture: OpenPose finds 127 at most; arrays have room for the most of any."""
+
+
+class _Person(msgspec.Struct):
+    pose_keypoints_2d: list[Number] = []
+
+
+class _Picture(msgspec.Struct):
+    people: Annotated[list[_Person], msgspec.Meta(max_length=MAX_PEOPLE, description=f"up to {MAX_PEOPLE} people")]
+
+
+def numbered_name(name: str) -> tuple[str, int] | None:
+    """Return the stem and the number of the name of a file; None for another kind of name."""
+    match = _NUMBERED.fullmatch(name)
+    if match is None or len(match["number"].lstrip("0")) > len(str(MAX_FRAMES)):
+        return None
+    return match["stem"], int(match["number"])
+
+
+def read_openpose(path: Path) -> list[Array]:
+    """Read the key points of the people in a picture.
+
+    Returns:
+        x, y (pixels) and confidence of each point of each person, (n_points, 3); NaN, NaN, 0 for an absent point. A
+        person without points is an empty array.
+
+    Raises:
+        FormatError: the file is malformed, or its numbers are not triples.
+    """
+    where = f"OpenPose file {path}"
+    data: Any = read_json(path, _KIND)
+    if isinstance(data, Mapping) and "people" not in data:
+        raise FormatError(f"{where}: expected the key 'people', found {', '.join(list(map(str, data))[:5]) or 'none'}")
+    people = check(data, _Picture, where, FormatError).people
+    found = []
+    for person in people:
+        if len(person.pose_keypoints_2d) % 3:
+            raise FormatError(
+                f"{where}: expected x, y and confidence of each point in 'pose_keypoints_2d', found "
+                f"{len(person.pose_keypoints_2d)} numbers; export it again"
+            )
+        values = np.array(person.pose_keypoints_2d, dtype=np.float64).reshape(-1, 3)
+        values[(values[:, :2] == 0).all(axis=1)] = (np.nan, np.nan, 0.0)
+        found.append(values)
+    return found
+
+
+def read_openpose_pictures(paths: Sequence[Path], where: str) -> PictureTable:
+    """Read the files of one camera, which `numbered_name` numbers, in ascending order.
+
+    Raises:
+        FormatError: a file is malformed, or people have different numbers of points; `where` names the folder.
+    """
+    people = [read_openpose(path) for path in paths]
+    sizes = {len(points): path for path, found in zip(paths, people, strict=True) for points in found if len(points)}
+    if len(sizes) > 1:
+        (n, one), (m, other) = list(sizes.items())[:2]
+        raise FormatError(
+            f"{where}: expected one skeleton, found {n} points in {one.name} and {m} in {other.name}; import them apart"
+        )
+    kept = [[points for points in found if len(points)] for found in people]
+    points = stack_pictures(kept, next(iter(sizes), 0), where)
+    numbers = [numbered_name(path.name) for path in paths]
+    return PictureTable((), np.array([n for _, n in filter(None, numbers)], dtype=np.int64), points)
+
+
+class OpenPosePerson(NamedTuple):
+    """A person in a picture."""
+
+    person: int
+    """Number of the person."""
+    points_px: Array
+    """Its points in the order of the skeleton, (n, 2); NaN without one."""
+    confidence: Array
+    """(n,), from 0 to 1."""
+    visibility: IntArray
+    """0 for a point that is not in the picture, 1 for one that is occluded, 2 for one that is visible, (n,)."""
+
+
+def file_name(camera: str, picture: int) -> str:
+    """Return the name of the file of a picture of a camera, counted from 0, as OpenPose gives it."""
+    return f"{camera}_{picture:012d}_keypoints.json"
+
+
+def write_openpose(path: Path, people: Sequence[OpenPosePerson]) -> None:
+    """Write the people of a picture.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    path.write_bytes(msgspec.json.encode({"version": 1.3, "people": [_person_row(p) for p in people]}))
+
+
+def _person_row(person: OpenPosePerson) -> dict[str, Any]:
+    is_there = (person.visibility > 0) & np.isfinite(person.points_px).all(axis=-1)
+    rows = np.column_stack([person.points_px, person.confidence])
+    rows[~is_there] = 0.0
+    others = ("face_keypoints_2d", "hand_left_keypoints_2d", "hand_right_keypoints_2d", "pose_keypoints_3d")
+    return {
+        "person_id": [person.person],
+        "pose_keypoints_2d": np.round(rows, 3).ravel().tolist(),
+        "pose_visibility": np.where(is_there, person.visibility, 0).tolist(),
+        **{key: [] for key in (*others, "face_keypoints_3d", "hand_left_keypoints_3d", "hand_right_keypoints_3d")},
+    }

@@ -1,0 +1,140 @@
+"""Check key points against the session: unit, size of the pictures, confidences, agreement of the views."""
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from tracker.errors import FormatError, Remedy
+from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.geometry.arrays import Array, Mask
+from tracker.geometry.cameras import Camera
+from tracker.observations.observed import ObservedPoints
+from tracker.observations.triangulation import INLIER_M, Views
+
+_MAX_OUTSIDE = 0.05
+"""Largest share of a camera's points outside of the picture. Detectors place points within it, or a little beyond where
+a limb is cut off: none of the points of `walk`, `fast_arms` and `balance_real` lies outside."""
+_SIZES = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 4 / 3, 1.5, 2.0, 3.0, 4.0)
+"""Ratios of usual sizes of pictures, such as 1920, 1280 and 640 px of width."""
+
+
+def picture_problems(tables: Mapping[str, PictureTable], cameras: Mapping[str, Camera]) -> list[FormatError]:
+    """Return what contradicts the pictures of the cameras: other sizes, normalized coordinates, no confidences."""
+    problems = []
+    for name, table in tables.items():
+        size = cameras[name].size
+        points = table.points[table.is_found]
+        if table.size is not None and table.size != size:
+            problems.append(_other_size(name, size, f"{table.size[0]}x{table.size[1]} in the file", table.size))
+        elif len(points) and np.abs(points[:, :2]).max() <= _MAX_NORMALIZED < min(size) / 4:
+            problems.append(
+                FormatError(
+                    f"camera '{name}': expected pixels of the {size[0]}x{size[1]} footage, found coordinates up to "
+                    f"{np.abs(points[:, :2]).max():.3g}, which are normalized",
+                    Remedy("scale_normalized"),
+                )
+            )
+        elif len(points):
+            outside = ((points[:, :2] < -0.5) | (points[:, :2] > np.array(size) - 0.5)).any(axis=-1)
+            if outside.mean() > _MAX_OUTSIDE:
+                reach = np.quantile(points[:, :2], 0.99, axis=0)
+                found = f"{outside.mean():.0%} of the points outside of it, as far as {reach[0]:.0f}, {reach[1]:.0f}"
+                problems.append(_other_size(name, size, found, None))
+        if not table.has_confidence:
+            problems.append(
+                FormatError(
+                    f"camera '{name}': expected a confidence for each point, found none", Remedy("say_confidence")
+                )
+            )
+    return problems
+
+
+_MAX_NORMALIZED = 2.0
+"""Largest coordinate of normalized points, of which 1 is the width or height: some are beyond the picture."""
+
+
+def _other_size(name: str, size: tuple[int, int], found: str, given: tuple[int, int] | None) -> FormatError:
+    text = f"{given[0]}x{given[1]}" if given else "WIDTHxHEIGHT"
+    return FormatError(
+        f"camera '{name}': expected key points of the {size[0]}x{size[1]} footage, found {found}",
+        Remedy("give_picture_size", size=text),
+    )
+
+
+def agreement_m(points: ObservedPoints, cameras: Sequence[Camera], scale: float = 1.0) -> float:
+    """Return the median distance between the viewing rays of a point in two views, metres; NaN with no two views.
+
+    Of several people in a view, those whose rays meet best count. Frames are sampled.
+
+    Args:
+        points: key points.
+        cameras: of the session, in its order.
+        scale: factor of the pixels, to try another size of the pictures.
+    """
+    views = Views(cameras)
+    frames = np.unique(np.linspace(0, points.n_frames - 1, _SAMPLES).astype(np.int64))
+    chosen, known = points.points_px[frames] * scale, points.is_known[frames]
+    rays = _rays(views, chosen, known)
+    gaps = []
+    for a, b in combinations(range(len(cameras)), 2):
+        across = np.cross(rays[:, a, :, None], rays[:, b, None])  # (frames, detections, detections, points, 3)
+        length = np.linalg.norm(across, axis=-1)
+        baseline = views.centers[b] - views.centers[a]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            apart = np.where(length > 1e-6, np.abs(across @ baseline) / length, np.nan)
+        by_pair = apart.reshape(len(apart), -1, apart.shape[-1])
+        medians = np.array([[_median(row) for row in frame] for frame in by_pair])
+        best = np.where(np.isfinite(medians), medians, np.inf).argmin(axis=1)
+        gaps.append(by_pair[np.arange(len(best)), best].ravel())
+    return _median(np.concatenate(gaps)) if gaps else np.nan
+
+
+_SAMPLES = 60
+"""Number of frames whose agreement is measured: the median of some thousand distances."""
+
+
+def _median(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if len(known) else np.nan
+
+
+def _rays(views: Views, points_px: Array, known: Mask) -> Array:
+    out = np.full((*points_px.shape[:-1], 3), np.nan)
+    undistorted = views.undistorted(np.where(known[..., None], points_px, np.nan))
+    for v, camera in enumerate(views.cameras):
+        out[:, v] = camera.pinhole.rays(undistorted[:, v])
+    return out
+
+
+def agreement_problem(points: ObservedPoints, cameras: Sequence[Camera]) -> FormatError | None:
+    """Return that the views do not agree, and as which size of the pictures or cameras they would; None if they do.
+
+    Rays of one point that pass each other by more than half a limb's thickness are of different points.
+    """
+    found = agreement_m(points, cameras)
+    if not found > INLIER_M / 2:
+        return None
+    scaled = {s: agreement_m(points, cameras, s) for s in _SIZES}
+    best = min(scaled, key=lambda s: scaled[s])
+    hint = ""
+    if scaled[best] < INLIER_M / 2:
+        width, height = (round(n / best) for n in cameras[0].size)
+        hint = f"; as key points of {width}x{height} pictures they would by {100 * scaled[best]:.0f} cm"
+    else:
+        for a, b in combinations(range(len(cameras)), 2):
+            exchanged = agreement_m(_exchanged(points, a, b), cameras)
+            if exchanged < INLIER_M / 2:
+                hint = f"; with {points.cameras[a]} and {points.cameras[b]} exchanged by {100 * exchanged:.0f} cm"
+                break
+    return FormatError(
+        f"expected the viewing rays of a point in two views to meet, found that half of them pass each other by over "
+        f"{100 * found:.0f} cm{hint}",
+        Remedy("check_views"),
+    )
+
+
+def _exchanged(points: ObservedPoints, a: int, b: int) -> ObservedPoints:
+    order = np.arange(len(points.cameras))
+    order[[a, b]] = b, a
+    return ObservedPoints(points.names, points.cameras, points.points_px[:, order], points.confidence[:, order])

@@ -1,0 +1,150 @@
+"""Find out which detections of different views and frames are of one person.
+
+Detections of two views are of one person if the rays of their points meet. From frame to frame, a person is where the
+reprojected points of the frame before are nearest (the Hungarian method, in each view).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.observations.triangulation import INLIER_M, Views, triangulate_points
+
+_SAME_PERSON_M = 0.4
+"""Largest median distance, metres, of a detection's points from a person's a frame before: a person is as wide."""
+
+
+@dataclass
+class _Track:
+    """A person who is followed."""
+
+    last_world: Array
+    """Last known position of each point, (n_points, 3), metres; NaN where never known."""
+    members: dict[tuple[int, int], int]
+    """Detection by frame and view."""
+    seen: int = 0
+    """Last frame with a detection."""
+
+
+def match_people(views: Views, points_px: Array, confidence: Array, n_people: int) -> IntArray:
+    """Return the person of each detection, (n_frames, n_views, n_detections), from 0; -1 for one of nobody.
+
+    The people are those who are seen most, in the order in which they appear.
+
+    Args:
+        views: the cameras.
+        points_px: undistorted px, (n_frames, n_views, n_detections, n_points, 2); NaN where absent.
+        confidence: (n_frames, n_views, n_detections, n_points).
+        n_people: number of people of whom the detections are.
+    """
+    is_present = (np.isfinite(points_px).all(axis=-1) & (confidence > 0)).any(axis=-1)
+    assert isinstance(is_present, np.ndarray)
+    if n_people == 1 and is_present.sum(axis=2).max(initial=0) <= 1:
+        return np.where(is_present, 0, -1)
+    tracks: list[_Track] = []
+    for frame in range(len(points_px)):
+        _follow(views, points_px[frame], confidence[frame], is_present[frame], frame, tracks)
+    chosen = _people(tracks, n_people)
+    out = np.full(is_present.shape, -1, dtype=np.int64)
+    for person, some in enumerate(chosen):
+        for track in some:
+            for (frame, view), detection in track.members.items():
+                out[frame, view, detection] = person
+    return out
+
+
+def _follow(
+    views: Views, points_px: Array, confidence: Array, is_present: Mask, frame: int, tracks: list[_Track]
+) -> None:
+    """Assign the detections of a frame to the tracks, and begin tracks with those that are left."""
+    taken: dict[int, dict[int, int]] = {}
+    left = {(v, int(d)) for v in range(len(is_present)) for d in np.flatnonzero(is_present[v])}
+    for v in range(len(is_present)):
+        detections = [d for view, d in sorted(left) if view == v]
+        if not (detections and tracks):
+            continue
+        distances = np.array(
+            [[_distance(views, v, t.last_world, points_px[v, d], confidence[v, d]) for d in detections] for t in tracks]
+        )
+        for row, i in zip(*linear_sum_assignment(distances), strict=True):
+            if distances[row, i] < _SAME_PERSON_M:
+                taken.setdefault(int(row), {})[v] = detections[i]
+                left.discard((v, detections[i]))
+    for group in _groups(views, points_px, confidence, sorted(left)):
+        tracks.append(_Track(np.full((*points_px.shape[2:3], 3), np.nan), {}))
+        taken[len(tracks) - 1] = group
+    for t, group in taken.items():
+        tracks[t].members |= {(frame, v): d for v, d in group.items()}
+        tracks[t].seen = frame
+        chosen = [group.get(v, -1) for v in range(len(is_present))]
+        px = np.stack(
+            [points_px[v, d] if d >= 0 else np.full_like(points_px[v, 0], np.nan) for v, d in enumerate(chosen)]
+        )
+        weights = np.stack([confidence[v, d] * (d >= 0) for v, d in enumerate(chosen)])
+        found = triangulate_points(views, px[None], weights[None]).points_world[0]
+        known = np.isfinite(found).all(axis=-1)
+        tracks[t].last_world[known] = found[known]
+
+
+def _distance(views: Views, view: int, points_world: Array, points_px: Array, confidence: Array) -> float:
+    """Return the median distance of a detection from points in space, metres; 1e3 if nothing can be compared."""
+    projected, depths = views.project(points_world)
+    apart = np.linalg.norm(projected[:, view] - points_px, axis=-1) * depths[:, view] / views.focal_px[view]
+    known = np.isfinite(apart) & (confidence > 0)
+    return float(np.median(apart[known])) if known.any() else 1e3
+
+
+def _groups(
+    views: Views, points_px: Array, confidence: Array, detections: list[tuple[int, int]]
+) -> list[dict[int, int]]:
+    """Join detections of different views whose rays meet, nearest first; groups of one view alone are left out."""
+    rays = {(v, d): views.cameras[v].pinhole.rays(points_px[v, d]) for v, d in detections}
+    pairs = []
+    for i, (v, d) in enumerate(detections):
+        for w, e in detections[i + 1 :]:
+            if v == w:
+                continue
+            both = (confidence[v, d] > 0) & (confidence[w, e] > 0)
+            apart = _ray_distances(views, v, w, rays[v, d][both], rays[w, e][both])
+            if len(apart) and np.median(apart) < INLIER_M:
+                pairs.append((float(np.median(apart)), (v, d), (w, e)))
+    groups = {at: {at[0]: at[1]} for at in detections}
+    for _, one, other in sorted(pairs):
+        a, b = groups[one], groups[other]
+        if a is not b and not a.keys() & b.keys():
+            a |= b
+            for at in b.items():
+                groups[at] = a
+    unique = {id(g): g for g in groups.values() if len(g) > 1}
+    return list(unique.values())
+
+
+def _ray_distances(views: Views, a: int, b: int, u: Array, v: Array) -> Array:
+    """Return the distances between rays of two views, (n,), metres; NaN left out."""
+    across = np.cross(u, v)
+    length = np.linalg.norm(across, axis=-1)
+    known = length > 1e-6
+    baseline = views.centers[b] - views.centers[a]
+    apart = np.abs(across[known] @ baseline) / length[known]
+    return apart[np.isfinite(apart)]
+
+
+def _people(tracks: list[_Track], n_people: int) -> list[list[_Track]]:
+    """Join tracks that follow one another to people, those with most detections first; in order of appearance."""
+    people: list[list[_Track]] = []
+    for track in sorted(tracks, key=lambda t: -len(t.members)):
+        frames = {frame for frame, _ in track.members}
+        free = [some for some in people if not any(frames & {f for f, _ in t.members} for t in some)]
+        if len(people) < n_people:
+            people.append([track])
+        elif free:
+            min(free, key=lambda some: _gap(some, track)).append(track)
+    return sorted(people, key=lambda some: min(min(t.members) for t in some))
+
+
+def _gap(some: list[_Track], track: _Track) -> float:
+    """Return the distance of the last positions of a person and of a track, metres."""
+    apart = [np.nanmedian(np.linalg.norm(t.last_world - track.last_world, axis=-1)) for t in some]
+    return float(np.min(apart))

@@ -1,0 +1,291 @@
+"""Import files of other programs: read them, place them at the frames of a session, check them, store them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tracker.errors import FormatError, Remedy, SessionError
+from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_size, read_joint_map
+from tracker.formats.keypoints.picture_table import PictureTable, check_size
+from tracker.geometry.arrays import IntArray
+from tracker.observations.checks import agreement_problem, picture_problems
+from tracker.observations.observed import ObservationSet, ObservedPoints, SourceFile
+from tracker.observations.placing import place_pictures
+from tracker.observations.readers import PICTURE_FORMATS, find_files
+from tracker.observations.request import ImportRequest
+from tracker.observations.sources import FileGroup, match_cameras
+from tracker.observations.space import read_space
+from tracker.observations.stored import checksum, save_observations
+from tracker.session.session import Session
+
+
+@dataclass(frozen=True)
+class ViewPreview:
+    """The part of an import that is of one camera, or of one file of points in space."""
+
+    camera: str
+    """Name of the camera; the person for points in space."""
+    place: Path | None
+    """The file or folder; None for a camera without one."""
+    n_rows: int = 0
+    """Number of pictures or rows."""
+    frames: tuple[int, int] | None = None
+    """First and last frame of the session with points; None without points."""
+    n_people: int = 0
+    """Most people in a picture."""
+    confidence: float = np.nan
+    """Median confidence of the points found; NaN if unknown."""
+
+
+@dataclass(frozen=True, eq=False)
+class ImportPlan:
+    """An import that has been read and checked, and is not yet stored."""
+
+    observations: ObservationSet
+    files: Mapping[str, Path]
+    """The file of each source, by its path within the observations."""
+    views: tuple[ViewPreview, ...]
+    problems: tuple[FormatError, ...]
+    """Contradictions to the session; with any, it cannot be stored."""
+
+
+def plan_import(session: Session, request: ImportRequest) -> ImportPlan:
+    """Read files and check them against a session; nothing is written.
+
+    Raises:
+        FormatError: a file is missing or malformed, of an unknown format, or of no camera of the session.
+    """
+    format_name, files = find_files(request.paths)
+    if format_name not in PICTURE_FORMATS:
+        return _plan_of_space(session, request, format_name, files)
+    return _plan_of_pictures(session, request, PICTURE_FORMATS[format_name].name, files)
+
+
+def store_import(session: Session, plan: ImportPlan) -> None:
+    """Store an import with its session.
+
+    Raises:
+        FormatError: the first of the plan's problems.
+        SessionError: it cannot be written.
+    """
+    if plan.problems:
+        raise plan.problems[0]
+    save_observations(session, plan.observations, plan.files)
+
+
+def _plan_of_pictures(
+    session: Session, request: ImportRequest, format_name: str, files: list[tuple[Path, Path]]
+) -> ImportPlan:
+    groups = PICTURE_FORMATS[format_name].read(files)
+    names = match_cameras([(g.labels, g.place) for g, _ in groups], session.camera_names, request.cameras)
+    unmatched = [g for (g, _), name in zip(groups, names, strict=True) if not name]
+    problems = [_no_camera(session, g) for g in unmatched]
+    chosen = {name: pair for pair, name in zip(groups, names, strict=True) if name}
+    if not chosen:
+        raise problems[0]
+    cameras = {c.camera.name: c.camera for c in session.cameras}
+    tables = {name: _scaled(table, cameras[name].size, request.picture_size) for name, (_, table) in chosen.items()}
+    if request.confidence is not None:
+        tables = {name: _with_confidence(table, request.confidence) for name, table in tables.items()}
+    problems += picture_problems(tables, cameras)
+    frames, wrong, notes = place_pictures(tables, session, request.first_frame)
+    problems += wrong
+    point_names, joint_map, unknown = _skeleton(tables, request)
+    problems += unknown
+    points = _assemble(session, tables, frames, point_names)
+    if not problems and (disagreement := agreement_problem(points, [c.camera for c in session.cameras])):
+        problems.append(disagreement)
+    notes += [f"{name}: {note}" for name, table in tables.items() for note in table.notes]
+    notes += _notes(tables)
+    sources, by_path = _sources([(g, name) for (g, _), name in zip(groups, names, strict=True)])
+    rows = np.unique(np.concatenate([f for f in frames.values()])).astype(np.float64)
+    observations = ObservationSet(
+        request.name, format_name, request.people, joint_map, points, None, rows, sources, tuple(notes),
+        _options(request),
+    )  # fmt: skip
+    views = tuple(_preview(name, chosen, tables, points, v) for v, name in enumerate(session.camera_names))
+    return ImportPlan(observations, by_path, views, tuple(problems))
+
+
+def _no_camera(session: Session, group: FileGroup) -> FormatError:
+    return FormatError(
+        f"expected the name of a camera ({', '.join(session.camera_names)}) in {group.place}, found "
+        f"{', '.join(filter(None, group.labels))}",
+        Remedy("name_observed_camera", camera=session.camera_names[0]),
+    )
+
+
+def _scaled(table: PictureTable, size: tuple[int, int], given: tuple[int, int] | None) -> PictureTable:
+    """Return points in the pixels of the camera, if they are said to be of pictures of another size."""
+    if given is None:
+        return table
+    factors = np.array(size) / np.array(given)
+    # Pixel borders stay aligned, as in OpenCV's resize; normalized points count from the border.
+    middle = 0.0 if given == (1, 1) else 0.5
+    points = table.points.copy()
+    points[..., :2] = (points[..., :2] + middle) * factors - 0.5
+    return PictureTable(table.names, table.numbers, points, None, table.rate, table.notes)
+
+
+def _with_confidence(table: PictureTable, confidence: float) -> PictureTable:
+    """Return points that all have one confidence where the file has none."""
+    points = table.points.copy()
+    if not table.has_confidence:
+        points[..., 2] = np.where(table.is_found, confidence, 0.0)
+    return PictureTable(table.names, table.numbers, points, table.size, table.rate, table.notes)
+
+
+def _skeleton(
+    tables: Mapping[str, PictureTable], request: ImportRequest
+) -> tuple[tuple[str, ...], JointMap, list[FormatError]]:
+    """Return the names of the points, their convention, and what is wrong with it.
+
+    Raises:
+        FormatError: cameras have different points, or the file of the map is malformed.
+    """
+    given = read_joint_map(request.joint_map) if request.joint_map is not None else None
+    filled = {name: t for name, t in tables.items() if t.points.shape[2]} or dict(tables)
+    first, *others = filled
+    for other in others:
+        (one, n), (two, m) = ((filled[x].names, filled[x].points.shape[2]) for x in (first, other))
+        if one != two or n != m:
+            raise FormatError(
+                f"expected the same points in all views, found {n} ({', '.join(one[:3])}...) for camera '{first}' and "
+                f"{m} ({', '.join(two[:3])}...) for camera '{other}'; import files of one skeleton"
+            )
+    names, n_points = filled[first].names, filled[first].points.shape[2]
+    where = f"the files of camera '{first}'"
+    numbered = names or tuple(f"point {i}" for i in range(n_points))
+    try:
+        if names:
+            found = given or guess_joint_map(names, where)
+            return names, found, _missing_markers(given, names, where)
+        found = given if given is not None and given.points else joint_map_of_size(n_points, where)
+        if len(found.points) == n_points:
+            chosen = given or found
+            return found.points, chosen, _missing_markers(given, found.points, where)
+        wrong = FormatError(
+            f"{where}: expected the {len(found.points)} points that the joint map {found.name} lists, found "
+            f"{n_points}; correct 'points' in the map"
+        )
+        return numbered, found, [wrong]
+    except FormatError as error:
+        return numbered, JointMap("unknown", {}), [error]
+
+
+def _missing_markers(given: JointMap | None, names: tuple[str, ...], where: str) -> list[FormatError]:
+    """Return that a map that was given names points which the files lack."""
+    missing = [m for m in (given.markers.values() if given else ()) if m not in names]
+    return [
+        FormatError(
+            f"{where} have no point '{marker}', which the joint map {given.name if given else ''} names; expected one "
+            f"of {', '.join(names)}"
+        )
+        for marker in missing[:1]
+    ]
+
+
+def _assemble(
+    session: Session, tables: Mapping[str, PictureTable], frames: Mapping[str, IntArray], names: tuple[str, ...]
+) -> ObservedPoints:
+    """Put the points of all cameras at the frames of the session."""
+    most = max(t.points.shape[1] for t in tables.values())
+    shape = (session.n_frames, len(session.camera_names), most, len(names))
+    check_size((*shape, 3), "the key points")
+    points_px, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
+    for v, name in enumerate(session.camera_names):
+        if name not in tables or tables[name].points.shape[2] != len(names):
+            continue
+        at = frames[name]
+        inside = (at >= 0) & (at < session.n_frames)
+        points = tables[name].points[inside]
+        n = points.shape[1]
+        known = tables[name].is_found[inside]
+        points_px[at[inside], v, :n] = np.where(known[..., None], points[..., :2], np.nan)
+        confidence[at[inside], v, :n] = np.where(known, np.clip(np.nan_to_num(points[..., 2]), 0.0, 1.0), 0.0)
+    return ObservedPoints(names, session.camera_names, points_px, confidence)
+
+
+def _notes(tables: Mapping[str, PictureTable]) -> list[str]:
+    above = sum(int((t.points[..., 2] > 1).sum()) for t in tables.values())
+    return [f"{above} confidences are above 1 and were taken as 1"] if above else []
+
+
+def _sources(groups: list[tuple[FileGroup, str]]) -> tuple[tuple[SourceFile, ...], dict[str, Path]]:
+    """Return the files with their checksums, and the file of each path.
+
+    Raises:
+        FormatError: a file cannot be read, or two would have one path.
+    """
+    sources: dict[str, SourceFile] = {}
+    by_path: dict[str, Path] = {}
+    for group, camera in groups:
+        for file in group.files:
+            path = file.relative_to(group.root).as_posix()
+            if by_path.get(path, file) != file:
+                path = f"{file.parent.name}/{path}"
+            if by_path.get(path, file) != file:
+                raise FormatError(f"expected files of different names, found two named {path}; rename one")
+            try:
+                found = SourceFile(path, checksum(file.read_bytes()), camera)
+            except OSError as error:
+                raise FormatError(f"{file} cannot be read: {error}; check that you may read it") from error
+            sources[path] = SourceFile(path, found.sha256, "") if path in sources else found
+            by_path[path] = file
+    return tuple(sources.values()), by_path
+
+
+def _options(request: ImportRequest) -> tuple[tuple[str, str], ...]:
+    found = {
+        "first_frame": request.first_frame,
+        "clock": request.clock,
+        "axes": request.axes if request.axes != "x,y,z" else None,
+        "unit_m": request.unit_m,
+        "confidence": request.confidence,
+        "picture_size": "x".join(map(str, request.picture_size)) if request.picture_size else None,
+    }
+    return tuple((key, str(value)) for key, value in found.items() if value is not None)
+
+
+def _preview(
+    name: str,
+    chosen: Mapping[str, tuple[FileGroup, PictureTable]],
+    tables: Mapping[str, PictureTable],
+    points: ObservedPoints,
+    view: int,
+) -> ViewPreview:
+    if name not in chosen:
+        return ViewPreview(name, None)
+    table = tables[name]
+    with_points = np.flatnonzero(points.is_known[:, view].any(axis=(1, 2)))
+    frames = (int(with_points[0]), int(with_points[-1])) if len(with_points) else None
+    known = table.is_found
+    confidence = table.points[..., 2][known]
+    median = float(np.median(confidence)) if len(confidence) else np.nan
+    most = int(np.count_nonzero(known.any(axis=-1), axis=1).max(initial=0))
+    return ViewPreview(name, chosen[name][0].place, len(table.numbers), frames, most, median)
+
+
+def _plan_of_space(
+    session: Session, request: ImportRequest, format_name: str, files: list[tuple[Path, Path]]
+) -> ImportPlan:
+    if len(files) != len(request.people):
+        raise SessionError(
+            f"expected one file of points in space for each person ({', '.join(request.people)}), found {len(files)}",
+            Remedy("name_people_of_files"),
+        )
+    placed, problems, notes = read_space(session, request, format_name, [path for path, _ in files])
+    groups = [(FileGroup((path,), (path.stem,), root), "") for path, root in files]
+    sources, by_path = _sources(groups)
+    observations = ObservationSet(
+        request.name, format_name, request.people, placed.joint_map, None, placed.joints, placed.row_frames, sources,
+        tuple(notes), _options(request),
+    )  # fmt: skip
+    views = []
+    for k, ((path, _), person) in enumerate(zip(files, request.people, strict=True)):
+        with_points = np.flatnonzero(np.isfinite(placed.joints.joints_world[:, k]).all(axis=-1).sum(axis=1))
+        frames = (int(with_points[0]), int(with_points[-1])) if len(with_points) else None
+        views.append(ViewPreview(person, path, len(placed.row_frames), frames, 1))
+    return ImportPlan(observations, by_path, tuple(views), tuple(problems))

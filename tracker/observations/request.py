@@ -1,0 +1,35 @@
+"""What is to be imported, and how."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tracker.session.clocks import Clock
+
+
+@dataclass(frozen=True)
+class ImportRequest:
+    """Files to import, and choices of the user."""
+
+    name: str
+    """Name of the observations within the session."""
+    paths: tuple[Path, ...]
+    """Files and folders."""
+    people: tuple[str, ...]
+    """People of the session of whom they are."""
+    joint_map: Path | None = None
+    """File with the naming convention; guessed by default."""
+    cameras: Mapping[str, Path] = field(default_factory=dict)
+    """File or folder by camera, where names do not tell."""
+    first_frame: int | None = None
+    """Frame of the session of the first picture or row; None to go by the numbers of the file."""
+    clock: Clock | None = None
+    """Points in space: whether rows lie at their numbers or at their times; see `Placement`."""
+    axes: str = "x,y,z"
+    """Points in space: axes of the file that are the session's x, y, z."""
+    unit_m: float | None = None
+    """Points in space: metres per unit of a file that states none."""
+    confidence: float | None = None
+    """Confidence of points in files without one."""
+    picture_size: tuple[int, int] | None = None
+    """Width and height of the pictures that the points are of, px; 1, 1 for normalized points."""

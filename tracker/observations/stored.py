@@ -1,0 +1,235 @@
+"""ObservationSet in the folder of a session: what they are, their numbers, and the files as they came.
+
+    observations/NAME/
+      observations.toml    format, people, joint map, notes, the files with their checksums
+      points.npz           positions and confidences, without pickled objects
+      files/               the imported files, unchanged
+
+A folder appears complete or not at all.
+"""
+
+import hashlib
+import io
+import secrets
+import shutil
+import zipfile
+import zlib
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+import tomli_w
+
+from tracker.errors import SessionError
+from tracker.files import refuse_links, sync_folder, write_text_atomic
+from tracker.formats.joint_maps import format_joint_map, parse_joint_map
+from tracker.formats.number_rows import MAX_NAMES, MAX_VALUES
+from tracker.geometry.arrays import Array
+from tracker.observations.observed import ObservationSet, ObservedJoints, ObservedPoints, SourceFile
+from tracker.session.session import Session
+from tracker.text_files import TABLE_BYTES, TextKind, read_toml
+from tracker.validation import FileStem, Name, check, check_version, quoted
+
+FOLDER = "observations"
+_FILE, _POINTS, _FILES = "observations.toml", "points.npz", "files"
+_VERSION = 1
+"""Newest version of the file that this program writes and reads."""
+_KIND = TextKind("observations", TABLE_BYTES, SessionError)
+
+
+class _SourceRow(msgspec.Struct, forbid_unknown_fields=True):
+    path: Annotated[str, msgspec.Meta(min_length=1, max_length=1000, description="the path of a file")]
+    sha256: Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}\Z", description="64 hexadecimal digits")]
+    camera: str = ""
+
+
+class _Content(msgspec.Struct, forbid_unknown_fields=True):
+    name: FileStem
+    format: Name
+    people: Annotated[tuple[Name, ...], msgspec.Meta(min_length=1, description="the people of whom they are")]
+    points: Annotated[
+        tuple[Name, ...], msgspec.Meta(min_length=1, max_length=MAX_NAMES, description="the names of the points")
+    ]
+    skeleton: Name
+    joint_map: dict[str, Any]
+    version: int = _VERSION
+    cameras: tuple[Name, ...] = ()
+    notes: tuple[str, ...] = ()
+    options: dict[str, str] = {}
+    sources: tuple[_SourceRow, ...] = ()
+
+
+def list_observations(session: Session) -> list[str]:
+    """Return the names of the observations of a session, in order."""
+    folder = session.folder / FOLDER
+    return sorted(p.parent.name for p in folder.glob(f"*/{_FILE}") if not p.parent.name.startswith("."))
+
+
+def source_path(session: Session, name: str, source: SourceFile) -> Path:
+    """Return the path of an imported file within the session."""
+    return session.folder / FOLDER / name / _FILES / source.path
+
+
+def checksum(data: bytes) -> str:
+    """Return the SHA-256 of the bytes of a file, 64 hexadecimal digits."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def save_observations(session: Session, observations: ObservationSet, files: Mapping[str, Path]) -> None:
+    """Store observations with a session.
+
+    Args:
+        session: to whose folder they are written.
+        observations: their sources name the files.
+        files: the file to copy for each path of a source.
+
+    Raises:
+        SessionError: there are observations of this name, a file changed since it was read, or the folder cannot be
+            written.
+    """
+    check(observations.name, FileStem, "the name of the observations", SessionError)
+    folder = session.folder / FOLDER / observations.name
+    refuse_links(session.folder, f"{FOLDER}/{observations.name}")
+    if folder.exists():
+        raise SessionError(f"{folder} exists already; choose another name, or remove that folder")
+    temporary = folder.with_name(f".{observations.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        temporary.mkdir(parents=True)
+        for source in observations.sources:
+            _copy(files[source.path], temporary / _FILES / source.path, source.sha256)
+        with (temporary / _POINTS).open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **_arrays(observations))
+        write_text_atomic(temporary / _FILE, tomli_w.dumps(_content(observations)))
+        temporary.rename(folder)
+        sync_folder(folder.parent)
+    except OSError as error:
+        raise SessionError(f"cannot write {folder}: {error}; see that you may write to the session's folder") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def load_observations(session: Session, name: str) -> ObservationSet:
+    """Read stored observations of a session.
+
+    Raises:
+        SessionError: there are none of this name, or they are damaged, newer, or of another number of frames.
+    """
+    folder = session.folder / FOLDER / name
+    if name not in (known := list_observations(session)):
+        listed = ", ".join(known) or "none"
+        raise SessionError(
+            f"expected the name of imported observations, found '{name}'; the session has {listed}: import some"
+        )
+    where = f"observations {folder / _FILE}"
+    data = read_toml(folder / _FILE, _KIND)
+    check_version(data, _VERSION, where, SessionError)
+    row = check(data, _Content, where, SessionError)
+    unknown = [p for p in row.people if p not in {person.name for person in session.people}]
+    if unknown:
+        raise SessionError(f"{where}: expected people of the session, found '{unknown[0]}'; import them again")
+    for source in row.sources:
+        path = PurePosixPath(source.path)
+        if path.is_absolute() or ".." in path.parts or "\\" in source.path or "\0" in source.path:
+            raise SessionError(f"{where}: expected the path of a file within, found {quoted(source.path)}; correct it")
+    arrays = _read_arrays(folder / _POINTS)
+    joint_map = parse_joint_map(row.skeleton, row.joint_map, str(folder / _FILE))
+    sources = tuple(SourceFile(s.path, s.sha256, s.camera) for s in row.sources)
+    try:
+        points, joints, rows = _from_arrays(row, arrays, session)
+    except (KeyError, ValueError, AssertionError) as error:
+        raise SessionError(
+            f"{folder / _POINTS} does not hold {session.n_frames} frames of the points that {_FILE} names ({error}); "
+            "import them again"
+        ) from error
+    return ObservationSet(
+        row.name, row.format, row.people, joint_map, points, joints, rows, sources, row.notes,
+        tuple(row.options.items()),
+    )  # fmt: skip
+
+
+def _content(observations: ObservationSet) -> dict[str, Any]:
+    points = observations.points
+    data = {
+        "version": _VERSION,
+        "name": observations.name,
+        "format": observations.format,
+        "people": list(observations.people),
+        "cameras": list(points.cameras) if points is not None else [],
+        "points": list(observations.point_names),
+        "skeleton": observations.joint_map.name,
+        "notes": list(observations.notes),
+        "joint_map": format_joint_map(observations.joint_map),
+        "options": dict(observations.options),
+        "sources": [{"path": s.path, "sha256": s.sha256, "camera": s.camera} for s in observations.sources],
+    }
+    check(data, _Content, f"observations {observations.name}", SessionError)
+    return data
+
+
+def _arrays(observations: ObservationSet) -> dict[str, Array]:
+    found: dict[str, Array] = {"row_frames": observations.row_frames}
+    if observations.points is not None:
+        found |= {"points_px": observations.points.points_px, "confidence": observations.points.confidence}
+    if observations.joints is not None:
+        found["joints_world"] = observations.joints.joints_world
+        if observations.joints.covariances is not None:
+            found["covariances"] = observations.joints.covariances
+    return found
+
+
+def _from_arrays(
+    row: _Content, arrays: Mapping[str, Array], session: Session
+) -> tuple[ObservedPoints | None, ObservedJoints | None, Array]:
+    """Return points, joints and the frames of the rows.
+
+    Raises:
+        KeyError: an array is missing.
+        ValueError: one has another shape, as AssertionError says too.
+    """
+    rows = arrays["row_frames"]
+    if rows.ndim != 1 or not np.isfinite(rows).all():
+        raise ValueError("row_frames")
+    joints = points = None
+    if "joints_world" in arrays:
+        joints = ObservedJoints(row.points, row.people, arrays["joints_world"], arrays.get("covariances"))
+    else:
+        points = ObservedPoints(row.points, row.cameras, arrays["points_px"], arrays["confidence"])
+        if row.cameras != session.camera_names:
+            raise ValueError(f"cameras {', '.join(row.cameras)}")
+    if (points or joints).n_frames != session.n_frames:  # type: ignore[union-attr]
+        raise ValueError(f"{(points or joints).n_frames} frames")  # type: ignore[union-attr]
+    return points, joints, rows
+
+
+def _read_arrays(path: Path) -> dict[str, Array]:
+    """Read the arrays of a file, at most `MAX_VALUES` values in each.
+
+    Raises:
+        SessionError: the file is missing or damaged.
+    """
+    try:
+        data = path.read_bytes()
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            too_large = any(i.file_size > MAX_VALUES * np.dtype(np.float64).itemsize for i in archive.infolist())
+        if too_large:
+            raise ValueError("an array is too large")
+        with np.load(io.BytesIO(data), allow_pickle=False) as found:
+            arrays = {name: np.asarray(found[name], dtype=np.float64) for name in found.files}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
+        raise SessionError(f"{path} cannot be read: {error}; import the files again") from error
+    return arrays
+
+
+def _copy(source: Path, target: Path, sha256: str) -> None:
+    """Copy a file.
+
+    Raises:
+        SessionError: it is another one than was read.
+    """
+    data = source.read_bytes()
+    if checksum(data) != sha256:
+        raise SessionError(f"{source} has changed since it was read; import it again")
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_bytes(data)

@@ -1,0 +1,197 @@
+"""Key points of imported observations in a session: first poses from them, and evidence of a run.
+
+How a detector sees each person is learnt before a run and stored, so that one that goes on uses the same.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tracker.acquisition.from_joints import place_joints
+from tracker.acquisition.from_keypoints import SeenBody, fit_to_keypoints, learn_seen_body
+from tracker.acquisition.segment_lengths import segment_lengths
+from tracker.body.dimensions import HEIGHT_LIMITS_M
+from tracker.body.model import BodyModel, PosedBody
+from tracker.errors import Remedy, TrackerError
+from tracker.evidence.keypoints import KeypointEvidence
+from tracker.evidence.observer import Observer
+from tracker.fitting.gauss_newton import PointTargets
+from tracker.fitting.hypothesis import Hypothesis
+from tracker.formats.model_toml import format_model, has_preset_sizes
+from tracker.initialization.first_pose import FirstPose, FirstPoses
+from tracker.observations.body_points import BodyPoints, body_points
+from tracker.observations.stored import load_observations
+from tracker.session.session import Session
+from tracker.store.annotation_store import AnnotationStore
+
+SEEN_BODIES = "seen bodies"
+"""Setting of the session: how the detector of each set of observations sees the people, see `seen_bodies_record`."""
+_OFFSET_M = 0.025
+"""Standard deviation of the constant offset of a detector's joint, metres: hips and shoulders are off by 2 to 5 cm."""
+SOURCE = "key points"
+"""Source of a first pose."""
+
+
+def read_points(session: Session, name: str) -> dict[int, BodyPoints]:
+    """Return the observed points of each person, by index, that are points of the person's body.
+
+    Args:
+        session: the session.
+        name: of the observations.
+
+    Raises:
+        TrackerError: there are no such observations, or they are of nobody in the session.
+    """
+    observations = load_observations(session, name)
+    found = body_points(observations, [c.camera for c in session.cameras])
+    return {i: found[p.name].known_to(p.model) for i, p in enumerate(session.people) if p.name in found}
+
+
+def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[int], name: str) -> FirstPoses:
+    """Find the first poses of people from key points, all on one frame. Pictures are not looked at.
+
+    Of the frames on which most points of all are known, the one whose key points fit the bodies best is taken. A body
+    in preset sizes takes the height of the points.
+
+    Args:
+        session: the session; nothing is stored.
+        people: indices of the people.
+        frames: that may be used.
+        name: of the observations.
+
+    Raises:
+        TrackerError: the observations lack somebody, or have too few points of them.
+    """
+    points, cameras = read_points(session, name), [c.camera for c in session.cameras]
+    bodies, costs = dict[int, Mapping[int, PosedBody]](), dict[int, dict[int, float]]()
+    for person in people:
+        who = session.people[person]
+        if person not in points:
+            raise TrackerError(f"expected key points of '{who.name}' in '{name}', found none; import them, too")
+        own = points[person]
+        bodies[person] = {k: b for k, b in fit_to_keypoints(_at_height(who.model, own), own).items() if k in frames}
+        if not bodies[person]:
+            raise TrackerError(
+                f"expected a frame with four joints of '{who.name}' in '{name}', found none; place the body by hand",
+                Remedy("place_body"),
+            )
+        costs[person] = learn_seen_body(bodies[person], own, cameras).costs(bodies[person], own, cameras)
+    common = sorted(set.intersection(*(set(c) for c in costs.values())))
+    if not common:
+        raise TrackerError(
+            f"expected a frame on which '{name}' has four joints of everybody, found none; find people one by one"
+        )
+    frame = min(common, key=lambda k: sum(own[k] for own in costs.values()))
+    starts = {i: Hypothesis(bodies[i][frame], SOURCE, costs[i][frame], is_measured=False) for i in people}
+    return FirstPoses(frame, {i: FirstPose(frame, start, "doubtful", 0.0, True, ()) for i, start in starts.items()})
+
+
+def _at_height(model: BodyModel, points: BodyPoints) -> BodyModel:
+    """Return a body in preset sizes at the height at which most of its segments are as long as those observed."""
+    if not has_preset_sizes(model):
+        return model
+    own = segment_lengths(model.named_points_world(model.neutral()))
+    seen = segment_lengths({n: points.joints_world[:, i] for i, n in enumerate(points.names)})
+    ratio = float(np.median([seen[n] / own[n] for n in own]))
+    return model.with_height(float(np.clip(model.height_m * ratio, *HEIGHT_LIMITS_M)))
+
+
+def seen_joints(session: Session, name: str, person: int, n_frames: int) -> dict[int, PointTargets]:
+    """Return the observed limb joints of a person by frame, to acquire sizes with.
+
+    A joint is off by as much on all frames, so that those of several frames together count as one.
+
+    Args:
+        session: the session.
+        name: of the observations.
+        person: index of the person.
+        n_frames: number of frames from which sizes are acquired.
+    """
+    own, model = read_points(session, name).get(person), session.people[person].model
+    if own is None:
+        return {}
+    found = {k: place_joints(model, own.places(k), _OFFSET_M * n_frames**0.5) for k in range(len(own.joints_world))}
+    return {k: t for k, t in found.items() if len(t.points)}
+
+
+def learn_seen_bodies(
+    session: Session, name: str, bodies: Mapping[int, Mapping[int, PosedBody]] | None = None
+) -> dict[int, SeenBody]:
+    """Learn how the detector sees each person.
+
+    Args:
+        session: the session with the present bodies.
+        name: of the observations.
+        bodies: of people whose poses other evidence shows: by index of the person and by frame, in the present bodies.
+            Others are posed by the key points alone, which do not show what all of them have in common.
+    """
+    points, cameras, out = read_points(session, name), [c.camera for c in session.cameras], dict[int, SeenBody]()
+    for person, own in points.items():
+        known = (bodies or {}).get(person) or fit_to_keypoints(session.people[person].model, own)
+        if known:
+            out[person] = learn_seen_body(known, own, cameras)
+    return out
+
+
+def keypoint_evidence(
+    session: Session, name: str, seen: Mapping[int, SeenBody], views: Sequence[str]
+) -> KeypointEvidence:
+    """Return key points as evidence of a run.
+
+    Args:
+        session: the session with the present bodies.
+        name: of the observations.
+        seen: how the detector sees each person, by index; people who are left out have no key points.
+        views: names of the cameras of the run.
+    """
+    points, names = read_points(session, name), [c.camera.name for c in session.cameras]
+    people = tuple(
+        seen[i].keypoints(p.model, points[i]) if i in seen and i in points else None
+        for i, p in enumerate(session.people)
+    )
+    return KeypointEvidence(people).of_views([names.index(v) for v in views])
+
+
+def with_keypoints(
+    session: Session, observer: Observer, name: str, seen: Mapping[int, SeenBody] | None = None
+) -> Observer:
+    """Return an observer to which key points are evidence, too; `seen` as in `keypoint_evidence`, learnt by default."""
+    known = learn_seen_bodies(session, name) if seen is None else seen
+    views = [c.camera.name for c in observer.cameras]
+    return observer.with_keypoints(keypoint_evidence(session, name, known, views))
+
+
+def seen_bodies_record(session: Session, name: str, seen: Mapping[int, SeenBody], before: Mapping[str, Any]) -> Any:
+    """Return the setting `SEEN_BODIES` with how one detector sees the people, whose bodies are noted.
+
+    Args:
+        session: the session with the present bodies.
+        name: of the observations.
+        seen: by index of the person.
+        before: the setting so far.
+    """
+    own = {
+        session.people[i].name: {
+            "body": format_model(session.people[i].model), "points": list(s.names),
+            "offsets_m": s.offsets_part.tolist(), "sigmas": s.sigmas.tolist(),
+        }
+        for i, s in seen.items()
+    }  # fmt: skip
+    return {**before, name: own}
+
+
+def stored_seen_bodies(session: Session, store: AnnotationStore, name: str) -> dict[int, SeenBody] | None:
+    """Return how a detector sees the people by their present bodies, as it was stored; None where it was not."""
+    stored = store.setting(SEEN_BODIES, {}).get(name)
+    if stored is None:
+        return None
+    out = dict[int, SeenBody]()
+    for i, person in enumerate(session.people):
+        own = stored.get(person.name)
+        if own is None:
+            continue
+        if own["body"] != format_model(person.model):
+            return None
+        out[i] = SeenBody(tuple(own["points"]), np.array(own["offsets_m"]), np.array(own["sigmas"]))
+    return out
