@@ -87,7 +87,7 @@ def _openpose_person(seen: PersonInView, camera: Camera, frame: int) -> OpenPose
     skeleton = next(known for known in known_joint_maps() if known.name == "BODY_25")
     counterparts = skeleton.counterparts(skeleton.points)
     model, keypoints = seen.body.model, seen.keypoints
-    found = 1.0 - np.nan_to_num(point_lost(model, seen.person.around[frame].record.limbs_lost))
+    found = 1.0 - np.nan_to_num(point_lost(model, seen.person.poses[frame].record.limbs_lost))
     points_px, confidence = np.full((len(counterparts), 2), np.nan), np.zeros(len(counterparts))
     visibility = np.zeros(len(counterparts), np.int64)
     for i, own in enumerate(counterparts.values()):

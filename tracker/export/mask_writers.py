@@ -52,7 +52,9 @@ class Masks:
         """
         self._motion, self._folder, self._cameras = motion, folder, cameras
         self._offsets = [source.offset for source in motion.session.cameras]
-        in_scene = sum(max((len(b.body.model.parts) for b in p.around.values()), default=0) for p in motion.people)
+        in_scene = sum(
+            max((len(b.body.model.parts) for b in ({**p.poses, **p.around}).values()), default=0) for p in motion.people
+        )
         rows = {(p.index, part.name): part for p in motion.exported for model in p.models for part in model.parts}
         if max(in_scene, len(rows) + 1) > SOMEBODY:
             raise FormatError(

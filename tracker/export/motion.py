@@ -50,9 +50,13 @@ class PersonMotion:
         """Number of poses that belong to another body than `model`."""
         return sum(p.body.model is not self.model for p in self.poses.values())
 
+    def body(self, frame: int) -> PosedBody:
+        """Return the body on a frame with a pose, exported or not."""
+        return (self.poses[frame] if frame in self.poses else self.around[frame]).body
+
     def moving(self, frame: int) -> PosedBody:
         """Return the body on a frame with a pose, with its velocity by the poses around it in the same body."""
-        body = self.around[frame].body
+        body = self.body(frame)
         near = {k: p.body for k, p in self.around.items() if abs(k - frame) <= 2}
         same = {k: b.values for k, b in near.items() if b.model is body.model}
         return replace(body, velocity=velocity(body.model, same, frame))
@@ -153,7 +157,7 @@ class ExportedMotion:
         shown = [p for p in self.people if frame in p.poses or frame in p.unselected]
         if any(c.clock.ahead(frame) for c in self.session.cameras):
             return [(p, p.moving(frame)) for p in shown]
-        return [(p, p.around[frame].body) for p in shown]
+        return [(p, p.body(frame)) for p in shown]
 
     def is_exported(self, person: PersonMotion, frame: int) -> bool:
         """Return whether the pose of a person in a frame is exported."""

@@ -15,6 +15,7 @@ from tracker.export.label_writers import write_points
 from tracker.export.motion import read_motion
 from tracker.export.options import ExportOptions
 from tracker.formats.anipose import read_calibration
+from tracker.formats.keypoints.openpose import read_openpose
 
 LIMBS = {
     "RElbow": "right_elbow",
@@ -46,6 +47,11 @@ def test_points_are_where_the_footage_shows_them(tmp_path):
         assert camera.fisheye or camera.distortion[0] == K1
         for frame in range(2, 5):
             people = {p["person_id"][0]: (p, points) for p, points in written(tmp_path / "o", camera.name, frame + 5)}
+            own = read_openpose(
+                tmp_path / "o" / f"{camera.name}_json" / f"{camera.name}_{frame + 5:012d}_keypoints.json"
+            )
+            for one, (_, points) in zip(own, people.values(), strict=True):
+                np.testing.assert_array_equal(np.nan_to_num(one), points)
             assert set(people) == {i for i in (0, 1) if frame in truth[i]}
             for i, (person, points) in people.items():
                 places = dict(zip(truth[i][frame].model.point_names, truth[i][frame].joint_centers_world, strict=True))
