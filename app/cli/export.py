@@ -33,7 +33,7 @@ class ExportArguments:
     """file or folder to write, or a folder that exists, for one named after the session."""
     format: Annotated[OptionalName, tyro.conf.arg(help=f"{_FORMATS_HELP}. By default as --out ends.")] = None
     person: OptionalName = None
-    """name; all people by default. In trc, mot and bvh each of several people has a file: OUT_NAME.trc."""
+    """name; all people by default. In trc, mot, bvh and c3d each of several people has a file: OUT_NAME.trc."""
     frames: Annotated[str | None, _choice("A:B|A,B,...")] = None
     """A:B, half open, or a list such as 3,7,12; from the first to the last pose by default."""
     keyframes_only: bool = False

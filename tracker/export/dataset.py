@@ -38,7 +38,7 @@ from tracker.formats.keypoints.coco import CocoAnnotation, CocoImage, segmentati
 from tracker.geometry.cameras import Camera
 
 CHECKSUMS = "SHA256SUMS"
-"""Name of the file that `sha256sum --check` reads."""
+"""Name of the file that `sha256sum -c` reads."""
 SUFFIXES = {"anipose": ".toml", "opencv": ".yml"}
 """Layouts of the calibration, with the ends of their files' names."""
 

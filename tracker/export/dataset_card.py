@@ -115,7 +115,7 @@ def _files(where: str, options: ExportOptions) -> Mapping[str, str]:
         "recordings/*/labels/openpose": "keypoints (BODY_25)",
         "recordings/*/calibration": "cameras in the layouts of anipose and of OpenCV, in metres",
         "recordings/*/poses.npz": "poses, joint centers and covariances in space",
-        "SHA256SUMS": "checksums; check them by `sha256sum --check SHA256SUMS`",
+        "SHA256SUMS": "checksums; check them by `sha256sum -c SHA256SUMS`",
     }
 
 

@@ -221,7 +221,7 @@ def _no_poses(
     reasons = [" that is not lost"] * has_lost
     if only is not None and any(p.unselected for p in people):
         reasons.append({"keyframes": " that is a keyframe", "reviewed": " that is reviewed"}[only])
-    remedy = Remedy("place_body" if len(reasons) == has_lost else "export_all_poses")
+    remedy = Remedy("place_body") if len(reasons) == has_lost else Remedy("export_all_poses")
     return SessionError(f"expected poses of {names}{where}, found none{''.join(reasons)}", remedy)
 
 
