@@ -156,7 +156,7 @@ def _refuse_existing(paths: Sequence[Path], overwrite: bool, may_replace: Callab
         may_overwrite = may_replace(found) if found.is_dir() and may_replace else not (found.is_dir() or may_replace)
         if found.exists() and not (overwrite and may_overwrite):
             kind = "folder" if found.is_dir() else "file"
-            remedy = Remedy("another_file_or_overwrite" if may_overwrite else "another_file")
+            remedy = Remedy("another_file_or_overwrite") if may_overwrite else Remedy("another_file")
             raise TrackerError(f"expected {found} not to exist, found a {kind}", remedy)
 
 
