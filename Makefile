@@ -90,7 +90,7 @@ $(VENV)/.tested: $(VENV)/.installed tests/support/chromium.py
 
 # .slow: the programs that write imported files and read exported ones; OpenSim is big.
 $(VENV)/.slow: $(VENV)/.tested
-	$(PIP_INSTALL) '.[dev,slow,import]'
+	$(PIP_INSTALL) '.[dev,slow,import,export]'
 	touch $@
 
 # The path is for npm's own scripts, which look for node there.

@@ -222,6 +222,13 @@ PHRASES = {
     "frames_of_one_body": Phrases(
         "give frames of one body as --frames, or another format", "choose Frames of one body, or another format"
     ),
+    "export_all_poses": Phrases(
+        "leave out --keyframes-only and --reviewed-only, or review poses first",
+        "choose all poses, or review poses first",
+    ),
+    "export_images": Phrases("leave out --pictures video, or --pixels", "choose Images, or Pixels as filmed"),
+    "fewer_people": Phrases("export one --person at a time", "export one of People at a time"),
+    "fewer_frames": Phrases("choose fewer as --frames, or another format", "choose fewer Frames, or another format"),
     "name_format": Phrases("correct --format", "choose another format"),
     "export_other_format": Phrases(
         "export the poses with --format instead, or leave them unedited to get the files as they came",

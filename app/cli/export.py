@@ -1,20 +1,20 @@
 """`quadrille export`: write stored poses to files of other programs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import OptionalName, OptionalRange, SessionArg
-from app.cli.target import load_target, parse_frames
+from app.cli.arguments import OptionalName, SessionArg
+from app.cli.target import load_target
 from app.export.formats import FORMATS, OPTIONS, ExportFormat, find_format
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.export.motion import ExportedMotion
+    from tracker.export.motion import Checked, ExportedMotion
 
 _FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.values())
 
@@ -30,22 +30,30 @@ class ExportArguments:
     session: SessionArg
     """session folder."""
     out: Path
-    """file to write, or a folder that exists, for a file named after the session."""
+    """file or folder to write, or a folder that exists, for one named after the session."""
     format: Annotated[OptionalName, tyro.conf.arg(help=f"{_FORMATS_HELP}. By default as --out ends.")] = None
     person: OptionalName = None
-    """name; all people by default. In trc, mot and bvh each of several people has a file: OUT_NAME.trc."""
-    frames: OptionalRange = None
-    """A:B, half open; from the first to the last pose by default."""
+    """name; all people by default. In trc, mot, bvh and c3d each of several people has a file: OUT_NAME.trc."""
+    frames: Annotated[str | None, _choice("A:B|A,B,...")] = None
+    """A:B, half open, or a list such as 3,7,12; from the first to the last pose by default."""
+    keyframes_only: bool = False
+    """export poses that a person set or verified, and no others."""
+    reviewed_only: bool = False
+    """export poses that a person has checked, and no others; keyframes are."""
     axes: Annotated[Literal["calibration", "y-up"] | None, _choice("calibration|y-up")] = None
-    """trc, csv, mot, bvh: calibration, the session's world (default of trc and csv); y-up, with the floor at y = 0."""
+    """calibration, the session's world; y-up, with the floor at y = 0, default of mot and bvh. glb is always y-up."""
     units: Annotated[Literal["m", "mm"] | None, _choice("m|mm")] = None
-    """trc, csv, bvh: unit of lengths; m by default."""
+    """trc, csv, bvh, c3d: unit of lengths; m by default, mm in c3d."""
     view: OptionalName = None
     """mp4: name of the camera; a grid of all views by default."""
     character: Annotated[str | None, tyro.conf.arg(metavar="BODY[:METRES]")] = None
     """mp4: body that moves as the person, beside the footage: a preset or a .toml file, and its height."""
+    pictures: Annotated[Literal["images", "video"] | None, _choice("images|video")] = None
+    """dataset: an image of each exported frame, by default, or the footage as it is."""
     keypoints: Annotated[Literal["all", "coco17", "body"] | None, _choice("all|coco17|body")] = None
-    """coco: the 17 keypoints of people, all points of the body, or both, which is the default."""
+    """coco, dataset: the 17 keypoints of people, all points of the body, or both, which is the default."""
+    pixels: Annotated[Literal["original", "undistorted"] | None, _choice("original|undistorted")] = None
+    """openpose, masks, dataset: of the footage (default), or without distortion, with such pictures and cameras."""
     like: OptionalName = None
     """send imported observations back in their own files; --out is a file, or the folder of several."""
     poses: Annotated[Literal["edited", "all"] | None, _choice("edited|all")] = None
@@ -54,6 +62,8 @@ class ExportArguments:
     """with --like: place points at the joints of the body, not as far from them as the files usually do."""
     skip_lost: bool = False
     """treat poses whose status is lost as missing."""
+    provenance: bool = True
+    """write OUT.provenance.json beside a format that cannot hold it: who made each pose, how, and how sure it is."""
     overwrite: bool = False
     """replace files that exist."""
     json: bool = False
@@ -68,16 +78,19 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
     if arguments.like is not None:
         return _send_back(arguments)
     _refuse_without_like(arguments)
-    from app.export.export import check_options, export, n_ticks
+    from app.export.export import check_options, export, for_format, n_ticks
+    from app.export.frame_list import parse_frame_list
     from tracker.export.motion import read_motion
 
     at = load_target(arguments.session, arguments.person, several=True)
     chosen = find_format(arguments.format, arguments.out)
     out = _file(arguments.out, chosen, at.session.folder.name)
     given = {name: getattr(arguments, name) for name in OPTIONS}
-    options = check_options(chosen, at.session, given)
-    frames = None if arguments.frames is None else parse_frames(arguments.frames, at.session)
-    motion = read_motion(at.session, at.people, frames, arguments.skip_lost)
+    options = replace(check_options(chosen, at.session, given), provenance=arguments.provenance)
+    n_frames, text = at.session.n_frames, arguments.frames
+    frames = None if text is None else parse_frame_list(text, n_frames, "--frames")
+    only: Checked | None = "keyframes" if arguments.keyframes_only else "reviewed" if arguments.reviewed_only else None
+    motion = for_format(chosen, read_motion(at.session, at.people, frames, arguments.skip_lost, only))
     with Reporter(silent=arguments.json).over(n_ticks(chosen, motion), "exporting") as tick:
         paths = export(chosen, motion, options, out, arguments.overwrite, tick)
     found = _summary(motion, chosen, paths, arguments.skip_lost) | {
@@ -127,13 +140,16 @@ def _count(n: int, noun: str) -> str:
 
 
 def _file(out: Path, chosen: ExportFormat, name: str) -> Path:
-    """Return the file to write.
+    """Return the file or folder to write.
 
     Raises:
         TrackerError: its suffix is of another format, or its folder is missing.
     """
-    out = out / f"{name}{chosen.suffixes[0]}" if out.is_dir() else out
-    if out.suffix.lower() != chosen.suffixes[0]:
+    from app.export.export import is_export_folder
+
+    if out.is_dir() and not (chosen.is_folder and is_export_folder(out)):
+        out = out / f"{name}{chosen.suffixes[0]}"
+    if out.suffix.lower() != chosen.suffixes[0] and not chosen.is_folder:
         raise TrackerError(
             f"expected --out to end in {chosen.suffixes[0]} for format {chosen.name}, found '{out.name}'; "
             f"rename it to {out.name.removesuffix(out.suffix)}{chosen.suffixes[0]}"
@@ -144,11 +160,15 @@ def _file(out: Path, chosen: ExportFormat, name: str) -> Path:
 
 
 def _summary(motion: "ExportedMotion", chosen: ExportFormat, paths: list[Path], skip_lost: bool) -> dict[str, Any]:
+    from tracker.export.provenance import SIDE_FILE
+
     return {
         "format": chosen.name,
-        "files": [str(path) for path in paths],
+        "files": [str(path) for path in paths if not path.name.endswith(SIDE_FILE)],
+        "provenance": [str(path) for path in paths if path.name.endswith(SIDE_FILE)],
         "people": [p.person.name for p in motion.exported],
-        "frames": [motion.frames.start, motion.frames.stop],
+        "frames": [motion.span.start, motion.span.stop],
+        "n_frames": len(motion.frames),
         "missing": motion.n_missing,
         "lost": motion.n_lost,
         "lost_skipped": skip_lost,
@@ -161,8 +181,9 @@ def _summary(motion: "ExportedMotion", chosen: ExportFormat, paths: list[Path], 
 def _format(found: dict[str, Any]) -> str:
     first, last = found["frames"]
     axes = "" if found["axes"] is None else f", axes {found['axes']}"
-    lines = [f"wrote {path}" for path in found["files"]]
-    lines.append(f"{', '.join(found['people'])}, frames {first}:{last}{axes}")
+    lines = [f"wrote {path}" for path in (*found["files"], *found["provenance"])]
+    listed = "" if found["n_frames"] == last - first else f" ({found['n_frames']} of them)"
+    lines.append(f"{', '.join(found['people'])}, frames {first}:{last}{listed}{axes}")
     if numbering := FORMATS[found["format"]].numbering:
         lines.append(numbering.format(frame=first, number=first + 1))
     if found["missing"]:

@@ -35,7 +35,7 @@ class Characters:
 
     def bodies(self, frame: int) -> list[PosedBody]:
         """Return the characters of the exported people who have a pose in a frame."""
-        posed = [body for p, body in self._motion.bodies(frame) if p.index in self._motion.chosen]
+        posed = [body for p, body in self._motion.bodies(frame) if self._motion.is_exported(p, frame)]
         return [
             PosedBody(self._character, drive_character(b.values, b.model, self._character, self._floor)) for b in posed
         ]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ from tracker.errors import Remedy, TrackerError
 
 if TYPE_CHECKING:
     from tracker.export.motion import ExportedMotion
-    from tracker.export.options import AxesName, ExportOptions
+    from tracker.export.options import AxesName, ExportOptions, UnitName
 
 Writer = Callable[["ExportedMotion", "ExportOptions", Sequence[Path], Callable[[], None]], None]
 """Writes a motion to the files of one format, and calls the function after each frame."""
@@ -27,28 +28,34 @@ class ExportFormat:
     """End of the name of each file; the first names the format."""
     write: Writer
     options: frozenset[str] = frozenset()
-    """Options that it has: `axes`, `units`, `keypoints`, `view`, `character`."""
+    """Options that it has, some of `OPTIONS`."""
     one_person: bool = False
     """Whether each person gets files of their own."""
     axes: "AxesName" = "calibration"
     """Axes by default, as programs that read it expect them."""
+    units: "UnitName" = "m"
+    """Unit of lengths by default."""
     gaps: str = "left empty"
     """Treatment of frames without a pose."""
     numbering: str = ""
     """Sentence on its frame numbers where they are not the session's, of `{frame}` and `{number}`, 1 more."""
     one_body: bool = False
     """Whether all poses of a person are of one body; those of earlier sizes are refitted."""
+    has_rate: bool = False
+    """Whether its frames have a constant rate; those between the exported ones are then like frames without a pose."""
+    is_folder: bool = False
+    """Whether it is a folder of files; the first suffix ends its name if it is named after the session."""
+    holds_provenance: bool = False
+    """Whether its own files hold the provenance of the poses."""
 
 
-def _by_writer(name: str) -> Writer:
-    """Return a function of `tracker.export.writers`, which is imported at the first export: help is quick without."""
+def _by_writer(name: str, module: str = "writers") -> Writer:
+    """Return a function of a module of `tracker.export`, imported at the first export: help is quick without."""
 
     def write(
         motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]
     ) -> None:
-        from tracker.export import writers
-
-        writer: Writer = getattr(writers, name)
+        writer: Writer = getattr(import_module(f"tracker.export.{module}"), name)
         writer(motion, options, paths, tick)
 
     return write
@@ -60,9 +67,10 @@ def _mp4(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Pat
     write_overlay_video(motion, options, paths[0], tick)
 
 
-OPTIONS = ("axes", "units", "view", "keypoints", "character")
+OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "pictures", "character")
 """Options that a format may have, the fields of `ExportOptions`."""
 _PLACE = frozenset(("axes", "units"))
+_FROM_1 = "counts from 1: frame {frame} of the session is"
 FORMATS: Mapping[str, ExportFormat] = {
     f.name: f
     for f in (
@@ -73,7 +81,8 @@ FORMATS: Mapping[str, ExportFormat] = {
             _by_writer("write_person_trc"),
             _PLACE,
             one_person=True,
-            numbering="Frame# counts from 1: frame {frame} of the session is Frame# {number}",
+            has_rate=True,
+            numbering=f"Frame# {_FROM_1} Frame# {{number}}",
         ),
         ExportFormat(
             "csv", "tables of joints and angles (CSV)", (".csv", "_angles.csv"), _by_writer("write_tables"), _PLACE
@@ -107,6 +116,83 @@ FORMATS: Mapping[str, ExportFormat] = {
             axes="y-up",
             gaps="interpolated",
             one_body=True,
+            has_rate=True,
+        ),
+        ExportFormat(
+            "glb",
+            "animated skeleton (glTF)",
+            (".glb",),
+            _by_writer("write_animation"),
+            axes="y-up",
+            gaps="interpolated by viewers",
+            one_body=True,
+        ),
+        ExportFormat(
+            "c3d",
+            "joint centers (C3D)",
+            (".c3d",),
+            _by_writer("write_person_c3d", "array_writers"),
+            _PLACE,
+            one_person=True,
+            units="mm",
+            has_rate=True,
+            numbering=f"C3D {_FROM_1} frame {{number}} of the file",
+        ),
+        ExportFormat(
+            "openpose",
+            "keypoints (OpenPose)",
+            ("_openpose",),
+            _by_writer("write_points", "label_writers"),
+            frozenset(("pixels",)),
+            gaps="left without people",
+            is_folder=True,
+        ),
+        ExportFormat(
+            "masks",
+            "masks of parts (PNG)",
+            ("_masks",),
+            _by_writer("write_masks", "mask_writers"),
+            frozenset(("pixels",)),
+            gaps="left without people",
+            is_folder=True,
+        ),
+        ExportFormat(
+            "movement",
+            "poses (movement, netCDF)",
+            (".nc", "_views.nc"),
+            _by_writer("write_movement", "array_writers"),
+            frozenset(("axes",)),
+            gaps="left as NaN",
+            has_rate=True,
+            holds_provenance=True,
+        ),
+        ExportFormat(
+            "nwb",
+            "poses (NWB, ndx-pose)",
+            (".nwb",),
+            _by_writer("write_poses_nwb", "nwb_writer"),
+            frozenset(("axes",)),
+            gaps="left as NaN",
+            has_rate=True,
+            holds_provenance=True,
+        ),
+        ExportFormat(
+            "npz",
+            "poses and cameras (NPZ)",
+            (".npz",),
+            _by_writer("write_npz", "array_writers"),
+            frozenset(("axes",)),
+            gaps="left as NaN",
+            holds_provenance=True,
+        ),
+        ExportFormat(
+            "dataset",
+            "dataset of pictures and labels",
+            ("_dataset",),
+            _by_writer("write_dataset", "dataset"),
+            frozenset(("keypoints", "pixels", "pictures")),
+            gaps="left without people",
+            is_folder=True,
         ),
         ExportFormat(
             "mp4",

@@ -84,7 +84,7 @@ def _drawn_paths(motion: ExportedMotion, frame: int, shown: Sequence[int]) -> li
     velocities = tuple(body.velocity for _, body in people)
     state = State(frame, tuple(ShownPose(body.values, "") for _, body in people), velocities=velocities)
     view = View(_LAYERS, tuple(float(i in shown) for i in range(len(session.cameras))))
-    exported = [p.index in motion.chosen for p, _ in people]
+    exported = [motion.is_exported(p, frame) for p, _ in people]
     return [path for path in overlays.paths(session, state, view, None) if exported[path.person]]
 
 

@@ -10,8 +10,9 @@ import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from aiohttp import web
@@ -21,6 +22,9 @@ from app.remedies import page_text
 from app.runtime.temporary_folder import TemporaryFolder
 from app.server import connections
 from tracker.errors import TrackerError
+
+if TYPE_CHECKING:
+    from tracker.export.motion import Checked
 
 _LOG = logging.getLogger(__name__)
 _CHUNK_BYTES = 1 << 18
@@ -58,6 +62,8 @@ class ExportRoutes:
                     "title": f.title,
                     "options": sorted(f.options),
                     "axes": f.axes,
+                    "units": f.units,
+                    "holds_provenance": f.holds_provenance or f.is_folder,
                     "numbering": f.numbering,
                 }
                 for f in FORMATS.values()
@@ -97,6 +103,7 @@ class ExportRoutes:
             _StoppedError: nobody waits for it any more.
         """
         from app.export.export import check_options, export, n_ticks
+        from app.export.frame_list import parse_frame_list
         from tracker.export.motion import read_motion
         from tracker.formats.file_names import identifier
         from tracker.formats.model_toml import PRESETS
@@ -115,17 +122,18 @@ class ExportRoutes:
                 f"expected a character among {', '.join(PRESETS)}, found '{character}'; choose one of them"
             )
         options = check_options(chosen, session, {name: query.get(name) for name in OPTIONS})
-        frames = None if not query.get("frames") else _frames(query["frames"], session.n_frames)
-        motion = read_motion(session, people, frames, query.get("skip_lost") == "1")
+        options = replace(options, provenance=query.get("provenance") == "1")
+        frames = None if not query.get("frames") else parse_frame_list(query["frames"], session.n_frames, "frames")
+        motion = read_motion(session, people, frames, query.get("skip_lost") == "1", _checked(query.get("only")))
         self._total = n_ticks(chosen, motion)
         stem = identifier("_".join([session.folder.name, *([] if person is None or len(names) == 1 else [person])]))
         paths = export(chosen, motion, options, folder / f"{stem}{chosen.suffixes[0]}", tick=self._tick(request))
-        if len(paths) == 1:
+        if len(paths) == 1 and not chosen.is_folder:
             return paths[0]
         archive = folder / f"{stem}_{chosen.name}.zip"
         with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-            for path in paths:
-                file.write(path, path.name)
+            for path in (p for found in paths for p in (sorted(found.rglob("*")) if found.is_dir() else [found])):
+                file.write(path, path.relative_to(folder))
         return archive
 
     def _tick(self, request: web.Request) -> Callable[[], None]:
@@ -139,18 +147,15 @@ class ExportRoutes:
         return tick
 
 
-def _frames(text: str, n_frames: int) -> range:
-    """Parse A:B, half open, of a request.
+def _checked(text: str | None) -> "Checked | None":
+    """Parse which poses a request exports.
 
     Raises:
-        TrackerError: it is no range within the session.
+        TrackerError: it is no such choice.
     """
-    first, colon, last = text.partition(":")
-    if colon and all(word.isascii() and word.isdigit() and len(word) < 10 for word in (first, last)):
-        frames = range(int(first), int(last))
-        if frames and frames.stop <= n_frames:
-            return frames
-    raise TrackerError(f"expected frames as A:B within 0:{n_frames} (A included, B not), found '{text[:40]}'")
+    if text is None or text == "keyframes" or text == "reviewed":
+        return text  # type: ignore[return-value]
+    raise TrackerError(f"expected only as keyframes or reviewed, found '{text[:40]}'; reload the page")
 
 
 async def _send(request: web.Request, path: Path) -> web.StreamResponse:

@@ -8,7 +8,7 @@ const PROGRESS_MS = 400;
 /** Longest text of the server that is shown as its reason. */
 const MAX_REASON = 400;
 
-/** @typedef {{name: string, title: string, options: string[], axes: string, numbering: string}} Format
+/** @typedef {{name: string, title: string, options: string[], axes: string, units: string, holds_provenance: boolean, numbering: string}} Format
  *   `numbering` is a sentence of a `{frame}` and its `{number}` in the file, or empty where they are the same
  */
 
@@ -87,11 +87,14 @@ export class ExportPanel {
   /** Show the options that the chosen format has. */
   #show() {
     const format = this.#chosen;
-    const has = new Set([...(format?.options ?? []), ...((this.#store.facts.session?.people.length ?? 0) > 1 ? ["person"] : [])]);
+    const has = new Set(format?.options);
+    if ((this.#store.facts.session?.people.length ?? 0) > 1) has.add("person");
+    if (format && !format.holds_provenance) has.add("provenance");
     for (const part of this.#panel.querySelectorAll("[data-option]")) {
       if (part instanceof HTMLElement) part.hidden = !has.has(part.dataset.option ?? "");
     }
     byId("export-axes", HTMLSelectElement).value = format?.axes ?? "calibration";
+    byId("export-units", HTMLSelectElement).value = format?.units ?? "m";
     this.#showNumbering();
   }
 
@@ -114,16 +117,18 @@ export class ExportPanel {
     }
     const text = this.#frames.value.trim();
     if (text) {
-      const frames = /^(\d{1,8})(?:\s*[-–]\s*(\d{1,8}))?$/.exec(text);
       const last = (this.#store.facts.session?.n_frames ?? 1) - 1;
-      const [from, to] = frames ? [Number(frames[1]), Number(frames[2] ?? frames[1])] : [0, -1];
-      if (from > to || to > last) {
-        this.#showMessage(`Expected frames within 0-${last}, such as 0-${Math.min(9, last)}, or nothing.`, true);
+      const frames = framesOf(text, last);
+      if (frames === null) {
+        this.#showMessage(`Expected frames within 0-${last}, such as 0-${Math.min(9, last)} or 0, ${last}, or nothing.`, true);
         return null;
       }
-      words.set("frames", `${from}:${to + 1}`);
+      words.set("frames", frames);
     }
+    const only = byId("export-only", HTMLSelectElement).value;
+    if (only) words.set("only", only);
     if (byId("export-skip-lost", HTMLInputElement).checked) words.set("skip_lost", "1");
+    if (!this.#chosen?.holds_provenance && byId("export-provenance", HTMLInputElement).checked) words.set("provenance", "1");
     return `export/${this.#format.value}?${words}`;
   }
 
@@ -204,6 +209,21 @@ function choices(select, options) {
   const chosen = select.value;
   select.replaceChildren(...options);
   if (options.some(({ value }) => value === chosen)) select.value = chosen;
+}
+
+/**
+ * @param {string} text frames as entered, first and last or a list
+ * @param {number} last frame of the session
+ * @returns {string | null} the same for the server; null if they are none of the session
+ */
+function framesOf(text, last) {
+  const ends = /^(\d{1,8})(?:\s*[-–]\s*(\d{1,8}))?$/.exec(text);
+  if (ends) {
+    const [from, to] = [Number(ends[1]), Number(ends[2] ?? ends[1])];
+    return from <= to && to <= last ? `${from}:${to + 1}` : null;
+  }
+  const words = text.split(",").map((word) => word.trim());
+  return words.every((word) => /^\d{1,8}$/.test(word) && Number(word) <= last) ? words.join(",") : null;
 }
 
 /** @param {string} disposition header with the name of a file */

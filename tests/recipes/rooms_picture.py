@@ -46,7 +46,7 @@ HOUSE = {
         ["contours", "images", "store", "observations"],
         ["session"],
         ["footage", "calibrations", "motion"],
-        ["formats/keypoints"],
+        ["formats/interchange", "formats/keypoints"],
         ["formats"],
         ["body"],
         ["geometry"],

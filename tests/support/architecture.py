@@ -15,6 +15,7 @@ ROOMS = [
     "tracker.motion",
     "tracker.formats",
     "tracker.formats.keypoints",
+    "tracker.formats.interchange",
     "tracker.calibrations",
     "tracker.footage",
     "tracker.session",

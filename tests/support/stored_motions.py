@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 from fisheye import with_fisheye
 from staging import cameras_around
@@ -72,3 +73,17 @@ def store_motion(folder, models, n_frames=8, gaps=(), lost=(), seed=0, up="z"):
         truth.append({f: PosedBody(person.model, poses[f]) for f in frames})
     store.close()
     return session, truth
+
+
+def filmed(session, tmp_path):
+    """Give each camera gray pictures with a bright dot at (150, 120); frame 0 of the session is their number 5."""
+    cameras = []
+    for source in session.cameras:
+        folder = tmp_path / f"shots_{source.camera.name}"
+        folder.mkdir()
+        for i in range(5 + session.n_frames):
+            picture = np.full((*source.camera.size[::-1], 3), 90, np.uint8)
+            cv2.circle(picture, (150, 120), 4, (255, 255, 255), -1)
+            cv2.imwrite(str(folder / f"{i:03d}.png"), picture)
+        cameras.append(replace(source, footage=folder, offset=5))
+    return replace(session, cameras=tuple(cameras))

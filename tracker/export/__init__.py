@@ -1,5 +1,6 @@
 """Export the stored poses of a session to the files of other programs.
 
 Imports all that it gathers: `session`, `store`, `contours`, `posing`; `formats` writes the files. Callers use `motion`,
-to read what is exported, and `writers`, one function for each format.
+to read what is exported, and one function for each format of `writers`, `array_writers`, `nwb_writer`, `label_writers`,
+`mask_writers` and `dataset`. `provenance` tells who made each pose, and how.
 """

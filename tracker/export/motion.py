@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from tracker.session.session import Person, Session
 from tracker.store.calibration_log import PosedRevisions, read_posed_revisions
 from tracker.store.stored_poses import StoredPose, read_stored_poses
 
+Checked = Literal["keyframes", "reviewed"]
+"""Poses that a person set or verified, or that a person has checked; a keyframe is one of both."""
+
 
 @dataclass(frozen=True, eq=False)
 class PersonMotion:
@@ -28,6 +32,8 @@ class PersonMotion:
     """By frame; a frame may be missing."""
     around: Mapping[int, StoredPose] = field(default_factory=dict)
     """The same, with those of two frames before and after the exported ones."""
+    unselected: frozenset[int] = frozenset()
+    """Frames with a pose in `around` that is not exported, but occludes others."""
 
     @cached_property
     def model(self) -> BodyModel:
@@ -44,9 +50,13 @@ class PersonMotion:
         """Number of poses that belong to another body than `model`."""
         return sum(p.body.model is not self.model for p in self.poses.values())
 
+    def body(self, frame: int) -> PosedBody:
+        """Return the body on a frame with a pose, exported or not."""
+        return (self.poses[frame] if frame in self.poses else self.around[frame]).body
+
     def moving(self, frame: int) -> PosedBody:
         """Return the body on a frame with a pose, with its velocity by the poses around it in the same body."""
-        body = self.poses[frame].body
+        body = self.body(frame)
         near = {k: p.body for k, p in self.around.items() if abs(k - frame) <= 2}
         same = {k: b.values for k, b in near.items() if b.model is body.model}
         return replace(body, velocity=velocity(body.model, same, frame))
@@ -66,7 +76,7 @@ class PersonMotion:
             )
         return {f: retarget_pose(p.body.values, p.body.model, self.model) for f, p in self.poses.items()}
 
-    def without_gaps(self, frames: range) -> Array:
+    def without_gaps(self, frames: Sequence[int]) -> Array:
         """Return a pose of the body `model` for each frame, (n, n_values).
 
         A gap is interpolated; before the first pose and after the last one the body stands still.
@@ -92,7 +102,8 @@ class ExportedMotion:
     """The poses of a session that are exported."""
 
     session: Session
-    frames: range
+    frames: Sequence[int]
+    """Ascending; files with a constant rate have all of `span`."""
     people: tuple[PersonMotion, ...]
     """All people of the session, because they occlude one another."""
     chosen: tuple[int, ...]
@@ -106,6 +117,11 @@ class ExportedMotion:
     def exported(self) -> tuple[PersonMotion, ...]:
         """The people who are exported."""
         return tuple(self.people[i] for i in self.chosen)
+
+    @property
+    def span(self) -> range:
+        """All frames from the first to the last one."""
+        return range(self.frames[0], self.frames[-1] + 1)
 
     @property
     def n_missing(self) -> int:
@@ -134,47 +150,81 @@ class ExportedMotion:
         return frame / self.session.fps
 
     def bodies(self, frame: int) -> list[tuple[PersonMotion, PosedBody]]:
-        """Return the people who have a pose in a frame, with their bodies, and velocities if a view needs them."""
-        shown = [p for p in self.people if frame in p.poses]
+        """Return the people who are in the scene in a frame, with their bodies, and velocities if a view needs them.
+
+        This includes people whose pose is not exported, see `is_exported`.
+        """
+        shown = [p for p in self.people if frame in p.poses or frame in p.unselected]
         if any(c.clock.ahead(frame) for c in self.session.cameras):
             return [(p, p.moving(frame)) for p in shown]
-        return [(p, p.poses[frame].body) for p in shown]
+        return [(p, p.body(frame)) for p in shown]
+
+    def is_exported(self, person: PersonMotion, frame: int) -> bool:
+        """Return whether the pose of a person in a frame is exported."""
+        return person.index in self.chosen and frame in person.poses
 
 
 def read_motion(
-    session: Session, chosen: Sequence[int], frames: range | None = None, skip_lost: bool = False
+    session: Session,
+    chosen: Sequence[int],
+    frames: Sequence[int] | None = None,
+    skip_lost: bool = False,
+    only: Checked | None = None,
 ) -> ExportedMotion:
     """Read the stored poses of a session.
 
     Args:
         session: the session; other programs may have it open.
         chosen: indices of the people to export. Of several, those without a pose are left out.
-        frames: by default from the first to the last pose of these people.
-        skip_lost: treat poses whose status is lost as missing, but for keyframes.
+        frames: ascending; by default from the first to the last pose of these people.
+        skip_lost: treat poses whose status is lost as missing, but for keyframes. They occlude nobody.
+        only: leave out poses that no person has set or verified ("keyframes"), or that nobody has checked ("reviewed"),
+            and frames without a pose that is left. People who are left out still occlude others.
 
     Raises:
-        SessionError: nobody has a pose in these frames.
+        SessionError: nobody has such a pose in these frames.
     """
     within = range(session.n_frames) if frames is None else frames
+    wanted = frozenset(within)
     people, n_lost = [], 0
     for index, person in enumerate(session.people):
-        wider = range(max(0, within.start - 2), within.stop + 2)
+        wider = range(max(0, within[0] - 2), within[-1] + 3)
         around = read_stored_poses(session.annotations_path, person.name, person.model, wider)
-        stored = {frame: pose for frame, pose in around.items() if frame in within}
+        stored = {frame: pose for frame, pose in around.items() if frame in wanted}
         lost = {f for f, pose in stored.items() if pose.record.status == "lost" and not pose.record.keyframe}
         n_lost += len(lost) * (index in chosen)
-        poses = {f: p for f, p in stored.items() if not skip_lost or f not in lost}
-        people.append(PersonMotion(index, person, poses, around))
+        present = {f: p for f, p in stored.items() if not skip_lost or f not in lost}
+        poses = {f: p for f, p in present.items() if _is_checked(p, only)}
+        people.append(PersonMotion(index, person, poses, around, frozenset(present.keys() - poses.keys())))
     having = tuple(i for i in chosen if people[i].poses)
     if not having:
-        names = " and ".join(f"'{session.people[i].name}'" for i in chosen)
-        where = "" if frames is None else f" in frames {frames.start}:{frames.stop}"
-        raise SessionError(
-            f"expected poses of {names}{where}, found none{' that is not lost' if n_lost else ''}",
-            Remedy("place_body"),
-        )
-    if frames is None:
-        found = [frame for i in having for frame in people[i].poses]
-        within = range(min(found), max(found) + 1)
+        raise _no_poses([people[i] for i in chosen], frames, n_lost > 0, only)
+    found = sorted({frame for i in having for frame in people[i].poses})
+    if only is not None:
+        within = found
+    elif frames is None:
+        within = range(found[0], found[-1] + 1)
     calibrations = read_posed_revisions(session.annotations_path, [p.name for p in session.people])
     return ExportedMotion(session, within, tuple(people), having, n_lost, calibrations)
+
+
+def _is_checked(pose: StoredPose, only: Checked | None) -> bool:
+    return only is None or pose.record.keyframe or (only == "reviewed" and pose.record.reviewed)
+
+
+def _no_poses(
+    people: Sequence[PersonMotion], frames: Sequence[int] | None, has_lost: bool, only: Checked | None
+) -> SessionError:
+    """Return the error of an export without poses."""
+    names = " and ".join(f"'{p.person.name}'" for p in people)
+    where = "" if frames is None else f" in frames {frames_text(frames)}"
+    reasons = [" that is not lost"] * has_lost
+    if only is not None and any(p.unselected for p in people):
+        reasons.append({"keyframes": " that is a keyframe", "reviewed": " that is reviewed"}[only])
+    remedy = Remedy("place_body") if len(reasons) == has_lost else Remedy("export_all_poses")
+    return SessionError(f"expected poses of {names}{where}, found none{''.join(reasons)}", remedy)
+
+
+def frames_text(frames: Sequence[int]) -> str:
+    """Return frames as a person writes them: A:B, half open, or 3,7,12."""
+    return f"{frames[0]}:{frames[-1] + 1}" if isinstance(frames, range) else ",".join(map(str, frames))

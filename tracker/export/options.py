@@ -20,6 +20,10 @@ UnitName = Literal["m", "mm"]
 UNITS: tuple[UnitName, ...] = get_args(UnitName)
 KeypointSet = Literal["all", "coco17", "body"]
 KEYPOINT_SETS: tuple[KeypointSet, ...] = get_args(KeypointSet)
+PicturesName = Literal["images", "video"]
+PICTURES: tuple[PicturesName, ...] = get_args(PicturesName)
+PixelsName = Literal["original", "undistorted"]
+PIXELS: tuple[PixelsName, ...] = get_args(PixelsName)
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,13 @@ class ExportOptions:
     """Overlay video: name of the camera; None for a grid of all."""
     character: str | None = None
     """Overlay video: body that moves as the person beside the footage, a preset or a file; see `load_character`."""
+
+    pixels: PixelsName = "original"
+    """Pixels of points and masks: those of the footage, or without lens distortion, with such pictures and cameras."""
+    pictures: PicturesName = "images"
+    """Dataset: an image of each exported frame, or the footage as it is."""
+    provenance: bool = False
+    """Whether a file beside one that cannot hold it has the provenance of the poses."""
 
     @property
     def per_metre(self) -> float:

@@ -14,6 +14,7 @@ from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_folder import ImageFolder
 from tracker.formats.bvh import UPRIGHT_Y, BvhFrame, write_bvh
 from tracker.formats.file_names import identifier
+from tracker.formats.interchange.gltf import AnimatedBody, write_glb
 from tracker.formats.keypoints.coco import (
     CocoAnnotation,
     CocoCategory,
@@ -111,14 +112,22 @@ def write_person_bvh(motion: ExportedMotion, options: ExportOptions, paths: Sequ
     write_bvh(paths[0], person.model, person.without_gaps(motion.frames), session.fps, frame, tick)
 
 
+def write_animation(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
+    """Write the motion of all people as glTF, with the shapes of their parts. Viewers interpolate frames between."""
+    bodies = []
+    for person in motion.exported:
+        poses = person.in_one_body()
+        frames = sorted(poses)
+        times = np.array([motion.time_s(f) for f in frames])
+        bodies.append(AnimatedBody(person.person.name, person.model, np.array([poses[f] for f in frames]), times))
+    write_glb(paths[0], motion.session.name, bodies, file_from_world(motion.session, options.axes))
+    for _ in motion.frames:
+        tick()
+
+
 def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
     """Write the keypoints of people in all views as COCO."""
-    categories: list[CocoCategory] = []
-    if options.keypoints != "body":
-        categories.append(person_category(1))
-    if options.keypoints != "coco17":
-        for model in {m.name: m for p in motion.exported for m in p.models}.values():
-            categories.append(body_category(len(categories) + 1, model))
+    categories = coco_categories(motion, options)
     cameras = [c.camera for c in motion.session.cameras]
     names = [_FileNames(source) for source in motion.session.cameras]
     images: list[CocoImage] = []
@@ -131,14 +140,25 @@ def write_keypoints(motion: ExportedMotion, options: ExportOptions, paths: Seque
             image = name.image(len(images) + 1, frame)
             images.append(image)
             for (person, body), seen in zip(people, found, strict=True):
-                if person.index in motion.chosen and seen.box_px is not None:
-                    annotations += _annotations(motion, categories, person, body, seen, image, len(annotations))
+                if motion.is_exported(person, frame) and seen.box_px is not None:
+                    annotations += coco_annotations(motion, categories, person, body, seen, image, len(annotations))
         tick()
     description = f"{motion.session.name}, exported by Quadrille, {motion.calibration_note}"
     write_coco(paths[0], description, motion.calibrations.present, categories, images, annotations)
 
 
-def _annotations(
+def coco_categories(motion: ExportedMotion, options: ExportOptions) -> list[CocoCategory]:
+    """Return the sets of keypoints of an export."""
+    categories: list[CocoCategory] = []
+    if options.keypoints != "body":
+        categories.append(person_category(1))
+    if options.keypoints != "coco17":
+        for model in {m.name: m for p in motion.exported for m in p.models}.values():
+            categories.append(body_category(len(categories) + 1, model))
+    return categories
+
+
+def coco_annotations(
     motion: ExportedMotion,
     categories: Sequence[CocoCategory],
     person: PersonMotion,

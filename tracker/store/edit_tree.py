@@ -32,7 +32,7 @@ class EditTree:
         """Add an edit after head, within a transaction, make it head and return its id."""
         edit = db.execute(
             "INSERT INTO edits (parent, label, author, time, program) VALUES (?, ?, ?, ?, ?)",
-            (head(db), label, author, now(), _program_version()),
+            (head(db), label, author, now(), program_version()),
         ).lastrowid
         assert edit is not None
         db.execute("UPDATE head SET edit = ?", (edit,))
@@ -179,7 +179,8 @@ def _chain(db: sqlite3.Connection, start: str, onward: str, parameter: int | Non
 
 
 @cache
-def _program_version() -> str:
+def program_version() -> str:
+    """Return the version of the program; "unknown" in a source tree that is not installed."""
     try:
         return metadata.version("quadrille")
     except metadata.PackageNotFoundError:  # run from the source tree without an installation

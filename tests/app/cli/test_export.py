@@ -3,13 +3,18 @@
 import errno
 import json
 
+import numpy as np
 import pytest
 from bodies import MODELS
 from command_line import assert_refused
 from stored_motions import store_motion
 
+from app.export.export import export
 from app.export.formats import FORMATS
+from tracker.export.motion import read_motion
+from tracker.export.options import ExportOptions
 from tracker.formats.trc import read_trc
+from tracker.session.session import load_session
 
 
 @pytest.fixture
@@ -25,16 +30,33 @@ def test_each_person_has_a_file_of_the_name(run, couple, tmp_path):
     found = json.loads(out)
     assert found["files"] == [str(tmp_path / f"m_{name}.trc") for name in ("ann", "bob")]
     assert (found["frames"], found["missing"], found["lost"]) == ([0, 8], 2, 1)
+    assert found["provenance"] == [str(tmp_path / f"m_{name}.trc.provenance.json") for name in ("ann", "bob")]
     status, out, _ = run("export", couple, "--out", tmp_path / "m.mot", "--person", "bob", "--skip-lost")
     assert status == 0
     assert (tmp_path / "m.osim").is_file()
     lines = out.splitlines()
-    assert lines[2:] == [
+    assert lines[3:] == [
         "bob, frames 0:8, axes y-up", "1 poses are missing and left out", "1 poses are lost, treated as missing"
     ]  # fmt: skip
     rows = (tmp_path / "m.mot").read_text().splitlines()
     assert rows[2] == "nRows=7"
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.mot", "m.osim", "m_ann.trc", "m_bob.trc", "s"]
+    data = ["m.mot", "m.osim", "m_ann.trc", "m_bob.trc"]
+    side = [f"{name}.provenance.json" for name in ("m.mot", "m_ann.trc", "m_bob.trc")]
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([*data, *side, "s"])
+
+
+def test_frames_by_list_and_keyframes_alone(run, couple, tmp_path):
+    words = ("export", couple, "--format", "csv", "--no-provenance", "--json")
+    status, out, _ = run(*words, "--out", tmp_path / "a.csv", "--frames", "1,2,6")
+    assert (status, json.loads(out)["frames"], json.loads(out)["n_frames"]) == (0, [1, 7], 3)
+    assert len((tmp_path / "a.csv").read_text().splitlines()) == 1 + 2 * 3
+    status, out, _ = run(*words, "--out", tmp_path / "b.csv", "--keyframes-only")
+    assert (status, json.loads(out)["frames"], json.loads(out)["missing"]) == (0, [1, 2], 0)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "a_angles.csv", "b.csv", "b_angles.csv", "s"]
+    # A table with a constant rate has a row for each frame between.
+    assert run("export", couple, "--out", tmp_path / "m.trc", "--person", "bob", "--frames", "2,4")[0] == 0
+    table = read_trc(tmp_path / "m.trc")
+    assert np.isnan(table.points[:, 0, 0]).tolist() == [False, True, False]
 
 
 def test_a_folder_takes_the_name_of_the_session(run, couple, tmp_path):
@@ -57,12 +79,14 @@ def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        (["--format", "fbx"], ["a format among trc, csv, mot, coco, bvh, mp4", "found 'fbx'", "--format"]),
+        (["--format", "fbx"], ["a format among trc, csv, mot, coco, bvh, glb, c3d", "found 'fbx'", "--format"]),
         (["--format", "trc", "--out", "{}/a.csv"], ["--out to end in .trc", "'a.csv'", "rename it to a.trc"]),
         (["--out", "{}/a"], ["a format among", "no known suffix in 'a'"]),
         (["--out", "{}/none/a.trc"], ["in a folder that exists", "none"]),
         (["--person", "eve"], ["--person to be one of ann, bob, found 'eve'"]),
         (["--frames", "5:99"], ["--frames as A:B within 0:8", "'5:99'"]),
+        (["--frames", "1,8"], ["or as a list such as 0,7", "'1,8'"]),
+        (["--frames", "2", "--keyframes-only"], ["in frames 2, found none that is a keyframe", "--keyframes-only"]),
         (["--frames", "3:4", "--person", "ann"], ["expected poses of 'ann' in frames 3:4, found none"]),
         (["--frames", "5:6", "--person", "bob", "--skip-lost"], ["found none that is not lost"]),
         (["--view", "cam0"], ["expected no --view with format trc", "--axes, --units"]),
@@ -85,6 +109,35 @@ def test_what_cannot_be_written_leaves_nothing(run, couple, tmp_path, monkeypatc
     monkeypatch.setattr("app.export.export.os.replace", full)
     result = run("export", couple, "--out", tmp_path / "a.mot", "--person", "ann")
     assert_refused(result, [f"cannot write {tmp_path / 'a.mot'}: No space left on device", "choose a folder"])
+    assert [p.name for p in tmp_path.iterdir()] == ["s"]
+
+
+def test_a_folder_is_replaced_only_if_an_export_made_it(run, couple, tmp_path):
+    words = ("export", couple, "--format", "openpose", "--frames", "1,2", "--json")
+    status, out, _ = run(*words, "--out", tmp_path)
+    assert (status, json.loads(out)["files"]) == (0, [str(tmp_path / "s_openpose")])
+    labels = tmp_path / "s_openpose"
+    assert len([*labels.rglob("*_keypoints.json")]) == 3 * 2
+    assert_refused(run(*words, "--out", tmp_path), ["s_openpose not to exist, found a folder", "--overwrite"])
+    (labels / "old").touch()
+    assert run(*words, "--out", labels, "--overwrite")[0] == 0  # the folder itself may be named
+    assert not (labels / "old").exists()
+    (labels / "provenance.json").unlink()
+    (labels / "mine").touch()
+    found = run(*words, "--out", tmp_path, "--overwrite")
+    assert_refused(found, ["s_openpose not to exist, found a folder", "choose another --out"])
+    assert (labels / "mine").exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["s", "s_openpose"]
+
+
+@pytest.mark.parametrize("name", ["trc", "openpose", "masks"])
+def test_an_interrupted_export_leaves_nothing(couple, tmp_path, name):
+    def interrupt():
+        raise KeyboardInterrupt
+
+    motion = read_motion(load_session(couple), (0,), range(2))
+    with pytest.raises(KeyboardInterrupt):
+        export(FORMATS[name], motion, ExportOptions(), tmp_path / f"a{FORMATS[name].suffixes[0]}", tick=interrupt)
     assert [p.name for p in tmp_path.iterdir()] == ["s"]
 
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import io
+import json
 import tempfile
 import threading
 import zipfile
@@ -61,6 +62,13 @@ async def test_files_are_made_sent_and_deleted(client, temporary):
     assert sorted(archive.namelist()) == ["dance_ann.mot", "dance_ann.osim", "dance_bob.mot", "dance_bob.osim"]
     async with client.get("/export/progress") as response:
         assert await response.json() == {"done": 0, "total": 0}
+    async with client.get("/export/openpose?frames=1,2&pixels=original") as response:
+        archive = zipfile.ZipFile(io.BytesIO(await response.read()))
+    assert "dance_openpose/cam0_json/cam0_000000000002_keypoints.json" in archive.namelist()
+    async with client.get("/export/trc?person=ann&only=keyframes&provenance=1") as response:
+        archive = zipfile.ZipFile(io.BytesIO(await response.read()))
+    assert sorted(archive.namelist()) == ["dance_ann.trc", "dance_ann.trc.provenance.json"]
+    assert [p["frame"] for p in json.loads(archive.read(archive.namelist()[1]))["people"]["ann"]] == [1]
     assert list(temporary.iterdir()) == []
 
 
@@ -73,6 +81,7 @@ async def test_files_are_made_sent_and_deleted(client, temporary):
         ("trc?person=..%2Fann", 400, "expected a person of ann, bob, found '../ann'"),
         ("trc?frames=5:99", 400, "expected frames as A:B within 0:8"),
         ("trc?frames=²:9", 400, "expected frames as A:B"),
+        ("trc?only=best", 400, "expected only as keyframes or reviewed"),
         ("trc?axes=up", 400, "expected --axes to be one of"),
         ("mp4?view=%2Fdev%2Fzero", 400, "expected --view to be one of cam0, cam1, cam2"),
         ("trc?frames=3:4&person=ann", 400, "expected poses of 'ann' in frames 3:4, found none"),

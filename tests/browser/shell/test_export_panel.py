@@ -10,7 +10,7 @@ import app.export.formats
 FORMATS = [
     {
         "name": name, "title": format.title, "options": options, "axes": format.axes,
-        "numbering": format.numbering,
+        "units": format.units, "holds_provenance": format.holds_provenance, "numbering": format.numbering,
     }
     for name, options in (("trc", ["axes", "units"]), ("bvh", ["axes", "units"]), ("mp4", ["view"]))
     for format in [app.export.formats.FORMATS[name]]
@@ -37,7 +37,9 @@ async def test_a_format_is_chosen_and_its_file_downloaded(fresh_page):
     await page.keyboard.press("Enter")
     await shows(page, "document.querySelector('#export-panel').matches(':popover-open')")
     labels = page.locator("#export-panel label:visible")
-    assert await labels.all_inner_texts() == ["Format", "People", "Frames", "Axes", "Units", "Leave out lost poses"]
+    assert await labels.all_inner_texts() == [
+        "Format", "People", "Frames", "Poses", "Axes", "Units", "Leave out lost poses", "Add the provenance"
+    ]  # fmt: skip
     untitled = "(all) => all.filter((one) => !one.title && !one.labels?.[0]?.title).map((one) => one.outerHTML)"
     assert await page.eval_on_selector_all("#export-panel :is(button, input, select)", untitled) == []
     assert await page.input_value("#export-axes") == "calibration"
@@ -52,7 +54,7 @@ async def test_a_format_is_chosen_and_its_file_downloaded(fresh_page):
     await page.fill("#export-frames", "5-500")
     await page.keyboard.press("Enter")
     progress = page.locator("#export-progress")
-    assert await progress.inner_text() == "Expected frames within 0-119, such as 0-9, or nothing."
+    assert await progress.inner_text() == "Expected frames within 0-119, such as 0-9 or 0, 119, or nothing."
     await page.fill("#export-frames", "5")
     await page.check("#export-skip-lost")
     async with page.expect_event("console"):  # the browser reports each answer of 400
@@ -61,10 +63,14 @@ async def test_a_format_is_chosen_and_its_file_downloaded(fresh_page):
     assert asked[-1] == "/bvh?person=person+1&axes=y-up&units=m&frames=5%3A6&skip_lost=1"
     page.errors.clear()
     await page.select_option("#export-format", "mp4")
-    assert await labels.all_inner_texts() == ["Format", "People", "Frames", "View", "Leave out lost poses"]
-    await page.fill("#export-frames", "")
+    assert await labels.all_inner_texts() == [
+        "Format", "People", "Frames", "Poses", "View", "Leave out lost poses", "Add the provenance"
+    ]  # fmt: skip
+    await page.fill("#export-frames", "3, 7,12")
+    await page.select_option("#export-only", "reviewed")
+    await page.check("#export-provenance")
     async with page.expect_download() as download:
         await page.click("#export-start")
     assert (await download.value).suggested_filename == "my dance.mp4"
-    assert "/mp4?person=person+1&skip_lost=1" in asked
+    assert "/mp4?person=person+1&frames=3%2C7%2C12&only=reviewed&skip_lost=1&provenance=1" in asked
     await shows(page, "document.querySelector('#export-progress').textContent === 'Saved my dance.mp4'")

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from tracker.body.model import BodyModel
 from tracker.files import write_text_atomic
@@ -56,6 +58,23 @@ class CocoImage(msgspec.Struct, frozen=True):
     """Frame of the footage: that of the session plus the camera's offset."""
 
 
+class Segmentation(msgspec.Struct, frozen=True):
+    """A mask as run lengths, which pycocotools decodes."""
+
+    size: tuple[int, int]
+    """Height and width."""
+    counts: Sequence[int]
+    """Lengths of runs, column by column; the first one is outside of the mask."""
+
+
+def segmentation(mask: NDArray[np.bool_]) -> Segmentation:
+    """Return a mask, (H, W), as run lengths."""
+    column_wise = mask.ravel(order="F")
+    ends = np.flatnonzero(np.diff(column_wise, prepend=False))
+    height, width = mask.shape
+    return Segmentation((height, width), np.diff(ends, prepend=0, append=mask.size).tolist())
+
+
 class CocoAnnotation(msgspec.Struct, frozen=True):
     """A person in an image, by the keypoints of one category."""
 
@@ -79,6 +98,8 @@ class CocoAnnotation(msgspec.Struct, frozen=True):
     earlier_calibration: bool
     """Whether that is another one than that of the file."""
     iscrowd: int = 0
+    segmentation: Segmentation | msgspec.UnsetType = msgspec.UNSET
+    """Its visible pixels."""
 
 
 def person_category(id: int) -> CocoCategory:

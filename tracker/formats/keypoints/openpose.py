@@ -7,7 +7,7 @@ pixels of the picture. 0, 0, 0 is an absent point. Files are named `CAMERA_00000
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -16,7 +16,7 @@ from tracker.errors import FormatError
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, number_like
 from tracker.formats.json_numbers import Span, json_spans, replace_spans
 from tracker.formats.keypoints.picture_table import PictureTable, stack_pictures
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.text_files import TABLE_BYTES, TextKind, read_json
 from tracker.validation import MAX_FRAMES, Number, check
 
@@ -119,3 +119,43 @@ def patch_openpose(data: bytes, changes: Sequence[tuple[int, Array]]) -> bytes:
                     span = with_points[person][3 * i + k]
                     new[span] = number_like(value, exact.text[slice(*span)], PIXEL_DECIMALS)
     return exact.encoded(replace_spans(exact.text, new))
+
+
+class OpenPosePerson(NamedTuple):
+    """A person in a picture."""
+
+    person: int
+    """Number of the person."""
+    points_px: Array
+    """Its points in the order of the skeleton, (n, 2); NaN without one."""
+    confidence: Array
+    """(n,), from 0 to 1."""
+    visibility: IntArray
+    """0 for a point that is not in the picture, 1 for one that is occluded, 2 for one that is visible, (n,)."""
+
+
+def file_name(camera: str, picture: int) -> str:
+    """Return the name of the file of a picture of a camera, counted from 0, as OpenPose gives it."""
+    return f"{camera}_{picture:012d}_keypoints.json"
+
+
+def write_openpose(path: Path, people: Sequence[OpenPosePerson]) -> None:
+    """Write the people of a picture.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    path.write_bytes(msgspec.json.encode({"version": 1.3, "people": [_person_row(p) for p in people]}))
+
+
+def _person_row(person: OpenPosePerson) -> dict[str, Any]:
+    is_there = (person.visibility > 0) & np.isfinite(person.points_px).all(axis=-1)
+    rows = np.column_stack([person.points_px, person.confidence])
+    rows[~is_there] = 0.0
+    others = ("face_keypoints_2d", "hand_left_keypoints_2d", "hand_right_keypoints_2d", "pose_keypoints_3d")
+    return {
+        "person_id": [person.person],
+        "pose_keypoints_2d": np.round(rows, 3).ravel().tolist(),
+        "pose_visibility": np.where(is_there, person.visibility, 0).tolist(),
+        **{key: [] for key in (*others, "face_keypoints_3d", "hand_left_keypoints_3d", "hand_right_keypoints_3d")},
+    }
