@@ -9,8 +9,8 @@ from collections import Counter
 import pytest
 from architecture import FILES, trees
 
-MAX_CONSTANTS, MAX_UNDOCUMENTED = 640, 0
-"""Present numbers; calibration added 80, imported observations 16. Each constant has its unit, and its source or the
+MAX_CONSTANTS, MAX_UNDOCUMENTED = 588, 0
+"""Present numbers; calibration added 80, imported observations 30. Each constant has its unit, and its source or the
 benchmark that fixed it; CONTRIBUTING.md names the benchmarks."""
 MAX_HIDDEN_SUBJECTS = 25
 HIDDEN_SUBJECT = re.compile(r"(?:^|(?<=[.!?:])\s+)(?:What|Where|Who|Whose|Those|Nor)\b")
