@@ -110,8 +110,8 @@ def _send_back(arguments: ExportArguments) -> None:
     from tracker.observations.stored import load_observations
     from tracker.session.session import load_session
 
-    others = ("format", "person", "frames", *OPTIONS)
-    if given := [name for name in others if getattr(arguments, name) is not None]:
+    others = ("format", "person", "frames", "keyframes_only", "reviewed_only", "skip_lost", *OPTIONS)
+    if given := [name.replace("_", "-") for name in others if getattr(arguments, name) not in (None, False)]:
         raise TrackerError(f"expected --like without --{given[0]}: the files stay as they came; leave it out")
     session = load_session(arguments.session)
     observations = load_observations(session, arguments.like or "")
