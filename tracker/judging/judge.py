@@ -22,6 +22,7 @@ from tracker.session.session import Session
 from tracker.store.stored_poses import StoredPose
 from tracker.tracking.pose_errors import SHARED_M
 from tracker.tracking.tracker import TrackerSettings
+from tracker.tracking.view_tracks import left_out
 
 DOUBTED = 0.5
 """Probability from which a limb is said to be off, and gets a reason."""
@@ -109,8 +110,14 @@ def judge(
         report: shows the progress of what follows.
 
     Raises:
-        TrackerError: the observations are of nobody in the session, or tracking cannot begin.
+        TrackerError: there are fewer than three cameras, the observations are of nobody in the session, or tracking
+            cannot begin.
     """
+    if not left_out(len(session.cameras)):
+        raise TrackerError(
+            f"expected three cameras or more to judge, found {len(session.cameras)}: without one of two, nothing shows "
+            "depth"
+        )
     points = read_points(session, name)
     if not points:
         raise TrackerError(
@@ -137,14 +144,15 @@ def judge_person(
     at = {n: i for i, n in enumerate(imported.names)}
     steps = np.array([_steps(imported, tracked[k], k) for k in frames]).reshape(len(frames), len(at), 3)
     jumps = dict(zip(frames, reasons.jumps(imported.joints_world[frames]), strict=True)) if frames else {}
-    out = dict[int, dict[str, LimbVerdict]]()
+    out, usual = dict[int, dict[str, LimbVerdict]](), _usual_errors(tracked)
     for number, (k, of_frame) in enumerate(zip(frames, steps, strict=True)):
         report("comparing", number / len(frames))
         own, verdicts = tracked[k], dict[str, LimbVerdict]()
         for limb, joints in LIMBS.items():
             columns = [at[j] for j in joints if j in at and np.isfinite(of_frame[at[j]]).all()]
             if columns:
-                verdicts[limb] = _verdict(own, limb, [imported.names[i] for i in columns], of_frame[columns])
+                names = [imported.names[i] for i in columns]
+                verdicts[limb] = _verdict(own, usual, limb, names, of_frame[columns])
         doubted = [limb for limb, v in verdicts.items() if v.probability_off >= DOUBTED]
         if doubted:
             seen = _Outside(observer, k) if observer is not None else None
@@ -163,12 +171,17 @@ def _steps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:
     return imported.joints_world[frame] - own.body.joint_centers_world[points]
 
 
-def _verdict(own: StoredPose, limb: str, names: Sequence[str], steps: Array) -> LimbVerdict:
-    model = own.body.model
-    points = [model.point_names.index(n) for n in names]
-    errors = np.eye(3) * SHARED_M**2 if own.record.errors is None else own.record.errors[points]
-    beyond = probability_beyond(steps, np.broadcast_to(errors, (len(points), 3, 3)))
-    off = with_doubt(beyond, np.array(_lost(own, limb)))
+def _usual_errors(tracked: Mapping[int, StoredPose]) -> Array:
+    """Return the median covariance of the points, (n_points, 3, 3), m^2, for the start, which has not been assessed."""
+    known = [t.record.errors for t in tracked.values() if t.record.errors is not None]
+    return np.median(known, axis=0) if known else SHARED_M**2 * np.eye(3)[None]
+
+
+def _verdict(own: StoredPose, usual: Array, limb: str, names: Sequence[str], steps: Array) -> LimbVerdict:
+    points = [own.body.model.point_names.index(n) for n in names]
+    errors = usual if own.record.errors is None else own.record.errors
+    errors = np.broadcast_to(errors, (len(own.body.model.point_names), 3, 3))[points]
+    off = with_doubt(probability_beyond(steps, errors), np.array(_lost(own, limb)))
     return LimbVerdict(float(off.max()), float(np.linalg.norm(steps, axis=1).max()), "")
 
 

@@ -103,3 +103,11 @@ def test_limbs_without_joints_are_left_out(joints, tracked):
     found = judged(joints, tracked).frames
     assert "right arm" not in found[3]
     assert "right arm" in found[4]
+
+
+def test_a_pose_that_was_not_assessed_has_the_usual_error(joints, tracked):
+    joints[6, AT["left_wrist"]] += (0.09, 0.0, 0.0)
+    first = judged(joints, tracked).frames[6]["left arm"].probability_off
+    unknown = {**tracked, 6: replace(tracked[6], record=replace(tracked[6].record, errors=None))}
+    assert 0.05 < first < 0.95
+    assert judged(joints, unknown).frames[6]["left arm"].probability_off == pytest.approx(first)
