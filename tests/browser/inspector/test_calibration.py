@@ -3,10 +3,17 @@
 import pytest
 from page_driver import shows, until
 
-SIGMA = {"rotation_deg": [0.03, 0.03, 0.2], "position_mm": [2, 2, 9], "focal_percent": [0.1], "time_ms": [1.5]}
+SIGMA = {
+    "rotation_deg": [0.03, 0.03, 0.2],
+    "position_mm": [2, 2, 9],
+    "focal_percent": [0.1],
+    "time_ms": [1.5],
+    "drift_ms_per_s": [1.5],
+}
 CAMERA = {
     "name": "FRONT", "misfit_px": 0.4, "misfit_mm": 3.0, "kinds": [], "rivals": [], "rotation_deg": [0, 0, 0],
-    "position_mm": [0, 0, 0], "focal_percent": 0, "time_ms": 0, "sigma": SIGMA, "since_frame": None, "is_seen": True,
+    "position_mm": [0, 0, 0], "focal_percent": 0, "time_ms": 0, "drift_ms_per_s": 0, "sigma": SIGMA,
+    "since_frame": None, "is_seen": True,
 }  # fmt: skip
 TURNED = CAMERA | {
     "name": "LEFT", "misfit_px": 9.4, "misfit_mm": 70.0, "kinds": ["rotation", "time"], "rivals": ["position"],
