@@ -201,7 +201,7 @@ PHRASES = {
     ),
     # cameras that are off
     "check_cameras": Phrases(
-        "quadrille check measures it", "Check the cameras, in the inspector's Calibration, measures it"
+        "run quadrille check to measure it", "press Check the cameras in the inspector's Calibration to measure it"
     ),
     # references and exports
     "check_reference_frames": Phrases(

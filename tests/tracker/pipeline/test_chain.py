@@ -106,7 +106,7 @@ def acquiring(opened, monkeypatch):
     height_m = opened.session.people[0].model.height_m
     opened.session = save_model(opened.session, 0, load_model("gavrila22").with_height(height_m))
 
-    def acquire(session, observer, person, frames, settings, report, known):
+    def acquire(session, observer, person, frames, settings, report, known, joints):
         asked.calls.append(known)
         report("fitting", 0.5)
         before = session.people[person].model

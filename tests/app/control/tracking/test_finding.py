@@ -83,7 +83,7 @@ def acquired(monkeypatch):
     """Stands for the acquisition of sizes: finds a body 10% taller once it is let go."""
     go = threading.Event()
 
-    def acquire(session, observer, person, frames, settings, report, known):
+    def acquire(session, observer, person, frames, settings, report, known, joints):
         report("fitting", 0.5)
         assert go.wait(10)
         body = session.people[person].model.with_height(1.1 * session.people[person].model.height_m)
