@@ -61,7 +61,7 @@ def test_a_camera_that_seems_off_is_a_notice_at_the_end_of_a_run(placed, tracker
     placed.tracking.start(backward=False, until=4)
     tracker.let_go(2)
     wait_for(lambda: placed.state.track.message)
-    measures = "Check the cameras, in the inspector's Calibration, measures it."
+    measures = "press Check the cameras in the inspector's Calibration to measure it."
     assert placed.state.track.notice == f"Camera LEFT is turned; {measures}"
     assert not placed.state.track.failed
 
