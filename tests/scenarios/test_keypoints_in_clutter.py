@@ -3,6 +3,8 @@
 Silhouettes are useless there. Key points, noisy and with gross errors, give the first poses.
 """
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -40,7 +42,7 @@ def cluttered(tmp_path_factory):
                     light = 1 + (FADES_TO - 1) * k / (N - 1)
                     video.write(np.clip(light * footage.read(k)[v], 0, 255).astype(np.uint8))
             cv2.imwrite(str(background), cv2.imread(str(other.background)))
-            sources.append(source._replace(footage=path, background=background))
+            sources.append(replace(source, footage=path, background=background))
     truth = {p.name: read_joints(folder / "scene" / f"truth_{p.name}.trc", made.fps) for p in made.people}
     people = [Person(n, load_model("gavrila38"), "#53a504") for n in ("ann", "bob")]
     session = create_session(folder / "session", cameras=sources, people=people, fps=made.fps, n_frames=N)
