@@ -42,6 +42,8 @@ class LimbVerdict(NamedTuple):
     """Distance of its farthest joint from the tracked one, metres."""
     reason: str
     """Why, for people; empty where it is in order."""
+    joint: str = ""
+    """Name of its farthest joint."""
 
 
 class Doubt(NamedTuple):
@@ -169,7 +171,8 @@ def _verdict(own: StoredPose, limb: str, names: Sequence[str], steps: Array) -> 
     errors = np.eye(3) * SHARED_M**2 if own.record.errors is None else own.record.errors[points]
     beyond = probability_beyond(steps, np.broadcast_to(errors, (len(points), 3, 3)))
     off = with_doubt(beyond, np.array(_lost(own, limb)))
-    return LimbVerdict(float(off.max()), float(np.linalg.norm(steps, axis=1).max()), "")
+    distances = np.linalg.norm(steps, axis=1)
+    return LimbVerdict(float(off.max()), float(distances.max()), "", names[int(distances.argmax())])
 
 
 def _lost(own: StoredPose, limb: str) -> float:
