@@ -18,8 +18,8 @@ const posing = posingRoom.mount(context, panes);
 const timeline = timelineRoom.mount(context, panes);
 const search = searchRoom.mount(context, timeline);
 const scene = sceneRoom.mount(context, panes);
-const inspector = inspectorRoom.mount(context, { panes, posing, scene });
 const sessions = sessionsRoom.mount(context);
+const inspector = inspectorRoom.mount(context, { panes, posing, scene, sessions });
 const bindings = shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector, sessions });
 exposeState(context, panes.grid, bindings);
 

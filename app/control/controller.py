@@ -38,6 +38,7 @@ from app.control.tracking.calibrating import Calibrating
 from app.control.tracking.comparing_runs import ComparingRuns
 from app.control.tracking.finding import FindingPeople
 from app.control.tracking.inconsistent_frames import InconsistentFrames
+from app.control.tracking.observing import Observing
 from app.control.tracking.pose_checks import PoseChecks
 from app.control.tracking.ranges import Ranges
 from app.control.tracking.tracking import Tracking
@@ -112,6 +113,8 @@ class Controller:
         """Acquires the sizes of bodies from the footage."""
         self.calibrating = Calibrating(session_state, activities, self.tracking)
         """Checks and corrects the cameras."""
+        self.observing = Observing(session_state, activities, self.finding)
+        """Shows, judges and imports observations of other programs."""
         self.history = History(session_state, activities, (self.body_sizes.follow, self.calibrating.follow))
         """Moves along the history."""
         self.cost_landscape = CostLandscapes(session_state, activities)
@@ -171,6 +174,7 @@ class Controller:
         self.body_acquisition.stop()
         self.finding.stop()
         self.calibrating.close()
+        self.observing.stop()
         self._save_retry.close()
         with self.activities.editing():
             self.history.save()

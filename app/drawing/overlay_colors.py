@@ -16,6 +16,10 @@ SILHOUETTE = "#7ff0e0"
 ACCEPTED = "#00a389"
 REJECTED = "#b32a9c"
 """Edge segments that the shown poses explain, and the others: legible without an outline on black and on white."""
+IMPORTED = "#d9c3a0"
+"""Points of other programs: quiet beside the bodies of people."""
+IMPORTED_OFF = "#f65a80"
+"""Limbs of them that are off: the rose red of what is lost or failed."""
 KIND_COLORS = {
     "candidate": NEUTRAL,
     "compared": NEUTRAL,
@@ -31,6 +35,8 @@ KIND_COLORS = {
     "accepted": ACCEPTED,
     "rejected": REJECTED,
     "residual": NEUTRAL,
+    "imported": IMPORTED,
+    "imported_off": IMPORTED_OFF,
 }
 """Colours of the kinds of lines; all other kinds have the colour of their person."""
 OUTLINE_RGB = (0, 0, 0)

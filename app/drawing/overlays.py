@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 
 from app.drawing.facing import facing_arrow
+from app.drawing.observed_points import limbs_off, observed_segments
 from app.drawing.overlay_colors import KIND_COLORS
 from app.drawing.seen_bodies import at_one_time, bodies_in, picture_times
 from app.state.calibration import CorrectedFrame
@@ -41,6 +42,7 @@ _EDGE_STRIDE_PX = 3
 PathKind = Literal[
     "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
     "former", "result", "residual", "part_edge", "epipolar", "accepted", "rejected", "floor", "floor_sight", "error",
+    "imported", "imported_off",
 ]  # fmt: skip
 Side = Literal["left", "right", ""]
 SIDES: tuple[Side, ...] = get_args(Side)
@@ -156,6 +158,7 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
             if replay is not None and replay.fitted_from is not None:
                 lines = residual_segments(bodies, views[index])
                 out.append(Path(index, 0, "residual", KIND_COLORS["residual"], lines))
+    out += [line for index in seen for line in _imported(session, state, view, index)]
     if state.drag is not None and "epipolar" in view.layers:
         out += [line for line in _epipolar_lines(session, state) if line.camera in view.cameras]
     # A person who is sought and has no pose yet is drawn by candidates alone.
@@ -419,6 +422,18 @@ def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown
         Path(index, 0, "rejected", KIND_COLORS["rejected"], lines[~of_accepted]),
         Path(index, 0, "accepted", KIND_COLORS["accepted"], lines[of_accepted]),
     ]
+
+
+def _imported(session: Session, state: State, view: View, index: int) -> list[Path]:
+    """Draw the imported points of the shown frame, and above them the limbs that are off."""
+    found, camera = state.observations, session.cameras[index].camera
+    if found.drawn is None or "imported" not in view.layers:
+        return []
+    lines: tuple[tuple[PathKind, FloatArray], ...] = (
+        ("imported", observed_segments(found.drawn, camera, index, state.frame)),
+        ("imported_off", limbs_off(found.drawn_judgements, camera, state.frame)),
+    )
+    return [Path(index, 0, kind, KIND_COLORS[kind], own) for kind, own in lines]
 
 
 def _dragged_place(session: Session, state: State, drag: DragState) -> Array:

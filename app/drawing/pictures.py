@@ -1,4 +1,4 @@
-"""Encode pictures for the page: footage and evidence as JPEG, masks as PNG, transparent where there is nothing."""
+"""Draw into pictures, and encode them for the page: footage and evidence as JPEG, masks as PNG with transparency."""
 
 import struct
 import zlib
@@ -12,10 +12,11 @@ from app.drawing import overlay_colors
 from tracker.body.model import PosedBody
 from tracker.contours.label_image import part_labels
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.geometry.arrays import Image, Mask
+from tracker.geometry.arrays import Array, FloatArray, Image, Mask
 from tracker.geometry.cameras import Camera
 
 _JPEG_QUALITY = 85
+_SUBPIXEL_BITS = 4
 _FAST = 1
 """zlib's lowest level: masks are large even areas, for which it compresses as well as the highest."""
 
@@ -117,3 +118,13 @@ def _jpeg(image: Image) -> bytes:
     done, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     assert done
     return bytes(data)
+
+
+def draw_lines(image: Image, segments_px: Array | FloatArray, color: tuple[int, int, int], width: int) -> None:
+    """Draw line segments, x0, y0, x1, y1, (N, 4), into an image in place.
+
+    All outlines lie below all lines: the pieces of a contour join without gaps.
+    """
+    ends = list(np.round(segments_px.reshape(-1, 2, 2) * (1 << _SUBPIXEL_BITS)).astype(np.int32))
+    for stroke, wide in ((overlay_colors.OUTLINE_RGB, width + 2), (color, width)):
+        cv2.polylines(image, ends, False, stroke, wide, cv2.LINE_AA, _SUBPIXEL_BITS)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.drawing import overlay_colors, pictures
-from app.drawing.outlined_lines import draw_lines
+from app.drawing.pictures import draw_lines
 from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.contours import occluding_contours, part_edges

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 
 from app.drawing import overlay_colors, overlays
-from app.drawing.outlined_lines import draw_lines
-from app.drawing.pictures import placeholder
+from app.drawing.pictures import draw_lines, placeholder
 from app.export.characters import Characters, draw_bodies
 from app.session.footage_indices import footage_indices
 from app.state.page_view import View

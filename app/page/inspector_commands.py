@@ -10,6 +10,7 @@ from app.control.tracking import track_settings
 from app.page import inspector_messages as wire
 from app.page.message_parsing import MessageError
 from app.page.message_types import Command
+from app.page.observation_messages import UseObservations
 from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.formats.model_toml import PRESETS
 from tracker.validation import quoted
@@ -93,6 +94,18 @@ def _calibration(controller: Controller, _: int, message: wire.CheckCalibration)
     actions[message.action]()
 
 
+def _observations(controller: Controller, _: int, message: UseObservations) -> None:
+    observing = controller.observing
+    actions: dict[str, Callable[[], None]] = {
+        "show": lambda: observing.show(message.name),
+        "judge": lambda: observing.judge(message.name),
+        "take": lambda: observing.take(message.name),
+        "stop": observing.stop,
+        "discard": observing.discard,
+    }
+    actions[message.action]()
+
+
 INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetTrackSettings: _track_settings,
     wire.SetView3d: _view_3d,
@@ -106,4 +119,5 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.AcquireSizes: _acquire,
     wire.FindPeople: _find_people,
     wire.CheckCalibration: _calibration,
+    UseObservations: _observations,
 }

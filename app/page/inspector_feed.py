@@ -9,11 +9,13 @@ from app.control.tracking import track_settings
 from app.drawing import dof_labels
 from app.drawing.misfit_field import NO_MISFITS, MisfitField, misfit_field
 from app.page import inspector_messages as wire
+from app.page import observation_messages as observed
 from app.page.message_types import Message
 from app.page.search_messages import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
 from app.state.calibration import CalibrationState
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
+from app.state.observations import ObservationsState
 from app.state.people import AcquisitionState
 from app.state.progress import FindState
 from app.state.run_choices import RunChoices
@@ -25,10 +27,14 @@ from tracker.calibration.camera_correction import in_units
 from tracker.calibration.findings import CameraFinding
 from tracker.formats.model_toml import PRESETS
 from tracker.geometry.arrays import Array
+from tracker.judging.judge import DOUBTED, Doubt
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.methods import METHODS
 from tracker.posing.grab import minor_points
 from tracker.tracking.chamfer.settings import TrackSettings
+
+_MAX_LISTED = 500
+"""Entries of the list by severity that a page receives: more than a person goes through at once."""
 
 
 class InspectorFeed:
@@ -51,6 +57,7 @@ class InspectorFeed:
             settings(state.settings, state.run_choices), view_3d(controller, state), body_sizes(controller, state),
             acquisition(state.acquisition), finding(state.finding, [c.camera.name for c in controller.session.cameras]),
             calibration(state.calibration, len(state.people), self._misfits(controller, state.calibration.check)),
+            observations(state.observations, [p.name for p in controller.session.people]),
             reason(state, controller.session.camera_names), *cost_map(state),
         ]  # fmt: skip
         changed = [message for message in now if message not in self._sent]
@@ -70,7 +77,7 @@ def _ingredients(state: State) -> tuple[Identity, ...]:
     made_from = (
         state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
-        state.finding, state.calibration, state.reasons, state.reason, state.frame,
+        state.finding, state.calibration, state.observations, state.reasons, state.reason, state.frame,
         state.people[state.person].trace, state.cost_map,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
@@ -201,6 +208,40 @@ def calibration(found: CalibrationState, n_people: int, field: MisfitField) -> w
         None if preview is None else preview.frame,
         0.0 if preview is None else round(preview.cost_before - preview.cost_after, 1),
         found.revision, tuple(_intervals(found.outdated.get(i, ())) for i in range(n_people)),
+    )  # fmt: skip
+
+
+def observations(found: ObservationsState, people: Sequence[str]) -> observed.ObservationsMessage:
+    """Describe imported observations.
+
+    Args:
+        found: their state.
+        people: names of the people of the session.
+    """
+    sets = tuple(
+        observed.ObservedSetInfo(s.name, s.format, s.people, s.is_in_space, s.n_frames, s.problem) for s in found.sets
+    )
+    judged = tuple(
+        observed.JudgedPerson(j.person, j.share_in_order, len(j.frames), tuple(j.sentences)) for j in found.judgements
+    )
+    doubts = [(people.index(j.person), d) for j in found.judgements for d in j.worst if _is_off(d)]
+    doubts.sort(key=lambda own: (-round(own[1].verdict.probability_off, 2), -own[1].verdict.distance_m))
+    return observed.ObservationsMessage(
+        sets, found.shown.name if found.shown is not None else "", found.plan is not None, found.running, found.stage,
+        found.share, found.message, found.failed, found.judged, judged,
+        tuple(_judged_limb(person, doubt) for person, doubt in doubts[:_MAX_LISTED]), len(doubts),
+    )  # fmt: skip
+
+
+def _is_off(doubt: Doubt) -> bool:
+    return doubt.verdict.probability_off >= DOUBTED
+
+
+def _judged_limb(person: int, doubt: Doubt) -> observed.JudgedLimb:
+    verdict = doubt.verdict
+    return observed.JudgedLimb(
+        person, doubt.frame, doubt.limb, verdict.joint, verdict.reason, round(verdict.probability_off, 3),
+        round(1000 * verdict.distance_m),
     )  # fmt: skip
 
 

@@ -1,11 +1,13 @@
-"""Bases of all messages of the pane socket, and types of values that several hold.
+"""Bases of all messages of the pane socket, types of values that several hold, and their encoding.
 
 Positions are in undistorted pixels, frames count from 0, cameras and people are indices into the session's lists.
 """
 
-from typing import Annotated, Literal, TypeAlias
+import struct
+from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
+import numpy as np
 from msgspec import Meta
 
 MAX_INT = 2**31
@@ -30,3 +32,24 @@ class Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag_field
 
 class Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A part of a message to a page."""
+
+
+def encode_text(message: Message) -> str:
+    """Return the JSON text of a message; NaN becomes null."""
+    return _ENCODER.encode(message).decode()
+
+
+def encode_binary(header: Message, payload: bytes) -> bytes:
+    """Return `[uint32 LE length of the header][header: JSON, UTF-8][payload]`."""
+    head = _ENCODER.encode(header)
+    return struct.pack("<I", len(head)) + head + payload
+
+
+def _plain(value: Any) -> Any:
+    """Return a numpy scalar as a Python one."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"messages hold no {type(value)}")
+
+
+_ENCODER = msgspec.json.Encoder(enc_hook=_plain)

@@ -18,7 +18,7 @@ from app.drawing.seen_bodies import bodies_in
 from app.page import search_messages
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
-from app.page.encoding import encode_binary
+from app.page.message_types import encode_binary
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import Picking
 from app.state.page_view import View

@@ -18,6 +18,7 @@ from app.page import (
     client_messages,
     inspector_messages,
     message_types,
+    observation_messages,
     pose_messages,
     search_messages,
     server_messages,
@@ -170,7 +171,8 @@ def _names() -> dict[Any, str]:
 
 def _named(name: str) -> Any:
     modules = (
-        message_types, client_messages, pose_messages, search_messages, inspector_messages, server_messages,
+        message_types, client_messages, pose_messages, search_messages, inspector_messages,
+        observation_messages, server_messages,
         binary_headers,
     )  # fmt: skip
     return next(getattr(module, name) for module in modules if hasattr(module, name))

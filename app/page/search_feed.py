@@ -10,8 +10,7 @@ from app.control.search.search_runs import SearchRun
 from app.page import search_messages as wire
 from app.page.binary_headers import LandscapeHeader, SearchCandidatesHeader, SearchStepsHeader
 from app.page.client_messages import Tab
-from app.page.encoding import encode_binary
-from app.page.message_types import Message
+from app.page.message_types import Message, encode_binary
 from app.state.identity import Identity
 from app.state.search import CostLandscape, ReplayState
 from app.state.state import State, finite_or_none

@@ -17,6 +17,7 @@ from app.page.inspector_messages import (
     View3dMessage,
 )
 from app.page.message_types import Message, Part, Status
+from app.page.observation_messages import ObservationsMessage
 from app.page.search_messages import (
     CostMapMessage,
     InconsistentMessage,
@@ -402,7 +403,7 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     SessionMessage, StateMessage, HistoryMessage, NoticeMessage, TimelineMessage, InconsistentMessage,
     RangeComparisonMessage, ObservabilityMessage, EpipolarMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
-    AcquisitionMessage, FindingMessage, CalibrationMessage, ReasonMessage, CostMapMessage,
+    AcquisitionMessage, FindingMessage, CalibrationMessage, ObservationsMessage, ReasonMessage, CostMapMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -14,10 +14,9 @@ from app.control.controller import Controller
 from app.drawing.curves import CurveGroup
 from app.page import client_messages as wire
 from app.page import commands, messages, picture_sets
-from app.page.encoding import encode_text
 from app.page.inspector_feed import InspectorFeed
 from app.page.message_parsing import MISUNDERSTOOD, MessageError, parse
-from app.page.message_types import Message
+from app.page.message_types import Message, encode_text
 from app.page.observability_feed import ObservabilityFeed
 from app.page.search_feed import SearchFeed
 from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
@@ -403,6 +402,8 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.calibration.n_changes,
         Identity(state.calibration.preview) if state.calibration.is_previewed else None,
         Identity(None if state.reason is None else state.reason.alternatives),
+        Identity(state.observations.drawn),
+        Identity(state.observations.drawn_judgements),
     )
     return (*drawn, _pins(state), state.floor.picking)
 

@@ -20,6 +20,7 @@ from app.scene3d.scene import SceneView
 from app.server.access import is_loopback
 from app.server.doorway import Doorway
 from app.server.export_routes import ExportRoutes
+from app.server.observation_routes import ObservationRoutes
 from app.server.private_viser import PrivateViser
 from app.server.server import create_app, serve_forever
 from app.server.session_routes import SessionRoutes, refusal
@@ -94,10 +95,10 @@ def open_session(
             app = create_app(PaneSocket(controller, offers), viser.socket_path, doorway.access, static_folder())
             ExportRoutes(session.folder).add_to(app)
             is_private = is_loopback(serving.host) and not serving.allow_hosts
-            others = SessionRoutes(
-                session.folder, tokens, refusal(is_private, serving.token), lambda: controller.state.save_error
-            )
+            no_paths = refusal(is_private, serving.token)
+            others = SessionRoutes(session.folder, tokens, no_paths, lambda: controller.state.save_error)
             others.add_to(app)
+            ObservationRoutes(controller, no_paths).add_to(app)
             ThumbnailRoutes(thumbnails.jpeg, thumbnails.silhouette, lambda: not _can_draw(controller)).add_to(app)
 
             def ready() -> None:

@@ -24,6 +24,7 @@ Layer = Literal[
     "joints",
     "observability",
     "errors",
+    "imported",
     "alternatives",
     "epipolar",
     "axes",

@@ -8,6 +8,7 @@ import numpy as np
 from app.state.calibration import CalibrationState
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import FloorState
+from app.state.observations import ObservationsState
 from app.state.people import (
     AcquisitionState,
     DepthNote,
@@ -81,6 +82,8 @@ class State:
     """Search for people whom nobody has placed."""
     calibration: CalibrationState = field(default_factory=CalibrationState)
     """Check of the cameras."""
+    observations: ObservationsState = field(default_factory=ObservationsState)
+    """Imported observations."""
     follow: bool = True
     """Whether each frame is shown as it is tracked."""
     locked: tuple[frozenset[int], ...] = ()
@@ -257,6 +260,7 @@ class StateChanges(TypedDict, total=False):
     track: TrackState
     finding: FindState
     calibration: CalibrationState
+    observations: ObservationsState
     follow: bool
     locked: tuple[frozenset[int], ...]
     ranges: RangeState

@@ -11,6 +11,7 @@ import { findSection } from "./find_section.js";
 import { BodySection } from "./body_section.js";
 import { Inspector } from "./inspector.js";
 import { jointSection } from "./joint_section.js";
+import { observationsSection } from "./observations_section.js";
 import { reasonSection } from "./reason_section.js";
 import { searchSection } from "./search_section.js";
 import { trackSection } from "./track_section.js";
@@ -30,11 +31,12 @@ const THEMES = [
  *
  * @param {import("../model/index.js").Context} context
  * @param {{panes: import("../panes/index.js").Panes, posing: import("../posing/index.js").PosingRoom,
- *   scene: import("../scene/index.js").SceneRoom}} rooms
+ *   scene: import("../scene/index.js").SceneRoom, sessions: import("./import_form.js").PathFields}} rooms
  */
-export function mount(context, { panes, posing, scene }) {
+export function mount(context, { panes, posing, scene, sessions }) {
   const joint = jointSection(context, posing);
   const calibration = calibrationSection(context);
+  const observations = observationsSection(context, panes, sessions);
   const sections = [
     joint,
     reasonSection(context, panes, posing),
@@ -43,6 +45,7 @@ export function mount(context, { panes, posing, scene }) {
     trackSection(context),
     searchSection(context),
     calibration,
+    observations,
     viewSection(context, scene, panes),
   ];
   const inspector = new Inspector(context.store, sections);
@@ -87,7 +90,8 @@ export function mount(context, { panes, posing, scene }) {
       run: findPeople,
     },
     ...calibration.bindings(() => inspector.reveal("calibration")),
-    ...sections.filter(({ id }) => id !== "find" && id !== "reason").map(({ id, title, hint }) => ({
+    ...observations.bindings(() => inspector.reveal("observations")),
+    ...sections.filter(({ id }) => !["find", "reason", "observations"].includes(id)).map(({ id, title, hint }) => ({
       keys: [],
       label: id === "view" ? "View settings: theme, 3-D view" : title,
       words: `${hint} inspector settings`,

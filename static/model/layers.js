@@ -111,6 +111,14 @@ export const LAYERS = [
     opacity: 0.9,
   },
   {
+    id: "imported",
+    group: "Evidence",
+    label: "Imported points",
+    title: "Points of the imported observations that the inspector shows: crosses joined by lines, red where the footage says they are off",
+    shown: true,
+    opacity: 0.9,
+  },
+  {
     id: "axes",
     group: "Evidence",
     label: "Silhouette axes",

@@ -66,6 +66,9 @@ export class Receiver {
       case "calibration":
         this.#store.set({ calibration: message });
         break;
+      case "imported":
+        this.#store.set({ observations: message });
+        break;
       case "acquisition":
         this.#store.set({ acquisition: message });
         break;

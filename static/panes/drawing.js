@@ -58,6 +58,8 @@ export const LINE_STYLES = {
   floor: { width: 1.25, dash: [], layer: null, hasOutline: true },
   floor_sight: { width: 1.5, dash: [5, 4], layer: null, hasOutline: true },
   rejected: { width: 1, dash: [], layer: "rejected", hasOutline: false },
+  imported: { width: 1, dash: [], layer: "imported", hasOutline: true },
+  imported_off: { width: 2, dash: [], layer: "imported", hasOutline: true },
 };
 
 /**

@@ -35,5 +35,5 @@ export function mount({ store, notify }) {
       run: () => void sessions.showNew(),
     },
   ]);
-  return { bindings };
+  return { bindings, completes: (/** @type {HTMLInputElement} */ input) => sessions.completes(input) };
 }

@@ -61,6 +61,15 @@ export class NewSession {
     }
   }
 
+  /**
+   * Complete a field of another form that takes files or folders, and give it the path picker.
+   *
+   * @param {HTMLInputElement} input
+   */
+  completes(input) {
+    makePathField(input, () => this.#browse(input));
+  }
+
   show() {
     this.#dialog.showModal();
     this.#begin();

@@ -16,7 +16,8 @@ export function makePathField(input, browse) {
   input.autocomplete = "off";
   input.spellcheck = false;
   completePaths(input, list);
-  const title = `Browse for ${input.labels?.[0].textContent?.toLowerCase()}`;
+  const label = input.closest("label") ?? input.labels?.[0]; // a form that is not in the page yet has no labels
+  const title = `Browse for ${label?.textContent?.toLowerCase()}`;
   const button = Object.assign(document.createElement("button"), { type: "button", className: "is-icon", title, innerHTML: FOLDER_ICON });
   button.setAttribute("aria-label", title);
   Object.assign(button.dataset, { browse: input.name, noCommand: "" });

@@ -54,6 +54,15 @@ export class Sessions {
     });
   }
 
+  /**
+   * Complete a field of another form that takes files or folders, and give it the path picker.
+   *
+   * @param {HTMLInputElement} input
+   */
+  completes(input) {
+    this.#create.completes(input);
+  }
+
   toggle() {
     togglePopover(this.#panel, this.#open);
     if (!this.#panel.matches(":popover-open")) return;

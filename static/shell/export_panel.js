@@ -1,12 +1,11 @@
 /** Popover that exports the session to a file of another program, which the browser downloads. */
 
+import { download } from "../widgets/downloads.js";
 import { button, byId } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
 import { capital } from "../widgets/text.js";
 
 const PROGRESS_MS = 400;
-/** Longest text of the server that is shown as its reason. */
-const MAX_REASON = 400;
 
 /** @typedef {{name: string, title: string, options: string[], axes: string, units: string, holds_provenance: boolean, numbering: string}} Format
  *   `numbering` is a sentence of a `{frame}` and its `{number}` in the file, or empty where they are the same
@@ -146,10 +145,7 @@ export class ExportPanel {
     this.#store.set({ exporting: 0 });
     const timer = setInterval(() => void this.#showProgress(), PROGRESS_MS);
     try {
-      const answer = await fetch(address, { signal: running.signal });
-      if (!answer.ok) throw new Error((await answer.text()).slice(0, MAX_REASON));
-      const name = fileName(answer.headers.get("Content-Disposition") ?? "");
-      save(await answer.blob(), name);
+      const name = await download(address, running.signal);
       this.#showMessage(`Saved ${name}`);
       this.#say("info", `Exported ${name}.`);
     } catch (error) {
@@ -224,24 +220,4 @@ function framesOf(text, last) {
   }
   const words = text.split(",").map((word) => word.trim());
   return words.every((word) => /^\d{1,8}$/.test(word) && Number(word) <= last) ? words.join(",") : null;
-}
-
-/** @param {string} disposition header with the name of a file */
-function fileName(disposition) {
-  const name = /filename\*=UTF-8''([^;]+)/.exec(disposition)?.[1];
-  return name ? decodeURIComponent(name) : "export";
-}
-
-/**
- * Save data as a file of the browser.
- *
- * @param {Blob} data
- * @param {string} name
- */
-function save(data, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(data);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
 }

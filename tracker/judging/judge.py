@@ -43,6 +43,8 @@ class LimbVerdict(NamedTuple):
     """Distance of its farthest joint from the tracked one, metres."""
     reason: str
     """Why, for people; empty where it is in order."""
+    joint: str = ""
+    """Name of its farthest joint."""
 
 
 class Doubt(NamedTuple):
@@ -182,7 +184,8 @@ def _verdict(own: StoredPose, usual: Array, limb: str, names: Sequence[str], ste
     errors = usual if own.record.errors is None else own.record.errors
     errors = np.broadcast_to(errors, (len(own.body.model.point_names), 3, 3))[points]
     off = with_doubt(probability_beyond(steps, errors), np.array(_lost(own, limb)))
-    return LimbVerdict(float(off.max()), float(np.linalg.norm(steps, axis=1).max()), "")
+    distances = np.linalg.norm(steps, axis=1)
+    return LimbVerdict(float(off.max()), float(distances.max()), "", names[int(distances.argmax())])
 
 
 def _lost(own: StoredPose, limb: str) -> float:

@@ -1,11 +1,12 @@
 """Poses from key points alone: a body fitted frame by frame, and smoothed. Pictures are not looked at."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from tracker.acquisition.from_keypoints import fit_to_keypoints, learn_seen_body
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.progress import Report, part_of, unreported
 from tracker.errors import TrackerError
 from tracker.evidence.keypoints import PersonKeypoints
 from tracker.fitting.gauss_newton import Fit, PosePrior, ResidualBlock, covariance, solve, weak_pull
@@ -39,25 +40,52 @@ def store_keypoint_poses(
     Raises:
         TrackerError: the observations have no frame with four joints of anybody.
     """
-    points, cameras = read_points(session, name), [c.camera for c in session.cameras]
     changes, counts = list[PoseChange](), dict[int, int]()
-    for i in (i for i in people if i in points):
+    for i, found in poses_of(session, people, name).items():
         person = session.people[i]
         revision = store.add_model_revision(person.name, format_model(person.model))
         held = {k for k, r in store.poses(person.name, range(session.n_frames)).items() if r.keyframe}
-        found = keypoint_poses(person.model, points[i], cameras, session.fps)
-        poses = {k: body for k, body in found.items() if k in frames and k not in held}
-        for k, body in poses.items():
-            sources = ("imported",) * len(body.values)
-            changes.append(PoseChange(person.name, k, PoseRecord(body.values, sources, revision, remark=f"by {name}")))
-        counts[i] = len(poses)
+        own = imported_changes(person.name, found, revision, name)
+        own = [c for c in own if c.frame in frames and c.frame not in held]
+        changes += own
+        counts[i] = len(own)
     if not changes:
         raise TrackerError(f"expected a frame with four joints of a person in '{name}', found none; import other files")
     store.commit(f"poses of {name}", changes)
     return counts
 
 
-def keypoint_poses(model: BodyModel, points: BodyPoints, cameras: Sequence[Camera], fps: float) -> dict[int, PosedBody]:
+def poses_of(
+    session: Session, people: Sequence[int], name: str, report: Report = unreported
+) -> dict[int, dict[int, PosedBody]]:
+    """Return poses of people by key points alone, by index of the person and frame.
+
+    Args:
+        session: the session; nothing is stored.
+        people: indices of the people; those of whom there are no key points are left out.
+        name: of the observations.
+        report: shows progress. An exception that it raises ends the work.
+    """
+    points, cameras = read_points(session, name), [c.camera for c in session.cameras]
+    known = [i for i in people if i in points]
+    out = dict[int, dict[int, PosedBody]]()
+    for number, i in enumerate(known):
+        of_person = part_of(report, number / len(known), (number + 1) / len(known))
+        out[i] = keypoint_poses(session.people[i].model, points[i], cameras, session.fps, of_person)
+    return out
+
+
+def imported_changes(person: str, poses: Mapping[int, PosedBody], revision: int, name: str) -> list[PoseChange]:
+    """Return what stores poses by key points, in a revision of the body of a person."""
+    return [
+        PoseChange(person, k, PoseRecord(b.values, ("imported",) * len(b.values), revision, remark=f"by {name}"))
+        for k, b in poses.items()
+    ]
+
+
+def keypoint_poses(
+    model: BodyModel, points: BodyPoints, cameras: Sequence[Camera], fps: float, report: Report = unreported
+) -> dict[int, PosedBody]:
     """Fit a body to the key points of all views on each frame, robustly, and smooth its motion.
 
     Args:
@@ -65,6 +93,7 @@ def keypoint_poses(model: BodyModel, points: BodyPoints, cameras: Sequence[Camer
         points: the key points.
         cameras: of the session, in its order.
         fps: frames per second.
+        report: shows progress. An exception that it raises ends the work.
 
     Returns:
         The body by frame.
@@ -73,7 +102,10 @@ def keypoint_poses(model: BodyModel, points: BodyPoints, cameras: Sequence[Camer
     if not first:
         return {}
     seen = learn_seen_body(first, points, cameras).keypoints(model, points)
-    fits = {k: _fit(body, seen, k, cameras) for k, body in first.items()}
+    fits = dict[int, Fit]()
+    for k, body in first.items():
+        report("fitting poses to key points", len(fits) / len(first))
+        fits[k] = _fit(body, seen, k, cameras)
     frames, n = sorted(fits), model.n_dofs
     track = PoseTrack(
         model, np.array(frames) / fps, np.array([fits[k].pose for k in frames]),

@@ -22,7 +22,6 @@ from app.runtime.json_output import format_json
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
-    from tracker.observations.importing import ImportPlan
     from tracker.session.session import Session
 
 Unit = Literal["m", "cm", "mm", "in", "ft"]
@@ -69,6 +68,7 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
 
     It shows which view, frames and points were found. Files that contradict the session are refused.
     """
+    from app.session.import_summary import import_summary
     from tracker.formats.trc import METRES_BY_WORD
     from tracker.observations.importing import plan_import, store_import
     from tracker.observations.request import ImportRequest
@@ -92,7 +92,7 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
         _size(arguments.picture_size),
     )
     plan = plan_import(session, request)
-    summary = _summary(session, plan)
+    summary: dict[str, Any] = {**import_summary(session, plan, command_line_text), "stored": False}
     if not (plan.problems or arguments.dry_run):
         with SessionLock(session.folder):
             store_import(session, plan)
@@ -125,34 +125,6 @@ def _size(text: str | None) -> tuple[int, int] | None:
     if not (width.isdecimal() and height.isdecimal() and 0 < int(width) < 100_000 and 0 < int(height) < 100_000):
         raise TrackerError(f"expected --picture-size as WIDTHxHEIGHT, such as 1920x1080, found '{text}'")
     return int(width), int(height)
-
-
-def _summary(session: "Session", plan: "ImportPlan") -> dict[str, Any]:
-    found = plan.observations
-    body_points = {points for points in found.counterparts.values() if points}
-    return {
-        "name": found.name,
-        "format": found.format,
-        "people": list(found.people),
-        "frames": session.n_frames,
-        "views": [
-            {
-                "view": v.camera,
-                "place": str(v.place) if v.place is not None else None,
-                "rows": v.n_rows,
-                "frames": list(v.frames) if v.frames is not None else None,
-                "most_people": v.n_people,
-                "confidence": v.confidence,
-            }
-            for v in plan.views
-        ],
-        "skeleton": found.joint_map.name,
-        "points": {name: list(points) for name, points in found.counterparts.items()},
-        "matched": len(body_points),
-        "notes": list(found.notes),
-        "problems": [command_line_text(p) for p in plan.problems],
-        "stored": False,
-    }
 
 
 def _format(summary: dict[str, Any]) -> str:

@@ -196,25 +196,36 @@ class FindingPeople:
         with self._session_state.lock:
             self._session_state.set(finding=replace(self._session_state.state.finding, **changes))
 
-    def store_found(self, found: FirstPoses) -> None:
+    def store_found(self, found: FirstPoses, label: str = "find people") -> None:
         """See `OpenSession.store_found`: store people and bodies as one entry of the history, and show them.
+
+        Args:
+            found: the people.
+            label: of the entry.
 
         Raises:
             TrackerError: somebody was placed meanwhile, or a body cannot be written.
         """
         with self._activities.editing():
-            if unplaced(self, range(len(self._session_state.present))) != tuple(found.poses):
+            if not set(found.poses) <= set(unplaced(self, range(len(self._session_state.present)))):
                 raise TrackerError(
                     "expected nobody to be placed meanwhile, found a new pose; what was found is discarded"
                 )
             records = {i: partial(first_record, first) for i, first in found.poses.items()}
-            self._store(found.frame, {i: first.model for i, first in found.poses.items()}, records)
+            self._store(found.frame, {i: first.model for i, first in found.poses.items()}, records, label)
             axes = axes_record(found)
             self._session_state.saver.store_setting(AXES, axes)
             frame, lines = _axes(axes)
             before = self._session_state.state.finding
             finding = replace(before, frame=frame, axes=lines, tried=None, candidates={}, sought=frozenset())
             self._session_state.show_frame(found.frame, finding=finding)
+
+    def place(self, found: FirstPoses, label: str) -> int | None:
+        """Store people who were found otherwise; return the new entry of the history, to add to."""
+        with self._activities.editing():
+            self._edit = None
+            self.store_found(found, label)
+            return self._edit
 
     def store_body(self, person: int, acquired: Acquisition, start: int) -> None:
         """See `OpenSession.store_body`: it belongs to the same entry of the history, unless there is a later one.
@@ -232,19 +243,21 @@ class FindingPeople:
                 )
             stored = StoredPose(PosedBody(self._session_state.present[person], record.values), record)
             resized = partial(resized_start, stored, acquired.body)
-            self._store(start, {person: acquired.body}, {person: resized})
+            self._store(start, {person: acquired.body}, {person: resized}, "find people")
             if self._session_state.state.frame == start:
                 self._session_state.show_frame(start)
 
     def _store(
-        self, frame: int, bodies: Mapping[int, BodyModel], records: Mapping[int, Callable[[int], PoseRecord]]
-    ) -> None:
+        self, frame: int, bodies: Mapping[int, BodyModel], records: Mapping[int, Callable[[int], PoseRecord]],
+        label: str,
+    ) -> None:  # fmt: skip
         """Store bodies, and poses on a frame, in the entry of the history of this search; the caller is editing.
 
         Args:
             frame: number of the frame.
             bodies: by person.
             records: by person, returns the pose for the revision of the body.
+            label: of the entry, where it is a new one.
         """
         session_state, saver = self._session_state, self._session_state.saver
         sizes, changes = [], []
@@ -256,7 +269,7 @@ class FindingPeople:
             changes.append(PoseChange(who.name, frame, records[person](revision)))
             if revision != before:
                 sizes.append((who.name, before, revision))
-        edit = self._edit = saver.write("find people", changes, self._entry(), by_program=False)
+        edit = self._edit = saver.write(label, changes, self._entry(), by_program=False)
         if edit is not None and sizes:
             saver.store_setting(SIZES_EDITS, with_sizes_changed(saver.setting(SIZES_EDITS, {}), edit, sizes))
             self._runs.clear()

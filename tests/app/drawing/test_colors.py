@@ -61,6 +61,7 @@ OWN_SHAPES = {
     "facing": "arrow", "facing_away": "arrow", "epipolar": "straight line across the pane",
     "floor": "crosses and grid", "part_edge": "thin line in an outline", "accepted": "loose strokes",
     "rejected": "loose strokes", "residual": "short strokes across the outlines",
+    "imported": "crosses joined by lines", "imported_off": "crosses joined by lines",
 }  # fmt: skip
 """Kinds of lines whose shape, not their dash, tells them from outlines of bodies."""
 
@@ -140,6 +141,7 @@ def test_warnings_errors_selection_and_marks_own_their_hues(scheme):
     if scheme == "dark":
         reserved["mark"] = overlay_colors.MARK
         others |= {"accepted": overlay_colors.ACCEPTED, "rejected": overlay_colors.REJECTED}
+        others["imported"] = overlay_colors.IMPORTED
     pairs = [*combinations(reserved.items(), 2), *((a, b) for a in reserved.items() for b in others.items())]
     near = [(a, b, difference(rgb(x), rgb(y))) for (a, x), (b, y) in pairs]
     assert [f"{a} and {b}: {found:.1f}" for a, b, found in near if found < OWN_HUE] == []

@@ -1,0 +1,227 @@
+"""Imported observations: list and show them, judge them by the footage, take them as poses, and import more."""
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from app.control.session.activities import Activities
+from app.control.session.session_state import SessionState
+from app.control.tracking.finding import FindingPeople
+from app.remedies import page_text
+from app.state.observations import ObservedSet
+from tracker.compute.progress import Report
+from tracker.errors import TrackerError
+from tracker.initialization.first_pose import FirstPoses
+from tracker.judging.judge import judge
+from tracker.observations.importing import ImportPlan, plan_import, store_import
+from tracker.observations.observed import ObservationSet
+from tracker.observations.request import ImportRequest
+from tracker.observations.stored import list_observations, load_observations
+from tracker.pipeline.chain import unplaced
+from tracker.pipeline.keypoint_evidence import find_by_keypoints, read_points
+from tracker.pipeline.keypoint_poses import imported_changes, poses_of
+from tracker.pipeline.track_session import AuditStep, Step, TrackSession
+from tracker.session.session import Session
+from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimate import BackwardStep, PoseEstimate
+
+_LOG = logging.getLogger(__name__)
+_STEPS = 100
+"""Progress is shown in so many steps."""
+
+
+class _StoppedError(Exception):
+    """The user has stopped the work."""
+
+
+class Observing:
+    """The imported observations of a session. At most one work on them at a time."""
+
+    def __init__(self, session_state: SessionState, activities: Activities, finding: FindingPeople) -> None:
+        """List the observations of the session, in the background.
+
+        Args:
+            session_state: holds the state.
+            activities: ends jobs and gestures before poses are stored.
+            finding: places people who have no pose yet.
+        """
+        self._session_state, self._activities, self._finding = session_state, activities, finding
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+        threading.Thread(target=self._list, name="list observations", daemon=True).start()
+
+    def show(self, name: str) -> None:
+        """Show a set in the views; none if the name is empty.
+
+        Raises:
+            TrackerError: there is no such set, or it cannot be read.
+        """
+        self._set(shown=load_observations(self._session_state.session, name) if name else None)
+
+    def judge(self, name: str) -> None:
+        """Begin to judge a set by the footage, and show it.
+
+        Raises:
+            TrackerError: other work on observations is under way, or the set cannot be read.
+        """
+        self._begin(name, self._judge)
+
+    def take(self, name: str) -> None:
+        """Begin to store a set as poses, as one entry of the history. Keyframes stay.
+
+        Raises:
+            TrackerError: other work on observations is under way, or the set cannot be read.
+        """
+        self._begin(name, self._take)
+
+    def stop(self) -> None:
+        """Stop the work; nothing of it is stored. The caller must not hold the lock."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join(30)
+
+    def plan(self, request: ImportRequest) -> ImportPlan:
+        """Read and check files, and show their points in the views. Nothing is stored.
+
+        Raises:
+            TrackerError: they cannot be read, or are of no camera of the session.
+        """
+        self.discard()
+        plan = plan_import(self._session_state.session, request)
+        self._set(plan=plan, message="", failed=False)
+        return plan
+
+    def discard(self) -> None:
+        """Forget the files that were read last."""
+        self._set(plan=None)
+
+    def store(self) -> None:
+        """Store the files that were read last with the session, and show them.
+
+        Raises:
+            TrackerError: there are none, they contradict the session, or the set cannot be written.
+        """
+        plan = self._session_state.state.observations.plan
+        if plan is None:
+            raise TrackerError("expected files that have been read, found none; check the files first")
+        store_import(self._session_state.session, plan)
+        self._list()
+        self._set(plan=None, shown=plan.observations, message=f"Imported {plan.observations.name}.", failed=False)
+
+    def _list(self) -> None:
+        session = self._session_state.session
+        self._set(sets=tuple(_described(session, name) for name in list_observations(session)))
+
+    def _begin(self, name: str, work: Callable[[str], str]) -> None:
+        with self._session_state.lock:
+            if self._session_state.state.observations.running:
+                raise TrackerError(
+                    "expected no other work on observations under way, found some; stop it or wait for its end"
+                )
+            shown = load_observations(self._session_state.session, name)
+            self._set(shown=shown, plan=None, running=True, stage="starting", share=0.0, message="", failed=False)
+        self._stopping.clear()
+        self._thread = threading.Thread(target=self._work, args=(name, work), name="observations", daemon=True)
+        self._thread.start()
+
+    def _work(self, name: str, work: Callable[[str], str]) -> None:
+        try:
+            self._set(running=False, message=work(name))
+        except _StoppedError:
+            self._set(running=False, message="Stopped; nothing was changed.")
+        except Exception as error:
+            if not isinstance(error, TrackerError):
+                _LOG.exception("work on observations failed")
+            text = page_text(error)
+            self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
+
+    def _judge(self, name: str) -> str:
+        session, observer = self._session_state.session, self._session_state.frames.observer
+        found = judge(session, observer, name, TrackSettings(), _ShownProgress(self._report), self._report)
+        self._set(judged=name, judgements=tuple(found))
+        return ""
+
+    def _take(self, name: str) -> str:
+        session_state = self._session_state
+        session, edit = session_state.session, None
+        known = read_points(session, name)
+        missing = [i for i in unplaced(self._finding, range(len(session.people))) if i in known]
+        first = find_by_keypoints(session, missing, range(session.n_frames), name) if missing else None
+        bodies = {} if first is None else {i: p.model for i, p in first.poses.items()}
+        sized = replace(
+            session, people=tuple(replace(p, model=bodies.get(i, p.model)) for i, p in enumerate(session.people))
+        )
+        found = poses_of(sized, tuple(known), name, self._report)
+        self._report("storing", 1.0)
+        label = f"poses of {name}"
+        if not any(found.values()):
+            raise TrackerError(
+                f"expected a frame with four joints of a person in '{name}', found none; import other files"
+            )
+        with self._activities.editing():
+            saver = session_state.saver
+            if first is not None:
+                edit = self._finding.place(first, label)
+            changes = [
+                change
+                for i, poses in found.items()
+                for change in imported_changes(session.people[i].name, poses, saver.revisions.current(i), name)
+            ]
+            saver.write(label, changes, edit, by_program=True)
+            session_state.refresh_saving()
+            session_state.show_frame(session_state.state.frame)
+        n = len(set().union(*found.values()))
+        return f"Stored poses on {n} frames; keyframes stayed. Undo takes them back."
+
+    def _report(self, stage: str, share: float, text: str = "", /) -> None:
+        if self._stopping.is_set():
+            raise _StoppedError
+        before, share = self._session_state.state.observations, round(share * _STEPS) / _STEPS
+        if (stage, share) != (before.stage, before.share):
+            self._set(stage=stage, share=share)
+
+    def _set(self, **changes: Any) -> None:
+        with self._session_state.lock:
+            before = self._session_state.state.observations
+            self._session_state.set(observations=replace(before, **changes))
+
+
+class _ShownProgress:
+    """The sink of a judgement, whose poses are stored elsewhere and not shown."""
+
+    def __init__(self, report: Report) -> None:
+        self.report = report
+        self._n_tracked = 0
+
+    def show(self, frame: int, found: FirstPoses | None) -> None:
+        """See `Sink.show`."""
+
+    def take(self, run: TrackSession, step: Step) -> None:
+        """See `Sink.take`."""
+        if isinstance(step, PoseEstimate):
+            self._n_tracked += 1
+            self.report("tracking", min(1.0, self._n_tracked / max(1, len(run.frames))))
+        elif isinstance(step, BackwardStep):
+            self.report("improving backward", step.done / step.total)
+        elif isinstance(step, AuditStep):
+            self.report("tracking without each view", step.done / step.total)
+
+
+def _described(session: Session, name: str) -> ObservedSet:
+    try:
+        found = load_observations(session, name)
+    except TrackerError as error:
+        return ObservedSet(name, problem=page_text(error))
+    return ObservedSet(name, found.format, found.people, found.points is None, _n_frames(found))
+
+
+def _n_frames(found: ObservationSet) -> int:
+    """Return the number of frames with points."""
+    if found.points is not None:
+        return int(found.points.is_known.any(axis=(1, 2, 3)).sum())
+    assert found.joints is not None
+    return int(np.isfinite(found.joints.joints_world).all(axis=3).any(axis=(1, 2)).sum())

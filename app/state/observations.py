@@ -1,0 +1,56 @@
+"""Imported observations: the sets of the session, what the views show of them, and their judgement."""
+
+from dataclasses import dataclass
+
+from tracker.judging.judge import Judgement
+from tracker.observations.importing import ImportPlan
+from tracker.observations.observed import ObservationSet
+
+
+@dataclass(frozen=True)
+class ObservedSet:
+    """One set in the session."""
+
+    name: str
+    format: str = ""
+    people: tuple[str, ...] = ()
+    is_in_space: bool = False
+    """Whether it has joints in space, not key points in pictures."""
+    n_frames: int = 0
+    """Number of frames with points."""
+    problem: str = ""
+    """Why it cannot be read; empty if it can."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObservationsState:
+    """Imported observations, and the work on them."""
+
+    sets: tuple[ObservedSet, ...] = ()
+    shown: ObservationSet | None = None
+    """The set that the views show; None for none."""
+    plan: ImportPlan | None = None
+    """An import that is previewed, and is not stored yet."""
+    running: bool = False
+    stage: str = ""
+    """The kind of work, as text for the user."""
+    share: float = 0.0
+    """Share of this work that is done, 0 to 1."""
+    message: str = ""
+    """How the last work ended; else empty."""
+    failed: bool = False
+    """Whether it ended with an error."""
+    judged: str = ""
+    """Name of the set of the judgements; empty without any."""
+    judgements: tuple[Judgement, ...] = ()
+    """One for each person of that set."""
+
+    @property
+    def drawn(self) -> ObservationSet | None:
+        """The set that the views draw: the previewed one, else the shown one."""
+        return self.shown if self.plan is None else self.plan.observations
+
+    @property
+    def drawn_judgements(self) -> tuple[Judgement, ...]:
+        """The judgements of the set that the views draw."""
+        return self.judgements if self.plan is None and self.shown and self.shown.name == self.judged else ()

@@ -1,0 +1,194 @@
+/** Form that imports results of other programs: paths are read and checked, shown over the pictures, then stored. */
+
+import { count } from "../widgets/text.js";
+import { textButton } from "./rows.js";
+
+/**
+ * @typedef {{completes: (input: HTMLInputElement) => void}} PathFields gives fields of paths completion and a picker
+ * @typedef {{view: string, place: string | null, rows: number, frames: [number, number] | null, most_people: number,
+ *   confidence: number | null}} View
+ * @typedef {{name: string, format: string, people: string[], frames: number, views: View[], skeleton: string,
+ *   points: Record<string, string[]>, matched: number, notes: string[], problems: string[]}} Plan
+ */
+
+/**
+ * @param {import("../model/store.js").Store} store
+ * @param {PathFields} paths
+ * @param {() => void} discard forgets what was read
+ */
+export function importForm(store, paths, discard) {
+  const fold = document.createElement("details");
+  fold.className = "import-form";
+  const head = Object.assign(document.createElement("summary"), { textContent: "Import…", title: "Bring key points or joints of another program into the session" });
+  const form = document.createElement("form");
+  const path = field("paths", "Files or folder", "Folder or files on the machine of the program, of one format; several are separated by semicolons");
+  path.input.dataset.takes = "files";
+  const name = field("name", "Name", "Name of the observations in the session");
+  const first = field("first_frame", "First frame", "Frame of the session of the first picture or row; by the numbers of the files if empty");
+  const size = field("picture_size", "Picture size", "Width x height of the pictures that the points are of, such as 1920x1080, if not the footage's; 1x1 for normalized points");
+  const confidence = field("confidence", "Confidence", "Confidence of all points, 0 to 1, where the files have none");
+  const people = Object.assign(document.createElement("label"), { className: "import-field", title: "Person of whom they are" });
+  const person = Object.assign(document.createElement("select"), { name: "person" });
+  people.append(span("Person"), person);
+  const check = Object.assign(document.createElement("button"), { type: "submit", textContent: "Check the files", title: "Read and check the files, and show their points over the pictures; nothing is stored" });
+  const take = textButton("Import", "Store these files with the session", () => void store_());
+  take.className = "is-primary";
+  const cancel = textButton("Cancel", "Forget these files", () => reset());
+  const buttons = Object.assign(document.createElement("div"), { className: "acquisition-work" });
+  buttons.append(check, take, cancel);
+  const result = Object.assign(document.createElement("div"), { className: "import-result" });
+  result.setAttribute("role", "status");
+  const further = document.createElement("details");
+  further.append(Object.assign(document.createElement("summary"), { textContent: "Where the files do not tell", title: "First frame, size of the pictures, confidence" }), first.label, size.label, confidence.label);
+  form.append(path.label, name.label, people, further, buttons, result);
+  fold.append(head, form);
+  paths.completes(path.input);
+
+  let isBusy = false;
+  /** @type {Plan | null} */
+  let plan = null;
+  const enable = () => {
+    check.disabled = isBusy || !path.input.value.trim() || !name.input.value.trim();
+    take.disabled = isBusy || !plan || plan.problems.length > 0;
+    take.hidden = cancel.hidden = plan === null;
+  };
+  const clear = () => {
+    result.replaceChildren();
+    if (plan) discard();
+    plan = null;
+    enable();
+  };
+  const reset = () => {
+    form.reset();
+    clear();
+    fold.open = false;
+  };
+  const refuse = (/** @type {unknown} */ error) => {
+    const text = error instanceof TypeError ? "The program does not answer." : String(/** @type {Error} */ (error).message);
+    result.replaceChildren(line(text, "is-failed"));
+  };
+
+  /**
+   * @param {string} address
+   * @param {unknown} request
+   */
+  const ask = async (address, request) => {
+    const answer = await fetch(address, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(request) });
+    if (!answer.ok) throw new Error(await answer.text());
+    return answer.json();
+  };
+
+  const read = async () => {
+    clear();
+    isBusy = true;
+    enable();
+    result.replaceChildren(line("Reading the files …"));
+    const every = store.facts.session?.people.map((one) => one.name) ?? [];
+    const [number, sure] = [first.input.value.trim(), confidence.input.value.trim()];
+    const pixels = /^\s*(\d+)\s*x\s*(\d+)\s*$/.exec(size.input.value);
+    try {
+      if (size.input.value.trim() && !pixels) throw new Error(`Expected a picture size such as 1920x1080, found “${size.input.value}”.`);
+      plan = /** @type {Plan} */ (
+        await ask("observations/plan", {
+          paths: path.input.value.trim(),
+          name: name.input.value.trim(),
+          people: person.value ? [person.value] : every,
+          first_frame: number ? Number(number) : null,
+          confidence: sure ? Number(sure) : null,
+          picture_size: pixels ? [Number(pixels[1]), Number(pixels[2])] : null,
+        })
+      );
+      result.replaceChildren(...describe(plan));
+    } catch (error) {
+      refuse(error);
+    }
+    isBusy = false;
+    enable();
+  };
+  const store_ = async () => {
+    isBusy = true;
+    enable();
+    try {
+      await ask("observations/import", {});
+      plan = null;
+      reset();
+    } catch (error) {
+      refuse(error);
+    }
+    isBusy = false;
+    enable();
+  };
+
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    void read();
+  });
+  form.addEventListener("input", clear);
+  enable();
+  return {
+    element: fold,
+    open() {
+      fold.open = true;
+      fold.scrollIntoView({ block: "nearest" });
+      path.input.focus();
+    },
+    /** Offer the people of the session. */
+    show() {
+      const names = store.facts.session?.people.map((one) => one.name) ?? [];
+      if (names.join() === [...person.options].map((one) => one.value).filter(Boolean).join()) return;
+      person.replaceChildren(...(names.length > 1 ? [new Option("all", "")] : []), ...names.map((one) => new Option(one, one)));
+    },
+  };
+}
+
+/** @param {Plan} plan */
+function describe(plan) {
+  const matched = Object.entries(plan.points).filter(([, own]) => own.length);
+  const others = Object.entries(plan.points).filter(([, own]) => !own.length).map(([point]) => point); // prettier-ignore
+  const list = document.createElement("ul");
+  for (const view of plan.views) {
+    const frames = view.frames ? `points in frames ${view.frames[0]} to ${view.frames[1]}` : "no points";
+    const more = [view.most_people > 1 ? `up to ${view.most_people} people` : "", view.confidence === null ? "" : `median confidence ${view.confidence.toFixed(2)}`];
+    const words = view.place === null ? ["no files"] : [`${count(view.rows)} rows`, frames, ...more];
+    list.append(Object.assign(document.createElement("li"), { textContent: `${view.view}: ${words.filter(Boolean).join(", ")}`, title: view.place ?? "" }));
+  }
+  const points = line(`${matched.length} points as ${plan.skeleton} names them${others.length ? `; without a joint of the body: ${others.join(", ")}` : ""}.`);
+  points.title = matched.map(([point, own]) => `${point} = ${own.join(" and ")}`).join("\n");
+  return [
+    line(`${plan.format}, of ${plan.people.join(", ")}:`),
+    list,
+    points,
+    ...plan.notes.map((text) => line(`Note: ${text}.`)),
+    ...plan.problems.map((text) => line(text, "is-failed")),
+    line(plan.problems.length ? "Nothing can be imported." : "The views show these points. Nothing was stored yet."),
+  ];
+}
+
+/**
+ * @param {string} name
+ * @param {string} text
+ * @param {string} title
+ */
+function field(name, text, title) {
+  const label = Object.assign(document.createElement("label"), { className: "import-field", title });
+  const input = Object.assign(document.createElement("input"), { type: "text", name, autocomplete: "off", spellcheck: false, id: `import-${name}` });
+  const holder = Object.assign(document.createElement("span"), { className: "path-field" });
+  holder.append(input);
+  label.append(span(text), holder);
+  return { label, input };
+}
+
+/**
+ * @param {string} text
+ * @param {string} [more] class
+ */
+function line(text, more) {
+  const element = Object.assign(document.createElement("p"), { className: "section-note", textContent: text });
+  if (more) element.classList.add(more);
+  return element;
+}
+
+/** @param {string} text */
+function span(text) {
+  return Object.assign(document.createElement("span"), { textContent: text });
+}

@@ -1,0 +1,237 @@
+/** Observations: results of other programs, shown over the pictures, judged by the footage, and taken as poses. */
+
+import { download } from "../widgets/downloads.js";
+import { alt } from "../widgets/key_matching.js";
+import { capital, count, displayName, percent } from "../widgets/text.js";
+import { importForm } from "./import_form.js";
+import { textButton } from "./rows.js";
+
+/**
+ * @typedef {import("../model/protocol.js").ObservationsMessage} Observations
+ * @typedef {import("../model/protocol.js").JudgedLimb} JudgedLimb
+ * @typedef {import("../model/protocol.js").UseObservations["action"]} Action
+ */
+
+/** Entries of the list that are built at first, and after "more". */
+const FEW_LISTED = 20;
+const NO_SET = "No observations were imported. Import them first.";
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {import("../panes/index.js").Panes} panes
+ * @param {import("./import_form.js").PathFields} sessions
+ * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Binding[]}}
+ */
+export function observationsSection({ store, send, notify, navigation, actions, layers }, panes, sessions) {
+  const act = (/** @type {Action} */ action, name = "") => send({ type: "observations", action, name });
+  const found = () => store.facts.observations;
+  /** Name of the set that buttons concern: the shown one, else the first that can be read. */
+  const current = () => found()?.shown || found()?.sets.find(({ problem }) => !problem)?.name || "";
+  const show = (/** @type {string} */ name) => {
+    act("show", found()?.shown === name ? "" : name);
+    if (!store.facts.layers.shown.imported) layers.toggle(["imported"], true);
+  };
+
+  const list = Object.assign(document.createElement("ul"), { className: "observed-sets" });
+  const none = Object.assign(note(), { textContent: "Key points and joints of other programs: import them, see where they are wrong, and mend that." });
+  const judge = textButton("Judge", "Track the people from these observations in the background, and say where the footage contradicts them", () => act("judge", current()));
+  judge.className = "is-primary";
+  const take = textButton("Take as poses", "Store them as poses that can be corrected; keyframes stay, and undo takes them back", () => act("take", current()));
+  const report = textButton("Write report", "Save the judgement as one HTML file with pictures of the worst frames", () => void writeReport());
+  const buttons = group(judge, take, report);
+  const stop = textButton("Stop", "Stop this work; nothing is changed", () => act("stop"));
+  const progress = document.createElement("progress");
+  const work = group(progress, stop);
+  const status = note();
+  status.setAttribute("role", "status");
+  const verdict = document.createElement("div");
+  const worst = Object.assign(document.createElement("ol"), { className: "observed-worst" });
+  const more = textButton("", "List less severe entries too", () => {
+    listed = Infinity;
+    showWorst();
+  });
+  const form = importForm(store, sessions, () => act("discard"));
+  const body = document.createElement("div");
+  body.className = "acquisition";
+  body.append(none, list, buttons, work, status, verdict, worst, more, form.element);
+
+  let listed = FEW_LISTED;
+  let at = -1;
+  /** @type {JudgedLimb[] | null} the entries that are listed */
+  let entries = null;
+  /** @type {JudgedLimb | null} the entry whose joint is zoomed to once its frame is drawn */
+  let zoom = null;
+
+  const writeReport = async () => {
+    report.disabled = true;
+    try {
+      const name = await download("observations/report");
+      notify({ type: "notice", level: "info", text: `Saved ${name}.` });
+    } catch (error) {
+      const reason = error instanceof TypeError ? "the program cannot be reached" : String(/** @type {Error} */ (error).message);
+      notify({ type: "notice", level: "error", text: `The report failed: ${reason}` });
+    }
+    report.disabled = false;
+  };
+
+  /** @param {number} rank of the entry of the list to go to */
+  const visit = (rank) => {
+    const { observations, session, state } = store.facts;
+    const entry = observations?.worst[rank];
+    const info = entry && session?.people[entry.person];
+    if (!entry || !info) return;
+    at = rank;
+    if (rank >= listed) listed = Infinity;
+    if (observations.shown !== observations.judged) act("show", observations.judged);
+    navigation.pause();
+    navigation.goTo(entry.frame);
+    const point = info.points.includes(entry.joint) ? entry.joint : null;
+    if (state?.person !== entry.person || state.point !== point) actions.selectPerson(entry.person, point);
+    zoom = entry;
+    zoomNow();
+    showWorst();
+  };
+
+  const zoomNow = () => {
+    const { overlay, shown, session, target } = store.facts;
+    if (zoom && target !== zoom.frame) zoom = null;
+    if (!zoom || overlay?.frame !== zoom.frame || shown?.frame !== zoom.frame) return;
+    const info = session?.people[zoom.person];
+    const limb = info?.point_limbs[zoom.joint]?.name;
+    panes.grid.frameJoints(zoom.person, info?.points.filter((point) => limb && info.point_limbs[point]?.name === limb) ?? []);
+    zoom = null;
+  };
+
+  const showSets = (/** @type {Observations} */ { sets, shown, running }) => {
+    none.hidden = sets.length > 0;
+    list.replaceChildren(
+      ...sets.map((set) => {
+        const row = document.createElement("li");
+        const what = set.problem || `${set.format}, ${set.is_in_space ? "joints" : "key points"} of ${set.people.join(", ")}, ${count(set.frames)} frames`;
+        const text = document.createElement("span");
+        text.append(Object.assign(document.createElement("b"), { textContent: set.name }), Object.assign(note(), { textContent: what }));
+        text.lastElementChild?.classList.toggle("is-failed", !!set.problem);
+        const toggle = textButton("Show", `Draw the points of ${set.name} over the pictures (toggle)`, () => show(set.name));
+        toggle.setAttribute("aria-pressed", String(set.name === shown));
+        toggle.setAttribute("aria-label", `Show ${set.name}`);
+        toggle.disabled = !!set.problem;
+        row.append(text, toggle);
+        return row;
+      }),
+    );
+    buttons.hidden = !current() || running;
+    work.hidden = !running;
+  };
+
+  const showWorst = () => {
+    const all = found()?.worst ?? [];
+    const several = (store.facts.session?.people.length ?? 1) > 1;
+    worst.replaceChildren(
+      ...all.slice(0, listed).map((entry, rank) => {
+        const row = document.createElement("li");
+        const who = several ? `${store.facts.session?.people[entry.person]?.name}, ` : "";
+        const go = textButton("", `Go to frame ${entry.frame} and select the ${displayName(entry.joint)}`, () => visit(rank));
+        go.append(
+          Object.assign(document.createElement("span"), { className: "observed-frame", textContent: String(entry.frame) }),
+          Object.assign(document.createElement("span"), { textContent: `${who}${entry.reason}` }),
+          Object.assign(document.createElement("span"), { className: "quiet", textContent: percent(entry.probability) }),
+        );
+        go.dataset.noCommand = "";
+        if (rank === at) go.setAttribute("aria-current", "true");
+        row.append(go);
+        return row;
+      }),
+    );
+    worst.hidden = all.length === 0;
+    more.hidden = all.length <= listed;
+    more.textContent = `${count(all.length - listed)} more`;
+    worst.querySelector("[aria-current]")?.scrollIntoView({ block: "nearest" });
+  };
+
+  const showAll = () => {
+    const now = found();
+    if (!now) return;
+    showSets(now);
+    progress.value = now.share;
+    status.textContent = now.running ? `${capital(now.stage)} …` : now.message;
+    status.hidden = !status.textContent;
+    status.classList.toggle("is-failed", now.failed);
+    report.hidden = !now.judged;
+    verdict.replaceChildren(...now.people.flatMap((person) => describe(person, now)));
+    const news = JSON.stringify(now.worst);
+    if (news !== JSON.stringify(entries)) {
+      [entries, listed, at] = [now.worst, FEW_LISTED, -1];
+      showWorst();
+    }
+    form.show();
+  };
+  showAll();
+  body.hidden = false;
+
+  return {
+    id: "observations",
+    title: "Observations",
+    hint: "Key points and joints of other programs: import, judge, mend",
+    body,
+    update(changed) {
+      if (changed.has("observations") || changed.has("session")) showAll();
+      if (changed.has("overlay") || changed.has("target")) zoomNow();
+    },
+    bindings(reveal) {
+      const noSet = () => (current() ? null : NO_SET);
+      const busy = () => (found()?.running ? "Work on observations is under way." : noSet());
+      const noEntry = () => (found()?.worst.length ? null : found()?.judged ? "No imported limb is off." : "Nothing was judged. Judge the observations first.");
+      const step = (/** @type {1 | -1} */ way) => visit(Math.max(0, Math.min((found()?.worst.length ?? 0) - 1, at + way)));
+      const command = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) => ({
+        keys: [],
+        label,
+        words: `${words} observations imported detector`,
+        matches: () => false,
+        why,
+        run: () => {
+          reveal();
+          run();
+        },
+      });
+      return [
+        {
+          keys: ["Alt J"],
+          label: "Observations of other programs",
+          area: "Views",
+          words: "imported key points joints openpose trc judge detector",
+          matches: alt("KeyJ", false),
+          run: reveal,
+        },
+        { keys: ["Alt Shift ↓"], label: "Next imported limb that is off", area: "Timeline", words: "judge worst", matches: alt("ArrowDown", true), why: noEntry, run: () => step(1) },
+        { keys: ["Alt Shift ↑"], label: "Previous imported limb that is off", area: "Timeline", words: "judge worst", matches: alt("ArrowUp", true), why: noEntry, run: () => step(-1) },
+        command("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
+        command("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
+        command("Take the observations as poses", "store mend correct", busy, () => act("take", current())),
+        command("Write the report of the judgement", "html save file", () => (found()?.judged ? null : "Nothing was judged. Judge the observations first."), () => void writeReport()),
+        command("Import observations…", "key points joints files openpose trc", () => null, form.open),
+      ];
+    },
+  };
+}
+
+/**
+ * @param {import("../model/protocol.js").JudgedPerson} person
+ * @param {Observations} found
+ */
+function describe({ name, share_in_order, frames, sentences }, { people, judged, off }) {
+  const who = people.length > 1 ? `${name} in ${judged}` : judged;
+  const limbs = people.length > 1 ? "" : off ? `; ${count(off)} ${off === 1 ? "limb is" : "limbs are"} off` : "";
+  const texts = [`${who}: ${percent(share_in_order)} of ${count(frames)} frames in order${limbs}.`, ...sentences.map((text) => `${capital(text)}.`)];
+  return texts.map((textContent) => Object.assign(note(), { textContent }));
+}
+
+function note() {
+  return Object.assign(document.createElement("p"), { className: "section-note" });
+}
+
+/** @param {HTMLElement[]} parts */
+function group(...parts) {
+  const element = Object.assign(document.createElement("div"), { className: "acquisition-work" });
+  element.append(...parts);
+  return element;
+}

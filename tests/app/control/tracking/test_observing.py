@@ -1,0 +1,154 @@
+"""Imported observations in the page's program: listed, shown, judged, taken as poses, and imported from files."""
+
+import threading
+
+import numpy as np
+import pytest
+from gestures import drag, wait_for
+from observed_people import BODY_25, seen, walking, write_openpose
+
+from app.control.tracking import observing
+from app.drawing import overlays
+from app.state.page_view import View
+from tracker.errors import TrackerError
+from tracker.judging.judge import Judgement, LimbVerdict
+from tracker.observations.request import ImportRequest
+from tracker.pipeline.keypoint_evidence import read_points
+
+VIEW = View(frozenset(("imported",)), (1, 1, 1, 1))
+
+
+@pytest.fixture
+def controller(opened):
+    return opened()
+
+
+@pytest.fixture
+def request_of(controller, tmp_path):
+    """Files of a person who walks before the cameras of the session, and the request that imports them."""
+    session = controller.session
+    motion = walking(session.n_frames, step=(0.002, 0.0, 0.0))
+    files = write_openpose(tmp_path / "found", session.camera_names, seen(session, [motion]))
+    return ImportRequest("openpose", (files,), tuple(p.name for p in session.people))
+
+
+@pytest.fixture
+def imported(controller, request_of):
+    controller.observing.plan(request_of)
+    controller.observing.store()
+    return controller
+
+
+def kinds(controller, kind):
+    state = controller.state
+    paths = overlays.paths(controller.session, state, VIEW, None)
+    return {p.camera: p.segments_px for p in paths if p.kind == kind and len(p.segments_px)}
+
+
+def at_rest(controller):
+    wait_for(lambda: not controller.state.observations.running, 60)
+    return controller.state.observations
+
+
+def test_files_are_previewed_and_then_stored(controller, request_of):
+    wait_for(lambda: controller.state.observations.sets == ())
+    controller.observing.plan(request_of)
+    assert kinds(controller, "imported").keys() == {0, 1, 2, 3}
+    assert not (controller.session.folder / "observations").exists()
+    controller.observing.discard()
+    assert kinds(controller, "imported") == {}
+    with pytest.raises(TrackerError, match="check the files first"):
+        controller.observing.store()
+    controller.observing.plan(request_of)
+    controller.observing.store()
+    (found,) = controller.state.observations.sets
+    assert (found.name, found.format, found.is_in_space) == ("openpose", "openpose", False)
+    assert found.n_frames == controller.session.n_frames
+    assert controller.state.observations.plan is None
+
+
+def test_points_are_drawn_where_they_are_in_undistorted_pixels(imported):
+    session, points = imported.session, imported.state.observations.shown.points
+    wrist = BODY_25.points.index("LWrist")
+    u, v = session.cameras[0].camera.undistort_points(points.points_px[0, 0, 0, wrist])
+    crosses = kinds(imported, "imported")[0]
+    middles = crosses.reshape(-1, 2, 2).mean(axis=1)
+    assert np.linalg.norm(middles - [u, v], axis=1).min() < 0.01
+    imported.observing.show("")
+    assert kinds(imported, "imported") == {}
+
+
+def test_a_set_that_cannot_be_read_is_listed_with_the_reason(imported):
+    (imported.session.folder / "observations" / "openpose" / "observations.toml").write_text("nonsense")
+    imported.observing._list()
+    (found,) = imported.state.observations.sets
+    assert found.problem
+    with pytest.raises(TrackerError):
+        imported.observing.show("openpose")
+
+
+def judged(controller):
+    """A judgement that calls the left arm off on frame 3."""
+    points = read_points(controller.session, "openpose")[0]
+    off, fine = LimbVerdict(0.98, 0.2, "left arm jumps", "left_wrist"), LimbVerdict(0.02, 0.01, "", "left_ankle")
+    frames = {3: {"left arm": off, "left leg": fine}, 4: {"left arm": fine}}
+    return Judgement(controller.session.people[0].name, frames, {}, {}, points, {})
+
+
+def test_limbs_that_are_off_are_drawn_on_their_frames_alone(imported, monkeypatch):
+    monkeypatch.setattr(observing, "judge", lambda *words: [judged(imported)])
+    imported.observing.judge("openpose")
+    assert at_rest(imported).judged == "openpose"
+    assert kinds(imported, "imported_off") == {}
+    imported.navigation.seek(3)
+    lines = kinds(imported, "imported_off")
+    assert lines.keys() == {0, 1, 2, 3}
+    assert len(lines[0]) == 3 * 2 + 2  # three joints, two bones
+    imported.observing.show("")
+    assert kinds(imported, "imported_off") == {}
+
+
+def test_a_judgement_can_be_stopped_and_is_the_only_work(imported, monkeypatch):
+    begun, stopping = threading.Event(), imported.observing._stopping
+
+    def judge(session, observer, name, settings, sink, report):
+        begun.set()
+        assert stopping.wait(10)
+        sink.report("finding", 0.5)
+
+    monkeypatch.setattr(observing, "judge", judge)
+    imported.observing.judge("openpose")
+    assert begun.wait(10)
+    with pytest.raises(TrackerError, match="no other work"):
+        imported.observing.take("openpose")
+    imported.observing.stop()
+    assert imported.state.observations.message == "Stopped; nothing was changed."
+    assert imported.state.observations.judgements == ()
+
+
+def test_joints_are_taken_as_poses_in_one_entry_and_keyframes_stay(imported):
+    drag(imported, "left_wrist", (6.0, -9.0))
+    kept = imported.state.poses[0]
+    imported.observing.take("openpose")
+    found = at_rest(imported)
+    assert not found.failed, found.message
+    assert imported.state.undo == "poses of openpose"
+    assert (imported.state.poses[0] == kept).all()
+    imported.navigation.seek(5)
+    assert imported.state.people[0].source == "imported"
+    body = imported.models[0].named_points_world(imported.state.poses[0])
+    points = read_points(imported.session, "openpose")[0].places(5)
+    gaps = [np.linalg.norm(body[n] - p) for n, p in points.items() if n in body]
+    assert np.median(gaps) < 0.15  # sizes are those of the session's person
+    imported.history.undo()
+    imported.navigation.seek(5)
+    assert imported.state.people[0].source is None
+
+
+def test_people_without_a_pose_are_placed_in_the_same_entry(imported):
+    imported.observing.take("openpose")
+    found = at_rest(imported)
+    assert not found.failed, found.message
+    assert imported.state.undo == "poses of openpose"
+    imported.history.undo()
+    assert imported.state.undo is None
