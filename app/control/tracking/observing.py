@@ -15,6 +15,7 @@ from app.remedies import page_text
 from app.state.observations import ObservedSet
 from tracker.compute.progress import Report
 from tracker.errors import TrackerError
+from tracker.geometry.arrays import Mask
 from tracker.initialization.first_pose import FirstPoses
 from tracker.judging.judge import judge
 from tracker.observations.importing import ImportPlan, plan_import, store_import
@@ -224,4 +225,5 @@ def _n_frames(found: ObservationSet) -> int:
     if found.points is not None:
         return int(found.points.is_known.any(axis=(1, 2, 3)).sum())
     assert found.joints is not None
-    return int(np.isfinite(found.joints.joints_world).all(axis=3).any(axis=(1, 2)).sum())
+    known: Mask = np.isfinite(found.joints.joints_world).all(axis=3)
+    return int(known.any(axis=(1, 2)).sum())
