@@ -15,7 +15,6 @@ from app.remedies import page_text
 from app.state.observations import ObservedSet
 from tracker.compute.progress import Report
 from tracker.errors import TrackerError
-from tracker.geometry.arrays import Mask
 from tracker.initialization.first_pose import FirstPoses
 from tracker.judging.judge import judge
 from tracker.observations.importing import ImportPlan, plan_import, store_import
@@ -225,5 +224,5 @@ def _n_frames(found: ObservationSet) -> int:
     if found.points is not None:
         return int(found.points.is_known.any(axis=(1, 2, 3)).sum())
     assert found.joints is not None
-    known: Mask = np.isfinite(found.joints.joints_world).all(axis=3)
-    return int(known.any(axis=(1, 2)).sum())
+    joints = found.joints.joints_world.reshape(found.joints.n_frames, -1)
+    return int(np.count_nonzero(np.isfinite(joints).any(axis=1)))
