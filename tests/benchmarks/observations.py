@@ -40,7 +40,8 @@ TRACKED = Conditions(
     start="found by `--init auto`, by key points where these are evidence",
     settings="`quadrille track --init auto --acquire --evidence ...`; each cell is the mean error of the 12 limb "
     "joints in mm / frames with one of them off by more than 150 mm",
-    chosen="of the key points none; those of the contours see the other tables",
+    chosen="the 2.5 cm of the offset of observed joints, and that sizes are acquired with them (`walk`, `fast_arms`); "
+    "those of the contours see the other tables",
     command=COMMAND,
 )
 JUDGED = TRACKED._replace(
@@ -48,7 +49,7 @@ JUDGED = TRACKED._replace(
     settings="`quadrille judge`; a limb is off where a joint is farther than 100 mm from the reference; injected are "
     f"{INJECTED} errors in each of {ROUNDS} rounds: legs exchanged on 5 to 20 frames, drifts of up to 50 to 300 mm, "
     "jumps of 50 to 150 mm of a joint",
-    chosen="none; the largest offset of a detector's joint was set before",
+    chosen="those of the tracking, as above; of the judge none",
 )
 
 
