@@ -37,6 +37,7 @@ class ChainProgress:
         self._progress, self._bar, self._stage = progress, ExitStack(), ""
         self._advance: Callable[[float], None] = lambda share: None
         self._tick: Callable[[], None] = lambda: None
+        self._pass: tuple[type, int] | None = None
 
     def __enter__(self) -> "ChainProgress":
         """Begin."""
@@ -70,8 +71,9 @@ class ChainProgress:
                 self._count(len(run.frames), "tracking")
             self._tick()
         elif isinstance(step, BackwardStep | AuditStep | RepairStep):
-            if step.done == 1:
-                self._count(step.total, _PASSES[type(step)])
+            if self._pass != (type(step), step.total):  # the repair begins again where it has found something
+                self._pass = type(step), step.total
+                self._count(step.total - step.done + 1, _PASSES[type(step)])
             self._tick()
 
     def _count(self, total: int, what: str) -> None:
