@@ -46,7 +46,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   status.setAttribute("role", "status");
   const verdict = document.createElement("div");
   const worst = Object.assign(document.createElement("ol"), { className: "observed-worst" });
-  const more = textButton("", "List less severe entries too", () => {
+  const more = textButton("More", "List less severe entries too", () => {
     listed = Infinity;
     showWorst();
   });
