@@ -67,6 +67,7 @@ def test_people_are_found_on_a_frame_without_gross_errors(tmp_path):
         assert (first.status, first.start.source) == ("doubtful", "key points")
 
 
+@pytest.mark.slow
 def test_a_preset_body_takes_the_height_of_the_points(tmp_path):
     motion = walking(N) * 0.8
     session, _ = imported(tmp_path, motions=[motion])
@@ -118,6 +119,7 @@ def test_joints_for_sizes_count_as_one_altogether(tmp_path):
     np.testing.assert_allclose(9 * many**2, one**2)
 
 
+@pytest.mark.slow
 def test_poses_of_key_points_are_stored_and_keyframes_stay(tmp_path):
     session, (motion,) = imported(tmp_path)
     model = session.people[0].model

@@ -145,6 +145,7 @@ def test_joints_are_taken_as_poses_in_one_entry_and_keyframes_stay(imported):
     assert imported.state.people[0].source is None
 
 
+@pytest.mark.slow
 def test_people_without_a_pose_are_placed_in_the_same_entry(imported):
     imported.observing.take("openpose")
     found = at_rest(imported)
