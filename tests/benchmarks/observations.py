@@ -23,10 +23,11 @@ from tracker.footage.recording import Recording as Footage
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.judging.judge import DOUBTED, Judgement, judge, judge_person
-from tracker.judging.verdicts import LIMBS, OFF_M
+from tracker.judging.verdicts import LIMBS
 from tracker.observations.body_points import BodyPoints
 from tracker.session.session import load_session
 from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.pose_errors import OFF_M
 
 NAMES = ("walk", "fast_arms", "balance_real")
 TABLES = ("observations tracked", "observations judged")

@@ -26,10 +26,9 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.triangulation import sigma_px
+from tracker.images.background_model import MAD_TO_SIGMA
 from tracker.observations.body_points import BodyPoints
 
-_NORMAL_MAD = 1.4826
-"""Standard deviations in a median absolute deviation, of normal errors."""
 _LEAST = 1e-3
 """Smallest confidence that counts."""
 _ROUNDS = 3
@@ -132,7 +131,7 @@ def learn_seen_body(bodies: Mapping[int, PosedBody], seen: BodyPoints, cameras: 
     errors *= np.sqrt(seen.confidence)[list(bodies), ..., None]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # a point that is never seen has no errors
-        sigmas = _NORMAL_MAD * np.nanmedian(np.abs(errors), axis=(0, 1, 3))
+        sigmas = MAD_TO_SIGMA * np.nanmedian(np.abs(errors), axis=(0, 1, 3))
     least = min(sigma_px(c) / c.pinhole.K[0, 0] for c in cameras)
     return SeenBody(seen.names, offsets, np.maximum(np.nan_to_num(sigmas), least))
 

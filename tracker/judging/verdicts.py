@@ -6,9 +6,8 @@ from types import MappingProxyType
 import numpy as np
 
 from tracker.geometry.arrays import Array
+from tracker.tracking.pose_errors import OFF_M
 
-OFF_M = 0.10
-"""A limb is off where one of its joints is farther from its true place, metres, as elsewhere."""
 LIMBS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         f"{side} {limb}": tuple(f"{side}_{joint}" for joint in joints)

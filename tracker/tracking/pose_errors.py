@@ -19,7 +19,7 @@ SELDOM_NATS = 10.0
 """How much likelier the colours of the run must find a limb elsewhere until it is off as likely as not, nats. Of 1,000
 simulated limbs in their place, none had more; of 20 that were put elsewhere, all had
 (`tests/benchmarks/region_evidence.py --displaced`)."""
-_OFF_M = 0.10
+OFF_M = 0.10
 """A limb is off where one of its joints is farther from its true place, metres."""
 
 
@@ -39,7 +39,7 @@ def limb_odds(model: BodyModel, covariances: Array) -> Array:
 
     sigmas = np.sqrt(np.trace(covariances, axis1=1, axis2=2) / 3)
     worst = np.array([sigmas[np.isin(model.point_parts, limb.parts)].max() for limb in limbs(model)])
-    return np.asarray(logit(beyond(_OFF_M, worst))[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
+    return np.asarray(logit(beyond(OFF_M, worst))[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
 
 
 def elsewhere_odds(nats: Array) -> Array:

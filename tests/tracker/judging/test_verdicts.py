@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from tracker.judging.verdicts import OFF_M, probability_beyond, with_doubt
+from tracker.judging.verdicts import probability_beyond, with_doubt
+from tracker.tracking.pose_errors import OFF_M
 
 
 @pytest.mark.parametrize("distance_m", [0.0, 0.05, 0.1, 0.15, 0.3])
