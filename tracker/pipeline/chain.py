@@ -18,12 +18,14 @@ from tracker.fitting.gauss_newton import PointTargets
 from tracker.footage.recording import Recording
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.initialization.first_pose import FirstPoses
+from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
 from tracker.pipeline.calibration_revisions import follow_history
 from tracker.pipeline.find_people import FindSettings, find_people, sentences, store_found
 from tracker.pipeline.keypoint_evidence import (
     SEEN_BODIES,
     learn_seen_bodies,
+    read_points,
     seen_bodies_record,
     seen_joints,
     with_keypoints,
@@ -134,17 +136,18 @@ def run_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
     track = replace(track, people=people, start=start)
     if not opened.is_interrupted(track):  # a run goes on in the bodies in which it was begun
         of_sizes = part_of(sink.report, end if missing else 0.0, 1.0, "acquiring sizes")
-        acquired = _acquire([i for i in plan.acquire if i in people], track, opened, of_sizes)
+        points = {} if track.keypoints is None else read_points(opened.session, track.keypoints)
+        acquired = _acquire([i for i in plan.acquire if i in people], track, points, opened, of_sizes)
         if track.keypoints is not None:
             session, before = opened.session, opened.setting(SEEN_BODIES, {})
-            seen = learn_seen_bodies(session, track.keypoints, acquired)
+            seen = learn_seen_bodies(session, points, acquired)
             opened.store_setting(SEEN_BODIES, seen_bodies_record(session, track.keypoints, seen, before))
     sink.report("tracking", 1.0, f"tracking from frame {start} to {track.frames[0]}, and to {track.frames[-1]}")
     return opened.track(track, sink)
 
 
 def _acquire(
-    people: Sequence[int], track: TrackPlan, opened: OpenSession, report: Report
+    people: Sequence[int], track: TrackPlan, points: Mapping[int, BodyPoints], opened: OpenSession, report: Report
 ) -> dict[int, dict[int, PosedBody]]:
     """Acquire the sizes of those people who have none of their own, one after the other, and store each; return their
     bodies by frame."""
@@ -157,9 +160,10 @@ def _acquire(
         session, part = opened.session, part_of(report, number / len(people), (number + 1) / len(people))
         known = posed_frames(session, person, whole, track.start)
         observer, joints = opened.observer, dict[int, PointTargets]()
-        if track.keypoints is not None:
-            observer = with_keypoints(session, observer, track.keypoints)
-            joints = seen_joints(session, track.keypoints, person, settings.n_frames)
+        if points:
+            observer = with_keypoints(session, observer, points)
+        if person in points:
+            joints = seen_joints(session.people[person].model, points[person], settings.n_frames)
         acquired = acquire_body(session, observer, person, whole, settings, part, known, joints)
         if acquired.is_better:
             opened.store_body(person, acquired, track.start)

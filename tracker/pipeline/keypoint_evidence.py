@@ -99,36 +99,33 @@ def _at_height(model: BodyModel, points: BodyPoints) -> BodyModel:
     return model.with_height(float(np.clip(model.height_m * ratio, *HEIGHT_LIMITS_M)))
 
 
-def seen_joints(session: Session, name: str, person: int, n_frames: int) -> dict[int, PointTargets]:
+def seen_joints(model: BodyModel, points: BodyPoints, n_frames: int) -> dict[int, PointTargets]:
     """Return the observed limb joints of a person by frame, to acquire sizes with.
 
     A joint is off by as much on all frames, so that those of several frames together count as one.
 
     Args:
-        session: the session.
-        name: of the observations.
-        person: index of the person.
+        model: the body.
+        points: of the person.
         n_frames: number of frames from which sizes are acquired.
     """
-    own, model = read_points(session, name).get(person), session.people[person].model
-    if own is None:
-        return {}
-    found = {k: place_joints(model, own.places(k), _OFFSET_M * n_frames**0.5) for k in range(len(own.joints_world))}
+    sigma_m, frames = _OFFSET_M * n_frames**0.5, range(len(points.joints_world))
+    found = {k: place_joints(model, points.places(k), sigma_m) for k in frames}
     return {k: t for k, t in found.items() if len(t.points)}
 
 
 def learn_seen_bodies(
-    session: Session, name: str, bodies: Mapping[int, Mapping[int, PosedBody]] | None = None
+    session: Session, points: Mapping[int, BodyPoints], bodies: Mapping[int, Mapping[int, PosedBody]] | None = None
 ) -> dict[int, SeenBody]:
     """Learn how the detector sees each person.
 
     Args:
         session: the session with the present bodies.
-        name: of the observations.
+        points: of each person, see `read_points`.
         bodies: of people whose poses other evidence shows: by index of the person and by frame, in the present bodies.
             Others are posed by the key points alone, which do not show what all of them have in common.
     """
-    points, cameras, out = read_points(session, name), [c.camera for c in session.cameras], dict[int, SeenBody]()
+    cameras, out = [c.camera for c in session.cameras], dict[int, SeenBody]()
     for person, own in points.items():
         known = (bodies or {}).get(person) or fit_to_keypoints(session.people[person].model, own)
         if known:
@@ -137,17 +134,17 @@ def learn_seen_bodies(
 
 
 def keypoint_evidence(
-    session: Session, name: str, seen: Mapping[int, SeenBody], views: Sequence[str]
+    session: Session, points: Mapping[int, BodyPoints], seen: Mapping[int, SeenBody], views: Sequence[str]
 ) -> KeypointEvidence:
     """Return key points as evidence of a run.
 
     Args:
         session: the session with the present bodies.
-        name: of the observations.
+        points: of each person, see `read_points`.
         seen: how the detector sees each person, by index; people who are left out have no key points.
         views: names of the cameras of the run.
     """
-    points, names = read_points(session, name), [c.camera.name for c in session.cameras]
+    names = [c.camera.name for c in session.cameras]
     people = tuple(
         seen[i].keypoints(p.model, points[i]) if i in seen and i in points else None
         for i, p in enumerate(session.people)
@@ -156,12 +153,12 @@ def keypoint_evidence(
 
 
 def with_keypoints(
-    session: Session, observer: Observer, name: str, seen: Mapping[int, SeenBody] | None = None
+    session: Session, observer: Observer, points: Mapping[int, BodyPoints], seen: Mapping[int, SeenBody] | None = None
 ) -> Observer:
     """Return an observer to which key points are evidence, too; `seen` as in `keypoint_evidence`, learnt by default."""
-    known = learn_seen_bodies(session, name) if seen is None else seen
+    known = learn_seen_bodies(session, points) if seen is None else seen
     views = [c.camera.name for c in observer.cameras]
-    return observer.with_keypoints(keypoint_evidence(session, name, known, views))
+    return observer.with_keypoints(keypoint_evidence(session, points, known, views))
 
 
 def seen_bodies_record(session: Session, name: str, seen: Mapping[int, SeenBody], before: Mapping[str, Any]) -> Any:

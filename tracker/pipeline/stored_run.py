@@ -12,7 +12,7 @@ from tracker.footage.camera_source import CameraSource
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
-from tracker.pipeline.keypoint_evidence import stored_seen_bodies, with_keypoints
+from tracker.pipeline.keypoint_evidence import read_points, stored_seen_bodies, with_keypoints
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.smoothing import TrackedRows, resumed_rows
 from tracker.pipeline.track_session import Leg, StoreWriter, TrackSession, outward
@@ -91,7 +91,7 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, pla
     people = session.people
     if plan.keypoints is not None:
         seen = stored_seen_bodies(session, store, plan.keypoints)
-        observer = with_keypoints(session, observer, plan.keypoints, seen)
+        observer = with_keypoints(session, observer, read_points(session, plan.keypoints), seen)
     locks = load_locks(people, store.setting)
     active = [active_dofs(p.model, locked) for p, locked in zip(people, locks, strict=True)]
     keyframes = keyframes_of(store, people, frozenset(plan.frames))

@@ -85,13 +85,12 @@ def test_who_has_no_key_points_is_named(tmp_path):
     with pytest.raises(TrackerError, match="expected key points of 'bob' in 'net', found none"):
         find_by_keypoints(other, (0, 1), range(N), "net")
     assert set(read_points(other, "net")) == {0}
-    assert seen_joints(other, "net", 1, 6) == {}
     assert session.people[0].name == "ann"
 
 
 def test_a_detector_that_was_learnt_is_read_again_for_the_same_body_alone(tmp_path):
     session, _ = imported(tmp_path)
-    learnt = learn_seen_bodies(session, "net")
+    learnt = learn_seen_bodies(session, read_points(session, "net"))
     with closing(AnnotationStore(session.annotations_path)) as store:
         assert stored_seen_bodies(session, store, "net") is None
         store.set_setting(SEEN_BODIES, seen_bodies_record(session, "net", learnt, {}))
@@ -105,7 +104,8 @@ def test_a_detector_that_was_learnt_is_read_again_for_the_same_body_alone(tmp_pa
 def test_evidence_is_of_the_cameras_of_the_run(tmp_path):
     session, _ = imported(tmp_path)
     views = [session.camera_names[i] for i in (3, 1)]
-    found = keypoint_evidence(session, "net", learn_seen_bodies(session, "net"), views)
+    seen_points = read_points(session, "net")
+    found = keypoint_evidence(session, seen_points, learn_seen_bodies(session, seen_points), views)
     camera = session.cameras[1].camera.pinhole
     shown = found.in_view(4, 1, camera)[0]
     points = read_points(session, "net")[0].known_to(session.people[0].model)
@@ -115,7 +115,8 @@ def test_evidence_is_of_the_cameras_of_the_run(tmp_path):
 
 def test_joints_for_sizes_count_as_one_altogether(tmp_path):
     session, _ = imported(tmp_path)
-    one, many = (seen_joints(session, "net", 0, n)[2].weights for n in (1, 9))
+    points, model = read_points(session, "net")[0], session.people[0].model
+    one, many = (seen_joints(model, points, n)[2].weights for n in (1, 9))
     np.testing.assert_allclose(9 * many**2, one**2)
 
 
