@@ -1,4 +1,4 @@
-"""Where in each picture the contours miss the edges: the mean shift in cells of the picture, magnified."""
+"""Misfit of contours to edges over each picture: the mean shift in cells of the picture, magnified."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -60,7 +60,7 @@ def misfit_field(pieces: Sequence[ResidualPieces], sizes: Sequence[tuple[int, in
             at = keys == key
             if np.count_nonzero(at) < _FEWEST:
                 continue
-            # Where all contours run alike, only the shift across them is known: the least one of all that fit.
+            # Contours that all run alike show only the shift across them: the least one of all that fit.
             shift = -np.linalg.pinv(own.hessians[at].sum(axis=0), rcond=_KNOWN) @ own.gradients[at].sum(axis=0)
             u, v = own.points_px[at].mean(axis=0)
             arrows.append(MisfitArrow(camera, *(round(float(x), 1) for x in (u, v)), *map(_hundredth, shift)))

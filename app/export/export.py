@@ -147,7 +147,7 @@ def _refuse_existing(paths: Sequence[Path], overwrite: bool, may_replace: Callab
     Args:
         paths: the files or folders to write.
         overwrite: whether files may be replaced.
-        may_replace: tells which folders may be replaced then; None for none.
+        may_replace: returns whether a folder may be replaced then; None for no folder.
 
     Raises:
         TrackerError: one exists that may not be replaced.

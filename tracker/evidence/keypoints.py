@@ -23,7 +23,7 @@ class ViewKeypoints(NamedTuple):
     points_part: Array
     """Place of each in its part, (N, 3), metres."""
     positions_px: Array
-    """Where each was seen, (N, 2), px of the view."""
+    """Observed position of each, (N, 2), px of the view."""
     sigmas_px: Array
     """Standard deviation of each, (N,), px of the view."""
 
@@ -37,7 +37,7 @@ class PersonKeypoints:
     points_part: Array
     """Place of each in its part, (N, 3), metres."""
     seen: Array
-    """Where each was seen, (F, V, N, 2), in normalized image coordinates x / z; NaN where absent."""
+    """Observed position of each, (F, V, N, 2), in normalized image coordinates x / z; NaN where absent."""
     sigmas: Array
     """Standard deviation of each, (F, V, N), in normalized image coordinates."""
 

@@ -35,7 +35,7 @@ class KeypointTerm(NamedTuple):
     projections: Array
     """Projection matrix of the view of each, (N, 3, 4)."""
     positions_px: Array
-    """Where it was seen, (N, 2), px."""
+    """Its observed position, (N, 2), px."""
     precisions: Array
     """Inverse variance of each, (N,), 1/px^2."""
 

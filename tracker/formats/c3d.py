@@ -46,7 +46,7 @@ class _Layout(NamedTuple):
     scale: float
     """Units per step of whole numbers; negative for reals."""
     data_at: int
-    """Where the first frame begins, bytes."""
+    """First byte of the first frame."""
     rate: float
     order: int
     """Order of bytes: `_Order.INTEL`, `_Order.DEC` or `_Order.SGI`."""

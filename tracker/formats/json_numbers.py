@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 Span: TypeAlias = tuple[int, int]
-"""Where a number begins and ends in a text."""
+"""Begin and end of a number in a text."""
 
 _TOKEN = re.compile(r'[ \t\n\r]*("(?:[^"\\]|\\.)*"|[\[\]{}:,]|[^\s"\[\]{}:,]+)', re.DOTALL)
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
@@ -20,7 +20,7 @@ class SpanList:
     items: list[Any]
     """Its items: a `Span` for a number, a `SpanList`, a dict, or None for text, true, false and null."""
     end: int
-    """Where its closing bracket stands."""
+    """Place of its closing bracket."""
 
 
 def json_spans(text: str) -> Any:

@@ -20,9 +20,9 @@ class BodyPoints:
     names: tuple[str, ...]
     """Names of the body's points, (N,)."""
     joints_world: Array
-    """Where they are, (F, N, 3), metres; NaN where unknown."""
+    """Their positions in the world, (F, N, 3), metres; NaN where unknown."""
     seen: Array
-    """Where each view has them, (F, V, N, 2), in normalized image coordinates x / z; NaN where absent."""
+    """Their positions in each view, (F, V, N, 2), in normalized image coordinates x / z; NaN where absent."""
     confidence: Array
     """(F, V, N), 0 to 1; 0 where absent."""
 

@@ -166,6 +166,6 @@ def _correction_lines(camera: dict[str, Any]) -> list[str]:
         lines.append(f"  {camera['name']} clock: {camera['time_ms']:+.1f} ± {sigma['time_ms']:.1f} ms")
     if camera["time_ms"] or camera["drift_ms_per_s"]:
         drift, deviation = camera["drift_ms_per_s"], sigma["drift_ms_per_s"]
-        told = f"{drift:+.2f} ± {deviation:.2f}" if drift else f"not determinable, ± {deviation:.2f}"
-        lines.append(f"  {camera['name']} drift of the clock: {told} ms a second")
+        value = f"{drift:+.2f} ± {deviation:.2f}" if drift else f"not determinable, ± {deviation:.2f}"
+        lines.append(f"  {camera['name']} drift of the clock: {value} ms a second")
     return lines
