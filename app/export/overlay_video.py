@@ -15,8 +15,8 @@ from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions, load_character
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions, load_character
 from tracker.footage.recording import Recording
 from tracker.footage.video_writer import VideoWriter
 from tracker.geometry.arrays import Array, FloatArray, Image

@@ -34,7 +34,7 @@ HOUSE = {
     ],
     "tracker/  the library": [
         ["experiments", "judging"],
-        ["pipeline", "export"],
+        ["pipeline", "exports"],
         ["simulate", "evaluation", "boards"],
         ["calibration", "posing"],
         ["acquisition", "initialization"],

@@ -40,7 +40,7 @@ ROOMS = [
     "tracker.initialization",
     "tracker.posing",
     "tracker.evaluation",
-    "tracker.export",
+    "tracker.exports",
     "tracker.simulate.people",
     "tracker.simulate.motion",
     "tracker.simulate.stage",

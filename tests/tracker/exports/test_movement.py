@@ -11,9 +11,9 @@ from foreign import foreign, projected
 from stored_motions import FPS, store_motion
 
 from tracker.errors import FormatError
-from tracker.export.array_writers import write_movement
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions, file_from_world
+from tracker.exports.array_writers import write_movement
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions, file_from_world
 from tracker.formats.interchange import optional_packages
 from tracker.geometry import rigid
 

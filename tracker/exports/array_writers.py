@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions, file_from_world
-from tracker.export.pose_arrays import pose_arrays
-from tracker.export.view_arrays import view_arrays
-from tracker.export.views import exported_cameras
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions, file_from_world
+from tracker.exports.pose_arrays import pose_arrays
+from tracker.exports.view_arrays import view_arrays
+from tracker.exports.views import exported_cameras
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.interchange.c3d import write_c3d
 from tracker.formats.interchange.movement_netcdf import PER_POSE, PoseDataset, Variable, per_point, write_dataset

@@ -23,15 +23,15 @@ import msgspec
 
 from tracker.calibrations.writing import write_layout
 from tracker.errors import FormatError, Remedy
-from tracker.export.array_writers import write_npz
-from tracker.export.dataset_card import TO_FILL_IN, LabelCounts, format_card
-from tracker.export.frame_views import FrameViews
-from tracker.export.label_writers import OpenPoseFiles, write_views
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions
-from tracker.export.provenance import write_provenance
-from tracker.export.views import IMAGES, Pictures, exported_cameras
-from tracker.export.writers import coco_annotations, coco_categories
+from tracker.exports.array_writers import write_npz
+from tracker.exports.dataset_card import TO_FILL_IN, LabelCounts, format_card
+from tracker.exports.frame_views import FrameViews
+from tracker.exports.label_writers import OpenPoseFiles, write_views
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions
+from tracker.exports.provenance import write_provenance
+from tracker.exports.views import IMAGES, Pictures, exported_cameras
+from tracker.exports.writers import coco_annotations, coco_categories
 from tracker.files import write_text_atomic
 from tracker.formats.file_names import identifier
 from tracker.formats.keypoints.coco import CocoAnnotation, CocoImage, segmentation, write_coco

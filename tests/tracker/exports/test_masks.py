@@ -13,10 +13,10 @@ from stored_motions import K1, store_motion
 
 from tracker.contours.label_image import part_labels
 from tracker.errors import FormatError, Remedy
-from tracker.export.mask_writers import write_masks
-from tracker.export.motion import PersonMotion, read_motion
-from tracker.export.options import ExportOptions
-from tracker.export.views import view_labels
+from tracker.exports.mask_writers import write_masks
+from tracker.exports.motion import PersonMotion, read_motion
+from tracker.exports.options import ExportOptions
+from tracker.exports.views import view_labels
 from tracker.geometry import rigid
 from tracker.geometry.lens_tables import lens_of, undistortion_map
 from tracker.store.annotation_store import AnnotationStore

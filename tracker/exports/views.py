@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tracker.body.model import PosedBody
 from tracker.contours.label_image import part_labels
 from tracker.errors import RecordingError
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions
 from tracker.files import write_text_atomic
 from tracker.footage.recording import Recording
 from tracker.formats.anipose import format_calibration

@@ -1,77 +1,39 @@
-"""The formats that a session is exported to, one entry each. Another format is a writer and an entry here."""
+"""The formats that a session is exported to, one entry each. Another format is a writer and an entry here.
+
+Other packages add theirs by an entry point (`tracker.compute.extensions`), and so does `app` with its overlay video.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tracker.compute.extensions import usable
 from tracker.errors import Remedy, TrackerError
+from tracker.exports.export_format import ExportFormat, Writer
 
 if TYPE_CHECKING:
-    from tracker.export.motion import ExportedMotion
-    from tracker.export.options import AxesName, ExportOptions, UnitName
-
-Writer = Callable[["ExportedMotion", "ExportOptions", Sequence[Path], Callable[[], None]], None]
-"""Writes a motion to the files of one format, and calls the function after each frame."""
-
-
-@dataclass(frozen=True)
-class ExportFormat:
-    """A format that a session is exported to."""
-
-    name: str
-    """By which the command line and the page refer to it."""
-    title: str
-    """Its content, for people."""
-    suffixes: tuple[str, ...]
-    """End of the name of each file; the first names the format."""
-    write: Writer
-    options: frozenset[str] = frozenset()
-    """Options that it has, some of `OPTIONS`."""
-    one_person: bool = False
-    """Whether each person gets files of their own."""
-    axes: "AxesName" = "calibration"
-    """Axes by default, as programs that read it expect them."""
-    units: "UnitName" = "m"
-    """Unit of lengths by default."""
-    gaps: str = "left empty"
-    """Treatment of frames without a pose."""
-    numbering: str = ""
-    """Sentence on its frame numbers where they are not the session's, of `{frame}` and `{number}`, 1 more."""
-    one_body: bool = False
-    """Whether all poses of a person are of one body; those of earlier sizes are refitted."""
-    has_rate: bool = False
-    """Whether its frames have a constant rate; those between the exported ones are then like frames without a pose."""
-    is_folder: bool = False
-    """Whether it is a folder of files; the first suffix ends its name if it is named after the session."""
-    holds_provenance: bool = False
-    """Whether its own files hold the provenance of the poses."""
+    from tracker.exports.motion import ExportedMotion
+    from tracker.exports.options import ExportOptions
 
 
 def _by_writer(name: str, module: str = "writers") -> Writer:
-    """Return a function of a module of `tracker.export`, imported at the first export: help is quick without."""
+    """Return a function of a module of `tracker.exports`, imported at the first export: help is quick without."""
 
     def write(
         motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]
     ) -> None:
-        writer: Writer = getattr(import_module(f"tracker.export.{module}"), name)
+        writer: Writer = getattr(import_module(f"tracker.exports.{module}"), name)
         writer(motion, options, paths, tick)
 
     return write
-
-
-def _mp4(motion: "ExportedMotion", options: "ExportOptions", paths: Sequence[Path], tick: Callable[[], None]) -> None:
-    from app.export.overlay_video import write_overlay_video
-
-    write_overlay_video(motion, options, paths[0], tick)
 
 
 OPTIONS = ("axes", "units", "view", "keypoints", "pixels", "pictures", "character")
 """Options that a format may have, the fields of `ExportOptions`."""
 _PLACE = frozenset(("axes", "units"))
 _FROM_1 = "counts from 1: frame {frame} of the session is"
-FORMATS: Mapping[str, ExportFormat] = {
+_OWN: Mapping[str, ExportFormat] = {
     f.name: f
     for f in (
         ExportFormat(
@@ -194,16 +156,9 @@ FORMATS: Mapping[str, ExportFormat] = {
             gaps="left without people",
             is_folder=True,
         ),
-        ExportFormat(
-            "mp4",
-            "overlay video (MP4)",
-            (".mp4",),
-            _mp4,
-            frozenset(("view", "character")),
-            gaps="shown without a body",
-        ),
     )
 }
+FORMATS: Mapping[str, ExportFormat] = {**_OWN, **usable("quadrille.exporters", ExportFormat, _OWN)}
 """All formats by name."""
 
 

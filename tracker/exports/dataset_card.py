@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.export.motion import ExportedMotion, frames_text
-from tracker.export.options import ExportOptions
-from tracker.export.provenance import PoseProvenance, pose_provenance
+from tracker.exports.motion import ExportedMotion, frames_text
+from tracker.exports.options import ExportOptions
+from tracker.exports.provenance import PoseProvenance, pose_provenance
 from tracker.store.edit_tree import program_version
 
 TO_FILL_IN = "TO BE FILLED IN"

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions, file_from_world
-from tracker.export.provenance import PoseProvenance, pose_provenance
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions, file_from_world
+from tracker.exports.provenance import PoseProvenance, pose_provenance
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 

@@ -10,9 +10,9 @@ from bodies import MODELS, with_center
 from foreign import foreign, projected
 from stored_motions import FPS, store_motion
 
-from tracker.export.motion import read_motion
-from tracker.export.nwb_writer import write_poses_nwb
-from tracker.export.options import ExportOptions, file_from_world
+from tracker.exports.motion import read_motion
+from tracker.exports.nwb_writer import write_poses_nwb
+from tracker.exports.options import ExportOptions, file_from_world
 from tracker.geometry import rigid
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange

@@ -10,9 +10,9 @@ from foreign import foreign
 from stored_motions import store_motion
 
 from tracker.errors import FormatError, Remedy
-from tracker.export.array_writers import write_person_c3d
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions, file_from_world
+from tracker.exports.array_writers import write_person_c3d
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions, file_from_world
 from tracker.formats.interchange import c3d, optional_packages
 from tracker.geometry import rigid
 from tracker.store.annotation_store import AnnotationStore

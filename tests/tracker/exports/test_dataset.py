@@ -16,10 +16,10 @@ from stored_motions import filmed, store_motion
 
 from tracker.calibrations.reading import read_cameras
 from tracker.errors import FormatError, Remedy
-from tracker.export.dataset import write_dataset
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions
-from tracker.export.views import view_labels
+from tracker.exports.dataset import write_dataset
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions
+from tracker.exports.views import view_labels
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import MarkChange
 

@@ -12,9 +12,9 @@ import trimesh
 from bodies import MODELS, with_center
 from stored_motions import FPS, store_motion
 
-from tracker.export import writers
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions, file_from_world
+from tracker.exports import writers
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions, file_from_world
 from tracker.geometry import rigid
 
 ROOT = Path(__file__).resolve().parents[3]

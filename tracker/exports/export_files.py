@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.export.formats import ExportFormat
 from tracker.errors import Remedy, TrackerError
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions
-from tracker.export.provenance import SIDE_FILE, write_provenance
+from tracker.exports.export_format import ExportFormat
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions
+from tracker.exports.provenance import SIDE_FILE, write_provenance
 from tracker.formats.file_names import identifiers
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
     Raises:
         TrackerError: the format has no such option, or a value is not allowed.
     """
-    from tracker.export.options import AXES, KEYPOINT_SETS, PICTURES, PIXELS, UNITS, load_character
+    from tracker.exports.options import AXES, KEYPOINT_SETS, PICTURES, PIXELS, UNITS, load_character
 
     values = {name: value for name, value in given.items() if value is not None}
     allowed: dict[str, Sequence[str]] = {

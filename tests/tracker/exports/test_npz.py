@@ -9,9 +9,9 @@ import pytest
 from bodies import MODELS
 from stored_motions import store_motion
 
-from tracker.export.array_writers import write_npz
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions, file_from_world
+from tracker.exports.array_writers import write_npz
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions, file_from_world
 from tracker.formats.model_toml import parse_model
 from tracker.geometry import rigid
 from tracker.store.annotation_store import AnnotationStore

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.model import PosedBody, ahead
-from tracker.export.keypoints import Keypoints, keypoints_in_views
-from tracker.export.motion import ExportedMotion, PersonMotion
-from tracker.export.views import view_labels
+from tracker.exports.keypoints import Keypoints, keypoints_in_views
+from tracker.exports.motion import ExportedMotion, PersonMotion
+from tracker.exports.views import view_labels
 from tracker.geometry.cameras import Camera
 
 

@@ -7,9 +7,9 @@ import pytest
 from bodies import MODELS
 from stored_motions import store_motion
 
-from tracker.export import writers
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions, file_from_world
+from tracker.exports import writers
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions, file_from_world
 from tracker.formats.model_toml import parse_model
 from tracker.geometry import rigid
 

@@ -11,9 +11,9 @@ from foreign import projected
 from stored_motions import K1, filmed, store_motion
 
 from tracker.errors import RecordingError
-from tracker.export.label_writers import write_points
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions
+from tracker.exports.label_writers import write_points
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions
 from tracker.formats.anipose import read_calibration
 from tracker.formats.keypoints.openpose import read_openpose
 

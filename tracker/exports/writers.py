@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.export.keypoints import Keypoints, keypoints_in_views
-from tracker.export.motion import ExportedMotion, PersonMotion
-from tracker.export.options import ExportOptions, file_from_world, up_in_file
+from tracker.exports.keypoints import Keypoints, keypoints_in_views
+from tracker.exports.motion import ExportedMotion, PersonMotion
+from tracker.exports.options import ExportOptions, file_from_world, up_in_file
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_folder import ImageFolder
 from tracker.formats.bvh import UPRIGHT_Y, BvhFrame, write_bvh

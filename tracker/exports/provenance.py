@@ -10,8 +10,8 @@ import numpy as np
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
-from tracker.export.motion import ExportedMotion, PersonMotion
-from tracker.export.options import ExportOptions, file_from_world
+from tracker.exports.motion import ExportedMotion, PersonMotion
+from tracker.exports.options import ExportOptions, file_from_world
 from tracker.files import write_text_atomic
 from tracker.geometry.arrays import Array
 from tracker.store.edit_tree import program_version

@@ -12,10 +12,10 @@ from stored_motions import store_motion
 
 from tracker.body.limbs import limbs
 from tracker.errors import Remedy, SessionError
-from tracker.export import writers
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions
-from tracker.export.provenance import pose_provenance, sources_of_points, write_provenance
+from tracker.exports import writers
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions
+from tracker.exports.provenance import pose_provenance, sources_of_points, write_provenance
 from tracker.pipeline.calibration_revisions import change_calibration
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore

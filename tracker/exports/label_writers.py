@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tracker.export.frame_views import FrameViews, PersonInView
-from tracker.export.keypoints import project_through_lens
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions
-from tracker.export.provenance import point_lost
-from tracker.export.views import Pictures, exported_cameras, undistorted_pictures
+from tracker.exports.frame_views import FrameViews, PersonInView
+from tracker.exports.keypoints import project_through_lens
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions
+from tracker.exports.provenance import point_lost
+from tracker.exports.views import Pictures, exported_cameras, undistorted_pictures
 from tracker.formats.joint_maps import known_joint_maps
 from tracker.formats.keypoints.openpose import OpenPosePerson, file_name, write_openpose
 from tracker.geometry.cameras import Camera

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.export.frame_views import FrameViews
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions
-from tracker.export.views import exported_cameras
+from tracker.exports.frame_views import FrameViews
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions
+from tracker.exports.views import exported_cameras
 from tracker.geometry.arrays import Array
 
 

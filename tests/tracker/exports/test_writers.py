@@ -17,10 +17,10 @@ from stored_motions import FPS, distorted_cameras, store_motion
 from tracker.calibration.camera_correction import N_CORRECTIONS
 from tracker.contours.label_image import part_labels
 from tracker.errors import Remedy, SessionError
-from tracker.export import writers
-from tracker.export.keypoints import keypoints_in_views, project_through_lens
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions, file_from_world
+from tracker.exports import writers
+from tracker.exports.keypoints import keypoints_in_views, project_through_lens
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions, file_from_world
 from tracker.formats.model_toml import format_model
 from tracker.formats.trc import read_trc
 from tracker.geometry import rigid

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions, file_from_world
-from tracker.export.pose_arrays import PoseArrays, pose_arrays
-from tracker.export.view_arrays import ViewPoints, view_arrays
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions, file_from_world
+from tracker.exports.pose_arrays import PoseArrays, pose_arrays
+from tracker.exports.view_arrays import ViewPoints, view_arrays
 from tracker.footage.camera_source import CameraSource
 from tracker.formats.interchange.nwb import NwbPerson, NwbRecording, NwbView, write_nwb
 from tracker.geometry.arrays import Array

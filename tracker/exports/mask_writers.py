@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
-from tracker.export.frame_views import FrameViews
-from tracker.export.label_writers import write_views
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions
-from tracker.export.views import exported_cameras, undistorted_pictures
+from tracker.exports.frame_views import FrameViews
+from tracker.exports.label_writers import write_views
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions
+from tracker.exports.views import exported_cameras, undistorted_pictures
 from tracker.files import write_text_atomic
 from tracker.formats.interchange.indexed_png import write_indexed_png
 from tracker.geometry.cameras import Camera

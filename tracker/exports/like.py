@@ -11,8 +11,8 @@ import numpy as np
 
 from tracker.body.model import PosedBody
 from tracker.errors import FormatError, Remedy, SessionError, TrackerError
-from tracker.export.keypoints import project_through_lens
-from tracker.export.mended_points import MendedPoints, PoseChoice, mended_points
+from tracker.exports.keypoints import project_through_lens
+from tracker.exports.mended_points import MendedPoints, PoseChoice, mended_points
 from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
 from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv

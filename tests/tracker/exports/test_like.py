@@ -17,8 +17,8 @@ from observed_people import BODY_25, make_session, seen, write_openpose
 
 from tracker.body.model import PosedBody
 from tracker.errors import FormatError, SessionError, TrackerError
-from tracker.export.keypoints import project_through_lens
-from tracker.export.like import export_like
+from tracker.exports.keypoints import project_through_lens
+from tracker.exports.like import export_like
 from tracker.formats.c3d import read_c3d
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
 from tracker.formats.keypoints.openpose import read_openpose
