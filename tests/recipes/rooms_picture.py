@@ -33,7 +33,8 @@ HOUSE = {
         ["state", "runtime"],
     ],
     "tracker/  the library": [
-        ["experiments", "judging"],
+        ["api", "experiments"],
+        ["judging"],
         ["pipeline", "exports"],
         ["simulate", "evaluation", "boards"],
         ["calibration", "posing"],

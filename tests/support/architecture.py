@@ -48,6 +48,7 @@ ROOMS = [
     "tracker.pipeline",
     "tracker.judging",
     "tracker.experiments",
+    "tracker.api",
     "app",
     "app.runtime",
     "app.state",

@@ -51,7 +51,8 @@ def extensions(group: str, kind: type | None = None, taken: Collection[str] = ()
     found, names = list[Extension](), set(taken)
     for point in sorted(metadata.entry_points(group=group), key=lambda p: (p.name, p.value)):
         package = "" if point.dist is None else f"{point.dist.name} {point.dist.version}"
-        value, error = None, ""
+        value: Any = None
+        error = ""
         if point.name in names:
             error = f"expected a name that is free, found '{point.name}' for the second time"
         else:
