@@ -29,6 +29,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
+from app.cli.batches import batch
 from app.cli.calibration import calibrate, check, sync
 from app.cli.observations import import_, judge
 from app.remedies import command_line_text
@@ -59,6 +60,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "export": export.command,
     "restore": restore.command,
     "simulate": simulate.command,
+    "batch": batch.command,
     "experiment": experiment.command,
     "bench": bench.command,
 }

@@ -20,7 +20,7 @@ HOUSE = {
     ],
     "app/  the viewer": [
         ["__main__"],
-        ["cli/calibration", "cli/observations"],
+        ["cli/calibration", "cli/observations", "cli/batches"],
         ["cli"],
         ["bench", "server"],
         ["page", "scene3d"],
@@ -33,6 +33,7 @@ HOUSE = {
         ["state", "runtime"],
     ],
     "tracker/  the library": [
+        ["batch"],
         ["api", "experiments"],
         ["judging"],
         ["pipeline", "exports"],

@@ -49,6 +49,7 @@ ROOMS = [
     "tracker.judging",
     "tracker.experiments",
     "tracker.api",
+    "tracker.batch",
     "app",
     "app.runtime",
     "app.state",
@@ -69,6 +70,7 @@ ROOMS = [
     "app.cli",
     "app.cli.calibration",
     "app.cli.observations",
+    "app.cli.batches",
     "app.__main__",
 ]
 FLOOR = {room: floor for floor, room in enumerate(ROOMS)}

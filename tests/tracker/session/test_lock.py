@@ -11,6 +11,7 @@ from itertools import combinations
 import pytest
 
 from tracker.errors import SessionError
+from tracker.session import holder as holder_module
 from tracker.session import lock as lock_module
 from tracker.session.lock import LOCK_FILE, SessionLock, is_held_here
 
@@ -235,8 +236,9 @@ def test_another_machine_with_the_same_host_name_does_not_steal_the_lock(tmp_pat
 def test_after_a_power_cut_the_lock_of_this_machine_is_free_but_not_that_of_a_container(
     tmp_path, monkeypatch, namespace, is_free
 ):
-    here = lock_module._System(socket.gethostname(), "now", namespace, "laptop")
-    monkeypatch.setattr(lock_module, "_this_system", lambda: here)
+    here = holder_module.System(socket.gethostname(), "now", namespace, "laptop")
+    monkeypatch.setattr(holder_module, "this_system", lambda: here)
+    monkeypatch.setattr(lock_module, "this_system", lambda: here)
     left_by(tmp_path, boot="before", namespace=namespace, machine="laptop")
     if is_free:
         SessionLock(tmp_path).acquire()
