@@ -54,8 +54,23 @@ class NextSession(NamedTuple):
     """Copies of the sockets of that port: connections wait there for the next program."""
 
 
+class FirstView(NamedTuple):
+    """What the page shows first."""
+
+    frame: int = 0
+    person: int = 0
+    """Index of the selected person."""
+
+
+_BEGINNING = FirstView()
+
+
 def open_session(
-    session: Session, doorway: Doorway, compiler: KernelCompiler, say: Callable[[str], None]
+    session: Session,
+    doorway: Doorway,
+    compiler: KernelCompiler,
+    say: Callable[[str], None],
+    first: FirstView = _BEGINNING,
 ) -> NextSession | None:
     """Serve the page of a session until the program is interrupted, or the page asks for another session.
 
@@ -64,6 +79,7 @@ def open_session(
         doorway: answers at the page's address meanwhile.
         compiler: compiles missing kernels; the caller closes it.
         say: shows a line to the user.
+        first: what the page shows first.
 
     Returns:
         The session to open next; None if the program was interrupted.
@@ -87,6 +103,8 @@ def open_session(
         frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
         saver = Saver(session, store, _author())
         controller = Controller(session, saver, frames, compiler)
+        controller.navigation.seek(first.frame)
+        controller.navigation.select(first.person, None)
         viser = PrivateViser()
         thumbnails = Thumbnails(controller, FootageCrops(session.cameras, indices))
         try:
