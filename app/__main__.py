@@ -15,6 +15,7 @@ from app.cli import (
     audit,
     bench,
     body,
+    doctor,
     evaluate,
     experiment,
     export,
@@ -63,6 +64,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "batch": batch.command,
     "experiment": experiment.command,
     "bench": bench.command,
+    "doctor": doctor.command,
 }
 _HELP = ("-h", "--help")
 _ABOUT = """Model-based human motion capture from several calibrated cameras.
