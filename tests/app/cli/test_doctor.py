@@ -38,7 +38,7 @@ def test_an_extension_that_does_not_load_is_a_warning_without_its_path(found, ru
     broken = extensions.Extension(
         "quadrille.metrics", "jerk", "other 1.0", None, "ImportError: /home/eve/lab/x.py is no"
     )
-    monkeypatch.setattr(extensions, "extensions", lambda group, kind: [broken] if "metrics" in group else [])
+    monkeypatch.setattr(extensions, "extensions", lambda group, kind: [broken] * ("metrics" in group))
     line = next(x for x in run("doctor")[1].splitlines() if "jerk" in x)
     assert line.startswith("warning")
     assert "PATH" in line
