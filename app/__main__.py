@@ -86,6 +86,10 @@ def main() -> None:
         return
     if not words or (words[0] not in _COMMANDS and words[0] not in _HELP):
         words = ["open", *words]
+    if not set(words) & {*_HELP}:
+        from app.session.annotator import set_annotator
+
+        set_annotator(None)
     # Help has colours, and shows nothing of a file.
     out = nullcontext() if set(words) & {*_HELP} else redirect_stdout(cast(TextIO, PlainOutput(sys.stdout)))
     try:

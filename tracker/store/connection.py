@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.files import IrregularFileError, refuse_links, sync_folder
-from tracker.store import backups, checksums, recovery, schema, verification
+from tracker.store import backups, checksums, identities, recovery, schema, verification
 from tracker.store.query_limit import EndlessQueryError, limited
 
 T = TypeVar("T")
@@ -247,6 +247,7 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
             db.execute("PRAGMA synchronous = EXTRA")
         db.execute("PRAGMA foreign_keys = ON")
         checksums.register(db)
+        identities.register(db)
     except BaseException:
         db.close()
         raise
