@@ -26,7 +26,7 @@ COLUMNS = {
     "comments": "uid, about, person, frame, limb, text, resolved, author, time",
 }
 """Columns of each table that its checksums cover."""
-_NO_UID = {"edits": ("uid",)}
+_NO_UID: dict[str, tuple[str, ...]] = {"edits": ("uid",)}
 LATER_COLUMNS: dict[int, dict[str, tuple[str, ...]]] = {
     6: {"pose_changes": ("limbs", "errors", "made_in", "trace"), **_NO_UID},
     7: {"pose_changes": ("errors", "made_in", "trace"), **_NO_UID},

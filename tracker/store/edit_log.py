@@ -100,7 +100,10 @@ def read_log(connection: Connection) -> EditLog:
     )
     tasks = TaskLog(connection)
     return EditLog(
-        [LoggedEdit(*row[1:], tuple(poses.get(row[0], ())), tuple(pins.get(row[0], ()))) for row in edits],
+        [
+            LoggedEdit(*map(str, edit), tuple(poses.get(number, ())), tuple(pins.get(number, ())))
+            for number, *edit in edits
+        ],
         frozenset(done),
         every("SELECT kind, edit, time FROM moves ORDER BY id", (), lambda r: Move(r[0], numbers[r[1]], r[2])),
         revisions,
