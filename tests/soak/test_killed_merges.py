@@ -129,7 +129,7 @@ def test_no_acknowledged_edit_is_missing_after_kills_and_merges(copies, tmp_path
 
         pid = in_a_child(edit)
         os.close(writer)
-        time.sleep(rng.uniform(0.02, 0.3))
+        time.sleep(rng.uniform(0.01, 0.1))
         os.kill(pid, signal.SIGKILL)
         os.waitpid(pid, 0)
         n_kills += 1
@@ -138,8 +138,8 @@ def test_no_acknowledged_edit_is_missing_after_kills_and_merges(copies, tmp_path
         n_edits += len(said)
         acknowledged[folder] |= {*said}
         assert labels(folder) >= acknowledged[folder]  # which opens it with all checks
-        if rng.random() < 0.3:
-            merged, n_writes = tmp_path / "in" / "merged", rng.randrange(30)
+        if rng.random() < 0.5:
+            merged, n_writes = tmp_path / "in" / "merged", rng.randrange(40)
 
             def merge(n=n_writes, merged=merged):
                 killed_at(merged.parent, n)

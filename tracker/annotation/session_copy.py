@@ -61,7 +61,7 @@ def _appearing(folder: Path) -> Iterator[Path]:
         yield temporary
         for path, _, names in os.walk(temporary):
             for name in names:
-                with (Path(path) / name).open("rb+") as file:
+                with (Path(path) / name).open("rb") as file:
                     os.fsync(file.fileno())
         if folder.exists():
             folder.rmdir()

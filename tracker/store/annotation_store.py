@@ -235,7 +235,8 @@ class AnnotationStore:
 
     def read_log(self) -> EditLog:
         """Read all that the store holds, without numbers of rows."""
-        return read_log(self._connection)
+        with self._connection.snapshot():
+            return read_log(self._connection)
 
     def write_log(self, log: EditLog) -> Written:
         """Write a log into this store, which must be new and empty."""

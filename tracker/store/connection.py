@@ -78,6 +78,17 @@ class Connection:
             self._contents = contents
 
     @contextmanager
+    def snapshot(self) -> Generator[None, None, None]:
+        """Read one state of the file within a `with` block, although other programs write."""
+        with self._lock, self._errors():
+            self._reopen_moved(for_writing=False)
+            self.db.execute("BEGIN")
+            try:
+                yield
+            finally:
+                self.db.rollback()
+
+    @contextmanager
     def impatient(self) -> Generator[None, None, None]:
         """Raise at once where other programs have locked the file, within a `with` block."""
         with self._lock:

@@ -101,8 +101,8 @@ def read_log(connection: Connection) -> EditLog:
     tasks = TaskLog(connection)
     return EditLog(
         [
-            LoggedEdit(*map(str, edit), tuple(poses.get(number, ())), tuple(pins.get(number, ())))
-            for number, *edit in edits
+            LoggedEdit(uid, label, author, time, program, tuple(poses.get(number, ())), tuple(pins.get(number, ())))
+            for number, uid, label, author, time, program in edits
         ],
         frozenset(done),
         every("SELECT kind, edit, time FROM moves ORDER BY id", (), lambda r: Move(r[0], numbers[r[1]], r[2])),
