@@ -8,9 +8,17 @@ import numpy as np
 import pytest
 from command_line import assert_refused, stored
 
+from tracker.calibration.camera_correction import N_CORRECTIONS
 from tracker.formats.model_toml import format_model
+from tracker.pipeline.calibration_revisions import (
+    change_calibration,
+    follow_history,
+    same_calibration,
+    with_corrections,
+)
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.calibration_log import revisions_of_poses
 from tracker.store.records import PinChange, PoseChange, PoseRecord
 
 
@@ -116,6 +124,43 @@ def test_what_is_no_copy_is_refused_and_nothing_is_written(run, session, tmp_pat
     assert_refused(run("merge", session, copy, "--into", into), ["found other numbers of frames"])
     assert not into.exists()
     assert_refused(run("merge", session, session, "--into", copy), ["exists already and is not an empty folder"])
+
+
+def test_the_merged_session_has_the_body_and_the_calibration_of_its_history(run, session, tmp_path):
+    annotate(session, 1.0, [0], "lead")
+    a, b, into = tmp_path / "a", tmp_path / "b", tmp_path / "into"
+    shutil.copytree(session, a)
+    shutil.copytree(session, b)
+    assert run("body", a, "--to", "gavrila38")[0] == 0
+    loaded = load_session(b)
+    corrections = np.zeros((len(loaded.cameras), N_CORRECTIONS))
+    corrections[0, 1] = 0.02
+    with closing(AnnotationStore(b / "annotations.sqlite")) as store:
+        changed = change_calibration(loaded, store, with_corrections(loaded, corrections), "calibrate")
+    annotate(a, 2.0, [1], "anna")
+    annotate(b, 2.0, [2], "ben")
+    assert run("merge", a, b, "--into", into)[0] == 0
+    found = load_session(into)
+    assert found.people[0].model.name == "gavrila38"
+    assert same_calibration(found, changed)
+    with closing(AnnotationStore(into / "annotations.sqlite")) as store:
+        assert revisions_of_poses(store, "person") == {0: 1, 1: 1, 2: 2}
+        assert follow_history(found, store) is found
+
+
+@pytest.mark.parametrize(("file", "before", "after", "expected"), [
+    ("calibration.toml", "481.58", "482.58", ["found other calibrations in", "give both the same calibration.toml"]),
+    ("models/person.toml", "height_m = 1.78", "height_m = 1.88", ["found other bodies of person in", "give both"]),
+])  # fmt: skip
+def test_changes_that_the_history_does_not_know_are_refused(run, session, tmp_path, file, before, after, expected):
+    annotate(session, 1.0, [0], "lead")
+    copy, into = tmp_path / "copy", tmp_path / "into"
+    shutil.copytree(session, copy)
+    text = (copy / file).read_text("utf-8")
+    assert before in text
+    (copy / file).write_text(text.replace(before, after), "utf-8")
+    assert_refused(run("merge", session, copy, "--into", into), expected)
+    assert not into.exists()
 
 
 @pytest.mark.parametrize(("words", "expected"), [
