@@ -4,6 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from tracker.errors import DamagedStoreError
 from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
 from tracker.pipeline.stored_run import UNFINISHED
 from tracker.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, CALIBRATIONS_OF_EDITS
@@ -36,12 +37,19 @@ def numbered_settings(log: EditLog) -> Numbered:
     bodies = {r.id: (r.person, r.toml) for r in log.revisions}
     sizes_edits = log.settings.get(SIZES_EDITS, {})
     sizes = {
-        log.numbers[int(edit)]: [(name, bodies[b], bodies[a]) for name, b, a in sizes_changed(sizes_edits, int(edit))]
+        log.numbers[int(edit)]: [
+            (name, bodies[b], bodies[a])
+            for name, b, a in sizes_changed(sizes_edits, int(edit))
+            if b in bodies and a in bodies
+        ]
         for edit in sizes_edits
         if int(edit) in log.numbers
     }
     known = log.settings.get(CALIBRATIONS, [])
     texts = [json.dumps({"toml": c["toml"], "clocks": c.get("clocks", {})}, sort_keys=True) for c in known]
+    named = [n for pair in log.settings.get(CALIBRATION_EDITS, {}).values() for n in pair]
+    if max([*named, *log.settings.get(CALIBRATIONS_OF_EDITS, {}).values()], default=0) > len(texts):
+        raise DamagedStoreError(f"the history names a calibration beyond the {len(texts)} that are stored; correct it")
     changes = {
         log.numbers[int(edit)]: (texts[before - 1], texts[after - 1])
         for edit, (before, after) in sorted(

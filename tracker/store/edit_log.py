@@ -5,13 +5,18 @@ import sqlite3
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
+from tracker.errors import DamagedStoreError
 from tracker.store import rows
 from tracker.store.connection import Connection
 from tracker.store.edit_tree import show_change
 from tracker.store.records import ModelRevision
-from tracker.store.task_log import Rows, TaskLog, write_rows
+from tracker.store.settings import checked_setting
+from tracker.store.task_log import Rows, TaskLog, Uid, write_rows
+from tracker.validation import check
+
+T = TypeVar("T")
 
 COLUMNS = tuple(rows.WRITTEN_COLUMNS.split(", "))
 """Columns of a pose in a `PoseRow`. Its body is the pair of person and text, its settings are JSON text."""
@@ -82,11 +87,14 @@ def read_log(connection: Connection) -> EditLog:
         DamagedStoreError: a row is not one that the program writes.
         SessionError: the file cannot be read.
     """
+    _check_rows(connection)
     every = connection.all
     revisions = every("SELECT id, person, toml, time FROM model_revisions ORDER BY id", (), rows.row_to_revision)
-    bodies = {r.id: (r.person, sys.intern(r.toml)) for r in revisions}
-    edits = every("SELECT id, uid, label, author, time, program FROM edits ORDER BY id", (), tuple)
-    numbers = {int(edit[0]): str(edit[1]) for edit in edits}
+    bodies = _ById("body model", {r.id: (r.person, sys.intern(r.toml)) for r in revisions})
+    edits = every(f"SELECT {', '.join(_Edit._fields)} FROM edits ORDER BY id", (), _checked_edit)
+    numbers = _ById("edit", {edit.id: edit.uid for edit in edits})
+    if len({*numbers.values()}) < len(edits):
+        raise DamagedStoreError("expected another identity for each edit (its uid), found two that are equal")
     poses, pins = _poses(connection, bodies, numbers), dict[int, list[Any]]()
     for edit, *key, u, v in every(
         "SELECT edit, person, frame, point, camera, u, v FROM pin_changes ORDER BY id", (), tuple
@@ -107,9 +115,71 @@ def read_log(connection: Connection) -> EditLog:
         frozenset(done),
         every("SELECT kind, edit, time FROM moves ORDER BY id", (), lambda r: Move(r[0], numbers[r[1]], r[2])),
         revisions,
-        dict(every("SELECT key, value FROM settings", (), lambda r: (r[0], rows.decoded_json(r[1], r[0])))),
+        dict(every("SELECT key, value FROM settings", (), _setting)),
         numbers,
         (tasks.tasks(), tasks.states(), tasks.comments()),
+    )
+
+
+class _Edit(NamedTuple):
+    """The columns of an edit."""
+
+    id: int
+    uid: Uid
+    label: str
+    author: str
+    time: str
+    program: str
+
+
+class _ById(dict[int, T]):
+    """What rows refer to by number."""
+
+    def __init__(self, kind: str, found: Mapping[int, T]) -> None:
+        super().__init__(found)
+        self._kind = kind
+
+    def __missing__(self, number: int) -> T:
+        raise DamagedStoreError(f"a row refers to {self._kind} {number!r:.20}, which is missing")
+
+
+def _checked_edit(row: Sequence[Any]) -> _Edit:
+    found: _Edit = check(list(row), _Edit, f"edit {row[0]!r:.20}", DamagedStoreError)
+    return found
+
+
+def _setting(row: Sequence[Any]) -> tuple[str, Any]:
+    return str(row[0]), checked_setting(str(row[0]), rows.decoded_json(row[1], f"setting '{row[0]}'"))
+
+
+def _check_rows(connection: Connection) -> None:
+    """Check all poses, alternatives and pins.
+
+    Raises:
+        DamagedStoreError: a row is not one that the program writes.
+    """
+
+    def pair(row: Sequence[Any]) -> rows.PoseLabel:
+        where = rows.PoseLabel(check(row[0], str, f"the person in frame {row[1]!r:.20}", DamagedStoreError), row[1])
+        rows.frame_number(row[1], where)
+        return where
+
+    of_pose, of_pin = "SELECT c.person, c.frame", "SELECT person, frame"
+    connection.all(f"{of_pose} FROM pose_changes c", (), pair)
+    connection.all(
+        f"{of_pose}, {rows.RECORD_COLUMNS} FROM pose_changes c {rows.ORIGIN} WHERE c.numbers IS NOT NULL",
+        (),
+        lambda row: rows.row_to_record(row[2:], pair(row)) and None,
+    )
+    connection.all(
+        f"{of_pose}, {rows.ALTERNATIVE_COLUMNS} {rows.ALTERNATIVES}",
+        (),
+        lambda row: rows.row_to_alternative(row[2:], pair(row)) and None,
+    )
+    connection.all(
+        f"{of_pin}, point, camera, coalesce(u, 0), coalesce(v, 0) FROM pin_changes",
+        (),
+        lambda row: rows.row_to_pin(row[2:], pair(row)) and None,
     )
 
 

@@ -22,13 +22,14 @@ State: TypeAlias = Literal["draft", "annotated", "verified", "rejected", "withdr
 """States of a task. The log stores the last three; the first two follow from the poses (`tracker.annotation.plan`)."""
 
 _Frame: TypeAlias = Annotated[int, Meta(ge=0, lt=MAX_FRAMES, description=f"a frame from 0 to {MAX_FRAMES - 1}")]
-_Uid: TypeAlias = Annotated[str, Meta(pattern=r"^[0-9a-f]{32}\Z", description="32 hexadecimal digits")]
+Uid: TypeAlias = Annotated[str, Meta(pattern=r"^[0-9a-f]{32}\Z", description="32 hexadecimal digits")]
+"""Identity of a row."""
 
 
 class TaskRow(NamedTuple):
     """A frame of a person that somebody is to annotate."""
 
-    uid: _Uid
+    uid: Uid
     kind: Kind
     person: str
     frame: _Frame
@@ -43,8 +44,8 @@ class TaskRow(NamedTuple):
 class StateRow(NamedTuple):
     """A decision on a task."""
 
-    uid: _Uid
-    task: _Uid
+    uid: Uid
+    task: Uid
     """Identity of the task."""
     state: State
     comment: str
@@ -56,7 +57,7 @@ class StateRow(NamedTuple):
 class CommentRow(NamedTuple):
     """A comment on a person in a frame, or the news that one is resolved or open again."""
 
-    uid: _Uid
+    uid: Uid
     about: Annotated[str, Meta(pattern=r"^([0-9a-f]{32})?\Z")]
     """Identity of the comment that it resolves or opens again; empty for a new comment."""
     person: str
@@ -144,7 +145,7 @@ class TaskLog:
 
     def _all(self, table: str, row_type: Callable[..., T], order: str) -> list[T]:
         def convert(row: tuple[Any, ...]) -> T:
-            found: T = check(list(row), row_type, f"a row of {table}", DamagedStoreError)
+            found: T = check(list(row), row_type, f"row {row[0]!r:.40} of {table}", DamagedStoreError)
             return found
 
         fields = ", ".join(TABLES[table]._fields)
