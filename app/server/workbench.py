@@ -1,7 +1,6 @@
 """Open a session in the page: store, controller, 3-D view and web server."""
 
 import asyncio
-import getpass
 import signal
 import socket
 from collections.abc import Callable, Coroutine
@@ -27,6 +26,7 @@ from app.server.session_routes import SessionRoutes, refusal
 from app.server.static_files import static_folder
 from app.server.thumbnail_routes import ThumbnailRoutes
 from app.session import proxies
+from app.session.annotator import annotator_or_login
 from app.session.footage_crops import FootageCrops
 from app.session.footage_indices import footage_indices
 from app.session.frame_cache import FrameCache
@@ -85,7 +85,7 @@ def open_session(
             say(offer)
         doorway.show("Preparing the views")
         frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
-        saver = Saver(session, store, _author())
+        saver = Saver(session, store, annotator_or_login())
         controller = Controller(session, saver, frames, compiler)
         viser = PrivateViser()
         thumbnails = Thumbnails(controller, FootageCrops(session.cameras, indices))
@@ -155,11 +155,3 @@ async def _until_interrupted(serving: Coroutine[Any, Any, None], is_chosen: asyn
     except asyncio.CancelledError:
         if not task.cancelled():
             raise
-
-
-def _author() -> str:
-    """Return the author for the history: the user of this machine, or empty if unknown."""
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError):  # a container's user may have no name
-        return ""
