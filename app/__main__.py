@@ -30,6 +30,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
+from app.cli.annotation import assign, merge, tasks
 from app.cli.batches import batch
 from app.cli.calibration import calibrate, check, sync
 from app.cli.observations import import_, judge
@@ -55,6 +56,9 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "track": track.command,
     "audit": audit.command,
     "judge": judge.command,
+    "assign": assign.command,
+    "tasks": tasks.command,
+    "merge": merge.command,
     "check": check.command,
     "evaluate": evaluate.command,
     "observability": observability.command,
@@ -90,6 +94,10 @@ def main() -> None:
         return
     if not words or (words[0] not in _COMMANDS and words[0] not in _HELP):
         words = ["open", *words]
+    if not set(words) & {*_HELP}:
+        from app.session.annotator import set_annotator
+
+        set_annotator(None)
     # Help has colours, and shows nothing of a file.
     out = nullcontext() if set(words) & {*_HELP} else redirect_stdout(cast(TextIO, PlainOutput(sys.stdout)))
     try:

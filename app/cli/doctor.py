@@ -16,6 +16,7 @@ from typing import Any
 from platformdirs import user_cache_path, user_state_path
 
 from app.runtime.json_output import format_json
+from app.runtime.memory import WORKER_BYTES, free_bytes
 
 _EXTRAS = {
     "import": ("quadrille import of DeepLabCut HDF5, SLEAP and NWB", ("h5py", "sleap_io")),
@@ -90,15 +91,13 @@ def _cores() -> Finding:
 
 
 def _memory() -> Finding:
-    from app.cli.batches.local import MEMORY_BYTES, free_bytes
-
     free = free_bytes()
     if free is None:
         return Finding("memory", "ok", "not known on this system")
-    text = f"{free / 1e9:.1f} GB free, enough for {max(0, free // MEMORY_BYTES)} workers of quadrille batch"
-    little = f"; finding people needs {MEMORY_BYTES / 1e9:.0f} GB: close other programs"
+    text = f"{free / 1e9:.1f} GB free, enough for {max(0, free // WORKER_BYTES)} workers of quadrille batch"
+    little = f"; finding people needs {WORKER_BYTES / 1e9:.0f} GB: close other programs"
     return Finding(
-        "memory", "ok" if free >= MEMORY_BYTES else "warning", text + (little if free < MEMORY_BYTES else "")
+        "memory", "ok" if free >= WORKER_BYTES else "warning", text + (little if free < WORKER_BYTES else "")
     )
 
 

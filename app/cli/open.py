@@ -25,6 +25,7 @@ def command(
     start_again: bool = False,
     frame: OptionalWhole = None,
     person: OptionalName = None,
+    annotator: OptionalName = None,
 ) -> None:
     """Open a session in the page; without SESSION, a working copy of a bundled sample.
 
@@ -39,11 +40,13 @@ def command(
         start_again: discard the working copy of the sample and make a new one.
         frame: frame to show first.
         person: name of the person to select.
+        annotator: name of the person who annotates, remembered; by default $QUADRILLE_ANNOTATOR, then the login.
     """
     from app.runtime.kernel_compiler import KernelCompiler
     from app.runtime.restart import restart
     from app.server.address import Serving
     from app.server.doorway import Doorway
+    from app.session.annotator import set_annotator
     from app.session.samples import DEFAULT_SAMPLE, sample_copy
     from tracker.session.folder import session_folder
     from tracker.session.lock import SessionLock
@@ -53,6 +56,7 @@ def command(
             f"expected a session or a sample, found {session} and {'--sample' if sample else '--start-again'}; "
             "leave one of them out"
         )
+    set_annotator(annotator)
     folder = sample_copy(sample or DEFAULT_SAMPLE, start_again) if session is None else session
     folder = session_folder(folder)
     serving = Serving(host, port, allow_host, browser, token)

@@ -1,7 +1,6 @@
 """Open a session in the page: store, controller, 3-D view and web server."""
 
 import asyncio
-import getpass
 import signal
 import socket
 import threading
@@ -29,6 +28,7 @@ from app.server.session_routes import SessionRoutes, refusal
 from app.server.static_files import static_folder
 from app.server.thumbnail_routes import ThumbnailRoutes
 from app.session import proxies
+from app.session.annotator import annotator_or_login
 from app.session.footage_crops import FootageCrops
 from app.session.footage_indices import footage_indices
 from app.session.frame_cache import FrameCache
@@ -105,7 +105,7 @@ def open_session(
             say(offer)
         doorway.show("Preparing the views")
         frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
-        saver = Saver(session, store, _author())
+        saver = Saver(session, store, annotator_or_login())
         controller = Controller(session, saver, frames, compiler)
         controller.navigation.seek(first.frame)
         controller.navigation.select(first.person, None)
@@ -184,11 +184,3 @@ async def _until_interrupted(serving: Coroutine[Any, Any, None], is_chosen: asyn
     except asyncio.CancelledError:
         if not task.cancelled():
             raise
-
-
-def _author() -> str:
-    """Return the author for the history: the user of this machine, or empty if unknown."""
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError):  # a container's user may have no name
-        return ""

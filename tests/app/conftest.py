@@ -17,11 +17,14 @@ from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.annotator import VARIABLE
 
 
 @pytest.fixture
-def run(monkeypatch, capsys):
+def run(monkeypatch, capsys, tmp_path):
     """Run the command line in this process; gives exit status, standard output and standard error."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))  # nobody is remembered there
+    monkeypatch.setenv(VARIABLE, "")
 
     def run_it(*words):
         monkeypatch.setattr(sys, "argv", ["quadrille", *map(str, words)])

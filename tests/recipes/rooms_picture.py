@@ -20,7 +20,7 @@ HOUSE = {
     ],
     "app/  the viewer": [
         ["__main__"],
-        ["cli/calibration", "cli/observations", "cli/batches"],
+        ["cli/calibration", "cli/observations", "cli/annotation", "cli/batches"],
         ["cli"],
         ["bench", "server"],
         ["page", "scene3d"],
@@ -34,7 +34,7 @@ HOUSE = {
     ],
     "tracker/  the library": [
         ["batch"],
-        ["api", "experiments"],
+        ["api", "experiments", "annotation"],
         ["judging"],
         ["pipeline", "exports"],
         ["simulate", "evaluation", "boards"],

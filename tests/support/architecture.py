@@ -46,6 +46,7 @@ ROOMS = [
     "tracker.simulate.stage",
     "tracker.simulate",
     "tracker.pipeline",
+    "tracker.annotation",
     "tracker.judging",
     "tracker.experiments",
     "tracker.api",
@@ -71,6 +72,7 @@ ROOMS = [
     "app.cli.calibration",
     "app.cli.observations",
     "app.cli.batches",
+    "app.cli.annotation",
     "app.__main__",
 ]
 FLOOR = {room: floor for floor, room in enumerate(ROOMS)}

@@ -23,8 +23,6 @@ from tracker.files import write_text_atomic
 from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
 
 State: TypeAlias = Literal["waiting", "running", "done", "failed"]
-MAX_ATTEMPTS = 3
-"""Workers that may die over a task before it counts as failed: one that dies of it every time would kill them all."""
 _KIND = TextKind("task", DOCUMENT_BYTES, TrackerError, "make the batch anew in another folder")
 
 

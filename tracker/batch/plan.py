@@ -42,6 +42,9 @@ class Settings(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """Names of those to track; all by default."""
     export: list[Name] | None = None
     """Formats to write the poses in."""
+    attempts: Annotated[int, Meta(ge=1, description="a whole number from 1")] | None = None
+    """Workers that may die over the recording before it counts as failed, so that it does not kill them all; 3 by
+    default."""
     skip: bool | None = None
     """Leave the recording out."""
 

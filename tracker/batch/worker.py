@@ -9,14 +9,12 @@ from pathlib import Path
 
 import msgspec
 
-from tracker.batch.claims import Claim
-from tracker.batch.manifest import MAX_ATTEMPTS, Manifest, Result, Task
+from tracker.batch.claims import BEAT_S, Claim
+from tracker.batch.manifest import Manifest, Result, Task
 from tracker.batch.tasks import Done, do_task
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
-_LOOK_S = 0.5
-"""Time between two looks for a task that others have to end first, s."""
 
 
 class LostClaimError(Exception):
@@ -44,7 +42,7 @@ def work(
     while not is_stopped() and (max_tasks is None or n_done < max_tasks) and not manifest.is_finished():
         found = manifest.claim_next()
         if found is None:
-            time.sleep(_LOOK_S)
+            time.sleep(BEAT_S)
             continue
         try:
             n_done += _do(manifest, *found, do, is_stopped)
@@ -77,8 +75,9 @@ def _do(
         return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, **used))
 
     try:
-        if manifest.count_attempt(task) > MAX_ATTEMPTS:
-            error = f"{MAX_ATTEMPTS} workers died over it; look at memory, and track it alone"
+        allowed = task.recording.settings.attempts or 3
+        if manifest.count_attempt(task) > allowed:
+            error = f"{allowed} workers died over it; look at memory, and track it alone"
             return end(Result("failed", error=error))
         with held.beating():
             done = do(task, manifest.folder, go_on)

@@ -95,6 +95,11 @@ def outdated_frames(session: Session, store: AnnotationStore) -> dict[str, list[
     return out
 
 
+def same_calibration(one: Session, other: Session) -> bool:
+    """Return whether two sessions have the same calibration but for rounding."""
+    return _same(_content(one), _content(other))
+
+
 def _number(store: AnnotationStore, content: Mapping[str, Any]) -> int:
     """Return the number of a calibration, which is stored if it is new."""
     known = store.setting(CALIBRATIONS, [])

@@ -31,7 +31,7 @@ _SAVE_FRAMES = 10
 """Frames after which a run is saved."""
 _RENAMED = {"second_pass": "backward_pass"}
 """Settings whose names have changed since sessions store them."""
-_UNFINISHED = "unfinished track"
+UNFINISHED = "unfinished track"
 """Setting of the store: the plan that was interrupted and its next frame."""
 
 
@@ -128,7 +128,7 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, pla
         unfinished = None
         if not run.finished:
             unfinished = {"task": plan.record(), "next": run.next_frame, "rows": run.rows_record()}
-        store.set_setting(_UNFINISHED, unfinished)
+        store.set_setting(UNFINISHED, unfinished)
 
 
 def _views(session: Session, plan: TrackPlan) -> list[int | None]:
@@ -145,7 +145,7 @@ def _frames_left(store: AnnotationStore, plan: TrackPlan) -> list[Sequence[int]]
     legs = plan.legs
     if not is_interrupted(store, plan):
         return legs
-    following = store.setting(_UNFINISHED)["next"]
+    following = store.setting(UNFINISHED)["next"]
     if following is None:
         return [leg[len(leg) :] for leg in legs]
     for number, leg in enumerate(legs):
@@ -158,12 +158,12 @@ def _frames_left(store: AnnotationStore, plan: TrackPlan) -> list[Sequence[int]]
 
 def forget_unfinished(store: AnnotationStore) -> None:
     """Forget an interrupted run, so that the same plan starts from its beginning."""
-    store.set_setting(_UNFINISHED, None)
+    store.set_setting(UNFINISHED, None)
 
 
 def is_interrupted(store: AnnotationStore, plan: TrackPlan) -> bool:
     """Return whether a run of this plan was interrupted, so that it goes on there."""
-    unfinished = store.setting(_UNFINISHED)
+    unfinished = store.setting(UNFINISHED)
     return unfinished is not None and _same_task(unfinished["task"], plan.record())
 
 
@@ -203,7 +203,7 @@ def _rows_before(
     session: Session, store: AnnotationStore, frames: Sequence[int], subjects: Subjects
 ) -> dict[int, TrackedRows]:
     """Return the rows of an interrupted run by person."""
-    unfinished = store.setting(_UNFINISHED)
+    unfinished = store.setting(UNFINISHED)
     if not frames or unfinished is None:
         return {}
     rows = {}

@@ -80,18 +80,31 @@ def is_alive(holder: Holder) -> bool:
         return False
     except PermissionError:
         pass
+    if _has_ended(holder.process):
+        return False
     started = start_of(holder.process)
     return not holder.started or not started or holder.started == started
 
 
 def start_of(process: int) -> str:
     """Return the start time of a process, in ticks since boot; empty if the system does not provide it."""
+    fields = _fields_of(process)
+    return fields[19] if fields else ""  # field 22
+
+
+def _has_ended(process: int) -> bool:
+    """Return whether a process has ended, though the one that started it has not asked for its status yet."""
+    fields = _fields_of(process)
+    return bool(fields) and fields[0] in "ZX"
+
+
+def _fields_of(process: int) -> list[str]:
+    """Return the fields that the system gives of a process, from its state (field 3) on; none if it gives none."""
     try:
         stat = Path(f"/proc/{process}/stat").read_text("utf-8", "replace")  # a program may have any name
     except OSError:
-        return ""
-    # The program's name, in parentheses, may contain spaces. The start time is field 22, the 20th after the name.
-    return stat.rpartition(")")[2].split()[19]
+        return []
+    return stat.rpartition(")")[2].split()  # the program's name, in parentheses, may contain spaces
 
 
 class System(NamedTuple):

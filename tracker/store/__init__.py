@@ -1,6 +1,5 @@
 """The annotation database of a session: a log of edits, current poses and pins, undo, body models, settings.
 
 Imports `geometry`, `body`, `formats` and the lock of `session`. Callers use `annotation_store.AnnotationStore`, the
-records of `records`,
-`stored_poses` and `backups`.
+records of `records`, the rows of `task_log`, `annotator`, `stored_poses` and `backups`.
 """

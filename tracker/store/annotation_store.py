@@ -14,8 +14,10 @@ from typing import Any, TypeVar
 
 from tracker.errors import SessionError
 from tracker.store import edit_tree, rows
+from tracker.store.annotator import annotator
 from tracker.store.changes import write_changes
 from tracker.store.connection import Connection
+from tracker.store.edit_log import EditLog, Written, read_log, write_log
 from tracker.store.records import (
     Alternative,
     Change,
@@ -28,6 +30,7 @@ from tracker.store.records import (
     PoseRecord,
 )
 from tracker.store.settings import checked_setting
+from tracker.store.task_log import TaskLog
 
 T = TypeVar("T")
 
@@ -41,15 +44,22 @@ class AnnotationStore:
     When a method returns, its changes are on the disk.
     """
 
-    def __init__(self, path: str | Path, read_only: bool = False) -> None:
+    def __init__(self, path: str | Path, read_only: bool = False, author: str | None = None) -> None:
         """Open a store. Unless read only, create a missing one and upgrade an older one.
+
+        Args:
+            path: of the file.
+            read_only: leave the file unchanged.
+            author: name of the annotator who makes the edits; by default that of `annotator`.
 
         Raises:
             SessionError: the file is missing, not a store, or newer than this program.
             DamagedStoreError: the file is not as it was written; the message names the backup to go back to.
         """
         self._connection = Connection(path, read_only)
-        self._edits = edit_tree.EditTree(self._connection)
+        self._edits, self._author = edit_tree.EditTree(self._connection), annotator() if author is None else author
+        self.tasks = TaskLog(self._connection)
+        """The plan of annotation: tasks, states and comments."""
         if not read_only and self.setting(_ID) is None:
             self.set_setting(_ID, secrets.token_hex(8))
 
@@ -137,7 +147,7 @@ class AnnotationStore:
         )
 
     def commit(
-        self, label: str, changes: Sequence[Change], author: str = "", by_program: bool = False,
+        self, label: str, changes: Sequence[Change], author: str | None = None, by_program: bool = False,
         settings: Callable[[int], Mapping[str, Any]] = lambda edit: {},
     ) -> Committed:  # fmt: skip
         """Make changes as one edit, which one undo reverts.
@@ -145,12 +155,12 @@ class AnnotationStore:
         Args:
             label: name of the edit for its user, such as `Drag left wrist`.
             changes: poses and pins to set or clear.
-            author: name of the person who makes it.
+            author: name of the annotator who makes it; by default the one of the store.
             by_program: leave keyframes unchanged.
             settings: returns settings that name the number of the edit; they are stored with it or not at all.
         """
         with self._connection.transaction() as db:
-            edit = self._edits.add(db, label, author)
+            edit = self._edits.add(db, label, self._author if author is None else author)
             for key, value in settings(edit).items():
                 _store_setting(db, key, value)
             return Committed(edit, write_changes(db, edit, changes, by_program))
@@ -222,6 +232,15 @@ class AnnotationStore:
         if found is None:
             raise self._connection.damaged(f"a pose refers to model revision {revision}, which is missing")
         return found
+
+    def read_log(self) -> EditLog:
+        """Read all that the store holds, without numbers of rows."""
+        with self._connection.snapshot():
+            return read_log(self._connection)
+
+    def write_log(self, log: EditLog) -> Written:
+        """Write a log into this store, which must be new and empty."""
+        return write_log(self._connection, log)
 
     def value_counts(self) -> dict[int, dict[int, tuple[str, int]]]:
         """Return for each model revision the numbers of values of its poses, each with a person and frame that has it.

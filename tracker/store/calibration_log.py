@@ -17,6 +17,9 @@ CALIBRATIONS = "calibrations"
 """Setting of the session: the revisions, in order, each with its cameras as `toml`, their `clocks` and its `time`."""
 CALIBRATION_EDITS = "calibration_edits"
 """Setting of the session: by entry of the history, the revisions before and after it."""
+CALIBRATIONS_OF_EDITS = "calibrations_of_edits"
+"""Setting of the session: by entry of the history, the revision that its poses were made with, where the order of the
+history does not say so: in a merged session, another copy may have been corrected meanwhile."""
 
 
 class PosedRevisions(NamedTuple):
@@ -68,7 +71,11 @@ def revisions_of_poses(store: AnnotationStore, person: str) -> dict[int, int]:
     applied = [edit for edit in edits if edit in done]
     first = min(before for before, _ in edits.values())
     of_entries = [first, *(edits[edit][1] for edit in applied)]
-    return {frame: of_entries[bisect_right(applied, edit)] for frame, edit in store.pose_edits(person).items()}
+    stated: Mapping[str, int] = store.setting(CALIBRATIONS_OF_EDITS, {})
+    return {
+        frame: stated.get(str(edit), of_entries[bisect_right(applied, edit)])
+        for frame, edit in store.pose_edits(person).items()
+    }
 
 
 def calibration_edits(store: AnnotationStore) -> dict[int, tuple[int, int]]:

@@ -7,8 +7,8 @@ checksums. Temporary triggers of each connection that writes keep both up to dat
 import sqlite3
 from zlib import crc32
 
-_COLUMNS = {
-    "edits": "id, parent, label, author, time, program",
+COLUMNS = {
+    "edits": "id, parent, label, author, time, program, uid",
     "head": "edit",
     "moves": "id, kind, edit, time",
     "model_revisions": "id, person, toml, time",
@@ -21,14 +21,21 @@ _COLUMNS = {
     "pin_changes": "id, edit, previous, person, frame, point, camera, u, v",
     "pins": "person, frame, point, camera, change",
     "settings": "key, value",
+    "tasks": "uid, kind, person, frame, annotator, author, time",
+    "task_states": "uid, task, state, comment, author, time",
+    "comments": "uid, about, person, frame, limb, text, resolved, author, time",
 }
 """Columns of each table that its checksums cover."""
+_NO_UID: dict[str, tuple[str, ...]] = {"edits": ("uid",)}
 LATER_COLUMNS: dict[int, dict[str, tuple[str, ...]]] = {
-    6: {"pose_changes": ("limbs", "errors", "made_in", "trace")},
-    7: {"pose_changes": ("errors", "made_in", "trace")},
-    8: {"pose_changes": ("made_in", "trace")},
+    6: {"pose_changes": ("limbs", "errors", "made_in", "trace"), **_NO_UID},
+    7: {"pose_changes": ("errors", "made_in", "trace"), **_NO_UID},
+    8: {"pose_changes": ("made_in", "trace"), **_NO_UID},
+    9: _NO_UID,
 }
 """Columns that the tables of each older version with checksums lack."""
+LATER_TABLES = ("tasks", "task_states", "comments")
+"""Tables that the older versions lack."""
 OLDEST_VERSION = min(LATER_COLUMNS)
 """The first version of a store with checksums."""
 _KEYS = {
@@ -36,6 +43,7 @@ _KEYS = {
     "alternatives": "change, rank",
     "pins": "person, frame, point, camera",
     "settings": "key",
+    **dict.fromkeys(LATER_TABLES, "uid"),
 }
 """Primary keys of the tables without row numbers."""
 _SCHEMA = "sqlite_master"
@@ -44,7 +52,7 @@ _LISTED = 3
 """Number of damaged rows that a message names."""
 
 ADDED = (
-    *(f"ALTER TABLE {table} ADD COLUMN checksum INTEGER" for table in _COLUMNS),
+    *(f"ALTER TABLE {table} ADD COLUMN checksum INTEGER" for table in COLUMNS if table not in LATER_TABLES),
     "CREATE TABLE contents (name TEXT PRIMARY KEY, n_rows INTEGER NOT NULL, total INTEGER NOT NULL) WITHOUT ROWID",
 )
 """Statements that add the checksums to the tables of a store; `fill_in` computes them."""
@@ -63,7 +71,7 @@ def watch(db: sqlite3.Connection) -> None:
     # The triggers call a function of the program, which some builds of SQLite refuse by default.
     db.execute("PRAGMA trusted_schema = ON")
     db.execute("PRAGMA recursive_triggers = ON")  # REPLACE deletes rows too
-    for table, columns in _COLUMNS.items():
+    for table, columns in COLUMNS.items():
         key = _KEYS.get(table, "rowid")
         where = "WHERE " + " AND ".join(f"{column} = NEW.{column}" for column in key.split(", "))
         added = (
@@ -84,7 +92,7 @@ def watch(db: sqlite3.Connection) -> None:
 def fill_in(db: sqlite3.Connection) -> None:
     """Compute all checksums of a store that has none, within a transaction."""
     db.execute("DELETE FROM contents")
-    for table, columns in _COLUMNS.items():
+    for table, columns in COLUMNS.items():
         db.execute(f"UPDATE {table} SET checksum = row_checksum({columns})")
         db.execute(f"INSERT INTO contents VALUES ('{table}', {_counted(table)})")
     db.execute(f"INSERT INTO contents VALUES ('{_SCHEMA}', {_counted_schema()})")
@@ -107,9 +115,11 @@ def differences(db: sqlite3.Connection, version: int) -> list[str]:
     """
     found = []
     known = {name: (n, total) for name, n, total in contents(db)}
-    if set(known) != {*_COLUMNS, _SCHEMA}:
+    tables = [table for table in COLUMNS if version not in LATER_COLUMNS or table not in LATER_TABLES]
+    if set(known) != {*tables, _SCHEMA}:
         found.append("the list of its tables is not as it was written")
-    for table, all_columns in _COLUMNS.items():
+    for table in tables:
+        all_columns = COLUMNS[table]
         later = LATER_COLUMNS.get(version, {}).get(table, ())
         columns = ", ".join(c for c in all_columns.split(", ") if c not in later)
         wrong = db.execute(
@@ -135,14 +145,14 @@ def _counted(table: str) -> str:
 
 def _counted_schema() -> str:
     """SQL for the number of definitions of the store's own tables and indices, and the sum of their checksums."""
-    own = ", ".join(f"'{table}'" for table in (*_COLUMNS, "contents"))
+    own = ", ".join(f"'{table}'" for table in (*COLUMNS, "contents"))
     rows = f"FROM {_SCHEMA} WHERE tbl_name IN ({own})"
     return f"(SELECT count(*) {rows}), (SELECT sum(row_checksum({_SCHEMA_COLUMNS})) {rows})"
 
 
 def _label(table: str) -> str:
     """SQL for the name of a row in a message."""
-    columns = _COLUMNS[table].split(", ")
+    columns = COLUMNS[table].split(", ")
     if "frame" in columns:
         return "coalesce(person, '?') || ', frame ' || coalesce(frame, '?')"
     return f"coalesce({columns[0]}, '?')"

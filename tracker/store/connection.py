@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.files import IrregularFileError, refuse_links, sync_folder
-from tracker.store import backups, checksums, recovery, schema, verification
+from tracker.store import backups, checksums, identities, recovery, schema, verification
 from tracker.store.query_limit import EndlessQueryError, limited
 
 T = TypeVar("T")
@@ -76,6 +76,17 @@ class Connection:
                 yield self.db
                 contents = checksums.contents(self.db)
             self._contents = contents
+
+    @contextmanager
+    def snapshot(self) -> Generator[None, None, None]:
+        """Read one state of the file within a `with` block, although other programs write."""
+        with self._lock, self._errors():
+            self._reopen_moved(for_writing=False)
+            self.db.execute("BEGIN")
+            try:
+                yield
+            finally:
+                self.db.rollback()
 
     @contextmanager
     def impatient(self) -> Generator[None, None, None]:
@@ -247,6 +258,7 @@ def _connect(path: Path, mode: str) -> sqlite3.Connection:
             db.execute("PRAGMA synchronous = EXTRA")
         db.execute("PRAGMA foreign_keys = ON")
         checksums.register(db)
+        identities.register(db)
     except BaseException:
         db.close()
         raise

@@ -14,6 +14,7 @@ from typing import Any
 from tracker.errors import SessionError
 from tracker.store import rows
 from tracker.store.connection import Connection
+from tracker.store.identities import new_uid
 from tracker.store.records import HistoryEntry
 
 _KEYS = {"pose": ("person, frame", "numbers"), "pin": ("person, frame, point, camera", "u")}
@@ -31,8 +32,8 @@ class EditTree:
     def add(self, db: sqlite3.Connection, label: str, author: str) -> int:
         """Add an edit after head, within a transaction, make it head and return its id."""
         edit = db.execute(
-            "INSERT INTO edits (parent, label, author, time, program) VALUES (?, ?, ?, ?, ?)",
-            (head(db), label, author, now(), program_version()),
+            "INSERT INTO edits (parent, label, author, time, program, uid) VALUES (?, ?, ?, ?, ?, ?)",
+            (head(db), label, author, now(), program_version(), new_uid()),
         ).lastrowid
         assert edit is not None
         db.execute("UPDATE head SET edit = ?", (edit,))

@@ -7,16 +7,17 @@ depends on the log of edits.
 import sqlite3
 from collections.abc import Sequence
 
-from tracker.store import checksums
+from tracker.store import checksums, identities
 
-VERSION = 9
+VERSION = 10
 """Version of the store; older ones are upgraded, newer ones are refused."""
 
 _SCHEMA = """
 CREATE TABLE edits (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     parent INTEGER REFERENCES edits,          -- NULL for the first
-    label TEXT NOT NULL, author TEXT NOT NULL, time TEXT NOT NULL, program TEXT NOT NULL
+    label TEXT NOT NULL, author TEXT NOT NULL, time TEXT NOT NULL, program TEXT NOT NULL,
+    uid TEXT                                                     -- the same in all copies of the store
 );
 CREATE INDEX edits_parent ON edits (parent);
 -- One row; NULL: nothing is done.
@@ -75,6 +76,16 @@ CREATE TABLE pins (
 CREATE TABLE settings (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 """
 """The tables without their checksums, which `checksums.ADDED` adds."""
+_TASKS = (
+    "CREATE TABLE tasks (uid TEXT PRIMARY KEY, kind TEXT NOT NULL, person TEXT NOT NULL, frame INTEGER NOT NULL, "
+    "annotator TEXT NOT NULL, author TEXT NOT NULL, time TEXT NOT NULL, checksum INTEGER) WITHOUT ROWID",
+    "CREATE TABLE task_states (uid TEXT PRIMARY KEY, task TEXT NOT NULL, state TEXT NOT NULL, comment TEXT NOT NULL, "
+    "author TEXT NOT NULL, time TEXT NOT NULL, checksum INTEGER) WITHOUT ROWID",
+    "CREATE TABLE comments (uid TEXT PRIMARY KEY, about TEXT NOT NULL, person TEXT NOT NULL, frame INTEGER NOT NULL, "
+    "limb TEXT NOT NULL, text TEXT NOT NULL, resolved INTEGER NOT NULL, author TEXT NOT NULL, time TEXT NOT NULL, "
+    "checksum INTEGER) WITHOUT ROWID",
+)
+"""The tables of the plan of annotation, with their checksums. Their rows are only added (`task_log`)."""
 
 _UPGRADES = {
     1: (
@@ -103,6 +114,7 @@ _UPGRADES = {
         "ALTER TABLE pose_changes ADD COLUMN made_in INTEGER REFERENCES edits",
         "ALTER TABLE pose_changes ADD COLUMN trace TEXT",
     ),
+    9: ("ALTER TABLE edits ADD COLUMN uid TEXT", *_TASKS),
 }
 """Statements that upgrade a store from each older version to the next."""
 STATEMENTS = (*_SCHEMA.split(";\n"), *checksums.ADDED, *(text for texts in _UPGRADES.values() for text in texts))
@@ -117,7 +129,7 @@ _MISSING_COLUMNS = {
     3: (_RENAMED_SETTINGS, "reviewed", *_SINCE_CHECKSUMS),
     4: (_RENAMED_SETTINGS, *_SINCE_CHECKSUMS),
     5: (_RENAMED_SETTINGS, *_SINCE_CHECKSUMS),
-    **{version: later["pose_changes"] for version, later in checksums.LATER_COLUMNS.items()},
+    **{version: later.get("pose_changes", ()) for version, later in checksums.LATER_COLUMNS.items()},
 }
 """Columns of `pose_changes` that each older version lacks or names differently. A store opened read only is read
 through temporary views, which hide the tables of the same names."""
@@ -130,7 +142,7 @@ def version(db: sqlite3.Connection) -> int:
 
 def create(db: sqlite3.Connection) -> None:
     """Create the tables of a new store in an empty file, within a transaction of the caller."""
-    _run(db, (*_SCHEMA.split(";\n"), *checksums.ADDED))
+    _run(db, (*_SCHEMA.split(";\n"), *checksums.ADDED, *_TASKS))
 
 
 def upgrade(db: sqlite3.Connection) -> int:
@@ -148,6 +160,7 @@ def upgrade(db: sqlite3.Connection) -> int:
 def _run(db: sqlite3.Connection, statements: Sequence[str]) -> None:
     for statement in statements:
         db.execute(statement)
+    db.execute(f"UPDATE edits SET uid = {identities.DERIVED} WHERE uid IS NULL")
     checksums.fill_in(db)
     db.execute(f"PRAGMA user_version = {VERSION}")
 
@@ -156,6 +169,12 @@ def show_as_new(db: sqlite3.Connection) -> None:
     """Make an older store readable like one of today's without writing to it."""
     found = version(db)
     if found == VERSION:
+        return
+    for table in checksums.LATER_TABLES:
+        columns = checksums.COLUMNS[table].split(", ")
+        db.execute(f"CREATE TEMP VIEW {table} AS SELECT {', '.join(f'NULL AS {c}' for c in columns)} WHERE 0")
+    db.execute(f"CREATE TEMP VIEW edits AS SELECT *, {identities.DERIVED} AS uid FROM main.edits")
+    if found == 9:
         return
     added = ", ".join(c if " AS " in c else f"NULL AS {c}" for c in _MISSING_COLUMNS[found])
     db.execute(f"CREATE TEMP VIEW pose_changes AS SELECT *, {added} FROM main.pose_changes")

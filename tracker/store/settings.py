@@ -75,6 +75,7 @@ _DECLARATIONS: Mapping[str, Any] = {
     "sizes_edits": dict[_IdText, list[tuple[Name, _Id, _Id] | str | int]],
     "calibrations": list[_Calibration],
     "calibration_edits": dict[_IdText, tuple[_Id, _Id]],
+    "calibrations_of_edits": dict[_IdText, _Id],
     "confirmed_keyframes": dict[Name, dict[_FrameText, Annotated[int, Meta(ge=0, lt=2**32)]]],
     "silhouette_axes": _Axes | None,
     "find people": _Chain | None,

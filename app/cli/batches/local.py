@@ -8,11 +8,10 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from app.runtime.memory import WORKER_BYTES, free_bytes
 from app.runtime.progress import Reporter
 from tracker.batch.manifest import Manifest
 
-MEMORY_BYTES = 2 << 30
-"""Memory of a worker that finds people in four views of 640 x 480: 1 to 2 GB; 0.6 GB where it only tracks."""
 _LOOK_S = 0.5
 _END_S = 10.0
 """Time for the workers to store what they have after Ctrl+C, s."""
@@ -62,11 +61,11 @@ def n_workers(wanted: int | None, n_tasks: int, cores: int, free: int | None) ->
         free: memory that programs can still have, bytes; None where the system does not provide it.
     """
     asked = min(wanted or cores, max(1, n_tasks))
-    allowed = asked if free is None else max(1, free // MEMORY_BYTES)
+    allowed = asked if free is None else max(1, free // WORKER_BYTES)
     if allowed >= asked:
         return asked, ""
     return allowed, (
-        f"{allowed} of {asked} workers are started: each may need {MEMORY_BYTES / 1e9:.1f} GB, and "
+        f"{allowed} of {asked} workers are started: each may need {WORKER_BYTES / 1e9:.1f} GB, and "
         f"{(free or 0) / 1e9:.1f} GB are free"
     )
 
@@ -88,15 +87,6 @@ def compile_kernels(progress: Reporter) -> None:
     if not is_compiled():
         progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
         subprocess.run([sys.executable, "-m", "app.bench.compile_kernels"], check=False)
-
-
-def free_bytes() -> int | None:
-    """Return the memory that programs can still have, bytes; None where the system does not provide it."""
-    with suppress(OSError, ValueError, IndexError):
-        for line in Path("/proc/meminfo").read_text("ascii").splitlines():
-            if line.startswith("MemAvailable:"):
-                return int(line.split()[1]) * 1024
-    return None
 
 
 def _cores() -> int:

@@ -8,6 +8,7 @@ import textwrap
 from contextlib import suppress
 from itertools import combinations
 
+import msgspec
 import pytest
 
 from tracker.errors import SessionError
@@ -224,6 +225,16 @@ def test_a_container_with_the_same_host_name_does_not_steal_the_lock(tmp_path):
     ways_out = "in another container; close it there, or delete .* if that container has ended"
     with pytest.raises(SessionError, match=f"in process {GONE} on .*, {ways_out}"):
         SessionLock(tmp_path).acquire()
+
+
+def test_a_process_that_nobody_has_asked_for_its_status_is_dead():
+    child = subprocess.Popen([sys.executable, "-c", "pass"])
+    os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)
+    holder = msgspec.structs.replace(
+        holder_module.this_holder(), process=child.pid, started=holder_module.start_of(child.pid)
+    )
+    assert not holder_module.is_alive(holder)
+    child.wait()
 
 
 def test_another_machine_with_the_same_host_name_does_not_steal_the_lock(tmp_path):

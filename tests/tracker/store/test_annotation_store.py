@@ -512,3 +512,24 @@ def test_an_assessment_ends_with_the_pose_and_with_a_mark(store):
     found = store.pose("ann", 3)
     assert (found.values[0], found.status, found.errors) == (1.5, "", None)
     assert [r.frame for r in store.frames("ann")] == [3]
+
+
+def test_a_log_is_read_as_of_one_moment(store, path, monkeypatch):
+    store.commit("a", [put(1, 10.0)])
+    reader = AnnotationStore(path, read_only=True)
+    found = reader._connection.all
+
+    def all_while_another_program_writes(sql, *rest):
+        rows = found(sql, *rest)
+        if "FROM edits" in sql:
+            with pytest.raises(SessionError), store.impatient():
+                store.commit("b", [put(2, 20.0)])
+        return rows
+
+    monkeypatch.setattr(reader._connection, "all", all_while_another_program_writes)
+    log = reader.read_log()
+    assert [edit.label for edit in log.edits] == ["a"]
+    assert [key for edit in log.edits for key, _ in edit.poses] == [("ann", 1)]
+    reader.close()
+    store.commit("c", [put(2, 20.0)])
+    assert xs(store) == {1: 10.0, 2: 20.0}

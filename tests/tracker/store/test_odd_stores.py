@@ -73,7 +73,7 @@ def test_foreign_definitions_are_refused(path, foreign, read_only):
     assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize("script", [f"store_version_{version}.sql" for version in (1, 3, 6, 7, 8)])
+@pytest.mark.parametrize("script", [f"store_version_{version}.sql" for version in (1, 3, 6, 7, 8, 9)])
 def test_foreign_definitions_in_an_older_store(tmp_path, script):
     path = tmp_path / "annotations.sqlite"
     with closing(sqlite3.connect(path)) as db:
@@ -88,7 +88,7 @@ def test_foreign_definitions_in_an_older_store(tmp_path, script):
 def test_the_words_of_the_program_define_tables_alone():
     words, names = definitions._own_words()
     assert not words & {"SELECT", "CHECK", "DEFAULT", "AS", "GENERATED", "TRIGGER", "VIEW", "VIRTUAL", "COLLATE", "'"}
-    assert names >= {*checksums._COLUMNS, "contents", "told"}
+    assert names >= {*checksums.COLUMNS, "contents", "told"}
     assert all("CREATE" in text or "ALTER" in text or "INSERT" in text for text in schema.STATEMENTS if text.strip())
 
 
@@ -121,6 +121,13 @@ ODD = [
     "UPDATE pose_changes SET previous = id", "UPDATE pin_changes SET previous = 1 + id WHERE id = 1",
     "UPDATE poses SET frame = -4 WHERE frame = 8",
     "UPDATE pose_changes SET frame = 'x' WHERE frame = 8",
+    "UPDATE pin_changes SET person = X'FF'", "UPDATE pose_changes SET made_in = 99", "UPDATE edits SET uid = NULL",
+    "UPDATE edits SET uid = 'x'", "UPDATE edits SET uid = (SELECT uid FROM edits WHERE id = 1)",
+    "INSERT INTO tasks VALUES ('x', 'plan', 'ann', 1, '', '', '', 0)",
+    f"INSERT INTO tasks VALUES ('{'0' * 32}', 'plan', 'ann', -1, '', '', '', 0)",
+    f"INSERT INTO tasks VALUES ('{'0' * 32}', 'other', 'ann', 1, '', '', '', 0)",
+    f"INSERT INTO task_states VALUES ('{'0' * 32}', '{'0' * 32}', 'fine', '', '', '', 0)",
+    f"INSERT INTO comments VALUES ('{'0' * 32}', '', 'ann', 1, '', X'FF', 0, '', '', 0)",
 ]  # fmt: skip
 
 
@@ -142,6 +149,7 @@ def read_all(path):
             store.frame_poses(name, range(1 << 31))
         for edit in store.history():
             store.frames_of(edit.edit)
+        store.read_log()
 
 
 SETTINGS = {
@@ -199,7 +207,7 @@ def test_odd_rows_are_named(path, statement):
     text = str(caught.value)
     assert re.match(rf"annotations {path} are damaged: ", text)
     assert text.isprintable()
-    assert re.search(r"frame|row \d|edit |setting|revision|decoded", text), text
+    assert re.search(r"frame|row [\d']|edit |setting|revision|decoded", text), text
     assert len(text) < 500
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from tracker.body.searches import Search
 from tracker.errors import DamagedStoreError, SessionError
-from tracker.store import schema
+from tracker.store import checksums, schema
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.backups import backups_of
 from tracker.store.records import Alternative, AssessmentChange, MarkChange, Pin, PoseChange, PoseRecord
@@ -86,6 +86,62 @@ def version_7(path):
 def version_8(path):
     """A store as its version 8 was written, with errors: a keyframe and two tracked frames."""
     return written(path, "store_version_8.sql")
+
+
+@pytest.fixture
+def version_9(path):
+    """A store as its version 9 was written: four edits of two authors, one an audit and the last undone."""
+    return written(path, "store_version_9.sql")
+
+
+def uids(path):
+    with closing(sqlite3.connect(path)) as db:
+        return [uid for (uid,) in db.execute("SELECT uid FROM edits ORDER BY id")]
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_in_version_9_edits_had_no_identities_and_nothing_was_planned(version_9, read_only):
+    before = version_9.read_bytes()
+    store = AnnotationStore(version_9, read_only=read_only)
+    assert [(e.edit, e.author, e.undone) for e in store.history()] == [
+        (4, "eve", True), (3, "", False), (2, "", False), (1, "eve", False),
+    ]  # fmt: skip
+    assert (store.tasks.tasks(), store.tasks.states(), store.tasks.comments()) == ([], [], [])
+    assert [(m.frame, m.author) for m in store.tasks.keyframe_edits()] == [(1, "eve"), (1, "eve")]
+    assert len({m.uid for m in store.tasks.present_poses()}) == 2
+    store.close()
+    assert (version_9.read_bytes() == before) == read_only
+
+
+def test_two_copies_of_a_store_of_version_9_agree_about_its_edits(version_9, tmp_path):
+    copy = tmp_path / "copy.sqlite"
+    copy.write_bytes(version_9.read_bytes())
+    read = AnnotationStore(copy, read_only=True).tasks.keyframe_edits()
+    for path in (version_9, copy):
+        store = AnnotationStore(path)
+        store.commit("new", [PoseChange("ann", 4, PoseRecord(np.zeros(2), ("manual",) * 2, 1))])
+        store.close()
+    mine, theirs = uids(version_9), uids(copy)
+    assert mine[:4] == theirs[:4]
+    assert read[0].uid == mine[0]
+    assert len({*mine, *theirs}) == 6  # the new edits differ
+    assert all(len(uid) == 32 for uid in mine)
+
+
+def test_copies_of_a_store_of_version_9_that_were_edited_apart_before_their_upgrade(version_9, tmp_path):
+    copy = tmp_path / "copy.sqlite"
+    copy.write_bytes(version_9.read_bytes())
+    with closing(sqlite3.connect(copy)) as db:
+        checksums.register(db)
+        db.execute("UPDATE edits SET time = '2026-11-28T00:00:00.000+00:00' WHERE id = 4")
+        db.execute(f"UPDATE edits SET checksum = row_checksum({checksums.COLUMNS['edits'].removesuffix(', uid')})")
+        db.execute("UPDATE contents SET total = (SELECT sum(checksum) FROM edits) WHERE name = 'edits'")
+        db.commit()
+    for path in (version_9, copy):
+        AnnotationStore(path).close()
+    mine, theirs = uids(version_9), uids(copy)
+    assert mine[:3] == theirs[:3]
+    assert mine[3] != theirs[3]
 
 
 @pytest.mark.parametrize("read_only", [False, True])

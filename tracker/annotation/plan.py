@@ -1,0 +1,124 @@
+"""The plan of annotation: tasks, and their states.
+
+A task is `draft` until its annotator sets a keyframe, and `annotated` from then on: both follow from the poses.
+Verified, rejected and withdrawn are decisions of a person, stored with author and time. The latest of all counts.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from tracker.errors import TrackerError
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.annotator import annotator
+from tracker.store.edit_tree import now
+from tracker.store.identities import derived_uid, new_uid
+from tracker.store.records import MarkChange
+from tracker.store.task_log import MadePose, State, StateRow, TaskRow
+
+STATES: tuple[State, ...] = ("draft", "annotated", "verified", "rejected")
+"""States of the tasks that are not withdrawn, in the order in which they are counted."""
+
+
+class Task(NamedTuple):
+    """A frame of a person that is to be annotated, and how far it is."""
+
+    row: TaskRow
+    state: State
+    comment: str
+    """Reason of the last decision; empty where it no longer counts."""
+    by: str
+    """Name of the person who brought it to its state; empty for nobody."""
+    time: str
+    """Time since when it has its state, ISO 8601, UTC."""
+
+
+def add_tasks(store: AnnotationStore, wishes: Iterable[tuple[str, int, str]], author: str | None = None) -> int:
+    """Plan tasks; those that are planned already stay as they are, and withdrawn ones return.
+
+    Args:
+        store: annotations of the session.
+        wishes: person, frame and annotator (empty for anybody) of each task.
+        author: of the plan; by default the annotator of this process.
+
+    Returns:
+        Number of tasks that were added or returned.
+    """
+    by, time = annotator() if author is None else author, now()
+    known = {task.row.uid: task for task in read_tasks(store)}
+    rows = [TaskRow(derived_uid("plan", *wish), "plan", *wish, by, time) for wish in dict.fromkeys(wishes)]
+    back = [row for row in rows if row.uid in known and known[row.uid].state == "withdrawn"]
+    added = [row for row in rows if row.uid not in known]
+    store.tasks.add(added, [StateRow(new_uid(), row.uid, "draft", "", by, time) for row in back])
+    return len(added) + len(back)
+
+
+def read_tasks(store: AnnotationStore) -> list[Task]:
+    """Return all tasks with their states, by person, frame and annotator; withdrawn ones too."""
+    present = {(m.person, m.frame): m for m in store.tasks.present_poses()}
+    by_hand: dict[tuple[str, int, str], MadePose] = {}
+    for made in store.tasks.keyframe_edits():
+        by_hand[made.person, made.frame, made.author] = by_hand[made.person, made.frame, ""] = made
+    decided = {state.task: state for state in store.tasks.states()}
+    return [_task(row, present, by_hand, decided.get(row.uid)) for row in store.tasks.tasks()]
+
+
+def _task(
+    row: TaskRow,
+    present: Mapping[tuple[str, int], MadePose],
+    by_hand: Mapping[tuple[str, int, str], MadePose],
+    decided: StateRow | None,
+) -> Task:
+    pose = present.get((row.person, row.frame))
+    made = by_hand.get((row.person, row.frame, row.annotator)) if pose is not None and pose.keyframe else None
+    plain = Task(row, "draft", "", "", row.time)
+    if made is not None and (row.kind == "plan" or made.time > row.time):
+        plain = Task(row, "annotated", "", made.author, made.time)
+    if decided is None:
+        return plain
+    at = Task(row, decided.state, decided.comment, decided.author, decided.time)
+    holds = {
+        "withdrawn": True,
+        "rejected": plain.state == "draft" or plain.time <= decided.time,
+        "verified": pose is not None and pose.time <= decided.time,
+    }
+    return at if holds.get(decided.state, False) else plain
+
+
+def count_states(tasks: Sequence[Task]) -> dict[str, int]:
+    """Return the number of tasks in each of `STATES`, and their `total` without withdrawn ones."""
+    found = Counter(task.state for task in tasks)
+    counts: dict[str, int] = {state: found[state] for state in STATES}
+    return counts | {"total": sum(counts.values())}
+
+
+def decide(store: AnnotationStore, at: tuple[str, int], state: State, comment: str = "", of: str | None = None) -> int:
+    """Verify, reject or withdraw the tasks of a person in a frame. A verified pose is marked as reviewed, too.
+
+    Args:
+        store: annotations of the session.
+        at: person and frame.
+        state: `verified`, `rejected` or `withdrawn`.
+        comment: for the annotator.
+        of: decide on the tasks of this annotator alone; None for all.
+
+    Returns:
+        Number of tasks.
+
+    Raises:
+        TrackerError: no task is there, or there is no pose to verify.
+    """
+    person, frame = at
+    tasks = [t.row for t in read_tasks(store) if (t.row.person, t.row.frame) == at and t.state != "withdrawn"]
+    rows = [row for row in tasks if of is None or row.annotator == of]
+    if not rows:
+        raise TrackerError(f"expected a task of {person} in frame {frame}, found none; plan the frame first")
+    if state == "verified":
+        pose = store.pose(person, frame)
+        if pose is None:
+            raise TrackerError(f"expected a pose of {person} in frame {frame} to verify, found none; annotate it first")
+        if not pose.keyframe and not pose.reviewed:
+            store.commit(f"Verify frame {frame}", [MarkChange(person, frame, keyframe=False, reviewed=True)])
+    by, time = annotator(), now()
+    store.tasks.add(states=[StateRow(new_uid(), row.uid, state, comment, by, time) for row in rows])
+    return len(rows)

@@ -1,0 +1,73 @@
+"""Write a session folder with the annotations of others: it appears whole or not at all."""
+
+import os
+import secrets
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from tracker.annotation.numbered_settings import Numbered, renumbered
+from tracker.errors import SessionError
+from tracker.files import sync_folder
+from tracker.observations.stored import FOLDER as OBSERVATIONS
+from tracker.pipeline.calibration_revisions import follow_history
+from tracker.session.folder import tidy_path
+from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_session
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.edit_log import EditLog
+
+
+def write_session_copy(
+    folder: Path, session: Session, log: EditLog, numbered: Numbered, observed: Sequence[Path]
+) -> None:
+    """Write a session with the cameras and people of another one.
+
+    Args:
+        folder: to write; must not exist, or be empty.
+        session: whose cameras, people and floor it gets; the calibration follows the log.
+        log: the annotations, its settings those without numbers.
+        numbered: the settings with numbers.
+        observed: session folders whose imported observations are copied; of equal names the first.
+
+    Raises:
+        SessionError: the folder is in use or cannot be written.
+    """
+    folder = tidy_path(folder)
+    with _appearing(folder) as temporary:
+        save_session(replace(session, folder=temporary))
+        if (session.folder / CALIBRATION_FILE).exists():  # to the bit: writing rounds, and each rounding is a revision
+            shutil.copyfile(session.folder / CALIBRATION_FILE, temporary / CALIBRATION_FILE)
+        with closing(AnnotationStore(temporary / session.annotations_path.name)) as store:
+            written = store.write_log(log)
+            for key, value in renumbered(numbered, [e.uid for e in log.edits], log.done, written).items():
+                store.set_setting(key, value)
+            follow_history(load_session(temporary), store)
+        for source in observed:
+            for one in sorted((source / OBSERVATIONS).glob("*")):
+                if one.is_dir() and not (temporary / OBSERVATIONS / one.name).exists():
+                    shutil.copytree(one, temporary / OBSERVATIONS / one.name)
+
+
+@contextmanager
+def _appearing(folder: Path) -> Iterator[Path]:
+    """Yield a folder beside another one, which it becomes at the end of the `with` block."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise SessionError(f"{folder} exists already and is not an empty folder; choose another name or remove it")
+    temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        temporary.mkdir(parents=True)
+        yield temporary
+        for path, _, names in os.walk(temporary):
+            for name in names:
+                with (Path(path) / name).open("rb") as file:
+                    os.fsync(file.fileno())
+        if folder.exists():
+            folder.rmdir()
+        temporary.rename(folder)
+        sync_folder(folder.parent)
+    except OSError as error:
+        raise SessionError(f"cannot write the session {folder}: {error}; choose a folder you may write to") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)

@@ -1,0 +1,165 @@
+"""The plan of annotation as rows that are only added: tasks, their states, comments; and the edits they depend on.
+
+The union of the rows of two copies is their merge: a row has the same `uid` everywhere.
+"""
+
+import sqlite3
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, TypeVar
+
+import msgspec
+from msgspec import Meta
+
+from tracker.errors import DamagedStoreError
+from tracker.store.connection import Connection
+from tracker.validation import MAX_FRAMES, check
+
+T = TypeVar("T")
+
+Kind: TypeAlias = Literal["plan", "disagreement"]
+"""Tasks of a plan, and poses on which two copies disagreed when they were merged."""
+State: TypeAlias = Literal["draft", "annotated", "verified", "rejected", "withdrawn"]
+"""States of a task. The log stores the last three; the first two follow from the poses (`tracker.annotation.plan`)."""
+
+_Frame: TypeAlias = Annotated[int, Meta(ge=0, lt=MAX_FRAMES, description=f"a frame from 0 to {MAX_FRAMES - 1}")]
+Uid: TypeAlias = Annotated[str, Meta(pattern=r"^[0-9a-f]{32}\Z", description="32 hexadecimal digits")]
+"""Identity of a row."""
+
+
+class TaskRow(NamedTuple):
+    """A frame of a person that somebody is to annotate."""
+
+    uid: Uid
+    kind: Kind
+    person: str
+    frame: _Frame
+    annotator: str
+    """Name of the annotator; empty for anybody."""
+    author: str
+    """Name of the person who planned it."""
+    time: str
+    """Time at which it was planned, ISO 8601, UTC."""
+
+
+class StateRow(NamedTuple):
+    """A decision on a task."""
+
+    uid: Uid
+    task: Uid
+    """Identity of the task."""
+    state: State
+    comment: str
+    """Reason, as of a rejection; may be empty."""
+    author: str
+    time: str
+
+
+class CommentRow(NamedTuple):
+    """A comment on a person in a frame, or the news that one is resolved or open again."""
+
+    uid: Uid
+    about: Annotated[str, Meta(pattern=r"^([0-9a-f]{32})?\Z")]
+    """Identity of the comment that it resolves or opens again; empty for a new comment."""
+    person: str
+    frame: _Frame
+    limb: str
+    """Name of the limb (`tracker.body.limbs`); empty for the whole body."""
+    text: str
+    resolved: Annotated[int, Meta(ge=0, le=1)]
+    """1 resolves the comment, 0 leaves or opens it."""
+    author: str
+    time: str
+
+
+class MadePose(NamedTuple):
+    """The edit that made or marked the pose of a person in a frame."""
+
+    person: str
+    frame: int
+    keyframe: bool
+    author: str
+    time: str
+    uid: str
+    """Identity of the edit."""
+
+
+Rows: TypeAlias = tuple[Sequence[TaskRow], Sequence[StateRow], Sequence[CommentRow]]
+"""All rows of the log: tasks, states, comments."""
+
+TABLES: dict[str, type[TaskRow] | type[StateRow] | type[CommentRow]] = {
+    "tasks": TaskRow, "task_states": StateRow, "comments": CommentRow
+}  # fmt: skip
+"""The tables, and the rows that they hold."""
+_DONE = (
+    "WITH RECURSIVE done (edit) AS "
+    "(SELECT edit FROM head UNION ALL SELECT parent FROM done JOIN edits ON id = done.edit)"
+)
+_EDIT = "JOIN edits e ON e.id = coalesce(c.made_in, c.edit)"
+_MADE = "c.person, c.frame, c.keyframe, e.author, e.time, e.uid"
+
+
+class TaskLog:
+    """The rows of the plan in an open store."""
+
+    def __init__(self, connection: Connection) -> None:
+        """Use an open store."""
+        self._connection = connection
+
+    def add(
+        self, tasks: Sequence[TaskRow] = (), states: Sequence[StateRow] = (), comments: Sequence[CommentRow] = ()
+    ) -> None:
+        """Add rows, all or none. A row whose `uid` is there already stays as it is.
+
+        Raises:
+            SessionError: the file cannot be written.
+        """
+        with self._connection.transaction() as db:
+            write_rows(db, (tasks, states, comments))
+
+    def tasks(self) -> list[TaskRow]:
+        """Return all tasks, by person, frame and annotator."""
+        return self._all("tasks", TaskRow, "person, frame, annotator, uid")
+
+    def states(self) -> list[StateRow]:
+        """Return all decisions on tasks, earliest first."""
+        return self._all("task_states", StateRow, "time, uid")
+
+    def comments(self) -> list[CommentRow]:
+        """Return all comments and what happened to them, earliest first."""
+        return self._all("comments", CommentRow, "time, uid")
+
+    def present_poses(self) -> list[MadePose]:
+        """Return the edits that made the present poses."""
+        return self._connection.all(
+            f"SELECT {_MADE} FROM poses p JOIN pose_changes c ON c.id = p.change {_EDIT}", (), _made
+        )
+
+    def keyframe_edits(self) -> list[MadePose]:
+        """Return the done edits that set or marked keyframes, earliest first, assessments left out."""
+        return self._connection.all(
+            f"{_DONE} SELECT {_MADE} FROM pose_changes c {_EDIT} WHERE c.keyframe = 1 AND c.numbers IS NOT NULL "
+            "AND c.edit IN (SELECT edit FROM done) ORDER BY e.time, e.uid",
+            (),
+            _made,
+        )
+
+    def _all(self, table: str, row_type: Callable[..., T], order: str) -> list[T]:
+        def convert(row: tuple[Any, ...]) -> T:
+            found: T = check(list(row), row_type, f"row {row[0]!r:.40} of {table}", DamagedStoreError)
+            return found
+
+        fields = ", ".join(TABLES[table]._fields)
+        return self._connection.all(f"SELECT {fields} FROM {table} ORDER BY {order}", (), convert)
+
+
+def write_rows(db: sqlite3.Connection, found: Rows) -> None:
+    """Write rows of all tables within a transaction; those that are there already stay."""
+    for (table, row_type), new in zip(TABLES.items(), found, strict=True):
+        assert all(msgspec.convert(list(row), row_type) == row for row in new)
+        marks = ", ".join("?" * len(row_type._fields))
+        db.executemany(f"INSERT OR IGNORE INTO {table} ({', '.join(row_type._fields)}) VALUES ({marks})", new)
+
+
+def _made(row: Sequence[Any]) -> MadePose:
+    person, frame, keyframe, *edit = row
+    return MadePose(str(person), int(frame), bool(keyframe), *map(str, edit))
