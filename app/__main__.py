@@ -15,6 +15,7 @@ from app.cli import (
     audit,
     bench,
     body,
+    doctor,
     evaluate,
     experiment,
     export,
@@ -30,6 +31,7 @@ from app.cli import (
 )
 from app.cli import open as open_
 from app.cli.annotation import assign, merge, tasks
+from app.cli.batches import batch
 from app.cli.calibration import calibrate, check, sync
 from app.cli.observations import import_, judge
 from app.remedies import command_line_text
@@ -63,8 +65,10 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "export": export.command,
     "restore": restore.command,
     "simulate": simulate.command,
+    "batch": batch.command,
     "experiment": experiment.command,
     "bench": bench.command,
+    "doctor": doctor.command,
 }
 _HELP = ("-h", "--help")
 _ABOUT = """Model-based human motion capture from several calibrated cameras.

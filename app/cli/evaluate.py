@@ -1,7 +1,6 @@
 """`quadrille evaluate`: compare stored poses with a reference."""
 
 from dataclasses import asdict, dataclass
-from math import gcd
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -11,11 +10,14 @@ from app.cli.arguments import OptionalClock, OptionalName, OptionalPath, Optiona
 from app.cli.target import Target, check_stride, load_target, parse_frames
 from app.remedies import command_line_text
 from app.runtime.json_output import format_json
-from tracker.errors import SessionError, TrackerError
+from tracker.errors import TrackerError
+from tracker.evaluation.metric import metrics
 
 if TYPE_CHECKING:
     from tracker.evaluation.metrics import Alignment
     from tracker.evaluation.references import Reference
+
+_METRICS = metrics()
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,11 @@ def command(arguments: Annotated[EvaluateArguments, tyro.conf.arg(name="")]) -> 
     print(format_json(found) if arguments.json else _format(found))
 
 
+if _METRICS:
+    listed = "; ".join(f"{metric.name}: {metric.title}" for metric in _METRICS.values())
+    command.__doc__ = f"{command.__doc__}\n    Measures of other packages: {listed}.\n    "
+
+
 def evaluate(
     at: Target,
     reference: "Reference",
@@ -74,39 +81,20 @@ def evaluate(
 ) -> dict[str, Any]:
     """Compare the stored poses of one person with a reference, over the given frames or all that have poses.
 
-    Without a stride, frames are as far apart as the stored poses, so that frames skipped by `track --stride` do not
-    count as missing.
-
     Returns:
         The errors; `notes` has a sentence if the two differ in length or lie metres apart.
 
     Raises:
         SessionError: the person has no pose.
     """
-    import numpy as np
-
-    from tracker.evaluation.comparability import distance_note, length_note
-    from tracker.evaluation.joint_offsets import evaluate_offsets
-    from tracker.evaluation.metrics import evaluate_joints, evaluate_poses
-    from tracker.evaluation.references import stored_motion
+    from tracker.evaluation.stored_evaluation import evaluate_stored
 
     session, (index,) = at
-    person = session.people[index]
-    stored = stored_motion(session, index)
-    joints, motion = stored.joints, stored.motion
-    if motion is None or not motion.poses:
-        raise SessionError(f"'{person.name}' has no poses yet; place the body in the page, or use init and track")
-    poses = motion.poses
-    wanted = range(min(poses), max(poses) + 1) if frames is None else parse_frames(frames, session)
-    wanted = wanted[:: check_stride(stride) if stride is not None else gcd(*np.diff(sorted(poses)).tolist()) or 1]
-    result = evaluate_joints(joints, reference.joints, wanted, align, stored.assessed)
-    result = evaluate_offsets(result, motion, (joints, reference.joints), wanted, align)
-    if reference.motion is not None:
-        result = evaluate_poses(result, motion, reference.motion, wanted)
-    apart = distance_note(joints, reference.joints, wanted, axes) if align == "none" else None
-    checks = length_note(session.n_frames, reference.n_frames), None if apart is None else command_line_text(*apart)
-    notes = [*reference.joints.notes, *(note for note in checks if note is not None)]
-    return {"person": person.name, **asdict(result), "notes": notes}
+    wanted = None if frames is None else parse_frames(frames, session)
+    every = None if stride is None else check_stride(stride)
+    found = evaluate_stored(session, index, reference, wanted, every, align, axes)
+    notes = [*found.notes, *([] if found.apart is None else [command_line_text(*found.apart)])]
+    return {"person": session.people[index].name, **asdict(found.result), "notes": notes}
 
 
 def _format(found: dict[str, Any]) -> str:
@@ -133,7 +121,12 @@ def _format(found: dict[str, Any]) -> str:
         errors = found["per_part_axis_deg"].items()
         lines += [f"  {part.replace('_', ' '):16} {error:6.2f} deg" for part, error in errors]
     lines += [f"note: {note}" for note in found["notes"]]
+    lines[1:1] = [f"  {_metric(name, value)}" for name, value in found["metrics"].items()]
     return "\n".join(lines)
+
+
+def _metric(name: str, value: float) -> str:
+    return f"{_METRICS[name].title} {value:.4g} {_METRICS[name].unit}".rstrip()
 
 
 def _lost(found: dict[str, Any]) -> str:

@@ -8,13 +8,14 @@ import tyro
 
 from app.cli.arguments import OptionalName, SessionArg
 from app.cli.target import load_target
-from app.export.formats import FORMATS, OPTIONS, ExportFormat, find_format
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
+from tracker.exports.export_format import ExportFormat
+from tracker.exports.formats import FORMATS, OPTIONS, find_format
 
 if TYPE_CHECKING:
-    from tracker.export.motion import Checked, ExportedMotion
+    from tracker.exports.motion import Checked, ExportedMotion
 
 _FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.values())
 
@@ -78,9 +79,9 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
     if arguments.like is not None:
         return _send_back(arguments)
     _refuse_without_like(arguments)
-    from app.export.export import check_options, export, for_format, n_ticks
-    from app.export.frame_list import parse_frame_list
-    from tracker.export.motion import read_motion
+    from tracker.exports.export_files import check_options, export, for_format, n_ticks
+    from tracker.exports.motion import read_motion
+    from tracker.session.frame_list import parse_frame_list
 
     at = load_target(arguments.session, arguments.person, several=True)
     chosen = find_format(arguments.format, arguments.out)
@@ -106,7 +107,7 @@ def _refuse_without_like(arguments: ExportArguments) -> None:
 
 def _send_back(arguments: ExportArguments) -> None:
     """Write the files of observations, with the points of mended poses replaced."""
-    from tracker.export.like import export_like
+    from tracker.exports.like import export_like
     from tracker.observations.stored import load_observations
     from tracker.session.session import load_session
 
@@ -145,7 +146,7 @@ def _file(out: Path, chosen: ExportFormat, name: str) -> Path:
     Raises:
         TrackerError: its suffix is of another format, or its folder is missing.
     """
-    from app.export.export import is_export_folder
+    from tracker.exports.export_files import is_export_folder
 
     if out.is_dir() and not (chosen.is_folder and is_export_folder(out)):
         out = out / f"{name}{chosen.suffixes[0]}"
@@ -160,7 +161,7 @@ def _file(out: Path, chosen: ExportFormat, name: str) -> Path:
 
 
 def _summary(motion: "ExportedMotion", chosen: ExportFormat, paths: list[Path], skip_lost: bool) -> dict[str, Any]:
-    from tracker.export.provenance import SIDE_FILE
+    from tracker.exports.provenance import SIDE_FILE
 
     return {
         "format": chosen.name,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import tyro
 
-from app.cli.arguments import Names, OptionalName
+from app.cli.arguments import Names, OptionalName, OptionalWhole
 from tracker.errors import TrackerError
 
 _SessionOrSample = Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="SESSION", help_behavior_hint="")]
@@ -23,6 +23,8 @@ def command(
     token: bool = True,
     sample: OptionalName = None,
     start_again: bool = False,
+    frame: OptionalWhole = None,
+    person: OptionalName = None,
     annotator: OptionalName = None,
 ) -> None:
     """Open a session in the page; without SESSION, a working copy of a bundled sample.
@@ -36,6 +38,8 @@ def command(
         token: require the token in the printed address. Without it every account of this machine can use the page.
         sample: name of the sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
         start_again: discard the working copy of the sample and make a new one.
+        frame: frame to show first.
+        person: name of the person to select.
         annotator: name of the person who annotates, remembered; by default $QUADRILLE_ANNOTATOR, then the login.
     """
     from app.runtime.kernel_compiler import KernelCompiler
@@ -59,18 +63,22 @@ def command(
     with SessionLock(folder), Doorway(serving) as doorway, closing(KernelCompiler()) as compiler:
         # These imports take seconds: the doorway answers meanwhile, and kernels are compiled. Objects made here stay.
         gc.disable()
+        from app.cli.target import load_target
         from tracker.session.relink import require_files
-        from tracker.session.session import load_session
 
-        found = load_session(folder)
+        at = load_target(folder, person, several=True)
+        found = at.session
+        if frame is not None and not 0 <= frame < found.n_frames:
+            raise TrackerError(f"expected --frame from 0 to {found.n_frames - 1}, found {frame}; correct it")
         require_files(found)
         doorway.open_browser()
 
-        from app.server.workbench import open_session
+        from app.server.workbench import FirstView, open_session
 
         gc.freeze()
         gc.enable()
-        chosen = open_session(found, doorway, compiler, lambda line: print(line, flush=True))
+        first = FirstView(frame or 0, 0 if person is None else at.people[0])
+        chosen = open_session(found, doorway, compiler, lambda line: print(line, flush=True), first)
     if chosen is not None:
         words = ["open", str(chosen.folder), "--host", host, "--port", str(chosen.port), "--no-browser"]
         restart(words, chosen.listening)

@@ -1,4 +1,4 @@
-"""Export a session to files of other programs, for the command line and the page.
+"""Overlay videos, reports and characters for the command line and the page.
 
-Imports the tracker and `app.drawing`. Callers use `formats.FORMATS`, one entry for each format, and `export.export`.
+Imports the tracker and `app.drawing`. `video_format.MP4` is found by its entry point.
 """

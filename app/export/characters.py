@@ -9,7 +9,7 @@ from app.drawing import overlay_colors
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
 from tracker.contours.label_image import part_labels
-from tracker.export.motion import ExportedMotion
+from tracker.exports.motion import ExportedMotion
 from tracker.geometry.arrays import Image
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import GroundPlane, up_rotation

@@ -15,12 +15,13 @@ from app.session.footage_indices import footage_indices
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
-from tracker.export.motion import ExportedMotion
-from tracker.export.options import ExportOptions, load_character
+from tracker.exports.motion import ExportedMotion
+from tracker.exports.options import ExportOptions, load_character
 from tracker.footage.recording import Recording
 from tracker.footage.video_writer import VideoWriter
 from tracker.geometry.arrays import Array, FloatArray, Image
 from tracker.geometry.cameras import Camera
+from tracker.session.session import Session
 
 _LAYERS = frozenset(("contours", "hidden"))
 _GRID_PX = (1920, 1080)
@@ -85,6 +86,22 @@ def _drawn_paths(motion: ExportedMotion, frame: int, shown: Sequence[int]) -> li
     view = View(_LAYERS, tuple(float(i in shown) for i in range(len(session.cameras))))
     exported = [motion.is_exported(p, frame) for p, _ in people]
     return [path for path in overlays.paths(session, state, view, None) if exported[path.person]]
+
+
+def draw_people(session: Session, state: State, index: int, image: Image | None) -> Image:
+    """Return the picture of one camera as filmed with the people of a state drawn over it, (h, w, 3), RGB.
+
+    Args:
+        session: with each person in the body that the state shows.
+        state: the poses.
+        index: of the camera.
+        image: as filmed, (h, w, 3), RGB; None for a damaged frame.
+    """
+    camera = session.cameras[index].camera
+    picture = placeholder(camera.size, "frame damaged") if image is None else image.copy()
+    view = View(_LAYERS, tuple(float(i == index) for i in range(len(session.cameras))))
+    _draw(picture, camera, [p for p in overlays.paths(session, state, view, None) if p.camera == index])
+    return picture
 
 
 def _draw(image: Image, camera: Camera, paths: Sequence[overlays.Path]) -> None:

@@ -17,14 +17,15 @@ from urllib.parse import quote
 
 from aiohttp import web
 
-from app.export.formats import FORMATS, OPTIONS, ExportFormat
 from app.remedies import page_text
 from app.runtime.temporary_folder import TemporaryFolder
 from app.server import connections
 from tracker.errors import TrackerError
+from tracker.exports.export_format import ExportFormat
+from tracker.exports.formats import FORMATS, OPTIONS
 
 if TYPE_CHECKING:
-    from tracker.export.motion import Checked
+    from tracker.exports.motion import Checked
 
 _LOG = logging.getLogger(__name__)
 _CHUNK_BYTES = 1 << 18
@@ -102,11 +103,11 @@ class ExportRoutes:
             TrackerError: an option is wrong, or there is nothing to export.
             _StoppedError: nobody waits for it any more.
         """
-        from app.export.export import check_options, export, n_ticks
-        from app.export.frame_list import parse_frame_list
-        from tracker.export.motion import read_motion
+        from tracker.exports.export_files import check_options, export, n_ticks
+        from tracker.exports.motion import read_motion
         from tracker.formats.file_names import identifier
         from tracker.formats.model_toml import PRESETS
+        from tracker.session.frame_list import parse_frame_list
         from tracker.session.session import load_session
 
         query = request.query

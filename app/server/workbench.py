@@ -3,7 +3,9 @@
 import asyncio
 import signal
 import socket
+import threading
 from collections.abc import Callable, Coroutine
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -54,8 +56,24 @@ class NextSession(NamedTuple):
     """Copies of the sockets of that port: connections wait there for the next program."""
 
 
+class FirstView(NamedTuple):
+    """What the page shows first."""
+
+    frame: int = 0
+    person: int = 0
+    """Index of the selected person."""
+
+
+_BEGINNING = FirstView()
+
+
 def open_session(
-    session: Session, doorway: Doorway, compiler: KernelCompiler, say: Callable[[str], None]
+    session: Session,
+    doorway: Doorway,
+    compiler: KernelCompiler,
+    say: Callable[[str], None],
+    first: FirstView = _BEGINNING,
+    begun: Callable[[Controller, Callable[[], None]], None] = lambda controller, stop: None,
 ) -> NextSession | None:
     """Serve the page of a session until the program is interrupted, or the page asks for another session.
 
@@ -64,6 +82,8 @@ def open_session(
         doorway: answers at the page's address meanwhile.
         compiler: compiles missing kernels; the caller closes it.
         say: shows a line to the user.
+        first: what the page shows first.
+        begun: called once when the page answers, with a function that ends it from another thread.
 
     Returns:
         The session to open next; None if the program was interrupted.
@@ -87,6 +107,8 @@ def open_session(
         frames = FrameCache(Observer(session.cameras, recording), proxies.proxies(session))
         saver = Saver(session, store, annotator_or_login())
         controller = Controller(session, saver, frames, compiler)
+        controller.navigation.seek(first.frame)
+        controller.navigation.select(first.person, None)
         viser = PrivateViser()
         thumbnails = Thumbnails(controller, FootageCrops(session.cameras, indices))
         try:
@@ -105,6 +127,8 @@ def open_session(
                 for name in proxies.stale(session):
                     say(f"the proxy of camera {name} is of other footage: run quadrille index {session.folder} again")
                 say(f"{session.name}: {doorway.address}")
+                loop = asyncio.get_running_loop()
+                begun(controller, partial(_end_from_a_thread, loop, others.is_chosen))
 
             doorway.close()
             served = serve_forever(app, [each.dup() for each in doorway.sockets], ready)
@@ -122,6 +146,10 @@ def open_session(
     if others.chosen is None:
         return None
     return NextSession(others.chosen, doorway.port, tuple(each.dup() for each in doorway.sockets))
+
+
+def _end_from_a_thread(loop: asyncio.AbstractEventLoop, ended: asyncio.Event) -> None:
+    loop.call_soon_threadsafe(ended.set)
 
 
 def _can_draw(controller: Controller) -> bool:
@@ -144,7 +172,8 @@ async def _until_interrupted(serving: Coroutine[Any, Any, None], is_chosen: asyn
     """Run until SIGINT, SIGTERM, the terminal's end or the choice of another session; then shut the server down."""
     task = asyncio.ensure_future(serving)
     choice = asyncio.ensure_future(is_chosen.wait())
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+    is_program = threading.current_thread() is threading.main_thread()  # signals are for programs alone
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) if is_program else ():
         asyncio.get_running_loop().add_signal_handler(number, task.cancel)
     await asyncio.wait({task, choice}, return_when=asyncio.FIRST_COMPLETED)
     if not choice.cancel():

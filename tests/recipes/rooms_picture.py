@@ -20,7 +20,7 @@ HOUSE = {
     ],
     "app/  the viewer": [
         ["__main__"],
-        ["cli/calibration", "cli/observations", "cli/annotation"],
+        ["cli/calibration", "cli/observations", "cli/annotation", "cli/batches"],
         ["cli"],
         ["bench", "server"],
         ["page", "scene3d"],
@@ -33,8 +33,10 @@ HOUSE = {
         ["state", "runtime"],
     ],
     "tracker/  the library": [
-        ["experiments", "judging", "annotation"],
-        ["pipeline", "export"],
+        ["batch"],
+        ["api", "experiments", "annotation"],
+        ["judging"],
+        ["pipeline", "exports"],
         ["simulate", "evaluation", "boards"],
         ["calibration", "posing"],
         ["acquisition", "initialization"],

@@ -1,52 +1,13 @@
 """The table of all layouts of calibrations that are read. `docs/recordings.md` lists it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 from tracker.calibrations import data_layouts as data
 from tracker.calibrations import motion_capture as mocap
 from tracker.calibrations import toml_layouts as toml
-from tracker.calibrations.camera_words import Section
+from tracker.calibrations.calibration_layout import OPENCV_POSES, CalibrationLayout
 from tracker.calibrations.document import Document
-from tracker.formats.camera_section import Units
+from tracker.compute.extensions import usable
 
-
-@dataclass(frozen=True)
-class CalibrationLayout:
-    """One way in which programs write calibrated cameras."""
-
-    name: str
-    """Name for people."""
-    recognized_by: str
-    """Content by which it is recognized."""
-    poses: str
-    """Convention of its poses, which is turned to `X_camera = R X_world + t`."""
-    unit: Units | None
-    """Unit of its translations; None if it does not fix one."""
-    recognizes: Callable[[Document], bool]
-    read: Callable[[Document], dict[str, Section]]
-    """Reads the cameras of one file by their names. The name of a lone camera without one is empty: its file's."""
-    by_program: bool = True
-    """Whether programs alone write it, so that its convention is beyond doubt where it fits."""
-    note: str = ""
-    """Sentence for users on what its files leave open; usually empty."""
-
-    @property
-    def has_opencv_poses(self) -> bool:
-        """Whether its poses map world to camera."""
-        return self.poses == _OPENCV
-
-    @property
-    def poses_in_words(self) -> str:
-        """The convention of its poses, for messages."""
-        if self.has_opencv_poses:
-            return f"poses that map world to camera ({_OPENCV})"
-        return f"poses of {self.name} ({self.poses})"
-
-
-_OPENCV = "X_camera = R X_world + t"
-
-LAYOUTS: tuple[CalibrationLayout, ...] = (
+_OWN: tuple[CalibrationLayout, ...] = (
     CalibrationLayout(
         "Kalibr (`camchain.yaml`)",
         "groups with `camera_model` and `intrinsics`",
@@ -64,9 +25,11 @@ LAYOUTS: tuple[CalibrationLayout, ...] = (
         data.read_mc_calib,
     ),
     CalibrationLayout(
-        "multical", "groups `cameras` and `camera_poses`", _OPENCV, None, data.is_multical, data.read_multical
+        "multical", "groups `cameras` and `camera_poses`", OPENCV_POSES, None, data.is_multical, data.read_multical
     ),
-    CalibrationLayout("CMU Panoptic", "the key `calibDataSource`", _OPENCV, "cm", data.is_panoptic, data.read_words),
+    CalibrationLayout(
+        "CMU Panoptic", "the key `calibDataSource`", OPENCV_POSES, "cm", data.is_panoptic, data.read_words
+    ),
     CalibrationLayout(
         "JARVIS (one file for each camera)",
         "`intrinsicMatrix`, `R` and `T`",
@@ -88,7 +51,7 @@ LAYOUTS: tuple[CalibrationLayout, ...] = (
     CalibrationLayout(
         "OpenPose (one file for each camera)",
         "`CameraMatrix` (3x4) and `Intrinsics`",
-        _OPENCV,
+        OPENCV_POSES,
         None,
         data.is_openpose,
         data.read_openpose,
@@ -97,7 +60,7 @@ LAYOUTS: tuple[CalibrationLayout, ...] = (
     CalibrationLayout(
         "EasyMocap (`intri.yml` and `extri.yml`)",
         "`K_NAME`, or `R_NAME` and `T_NAME`",
-        _OPENCV,
+        OPENCV_POSES,
         None,
         data.is_easymocap,
         data.read_words,
@@ -106,7 +69,7 @@ LAYOUTS: tuple[CalibrationLayout, ...] = (
     CalibrationLayout(
         "Caliscope (`camera_array.toml`)",
         "sections below `cameras`",
-        _OPENCV,
+        OPENCV_POSES,
         None,
         toml.is_caliscope,
         toml.read_caliscope,
@@ -114,18 +77,18 @@ LAYOUTS: tuple[CalibrationLayout, ...] = (
     CalibrationLayout(
         "Caliscope before 0.5, pyxy3d (`config.toml`)",
         "sections with `port` or `cam_id` at the top",
-        _OPENCV,
+        OPENCV_POSES,
         None,
         toml.is_pyxy3d,
         toml.read_top_sections,
     ),
     CalibrationLayout(
-        "FreeMoCap", "`charuco_...` in `metadata`", _OPENCV, None, toml.is_freemocap, toml.read_top_sections
+        "FreeMoCap", "`charuco_...` in `metadata`", OPENCV_POSES, None, toml.is_freemocap, toml.read_top_sections
     ),
     CalibrationLayout(
         "anipose, Pose2Sim (`Calib.toml`)",
         "TOML sections with `matrix`, `rotation` and `translation`",
-        _OPENCV,
+        OPENCV_POSES,
         None,
         toml.is_anipose,
         toml.read_top_sections,
@@ -134,7 +97,7 @@ LAYOUTS: tuple[CalibrationLayout, ...] = (
     CalibrationLayout(
         "AIST++ and other lists of anipose's cameras",
         "a list with anipose's keys",
-        _OPENCV,
+        OPENCV_POSES,
         None,
         data.is_aniposelib,
         data.read_words,
@@ -159,14 +122,18 @@ LAYOUTS: tuple[CalibrationLayout, ...] = (
     CalibrationLayout(
         "OpenCV's words in JSON, YAML or XML",
         "a matrix under `K`, `camera_matrix`, ... of each camera",
-        _OPENCV,
+        OPENCV_POSES,
         None,
         data.has_cameras,
         data.read_words,
         by_program=False,
     ),
 )
-"""In the order in which they are tried: those that share words with others first."""
+LAYOUTS: tuple[CalibrationLayout, ...] = (
+    *usable("quadrille.calibrations", CalibrationLayout, [layout.name for layout in _OWN]).values(),
+    *_OWN,
+)
+"""In the order in which they are tried: those of other packages, then those that share words with others."""
 
 
 def find_layout(document: Document) -> CalibrationLayout | None:

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
+from tracker.calibrations.calibration_layout import CalibrationLayout
 from tracker.calibrations.camera_matrices import is_transposed
 from tracker.calibrations.camera_words import Section, is_absent, plain_text
 from tracker.calibrations.convention_names import CONVENTIONS, PoseConvention
 from tracker.calibrations.data_layouts import has_extrinsics, has_intrinsics
 from tracker.calibrations.document import Document, read_document, refuse
 from tracker.calibrations.foreign import foreign, named
-from tracker.calibrations.layouts import CalibrationLayout, find_layout
+from tracker.calibrations.layouts import find_layout
 from tracker.calibrations.pose_conventions import check_convention, odd_camera, read_pose
 from tracker.calibrations.rotation_forms import check_turned, refuse_angles, with_quaternions
 from tracker.calibrations.toml_layouts import board_square

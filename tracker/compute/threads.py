@@ -11,8 +11,8 @@ S = TypeVar("S")
 T = TypeVar("T")
 U = TypeVar("U")
 
-N_HELPERS = os.cpu_count() or 1
-"""Number of threads of each pool."""
+N_HELPERS = int(os.environ.get("QUADRILLE_THREADS") or os.cpu_count() or 1)
+"""Number of threads of each pool: QUADRILLE_THREADS, which workers of a batch share out, or one for each core."""
 
 
 @lru_cache(maxsize=1)

@@ -1,7 +1,7 @@
 """Errors of an estimated motion against a reference: of joints, and of angles if the reference has poses."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -72,6 +72,8 @@ class Evaluation:
     """Mean angle of each part that both bodies have, over the frames; None without true poses."""
     angle_error_deg: Mapping[str, float] | None = None
     """Mean absolute error of each angle by degree of freedom; None without true poses of the same model."""
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    """Measures that other packages add (`tracker.evaluation.metric`), by name."""
 
 
 class FrameError(NamedTuple):

@@ -7,25 +7,19 @@ recognized on the machine on which it ran; a lock of another machine or containe
 reused process numbers and the safe replacement of a stale lock would remain.
 """
 
-import hashlib
 import json
 import os
-import secrets
-import socket
 import sys
 import time
 from contextlib import suppress
-from datetime import UTC, datetime
-from functools import cache
 from pathlib import Path
 from types import TracebackType
-from typing import Annotated, NamedTuple, TypeAlias
 
 import msgspec
-from msgspec import Meta
 
 from tracker.errors import SessionError
 from tracker.files import read_regular, refuse_links
+from tracker.session.holder import Holder, is_alive, this_holder, this_system
 from tracker.validation import check
 
 if sys.platform != "win32":
@@ -40,31 +34,6 @@ _WRITING_S = 2.0
 file does not appear whole, takes milliseconds."""
 _LOOK_S = 0.05
 """Time between two looks at a lock, s."""
-_FIRST_NAMESPACE = "pid:[4026531836]"
-"""The namespace of processes outside of any container (`PROC_PID_INIT_INO` of Linux)."""
-
-_Word: TypeAlias = Annotated[str, Meta(max_length=300)]
-
-
-class Holder(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The holder of a lock."""
-
-    host: _Word
-    process: Annotated[int, Meta(ge=1, le=2**31 - 1, description="the number of a process")]
-    started: _Word
-    """Start time of the process according to the system; empty if unknown. Process numbers are reused."""
-    since: _Word
-    """Time at which the lock was taken, ISO 8601."""
-    token: _Word
-    """Identifies this lock uniquely."""
-    boot: _Word = ""
-    """Identifies the system since it was started; empty if unknown, as in locks of older programs."""
-    namespace: _Word = ""
-    """Namespace of the number of the process: each container has its own. Empty if unknown."""
-    machine: _Word = ""
-    """Identifies the installation of the system, as a hash; empty if unknown."""
-
-
 _held_here: set[str] = set()
 """Tokens of the locks that this program holds."""
 
@@ -100,17 +69,7 @@ class SessionLock:
             SessionError: another program holds it, or the folder cannot be written.
         """
         refuse_links(self._path.parent, LOCK_FILE)
-        here = _this_system()
-        me = Holder(
-            here.host,
-            os.getpid(),
-            _start_of(os.getpid()),
-            datetime.now(UTC).isoformat(timespec="seconds"),
-            secrets.token_hex(8),
-            here.boot,
-            here.namespace,
-            here.machine,
-        )
+        me = this_holder()
         try:
             while not self._create(me):
                 self._clear_stale()
@@ -168,7 +127,7 @@ class SessionLock:
         if data is None:
             return  # released in the meantime
         holder = _parse(data)
-        if not _is_blank(data) and (holder is None or _is_alive(holder)):
+        if not _is_blank(data) and (holder is None or is_alive(holder)):
             raise SessionError(f"session {self._path.parent} is open already {_describe(holder, self._path)}")
         with suppress(FileNotFoundError), self._path.open("rb+") as file:
             # Several programs may find the same stale lock. The one that has this file to itself removes it; to the
@@ -245,7 +204,7 @@ def _have_alone(number: int) -> bool:
 def _describe(holder: Holder | None, path: Path) -> str:
     if holder is None:
         return f"and its lock {path} cannot be read; close the other program, or delete that file if there is none"
-    here = _this_system()
+    here = this_system()
     if (holder.host, holder.boot, holder.namespace) == here[:3] and holder.process == os.getpid():
         return f"in this program since {holder.since}; go on there"
     who = f"in process {holder.process} on {holder.host} since {holder.since}"
@@ -257,62 +216,3 @@ def _describe(holder: Holder | None, path: Path) -> str:
     if holder.host == here.host and holder.boot and holder.namespace != here.namespace:
         return f"{who}, in another container; close it there, or delete {path} if that container has ended"
     return f"{who}; close it there, or delete {path} if that program no longer runs"
-
-
-def _is_alive(holder: Holder) -> bool:
-    """Return whether the holder may still run; only a process that is certainly gone counts as dead."""
-    here = _this_system()
-    if holder.host != here.host or sys.platform == "win32":  # signal 0 would end the process on Windows
-        return True
-    if holder.boot and holder.boot != here.boot:
-        # Machines and containers may share a name. This one was started again if it is the same installation.
-        is_known = bool(holder.machine) and holder.namespace == _FIRST_NAMESPACE
-        return not (is_known and (holder.machine, holder.namespace) == (here.machine, here.namespace))
-    if holder.boot and holder.namespace != here.namespace:
-        return True  # in another container, where the number means another process
-    try:
-        os.kill(holder.process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        pass
-    started = _start_of(holder.process)
-    return not holder.started or not started or holder.started == started
-
-
-def _start_of(process: int) -> str:
-    """Return the start time of a process, in ticks since boot; empty if the system does not provide it."""
-    try:
-        stat = Path(f"/proc/{process}/stat").read_text("utf-8", "replace")  # a program may have any name
-    except OSError:
-        return ""
-    # The program's name, in parentheses, may contain spaces. The start time is field 22, the 20th after the name.
-    return stat.rpartition(")")[2].split()[19]
-
-
-class _System(NamedTuple):
-    """The system that a program runs on; see `Holder`."""
-
-    host: str
-    boot: str
-    namespace: str
-    machine: str
-
-
-@cache
-def _this_system() -> _System:
-    """Identify this system; empty words where it does not provide them."""
-    namespace = ""
-    with suppress(OSError):
-        namespace = os.readlink("/proc/self/ns/pid")
-    machine = _first_line("/etc/machine-id")
-    # The manual of machine-id asks programs to show a hash of it alone.
-    hashed = hashlib.sha256(f"quadrille {machine}".encode()).hexdigest()[:16] if machine else ""
-    return _System(socket.gethostname()[:300], _first_line("/proc/sys/kernel/random/boot_id"), namespace, hashed)
-
-
-def _first_line(path: str) -> str:
-    try:
-        return Path(path).read_text("utf-8", "replace").strip()[:300]
-    except OSError:
-        return ""

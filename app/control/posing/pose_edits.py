@@ -56,6 +56,21 @@ class PoseEdits:
             dof_values[dof] = value
             self._set_dof_values(person, dof, dof_values, f"set {display_name(model.dof_names[dof])}")
 
+    def set_values(self, person: int, values: Array, frame: int | None = None) -> None:
+        """Set a whole pose, (n_values,), within the limits of the joints; locked degrees of freedom stay.
+
+        Raises:
+            TrackerError: it is not a pose of the person's body.
+        """
+        with self._on(person, frame) as model:
+            if values.shape != (len(model.value_names),) or not np.isfinite(values).all():
+                found = values.shape if np.isfinite(values).all() else "numbers that are not finite"
+                n = len(model.value_names)
+                raise TrackerError(f"expected the {n} values of '{model.name}', found {found}; see its value_names")
+            free = self._session_state.active_dofs(person)
+            before = self._session_state.state.poses[person]
+            self._apply(person, copy_dofs(model, before, model.clip(values), free), "set pose")
+
     def turn(self, person: int, dof: int, by: float, frame: int | None = None) -> None:
         """Change one degree of freedom by a step, rad or metres; see `set_dof`."""
         with self._on(person, frame) as model:

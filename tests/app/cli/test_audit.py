@@ -62,6 +62,7 @@ def test_poses_are_assessed_but_stay(run, posed, tracks):
         np.testing.assert_array_equal(after[k].values, before[k].values)
 
 
+@pytest.mark.slow
 def test_a_keyframe_is_assessed_and_stays(run, posed, tracks):
     with closing(AnnotationStore(posed / "annotations.sqlite")) as store:
         store.commit("keyframes", [MarkChange("person", k, True, True) for k in (APART, 24)], author="eve")

@@ -51,6 +51,7 @@ def words(footage, out, *more, board="board.toml"):
     return ("--board", footage / board, "--videos", *videos, "--out", out, "--json", *more)
 
 
+@pytest.mark.slow
 def test_cameras_are_calibrated_in_the_world_of_the_floor(run, footage, tmp_path):
     status, out, _ = run(*words(footage, tmp_path / "c.toml", "--floor-frame", "13"))
     assert status == 0
@@ -70,6 +71,7 @@ def test_cameras_are_calibrated_in_the_world_of_the_floor(run, footage, tmp_path
     assert_refused(again, ["expected", "c.toml not to exist, found a file", "--overwrite"])
 
 
+@pytest.mark.slow
 def test_a_layout_is_written_and_the_report_is_read_by_people(run, footage, tmp_path):
     given = [w for w in words(footage, tmp_path / "rig.yml", "--layout", "opencv") if w != "--json"]
     status, out, _ = run(*given)

@@ -9,10 +9,10 @@ from bodies import MODELS
 from command_line import assert_refused
 from stored_motions import store_motion
 
-from app.export.export import export
-from app.export.formats import FORMATS
-from tracker.export.motion import read_motion
-from tracker.export.options import ExportOptions
+from tracker.exports.export_files import export
+from tracker.exports.formats import FORMATS
+from tracker.exports.motion import read_motion
+from tracker.exports.options import ExportOptions
 from tracker.formats.trc import read_trc
 from tracker.session.session import load_session
 
@@ -106,7 +106,7 @@ def test_what_cannot_be_written_leaves_nothing(run, couple, tmp_path, monkeypatc
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("app.export.export.os.replace", full)
+    monkeypatch.setattr("tracker.exports.export_files.os.replace", full)
     result = run("export", couple, "--out", tmp_path / "a.mot", "--person", "ann")
     assert_refused(result, [f"cannot write {tmp_path / 'a.mot'}: No space left on device", "choose a folder"])
     assert [p.name for p in tmp_path.iterdir()] == ["s"]

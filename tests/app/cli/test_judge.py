@@ -71,6 +71,7 @@ def test_exchanged_legs_come_first(run, imported):
     assert set(arm) == {"probability_off", "distance_mm", "reason"}
 
 
+@pytest.mark.slow
 def test_the_report_is_one_file_with_pictures(run, imported, tmp_path):
     path = tmp_path / "judged.html"
     status, out, _ = run("judge", imported, "--of", "net", "--report", path)

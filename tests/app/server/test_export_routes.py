@@ -13,11 +13,12 @@ from bodies import MODELS
 from serving import listening
 from stored_motions import store_motion
 
-from app.export import formats
 from app.server import server
 from app.server.access import Access
 from app.server.export_routes import ExportRoutes
 from app.server.static_files import static_folder
+from tracker.exports import formats
+from tracker.exports.export_format import ExportFormat
 
 
 class Nobody:
@@ -114,7 +115,7 @@ async def test_one_runs_at_a_time_and_stops_when_the_page_goes(client, temporary
             loop.call_soon_threadsafe(reached.set)
 
     one = formats.FORMATS["coco"]
-    monkeypatch.setitem(formats.FORMATS, "coco", formats.ExportFormat("coco", one.title, one.suffixes, slow))
+    monkeypatch.setitem(formats.FORMATS, "coco", ExportFormat("coco", one.title, one.suffixes, slow))
     try:
         first = asyncio.create_task(client.get("/export/coco"))
         await asyncio.wait_for(reached.wait(), 20)

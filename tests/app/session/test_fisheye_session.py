@@ -17,8 +17,8 @@ from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.camera_exchange import find_exchange
 from tracker.evidence.observer import Observer
-from tracker.export.motion import ExportedMotion, PersonMotion, StoredPose
-from tracker.export.options import ExportOptions
+from tracker.exports.motion import ExportedMotion, PersonMotion, StoredPose
+from tracker.exports.options import ExportOptions
 from tracker.footage.recording import Recording
 from tracker.footage.video import open_footage
 from tracker.session.session import load_session
@@ -67,6 +67,7 @@ def test_the_page_gets_the_undistorted_picture_and_its_size(opened):
     assert np.all(path.segments_px.reshape(-1, 2).max(axis=0) >= points.min(axis=0))
 
 
+@pytest.mark.slow
 def test_pins_are_stored_in_pixels_of_the_footage(opened, session):
     controller = opened()
     camera = controller.session.cameras[FRONT].camera

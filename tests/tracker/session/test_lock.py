@@ -8,9 +8,11 @@ import textwrap
 from contextlib import suppress
 from itertools import combinations
 
+import msgspec
 import pytest
 
 from tracker.errors import SessionError
+from tracker.session import holder as holder_module
 from tracker.session import lock as lock_module
 from tracker.session.lock import LOCK_FILE, SessionLock, is_held_here
 
@@ -225,6 +227,16 @@ def test_a_container_with_the_same_host_name_does_not_steal_the_lock(tmp_path):
         SessionLock(tmp_path).acquire()
 
 
+def test_a_process_that_nobody_has_asked_for_its_status_is_dead():
+    child = subprocess.Popen([sys.executable, "-c", "pass"])
+    os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)
+    holder = msgspec.structs.replace(
+        holder_module.this_holder(), process=child.pid, started=holder_module.start_of(child.pid)
+    )
+    assert not holder_module.is_alive(holder)
+    child.wait()
+
+
 def test_another_machine_with_the_same_host_name_does_not_steal_the_lock(tmp_path):
     left_by(tmp_path, boot="4f0c3f9e-0000-4000-8000-000000000000", machine="another")
     with pytest.raises(SessionError, match=f"in process {GONE} on"):
@@ -235,8 +247,9 @@ def test_another_machine_with_the_same_host_name_does_not_steal_the_lock(tmp_pat
 def test_after_a_power_cut_the_lock_of_this_machine_is_free_but_not_that_of_a_container(
     tmp_path, monkeypatch, namespace, is_free
 ):
-    here = lock_module._System(socket.gethostname(), "now", namespace, "laptop")
-    monkeypatch.setattr(lock_module, "_this_system", lambda: here)
+    here = holder_module.System(socket.gethostname(), "now", namespace, "laptop")
+    monkeypatch.setattr(holder_module, "this_system", lambda: here)
+    monkeypatch.setattr(lock_module, "this_system", lambda: here)
     left_by(tmp_path, boot="before", namespace=namespace, machine="laptop")
     if is_free:
         SessionLock(tmp_path).acquire()

@@ -49,6 +49,7 @@ def test_the_floor_darkens_beside_the_feet(backdrops, skin):
     assert np.sum((ratio < 0.85) & (mask == 0)) > 100
 
 
+@pytest.mark.slow
 def test_masks_tell_people_apart_and_the_nearer_hides_the_other(backdrops):
     figure = ModelFigure(load_model("gavrila22", 1.7))
     camera = backdrops[0].camera

@@ -1,0 +1,105 @@
+"""`quadrille batch`: track the recordings of a plan."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from app.cli.arguments import OptionalName, OptionalPath, OptionalWhole
+from app.runtime.json_output import format_json
+from app.runtime.progress import Reporter
+from tracker.errors import TrackerError
+
+if TYPE_CHECKING:
+    from tracker.batch.manifest import Manifest
+
+_SUFFIX = "_batch"
+
+
+@dataclass(frozen=True)
+class BatchArguments:
+    """Arguments of `quadrille batch`."""
+
+    plan: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PLAN", help="TOML file; docs/batch.md")]
+    """TOML file; docs/batch.md describes it."""
+    out: OptionalPath = None
+    """folder of the batch: tasks, their states and results. PLAN_batch beside the plan by default."""
+    workers: OptionalWhole = None
+    """number of processes; by default as many as cores and free memory allow."""
+    slurm: bool = False
+    """write the scripts of a job array and of the step after it, and run nothing."""
+    dask: OptionalName = None
+    """address of a running scheduler: its workers do the tasks. Needs quadrille[dask]."""
+    work: bool = False
+    """do tasks of --out in this process until none is left, as the jobs of an array do."""
+    retry: bool = False
+    """do failed tasks again."""
+    table: bool = False
+    """show the table of results, and run nothing."""
+    report: OptionalPath = None
+    """write the table to this HTML file, too."""
+    json: bool = False
+    """print one JSON object."""
+
+
+def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> None:
+    """Track the recordings of a plan, and show which of them need a person.
+
+    Ctrl+C stops it; run it again to go on. Recordings that fail are listed with the reason, and the others go on.
+    """
+    from app.cli.batches import local, morning
+    from tracker.batch.manifest import Manifest
+    from tracker.batch.plan import read_plan
+
+    out = arguments.out or arguments.plan.with_name(arguments.plan.stem + _SUFFIX)
+    _check(arguments)
+    if arguments.work:
+        local.work_here(out)
+        return
+    if arguments.table:
+        manifest = Manifest.load(out)
+    else:
+        manifest = Manifest.create(read_plan(arguments.plan, out.resolve()), out.resolve())
+    if arguments.retry:
+        manifest.retry()
+    progress, is_stopped = Reporter(silent=arguments.json), False
+    if arguments.slurm:
+        from app.cli.batches.slurm import write_scripts
+
+        print(write_scripts(manifest, arguments.plan.resolve()))
+        return
+    if not arguments.table and not manifest.is_finished():
+        is_stopped = _run(manifest, arguments, progress)
+    found = morning.record(manifest)
+    if arguments.report is not None:
+        from app.export.batch_report import write_batch_report
+
+        write_batch_report(found, arguments.report)
+    print(format_json(found) if arguments.json else morning.format_table(found))
+    if is_stopped:
+        sys.exit(130)
+    if found["totals"]["failed"]:
+        sys.exit(1)
+
+
+def _check(arguments: BatchArguments) -> None:
+    ways = ("slurm", "work", "table")
+    given = [f"--{w}" for w in ways if getattr(arguments, w)] + ["--dask"] * (arguments.dask is not None)
+    given += ["--workers"] * (arguments.workers is not None)
+    if len(given) > 1:
+        raise TrackerError(f"expected one of {', '.join(given)}, found all of them; choose one")
+    if arguments.workers is not None and arguments.workers < 1:
+        raise TrackerError(f"expected --workers as a whole number from 1, found {arguments.workers}; correct it")
+
+
+def _run(manifest: "Manifest", arguments: BatchArguments, progress: Reporter) -> bool:
+    """Do the tasks; return whether the user stopped it."""
+    if arguments.dask is not None:
+        from app.cli.batches.dask_cluster import run_on_cluster
+
+        return run_on_cluster(manifest, arguments.dask, progress)
+    from app.cli.batches.local import run_locally
+
+    return run_locally(manifest, arguments.workers, progress)

@@ -1,0 +1,67 @@
+"""A batch on the workers of a running Dask cluster."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+from app.runtime.progress import Reporter
+from tracker.batch.manifest import Manifest
+from tracker.errors import TrackerError
+
+_LOOK_S = 0.5
+_CONNECT_S = 10
+
+
+def run_on_cluster(manifest: Manifest, address: str, progress: Reporter) -> bool:
+    """Do the tasks of a batch on a cluster whose workers see its folder; return whether Ctrl+C stopped it.
+
+    A worker that dies gives its task back as any other does (`tracker.batch.claims`), to the workers that are left.
+
+    Raises:
+        TrackerError: the package `distributed` is missing, or no scheduler answers.
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise TrackerError(
+            "expected the package distributed for --dask, found none; install it with: pip install 'quadrille[dask]'"
+        ) from error
+    try:
+        client = Client(address, timeout=_CONNECT_S)
+    except (OSError, ValueError) as error:
+        raise TrackerError(
+            f"expected a Dask scheduler at {address}, found none that answers; start it first"
+        ) from error
+    with client:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise TrackerError(f"expected workers at {address}, found none; start some with dask worker {address}")
+        progress.say(f"{len(manifest.tasks)} recordings, {threads} threads of workers")
+        futures = [client.submit(work_once, str(manifest.folder), pure=False) for _ in manifest.tasks]
+        try:
+            _wait(manifest, futures, client, progress)
+        except KeyboardInterrupt:
+            client.cancel(futures, force=True)
+            return True
+    return False
+
+
+def work_once(folder: str) -> int:
+    """Do one task of a batch, on a worker of the cluster; return the number of tasks done."""
+    from tracker.batch.worker import work
+
+    return work(Path(folder), max_tasks=1)
+
+
+def _wait(manifest: Manifest, futures: list[Any], client: Any, progress: Reporter) -> None:
+    """Wait for all tasks. Calls whose worker died are made again as long as tasks are left."""
+    shown = set[int]()
+    while not manifest.is_finished():
+        for task in manifest.tasks:
+            if task.number not in shown and (result := manifest.result(task)) is not None:
+                shown.add(task.number)
+                progress.say(f"{len(shown)}/{len(manifest.tasks)} {task.recording.name}: {result.state}")
+        futures[:] = [f for f in futures if not f.done()]
+        if not futures:
+            futures.append(client.submit(work_once, str(manifest.folder), pure=False))
+        time.sleep(_LOOK_S)

@@ -1,0 +1,120 @@
+"""Workers of a batch as processes of this machine."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from app.runtime.memory import WORKER_BYTES, free_bytes
+from app.runtime.progress import Reporter
+from tracker.batch.manifest import Manifest
+
+_LOOK_S = 0.5
+_END_S = 10.0
+"""Time for the workers to store what they have after Ctrl+C, s."""
+
+
+def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> bool:
+    """Do the tasks of a batch by processes of this machine; return whether Ctrl+C stopped it.
+
+    Args:
+        manifest: of the batch.
+        wanted: number of workers; as many as cores and memory allow by default.
+        progress: shows a line for each task.
+    """
+    n_open = len(manifest.tasks) - sum(n for s, n in manifest.counts().items() if s in ("done", "failed"))
+    n, note = n_workers(wanted, n_open, _cores(), free_bytes())
+    if note:
+        progress.say(note)
+    progress.say(f"{n_open} recordings, {n} {'worker' if n == 1 else 'workers'}")
+    compile_kernels(progress)
+    environment = {**os.environ, "QUADRILLE_THREADS": str(max(1, _cores() // n))}
+    words = [sys.executable, "-m", "app", "batch", str(manifest.folder), "--out", str(manifest.folder), "--work"]
+    logs = manifest.folder / "logs"
+    logs.mkdir(exist_ok=True)
+    workers = list[subprocess.Popen[bytes]]()
+    try:
+        for number in range(n):
+            with (logs / f"worker_{number}.txt").open("ab") as log:
+                workers.append(subprocess.Popen(words, stdout=log, stderr=log, env=environment, start_new_session=True))
+        _watch(manifest, workers, progress)
+    except KeyboardInterrupt:
+        _stop(workers)
+        return True
+    finally:
+        for worker in workers:
+            worker.kill()
+            worker.wait()
+    return False
+
+
+def n_workers(wanted: int | None, n_tasks: int, cores: int, free: int | None) -> tuple[int, str]:
+    """Return a number of workers that memory allows, and a sentence where it is smaller than asked for.
+
+    Args:
+        wanted: number asked for; one for each core by default.
+        n_tasks: number of tasks that are left.
+        cores: of the machine.
+        free: memory that programs can still have, bytes; None where the system does not provide it.
+    """
+    asked = min(wanted or cores, max(1, n_tasks))
+    allowed = asked if free is None else max(1, free // WORKER_BYTES)
+    if allowed >= asked:
+        return asked, ""
+    return allowed, (
+        f"{allowed} of {asked} workers are started: each may need {WORKER_BYTES / 1e9:.1f} GB, and "
+        f"{(free or 0) / 1e9:.1f} GB are free"
+    )
+
+
+def work_here(folder: Path) -> None:
+    """Do tasks in this process until none is left. SIGTERM and Ctrl+C give the task at hand back."""
+    from tracker.batch.worker import work
+
+    stopped = list[int]()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda n, _: stopped.append(n))
+    work(folder, is_stopped=lambda: bool(stopped))
+
+
+def compile_kernels(progress: Reporter) -> None:
+    """Compile missing kernels once, before workers would each do it."""
+    from tracker.compute.kernel_cache import is_compiled
+
+    if not is_compiled():
+        progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
+        subprocess.run([sys.executable, "-m", "app.bench.compile_kernels"], check=False)
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _watch(manifest: Manifest, workers: list[subprocess.Popen[bytes]], progress: Reporter) -> None:
+    """Show each task that ends, until all have, or no worker is left."""
+    left = {t.number for t in manifest.tasks if manifest.result(t) is None}
+    n = len(left)
+    while left:
+        ended = all(w.poll() is not None for w in workers)
+        for number in sorted(left):
+            task = manifest.tasks[number]
+            if (result := manifest.result(task)) is not None:
+                left.remove(number)
+                how = f"{result.seconds:.0f} s" if result.state == "done" else f"failed: {result.error}"
+                progress.say(f"{n - len(left)}/{n} {task.recording.name}: {how}")
+        if ended:
+            return
+        time.sleep(_LOOK_S)
+
+
+def _stop(workers: list[subprocess.Popen[bytes]]) -> None:
+    """Ask the workers to give their tasks back, and wait for them."""
+    for worker in workers:
+        worker.terminate()
+    until = time.monotonic() + _END_S
+    for worker in workers:
+        with suppress(subprocess.TimeoutExpired):
+            worker.wait(max(0.0, until - time.monotonic()))

@@ -1,0 +1,80 @@
+"""The morning after a batch: the table of its recordings, as JSON and for a terminal."""
+
+import shlex
+from typing import Any
+
+from app.remedies import PHRASES
+from tracker.batch.manifest import Manifest, Result
+from tracker.batch.results import Row, summarize, totals
+
+
+def record(manifest: Manifest) -> dict[str, Any]:
+    """Return the results of a batch as one JSON object; docs/batch.md lists its keys."""
+    rows = summarize(manifest)
+    sums = totals(manifest, rows)
+    return {
+        "folder": str(manifest.folder),
+        "recordings": [_record(row) for row in rows],
+        "totals": {
+            **{state: sums.counts.get(state, 0) for state in ("done", "failed", "running", "waiting")},
+            "hours": sums.hours,
+            "cpu_hours": sums.cpu_hours,
+            "poses": sums.n_poses,
+            "verified": sums.n_verified,
+            "share_verified": sums.share_verified,
+        },
+    }
+
+
+def format_table(found: dict[str, Any]) -> str:
+    """Format the results for a terminal."""
+    rows = found["recordings"]
+    width = max(9, *(len(row["name"]) for row in rows))
+    lines = [f"{'recording':{width}}  state    error mm  doubted  verified     s  look at"]
+    for row in rows:
+        error = "" if row["expected_error_mm"] is None else f"{row['expected_error_mm']:.1f}"
+        doubted = f"{100 * row['share_doubted']:.0f}%" if row["poses"] else ""
+        verified = f"{row['verified']}/{row['poses']}" if row["poses"] else ""
+        at = "" if row["worst_frame"] is None else f"frame {row['worst_frame']} ({row['worst_person']})"
+        numbers = f"{error:>9}  {doubted:>7}  {verified:>8}  {row['seconds']:4.0f}"
+        lines.append(f"{row['name']:{width}}  {row['state']:7} {numbers}  {at}")
+    lines += [f"{row['name']}: {row['error']}" for row in rows if row["error"]]
+    lines += [f"{row['name']}: {row['contradiction']}" for row in rows if row["contradiction"]]
+    sums = found["totals"]
+    counts = ", ".join(f"{sums[s]} {s}" for s in ("done", "failed", "running", "waiting") if sums[s])
+    lines.append(
+        f"{counts}; {sums['hours']:.2f} hours of workers; {100 * sums['share_verified']:.0f}% of "
+        f"{sums['poses']} poses verified"
+    )
+    if opened := next((row["open"] for row in rows if row["open"]), None):
+        lines.append(f"open the first with: {opened}")
+    return "\n".join(lines)
+
+
+def _record(row: Row) -> dict[str, Any]:
+    words = ["quadrille", "open", row.session]
+    words += [] if row.worst_frame is None else ["--frame", str(row.worst_frame), "--person", row.worst_person]
+    return {
+        "name": row.name,
+        "session": row.session,
+        "state": row.state,
+        "expected_error_mm": row.expected_error_mm,
+        "share_doubted": row.share_doubted,
+        "poses": row.n_poses,
+        "verified": row.n_verified,
+        "worst_frame": row.worst_frame,
+        "worst_person": row.worst_person,
+        "seconds": row.seconds,
+        "cpu_seconds": row.cpu_seconds,
+        "contradiction": row.contradiction,
+        "error": "" if row.result is None else _error(row.result),
+        "files": [] if row.result is None else row.result.files,
+        "open": shlex.join(words) if row.state == "done" else "",
+    }
+
+
+def _error(result: Result) -> str:
+    """Return why a task failed, with what to do in the words of the command line."""
+    if not result.remedy:
+        return result.error
+    return f"{result.error}; {PHRASES[result.remedy].command_line.format(**result.remedy_fields)}"

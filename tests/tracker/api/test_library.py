@@ -1,0 +1,82 @@
+"""The library as a stranger calls it: sessions and poses as arrays, work and results, wrong arguments."""
+
+import shutil
+
+import numpy as np
+import pytest
+from bodies import MODELS
+from command_line import SAMPLE
+from stored_motions import store_motion
+
+import tracker
+from tracker.evaluation.references import read_joints
+from tracker.pipeline.given_pose import set_pose_at_joints
+
+
+@pytest.fixture
+def stored(tmp_path):
+    """A session of two people with poses, without one of bob on frame 3, and their true bodies by frame."""
+    return store_motion(tmp_path / "s", [MODELS["gavrila38"]] * 2, n_frames=6, gaps={(1, 3)}, lost={(1, 4)})
+
+
+def test_poses_are_arrays_with_their_frames_times_and_covariances(stored):
+    session, truth = stored
+    poses = tracker.read_poses(session.folder, "bob")
+    assert poses.frames.tolist() == [0, 1, 2, 4, 5]
+    assert np.allclose(poses.times_s, poses.frames / session.fps)
+    assert poses.joints.shape == (5, len(poses.names), 3)
+    assert poses.covariances.shape == (5, len(poses.names), 3, 3)
+    assert poses.statuses[3] == "lost"
+    body = truth[1][4]
+    at = body.model.point_names.index("left_elbow")
+    assert np.allclose(poses.joint("left_elbow")[3], body.joint_centers_world[at])
+    with pytest.raises(KeyError, match="left_elbow"):
+        poses.joint("elbow")
+
+
+def test_a_range_of_frames_is_read_and_exported(stored, tmp_path):
+    session, _ = stored
+    assert tracker.read_poses(session, "ann", range(2, 5)).frames.tolist() == [2, 3, 4]
+    (path,) = tracker.export(session, tmp_path / "ann.trc", people=["ann"], options={"units": "mm"})
+    assert tracker.evaluate(session, path, "ann").mpjpe_mm < 0.01
+    with pytest.raises(tracker.TrackerError, match="not to exist"):
+        tracker.export(session, path, people=["ann"])
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda s: tracker.read_poses(s), "name of a person"),
+        (lambda s: tracker.read_poses(s, "eve"), "ann, bob"),
+        (lambda s: tracker.read_poses(s, "ann", [9]), "frames from 0 to 5, found 9"),
+        (lambda s: tracker.export(s, "a.xyz"), "expected a format"),
+        (lambda s: tracker.export(s, "a.trc", options={"view": "C0"}), "expected no --view"),
+        (lambda s: tracker.evaluate(s, "a.txt", "ann"), "expected a reference"),
+        (lambda s: tracker.open_session(s.folder / "none"), "none"),
+    ],
+)
+def test_wrong_arguments_are_a_sentence(stored, call, words):
+    with pytest.raises(tracker.TrackerError, match=words):
+        call(stored[0])
+
+
+def test_a_name_alone_is_no_list_of_names(stored):
+    with pytest.raises(TypeError, match=r"\['ann'\]"):
+        tracker.export(stored[0], "a.trc", people="ann")
+
+
+def test_footage_is_tracked_and_the_progress_stops_it(tmp_path):
+    folder = shutil.copytree(SAMPLE, tmp_path / "s")
+    session = tracker.open_session(folder)
+    set_pose_at_joints(session, 0, 0, read_joints(SAMPLE / "truth.trc", session.fps), fit_sizes=False)
+    tracker.track(folder, frames=range(3), options={"audit": False})
+    assert tracker.read_poses(folder).frames.tolist() == [0, 1, 2]
+
+    def stop(stage, share):
+        if share > 0.2:
+            raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        tracker.track(folder, frames=range(40), options={"audit": False}, progress=stop)
+    with pytest.raises(tracker.TrackerError, match="expected options among"):
+        tracker.track(folder, options={"nothing": 1})

@@ -1,0 +1,42 @@
+"""The library for other programs is stable: a change of a name, an argument or a field is made on purpose."""
+
+import dataclasses
+import inspect
+from pathlib import Path
+
+import tracker
+from tracker.api.pose_series import PoseSeries
+from tracker.api.work import Found, Tracked
+from tracker.evaluation.metric import ComparedJoints, Metric
+from tracker.exports.export_format import ExportFormat
+
+SURFACE = Path(__file__).with_name("surface.txt")
+RESULTS = (ComparedJoints, ExportFormat, Found, Metric, PoseSeries, Tracked)
+
+
+def arguments(function):
+    """Arguments with their defaults; annotations are printed otherwise by each version of Python."""
+    found = inspect.signature(function)
+    bare = [p.replace(annotation=inspect.Parameter.empty) for p in found.parameters.values()]
+    return found.replace(parameters=bare, return_annotation=inspect.Signature.empty)
+
+
+def surface():
+    """Name and arguments of each public function, and the fields of what they take and return."""
+    lines = []
+    for name in sorted(tracker.__all__):
+        found = getattr(tracker, name)
+        lines.append(f"tracker.{name}{arguments(found) if inspect.isfunction(found) else ''}")
+    for kind in RESULTS:
+        lines += [f"{kind.__name__}.{f.name}" for f in dataclasses.fields(kind)]
+    return "\n".join(lines) + "\n"
+
+
+def test_the_surface_is_as_written_down():
+    """After a change on purpose: write `surface()` to the file, and an entry to CHANGELOG.md."""
+    assert surface() == SURFACE.read_text("utf-8")
+
+
+def test_a_name_that_is_not_there_is_refused_as_usual():
+    assert not hasattr(tracker, "tracks")
+    assert dir(tracker) == sorted(tracker.__all__)

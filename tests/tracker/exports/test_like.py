@@ -1,0 +1,317 @@
+"""Imported files leave as they came; mended poses change their own points alone."""
+
+import json
+from contextlib import closing
+
+import numpy as np
+import pytest
+from observed_files import (
+    write_bvh_chain,
+    write_c3d,
+    write_coco_images,
+    write_deeplabcut,
+    write_points_csv,
+    write_sleap,
+)
+from observed_people import BODY_25, make_session, seen, write_openpose
+
+from tracker.body.model import PosedBody
+from tracker.errors import FormatError, SessionError, TrackerError
+from tracker.exports.keypoints import project_through_lens
+from tracker.exports.like import export_like
+from tracker.formats.c3d import read_c3d
+from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
+from tracker.formats.keypoints.openpose import read_openpose
+from tracker.formats.model_toml import format_model
+from tracker.formats.points_csv import read_points_csv
+from tracker.formats.trc import read_trc, write_trc
+from tracker.observations.importing import plan_import, store_import
+from tracker.observations.request import ImportRequest
+from tracker.observations.stored import load_observations, source_path
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange, PoseRecord
+
+N = 10
+EDITED = 6
+OFFSET = np.array([0.0, 0.0, 0.03])
+
+
+@pytest.fixture
+def session(tmp_path):
+    return make_session(tmp_path / "s", N)
+
+
+def poses(session):
+    model = session.people[0].model
+    rng = np.random.default_rng(3)
+    # Upright on the floor, facing x, and hardly turning.
+    upright = PosedBody(model, model.neutral())
+    lift = -upright.points_world[:, 2].min()
+    moves = 0.1 * rng.normal(size=(N, model.n_dofs))
+    moves[:, :6] *= 0.1
+    moves[:, 2] += lift
+    return [PosedBody(model, model.retract(model.neutral(), move)) for move in moves]
+
+
+def observed(session, bodies, offset=OFFSET):
+    """Points of a detector that is off by the same vector in the world; the bodies hardly turn."""
+    names = BODY_25.points
+    where = BODY_25.counterparts(names)
+    model = session.people[0].model
+    out = np.zeros((N, len(names), 3))
+    for k, body in enumerate(bodies):
+        centers = dict(zip(model.point_names, body.joint_centers_world, strict=True))
+        for i, name in enumerate(names):
+            own = [centers[p] for p in where[name] if p in centers]
+            out[k, i] = np.mean(own, axis=0) + offset if own else centers["head"] + 0.01 * i
+    return out
+
+
+def store(session, bodies, edited=(EDITED,)):
+    model = session.people[0].model
+    with closing(AnnotationStore(session.annotations_path)) as annotations:
+        revision = annotations.add_model_revision("ann", format_model(model))
+        changes = [
+            PoseChange(
+                "ann",
+                k,
+                PoseRecord(
+                    b.values, ("manual" if k in edited else "tracked",) * len(b.values), revision, keyframe=k in edited
+                ),
+            )
+            for k, b in enumerate(bodies)
+        ]
+        annotations.commit("Poses", changes)
+
+
+def imported(session, path, **choices):
+    plan = plan_import(session, ImportRequest("mp", (path,), ("ann",), **choices))
+    assert not plan.problems, plan.problems
+    store_import(session, plan)
+    return load_observations(session, "mp")
+
+
+def write_kind(kind, session, folder, truth):
+    """Write observations of a format; return the path to import and the choices."""
+    points = seen(session, [truth])
+    if kind == "openpose":
+        return write_openpose(folder / "k", session.camera_names, points), {}
+    if kind == "coco":
+        write_coco_images(folder / "c.json", session.camera_names, BODY_25.points, points, "scores")
+        return folder / "c.json", {}
+    if kind.startswith("dlc"):
+        for v, name in enumerate(session.camera_names):
+            write_deeplabcut(folder / "d" / name, BODY_25.points, points[:, v], kind.removeprefix("dlc "))
+        return folder / "d", {}
+    if kind == "sleap":
+        for v, name in enumerate(session.camera_names):
+            write_sleap(folder / "sl" / f"{name}.slp", BODY_25.points, points[:, v])
+        return folder / "sl", {}
+    if kind == "trc":
+        write_trc(folder / "a.trc", BODY_25.points, truth, 30.0, units="mm")
+        return folder / "a.trc", {}
+    if kind == "trc utf-16":
+        write_trc(folder / "b.trc", BODY_25.points, truth, 30.0)
+        (folder / "a.trc").write_bytes((folder / "b.trc").read_text().replace("\n", "\r\n").encode("utf-16"))
+        return folder / "a.trc", {}
+    if kind == "csv":
+        write_points_csv(folder / "a.csv", BODY_25.points, truth, 30.0, "mm")
+        return folder / "a.csv", {}
+    write_c3d(folder / "a.c3d", BODY_25.points, truth, 30.0)
+    return folder / "a.c3d", {}
+
+
+KINDS = [
+    *("openpose", "coco", "dlc csv", "dlc multi", "trc", "trc utf-16", "csv", "c3d"),
+    *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("dlc h5", "sleap")),
+]
+NEEDS = {"dlc h5": "h5py", "sleap": "sleap_io", "c3d": "ezc3d"}
+
+
+def read_space(path):
+    return {".trc": read_trc, ".csv": lambda p: read_points_csv(p, None, 30.0), ".c3d": lambda p: read_c3d(p, None)}[
+        path.suffix
+    ](path)
+
+
+def contents(folder):
+    return {p.relative_to(folder).as_posix(): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_untouched_files_leave_as_they_came(session, tmp_path, kind):
+    if kind in NEEDS:
+        pytest.importorskip(NEEDS[kind])
+    path, choices = write_kind(kind, session, tmp_path, observed(session, poses(session)))
+    before = contents(path) if path.is_dir() else path.read_bytes()
+    observations = imported(session, path, **choices)
+    done = export_like(session, observations, tmp_path / f"back{path.suffix}")
+    after = contents(tmp_path / "back") if path.is_dir() else (tmp_path / f"back{path.suffix}").read_bytes()
+    assert after == before
+    assert (done.changed, done.frames) == ((), ())
+
+
+@pytest.mark.parametrize("kind", ["trc", "trc utf-16", "csv", "c3d"])
+def test_a_mended_frame_alone_differs_in_space(session, tmp_path, kind):
+    if kind in NEEDS:
+        pytest.importorskip(NEEDS[kind])
+    bodies = poses(session)
+    truth = observed(session, bodies)
+    wrong = truth.copy()
+    wrong[EDITED] += 0.2
+    path, _ = write_kind(kind, session, tmp_path, wrong)
+    store(session, bodies)
+    out = tmp_path / f"back{path.suffix}"
+    done = export_like(session, imported(session, path), out)
+    assert done.frames == (EDITED,)
+    before, after = read_space(path), read_space(out)
+    assert before.names == after.names
+    others = np.arange(N) != EDITED
+    assert np.array_equal(before.points[others], after.points[others])
+    mapped = [i for i, points in enumerate(BODY_25.counterparts(BODY_25.points).values()) if points]
+    assert np.abs(after.points[EDITED][mapped] - truth[EDITED][mapped]).max() < 0.015  # bodies turn a little
+    rest = [i for i in range(25) if i not in mapped]
+    assert np.array_equal(after.points[EDITED][rest], before.points[EDITED][rest])
+    one, other = path.read_bytes(), out.read_bytes()
+    if kind.startswith("trc"):  # line by line, and its ends
+        encoding = "utf-16" if "utf-16" in kind else "utf-8"
+        lines = zip(one.decode(encoding).split("\n"), other.decode(encoding).split("\n"), strict=True)
+        assert [i for i, (a, b) in enumerate(lines) if a != b] == [6 + EDITED]
+    if kind == "c3d":
+        assert len(one) == len(other)
+
+
+@pytest.mark.parametrize("learn", [True, False])
+def test_offsets_are_learnt_or_plain(session, tmp_path, learn):
+    bodies = poses(session)
+    truth = observed(session, bodies)
+    write_trc(tmp_path / "a.trc", BODY_25.points, truth, 30.0)
+    store(session, bodies)
+    export_like(session, imported(session, tmp_path / "a.trc"), tmp_path / "b.trc", learn_offsets=learn)
+    knee = BODY_25.points.index("LKnee")
+    off = np.linalg.norm(read_trc(tmp_path / "b.trc").points[EDITED, knee] - truth[EDITED, knee])
+    assert off < 0.01 if learn else off == pytest.approx(0.03, abs=1e-4)
+
+
+@pytest.mark.parametrize("kind", ["openpose", "dlc csv", "dlc multi"])
+def test_a_mended_frame_alone_differs_in_pictures(session, tmp_path, kind):
+    bodies = poses(session)
+    truth = observed(session, bodies, np.zeros(3))
+    path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
+    store(session, bodies)
+    done = export_like(session, imported(session, path), tmp_path / "back")
+    assert done.frames == (EDITED,)
+    before, after = contents(path), contents(tmp_path / "back")
+    knee = BODY_25.points.index("LKnee")
+    for source in session.cameras:
+        camera = source.camera
+        expected = project_through_lens(camera, truth[EDITED, knee : knee + 1])[0]
+        if kind == "openpose":
+            name = f"{camera.name}/{camera.name}_{EDITED:012d}_keypoints.json"
+            (person,) = read_openpose(tmp_path / "back" / name)
+            found, nose = person[knee], person[0]
+            before_nose = read_openpose(path / name)[0][0]
+        else:
+            name = f"{camera.name}.csv"
+            table = read_deeplabcut_csv(tmp_path / "back" / name)
+            found, nose = table.points[EDITED, 0, knee], table.points[EDITED, 0, 0]
+            before_nose = read_deeplabcut_csv(path / name).points[EDITED, 0, 0]
+            lines = zip(before[name].split(b"\n"), after[name].split(b"\n"), strict=True)
+            assert [i for i, (a, b) in enumerate(lines) if a != b] == [EDITED + (3 if kind == "dlc csv" else 4)]
+        assert np.abs(found[:2] - expected).max() < 0.1
+        assert found[2] == 1.0
+        assert np.array_equal(nose, before_nose)
+    differ = {name for name in before if before[name] != after[name]}
+    if kind == "openpose":
+        assert differ == {f"{c}/{c}_{EDITED:012d}_keypoints.json" for c in session.camera_names}
+
+
+def test_a_person_who_was_not_found_is_added(session, tmp_path):
+    bodies = poses(session)
+    points = seen(session, [observed(session, bodies, np.zeros(3))])
+    points[EDITED, 1] = (np.nan, np.nan, 0)
+    path = write_openpose(tmp_path / "k", session.camera_names, points)
+    store(session, bodies)
+    export_like(session, imported(session, path), tmp_path / "back")
+    (person,) = read_openpose(tmp_path / "back" / "cam1" / f"cam1_{EDITED:012d}_keypoints.json")
+    assert len(person) == 25
+    assert np.isnan(person[0]).tolist() == [True, True, False]  # the nose is no joint of the body
+
+
+def test_nobody_is_added_who_is_not_in_the_picture(session, tmp_path):
+    bodies = poses(session)
+    points = seen(session, [observed(session, bodies, np.zeros(3))])
+    points[EDITED, 1] = (np.nan, np.nan, 0)
+    path = write_openpose(tmp_path / "k", session.camera_names, points)
+    model = session.people[0].model
+    away = bodies[EDITED].values.copy()
+    away[:2] += 30 * session.cameras[1].camera.T_world_camera[:2, 0]  # far to the right of that camera
+    store(session, [PosedBody(model, away) if k == EDITED else b for k, b in enumerate(bodies)])
+    export_like(session, imported(session, path), tmp_path / "back")
+    assert read_openpose(tmp_path / "back" / "cam1" / f"cam1_{EDITED:012d}_keypoints.json") == []
+
+
+def test_all_poses(session, tmp_path):
+    bodies = poses(session)
+    write_trc(tmp_path / "a.trc", BODY_25.points, observed(session, bodies), 30.0)
+    store(session, bodies)
+    done = export_like(session, imported(session, tmp_path / "a.trc"), tmp_path / "b.trc", poses="all")
+    assert done.frames == tuple(range(N))
+
+
+def test_choices_of_the_import_hold_on_the_way_back(session, tmp_path):
+    bodies = poses(session)
+    truth = observed(session, bodies, np.zeros(3))
+    half = seen(session, [truth]) * [0.5, 0.5, 1] - [0.25, 0.25, 0]
+    path = write_openpose(tmp_path / "k", session.camera_names, half[2:])
+    store(session, bodies)
+    observations = imported(session, path, first_frame=2, picture_size=(320, 240))
+    export_like(session, observations, tmp_path / "back")
+    name = f"cam0/cam0_{EDITED - 2:012d}_keypoints.json"
+    one, other = (read_openpose(folder / name)[0] for folder in (path, tmp_path / "back"))
+    assert np.abs(one[:, :2] - other[:, :2]).max() < 0.01
+
+
+def test_axes_and_units_of_the_file(session, tmp_path):
+    bodies = poses(session)
+    truth = observed(session, bodies)
+    turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # y of the file points up
+    write_trc(tmp_path / "a.trc", BODY_25.points, truth @ turn.T, 30.0, units="mm")
+    store(session, bodies)
+    export_like(session, imported(session, tmp_path / "a.trc", axes="x,-z,y"), tmp_path / "b.trc")
+    one, other = read_trc(tmp_path / "a.trc"), read_trc(tmp_path / "b.trc")
+    assert np.abs(one.points - other.points).max() < 0.015
+    assert not np.array_equal(one.points[EDITED], other.points[EDITED])
+
+
+def test_formats_that_cannot_be_changed_in_place(session, tmp_path):
+    bodies = poses(session)
+    write_bvh_chain(tmp_path / "a.bvh")
+    request = ImportRequest("mp", (tmp_path / "a.bvh",), ("ann",), unit_m=0.01, first_frame=0)
+    (tmp_path / "map.toml").write_text('left_hip = "LeftUpLeg"\nleft_knee = "LeftLeg"\n')
+    plan = plan_import(session, ImportRequest(**(vars(request) | {"joint_map": tmp_path / "map.toml"})))
+    store_import(session, plan)
+    store(session, bodies)
+    with pytest.raises(FormatError, match=r"whose points can be replaced in place .*, found BVH"):
+        export_like(session, load_observations(session, "mp"), tmp_path / "b.bvh")
+    assert not (tmp_path / "b.bvh").exists()
+
+
+def test_a_stored_file_that_was_changed(session, tmp_path):
+    write_trc(tmp_path / "a.trc", BODY_25.points, observed(session, poses(session)), 30.0)
+    observations = imported(session, tmp_path / "a.trc")
+    path = source_path(session, "mp", observations.sources[0])
+    path.write_text(path.read_text() + "\n")
+    with pytest.raises(SessionError, match="is not as it was imported"):
+        export_like(session, observations, tmp_path / "b.trc")
+    path.unlink()
+    with pytest.raises(SessionError, match="cannot read the imported file"):
+        export_like(session, observations, tmp_path / "b.trc")
+
+
+def test_nothing_is_replaced(session, tmp_path):
+    write_trc(tmp_path / "a.trc", BODY_25.points, observed(session, poses(session)), 30.0)
+    observations = imported(session, tmp_path / "a.trc")
+    with pytest.raises(TrackerError, match="not to exist, found a file"):
+        export_like(session, observations, tmp_path / "a.trc")
+    assert json.dumps([p.name for p in tmp_path.iterdir() if p.name.endswith(".tmp")]) == "[]"

@@ -1,0 +1,57 @@
+"""The stored poses of one person as arrays over frames."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.body.model import PosedBody
+from tracker.geometry.arrays import Array, IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSeries:
+    """The poses of one person on F frames, of n joints and other named points."""
+
+    person: str
+    frames: IntArray
+    """Frames with a pose, (F,), ascending."""
+    times_s: Array
+    """Their times, (F,)."""
+    bodies: tuple[PosedBody, ...]
+    """The body in each pose, (F,); sizes may change between them."""
+    names: tuple[str, ...]
+    """Of the joints and points, (n,)."""
+    joints: Array
+    """Positions in the world, (F, n, 3), metres; NaN for points that a body lacks."""
+    covariances: Array
+    """Of the positions in the world, (F, n, 3, 3), m^2; NaN where not known."""
+    statuses: NDArray[np.str_]
+    """good, doubtful, lost, or empty where not assessed, (F,)."""
+    sources: NDArray[np.str_]
+    """How each pose was made, such as hand or tracked, (F,)."""
+    keyframes: NDArray[np.bool_]
+    """Whether a person set or verified it, (F,)."""
+
+    def __len__(self) -> int:
+        """Return the number of frames."""
+        return len(self.frames)
+
+    def joint(self, name: str) -> Array:
+        """Return the positions of a joint, (F, 3), metres.
+
+        Raises:
+            KeyError: no body has a joint of this name.
+        """
+        if name not in self.names:
+            raise KeyError(f"expected a joint among {', '.join(self.names)}, found '{name}'")
+        return self.joints[:, self.names.index(name)]
+
+    def errors_m(self, name: str) -> Array:
+        """Return the root mean square error of a joint, (F,), metres; NaN where not known.
+
+        Raises:
+            KeyError: no body has a joint of this name.
+        """
+        self.joint(name)
+        return np.asarray(np.sqrt(np.trace(self.covariances[:, self.names.index(name)], axis1=-2, axis2=-1)))

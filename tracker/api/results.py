@@ -1,0 +1,142 @@
+"""Read the stored poses of a session, compare them, judge imported ones, and write files."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Literal
+
+from tracker.api.pose_series import PoseSeries
+from tracker.api.sessions import PersonName, SessionOrFolder, frames_of, open_session, opened, people_of, person_of
+from tracker.api.work import Progress, ProgressSink
+from tracker.evaluation.metrics import Alignment, Evaluation
+from tracker.evaluation.references import placement, read_reference
+from tracker.evaluation.stored_evaluation import evaluate_stored
+from tracker.exports.export_files import check_options, for_format
+from tracker.exports.export_files import export as export_motion
+from tracker.exports.formats import find_format
+from tracker.exports.motion import Checked, read_motion
+from tracker.exports.options import ExportOptions
+from tracker.exports.pose_arrays import pose_arrays
+from tracker.judging import judge as judging
+from tracker.judging.judge import Judgement
+from tracker.tracking.chamfer.settings import TrackSettings
+
+
+def read_poses(session: SessionOrFolder, person: PersonName = None, frames: Sequence[int] | None = None) -> PoseSeries:
+    """Read the stored poses of a person as arrays.
+
+    Args:
+        session: the session or its folder; other programs may have it open.
+        person: name; needed in a session of several people.
+        frames: all by default. Those without a pose are left out.
+
+    Raises:
+        SessionError: the person has no pose on these frames.
+    """
+    found = open_session(session)
+    index = person_of(found, person)
+    motion = read_motion(found, [index], None if frames is None else frames_of(found, frames))
+    arrays = pose_arrays(motion, ExportOptions())
+    own = motion.people[index]
+    posed = [i for i, frame in enumerate(motion.frames) if frame in own.poses]
+    return PoseSeries(
+        person=own.person.name,
+        frames=arrays.frames[posed],
+        times_s=arrays.times_s[posed],
+        bodies=tuple(own.poses[motion.frames[i]].body for i in posed),
+        names=arrays.points,
+        joints=arrays.joints[posed, 0],
+        covariances=arrays.covariances[posed, 0],
+        statuses=arrays.texts["status"][posed, 0],
+        sources=arrays.texts["source"][posed, 0],
+        keyframes=arrays.keyframe[posed, 0],
+    )
+
+
+def evaluate(
+    session: SessionOrFolder,
+    reference: str | Path,
+    person: PersonName = None,
+    frames: Sequence[int] | None = None,
+    *,
+    joint_map: str | Path | None = None,
+    axes: str = "x,y,z",
+    align: Alignment = "none",
+) -> Evaluation:
+    """Compare the stored poses of a person with a reference.
+
+    Args:
+        session: the session or its folder.
+        reference: a TRC file, a table of poses (CSV), or the folder of another session.
+        person: name; needed in a session of several people.
+        frames: from the first to the last pose by default.
+        joint_map: TOML file with the names of the file's joints, where they are others.
+        axes: the file's axes in the session's order, such as x,-z,y.
+        align: rigid-all moves the whole reference onto the estimate first.
+
+    Raises:
+        TrackerError: the reference is malformed or of other joints, or the person has no pose.
+    """
+    found = open_session(session)
+    index, mapped = person_of(found, person), None if joint_map is None else Path(joint_map)
+    known = read_reference(Path(reference), found, index, mapped, axes, placement(found))
+    wanted = None if frames is None else frames_of(found, frames)
+    return evaluate_stored(found, index, known, wanted, align=align, axes=axes).result
+
+
+def judge(session: SessionOrFolder, observations: str, *, progress: Progress | None = None) -> list[Judgement]:
+    """Judge imported observations by the footage; see docs/observations.md.
+
+    Args:
+        session: the session or its folder.
+        observations: name under which they were imported.
+        progress: receives the progress.
+
+    Returns:
+        A judgement of each person; `worst` lists limbs by severity.
+
+    Raises:
+        TrackerError: there are no such observations, fewer than three cameras, or tracking cannot begin.
+    """
+    with opened(session) as stored:
+        sink = ProgressSink(progress)
+        return judging.judge(stored.session, stored.observer, observations, TrackSettings(), sink, sink.report)
+
+
+def export(
+    session: SessionOrFolder,
+    out: str | Path,
+    format: str | None = None,
+    people: Sequence[str] | None = None,
+    frames: Sequence[int] | None = None,
+    *,
+    only: Literal["keyframes", "reviewed"] | None = None,
+    skip_lost: bool = False,
+    overwrite: bool = False,
+    options: Mapping[str, str] | None = None,
+) -> list[Path]:
+    """Write stored poses to files of another program; docs/export.md describes each format.
+
+    Args:
+        session: the session or its folder.
+        out: the file or folder to write; with several files, their names are made from this one.
+        format: name of the format; by default as `out` ends.
+        people: names; all by default.
+        frames: from the first to the last pose by default.
+        only: leave out poses that nobody set or verified, or that nobody reviewed.
+        skip_lost: treat poses whose status is lost as missing.
+        overwrite: replace files that exist.
+        options: of the format by name, such as axes or units.
+
+    Returns:
+        The files, which appear complete, or none.
+
+    Raises:
+        TrackerError: there is nothing to export, an option is wrong, or a file exists.
+    """
+    found, path = open_session(session), Path(out)
+    chosen = find_format(format, path)
+    given = check_options(chosen, found, dict(options or {}))
+    checked: Checked | None = only
+    wanted = None if frames is None else frames_of(found, frames)
+    motion = for_format(chosen, read_motion(found, people_of(found, people), wanted, skip_lost, checked))
+    return export_motion(chosen, motion, given, path, overwrite)

@@ -1,0 +1,247 @@
+"""The plan of a batch: which recordings, and what to do with each. docs/batch.md describes the file."""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from tracker.errors import TrackerError
+from tracker.session.folder import SESSION_FILE
+from tracker.text_files import DOCUMENT_BYTES, TextKind, read_lines, read_toml
+from tracker.validation import Name, check
+
+FOLDER_FILE = "batch.toml"
+"""Name of a file of settings for the recordings in its folder and below."""
+_KIND = TextKind("plan", DOCUMENT_BYTES, TrackerError)
+_TABLE = TextKind("table", DOCUMENT_BYTES, TrackerError)
+_COLUMNS = ("name", "calibration", "videos", "background", "people", "height", "fps")
+_REQUIRED = ("name", "calibration", "videos")
+_MANY = ";"
+"""Separates several values in a cell of a table."""
+
+
+class Settings(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
+    """What to do with a recording. A value that is not given is inherited."""
+
+    find: bool | None = None
+    """Find people who have no pose; true by default."""
+    acquire: bool | None = None
+    """Acquire sizes of people whose bodies have those of a preset; true by default."""
+    method: Literal["chamfer", "contour", "voxel"] | None = None
+    options: dict[str, bool | float | str] | None = None
+    """Of the method, by name."""
+    frames: Annotated[str, Meta(pattern=r"^\d*:\d*\Z", description="frames as A:B")] | None = None
+    stride: Annotated[int, Meta(ge=1, description="a whole number from 1")] | None = None
+    keypoints: Name | None = None
+    """Name of imported observations that are evidence too."""
+    people: list[Name] | None = None
+    """Names of those to track; all by default."""
+    export: list[Name] | None = None
+    """Formats to write the poses in."""
+    attempts: Annotated[int, Meta(ge=1, description="a whole number from 1")] | None = None
+    """Workers that may die over the recording before it counts as failed, so that it does not kill them all; 3 by
+    default."""
+    skip: bool | None = None
+    """Leave the recording out."""
+
+    def over(self, other: "Settings") -> "Settings":
+        """Return these settings, with those of another where they are not given. Options are merged one by one."""
+        own = {f: v for f in self.__struct_fields__ if (v := getattr(self, f)) is not None}
+        if self.options is not None:
+            own["options"] = {**(other.options or {}), **self.options}
+        return msgspec.structs.replace(other, **own)
+
+
+class _FolderFile(msgspec.Struct, forbid_unknown_fields=True):
+    settings: Settings = msgspec.field(default_factory=Settings)
+
+
+class _PlanFile(msgspec.Struct, forbid_unknown_fields=True):
+    sessions: list[Annotated[str, Meta(min_length=1, max_length=1000)]] = []
+    """Session folders, as paths or patterns such as `lab/*/session`."""
+    table: str | None = None
+    """CSV file with a row for each recording to make a session of."""
+    freeze_bodies: bool = False
+    """Acquire each person's body once, and use it in all recordings with a person of that name."""
+    settings: Settings = msgspec.field(default_factory=Settings)
+    recordings: dict[str, Settings] = {}
+    """Settings of single recordings, by name."""
+
+
+@dataclass(frozen=True)
+class Footage:
+    """A recording that has no session yet: a row of the table."""
+
+    calibration: str
+    videos: tuple[str, ...]
+    background: str | None = None
+    people: tuple[str, ...] = ("person",)
+    height_m: float | None = None
+    fps: float | None = None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recording of a plan."""
+
+    name: str
+    """Unique in the plan: the session's path below the plan, or its name in the table."""
+    session: str
+    """Absolute path of the session folder."""
+    settings: Settings
+    footage: Footage | None = None
+    """To make the session of, if there is none."""
+
+
+@dataclass(frozen=True)
+class BatchPlan:
+    """All recordings of a batch, without those that are left out."""
+
+    path: Path
+    recordings: tuple[Recording, ...]
+    freeze_bodies: bool = False
+    people: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Names of the people of each recording that has a session, as far as it can be read."""
+
+
+def read_plan(path: Path, out: Path) -> BatchPlan:
+    """Read a plan, and the settings of the folders on the way to each recording.
+
+    Args:
+        path: the TOML file.
+        out: folder of the batch, where sessions of the table are made.
+
+    Raises:
+        TrackerError: a file is malformed, or no recording is found.
+    """
+    path = path.resolve()
+    row = check(read_toml(path, _KIND), _PlanFile, f"plan {path}", TrackerError)
+    found = {**_by_pattern(row, path), **_of_table(row, path, out)}
+    if unknown := sorted(row.recordings.keys() - found.keys()):
+        raise TrackerError(
+            f"plan {path}: expected settings of recordings among {', '.join(sorted(found))[:300] or 'none'}, found "
+            f"'{unknown[0]}'; correct the name"
+        )
+    if not found:
+        raise TrackerError(
+            f"plan {path}: expected sessions or a table with recordings, found none; 'sessions' takes paths such as "
+            f"lab/*/session, of folders with {SESSION_FILE}"
+        )
+    chosen = []
+    for name, (session, footage) in sorted(found.items()):
+        inherited = _inherited(path.parent, session, row.settings)
+        settings = row.recordings.get(name, Settings()).over(inherited)
+        if not settings.skip:
+            chosen.append(Recording(name, str(session), settings, footage))
+    people = {r.name: names for r in chosen if (names := _people_of(r))}
+    return BatchPlan(path, tuple(chosen), row.freeze_bodies, people)
+
+
+def _by_pattern(row: _PlanFile, path: Path) -> dict[str, tuple[Path, Footage | None]]:
+    """Return the session folders that the patterns of a plan name."""
+    found = dict[str, tuple[Path, Footage | None]]()
+    for pattern in row.sessions:
+        base, relative = path.parent, pattern
+        if Path(pattern).is_absolute():
+            base, relative = Path(Path(pattern).anchor), str(Path(pattern).relative_to(Path(pattern).anchor))
+        folders = [p for p in sorted(base.glob(relative)) if p.is_dir()]
+        if not folders:
+            raise TrackerError(f"plan {path}: expected session folders at '{pattern}', found none; correct the path")
+        for folder in folders:
+            whole = folder.resolve()
+            inside = whole.is_relative_to(path.parent)
+            found[(whole.relative_to(path.parent) if inside else whole).as_posix()] = (whole, None)
+    return found
+
+
+def _of_table(row: _PlanFile, path: Path, out: Path) -> dict[str, tuple[Path, Footage | None]]:
+    """Return the recordings of the table of a plan."""
+    if row.table is None:
+        return {}
+    table = path.parent / row.table
+    lines = list(csv.reader(read_lines(table, _TABLE)))
+    header = [cell.strip() for cell in lines[0]] if lines else []
+    if wrong := [c for c in header if c not in _COLUMNS] or [c for c in _REQUIRED if c not in header]:
+        raise TrackerError(
+            f"table {table}: expected columns {', '.join(_COLUMNS)}, of which {', '.join(_REQUIRED)} are needed; found "
+            f"{', '.join(header)[:200] or 'none'}; correct '{wrong[0]}'"
+        )
+    found = dict[str, tuple[Path, Footage | None]]()
+    for number, line in enumerate(lines[1:], 2):
+        if not any(cell.strip() for cell in line):
+            continue
+        cells = {k: v.strip() for k, v in zip(header, line, strict=False) if v.strip()}
+        where = f"table {table}, line {number}"
+        name = cells.get("name", "")
+        if missing := [c for c in _REQUIRED if c not in cells]:
+            raise TrackerError(f"{where}: expected a value as '{missing[0]}', found none; fill it in")
+        if name in found or Path(name).name != name or name.startswith("."):
+            raise TrackerError(
+                f"{where}: expected a name of its own that can be a folder's, found '{name}'; name it anew"
+            )
+        found[name] = (out / "sessions" / name, _footage(cells, table.parent, where))
+    return found
+
+
+def _footage(cells: Mapping[str, str], base: Path, where: str) -> Footage:
+    def several(key: str) -> tuple[str, ...]:
+        return tuple(part.strip() for part in cells.get(key, "").split(_MANY) if part.strip())
+
+    def number(key: str) -> float | None:
+        try:
+            return float(cells[key]) if key in cells else None
+        except ValueError:
+            raise TrackerError(f"{where}: expected a number as '{key}', found '{cells[key]}'; correct it") from None
+
+    background = cells.get("background")
+    return Footage(
+        str(base / cells["calibration"]),
+        tuple(str(base / video) for video in several("videos")),
+        None if background is None else str(base / background),
+        several("people") or ("person",),
+        number("height"),
+        number("fps"),
+    )
+
+
+def _inherited(top: Path, session: Path, settings: Settings) -> Settings:
+    """Return settings with those of the folders from the plan's down to the session, the innermost first."""
+    folders = [p for p in (session, *session.parents) if p.is_relative_to(top)] if session.is_relative_to(top) else []
+    for folder in reversed(folders):
+        file = folder / FOLDER_FILE
+        if file.is_file():
+            row = check(read_toml(file, _KIND), _FolderFile, f"settings {file}", TrackerError)
+            settings = row.settings.over(settings)
+    return settings
+
+
+def _people_of(recording: Recording) -> tuple[str, ...]:
+    """Return the names of the people of a recording; none where its session cannot be read, which its task says."""
+    from tracker.session.session import load_session
+
+    if recording.footage is not None:
+        return recording.footage.people
+    try:
+        return tuple(p.name for p in load_session(recording.session).people)
+    except TrackerError:
+        return ()
+
+
+def plain(recording: Recording) -> dict[str, Any]:
+    """Return a recording as plain data for a file of tasks; `from_plain` reads it."""
+    data: dict[str, Any] = msgspec.to_builtins(recording)
+    return data
+
+
+def from_plain(data: Any) -> Recording:
+    """Return a recording of `plain` data.
+
+    Raises:
+        TrackerError: it is no recording.
+    """
+    found: Recording = check(data, Recording, "task", TrackerError)
+    return found

@@ -1,0 +1,103 @@
+"""A worker: claims tasks one after the other, and does them. All ways to run a batch call `work`."""
+
+import logging
+import os
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+
+from tracker.batch.claims import BEAT_S, Claim
+from tracker.batch.manifest import Manifest, Result, Task
+from tracker.batch.tasks import Done, do_task
+from tracker.errors import TrackerError
+
+_LOG = logging.getLogger(__name__)
+
+
+class LostClaimError(Exception):
+    """Another worker has taken the task, because this one showed no sign of life."""
+
+
+def work(
+    folder: Path,
+    max_tasks: int | None = None,
+    do: Callable[[Task, Path, Callable[[str, float], None]], Done] = do_task,
+    is_stopped: Callable[[], bool] = lambda: False,
+) -> int:
+    """Do tasks of a batch until all have ended.
+
+    Args:
+        folder: of the batch.
+        max_tasks: number of tasks after which it ends; None for no limit.
+        do: does a task.
+        is_stopped: asked at each step; the task at hand is then given back, and goes on where it was later.
+
+    Returns:
+        Number of tasks that this worker has ended.
+    """
+    manifest, n_done = Manifest.load(folder), 0
+    while not is_stopped() and (max_tasks is None or n_done < max_tasks) and not manifest.is_finished():
+        found = manifest.claim_next()
+        if found is None:
+            time.sleep(BEAT_S)
+            continue
+        try:
+            n_done += _do(manifest, *found, do, is_stopped)
+        except InterruptedError:
+            break
+    return n_done
+
+
+def _do(
+    manifest: Manifest,
+    task: Task,
+    held: Claim,
+    do: Callable[[Task, Path, Callable[[str, float], None]], Done],
+    is_stopped: Callable[[], bool],
+) -> bool:
+    """Do one task; return whether its result was written."""
+    if held.dead is not None:
+        held.free_session(Path(task.recording.session))
+    began, cpu = time.monotonic(), time.process_time()
+
+    def go_on(stage: str, share: float) -> None:
+        if is_stopped():
+            raise InterruptedError
+        if not held.is_held():
+            raise LostClaimError
+
+    def end(result: Result) -> bool:
+        used = {"seconds": time.monotonic() - began, "cpu_seconds": time.process_time() - cpu}
+        who = f"{socket.gethostname()} {os.getpid()}"
+        return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, **used))
+
+    try:
+        allowed = task.recording.settings.attempts or 3
+        if manifest.count_attempt(task) > allowed:
+            error = f"{allowed} workers died over it; look at memory, and track it alone"
+            return end(Result("failed", error=error))
+        with held.beating():
+            done = do(task, manifest.folder, go_on)
+    except TrackerError as error:
+        remedy = error.remedy
+        fields = {} if remedy is None else {k: str(v) for k, v in remedy.fields.items()}
+        code = "" if remedy is None else remedy.code
+        return end(Result("failed", error=str(error), remedy=code, remedy_fields=fields))
+    except LostClaimError:
+        _LOG.warning("%s was taken by another worker; this one goes on with the next task", task.recording.name)
+        return False
+    except (InterruptedError, KeyboardInterrupt):
+        manifest.forget_attempt(task)
+        held.release()
+        raise
+    except Exception as error:  # one recording must not end the others
+        _LOG.exception("%s failed", task.recording.name)
+        text = f"internal error: {type(error).__name__}: {error}; please report it with the log"
+        return end(Result("failed", error=text))
+    files = [str(path.relative_to(manifest.folder)) for path in done.files]
+    statuses = {name: dict(counts) for name, counts in done.tracked.statuses.items()}
+    tracked = done.tracked
+    return end(Result("done", "", 0.0, 0.0, tracked.first_frame, statuses, tracked.contradiction, files))

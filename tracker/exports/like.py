@@ -1,0 +1,240 @@
+"""Send imported files back in their own format: what was mended is replaced, all other bytes stay."""
+
+import os
+import secrets
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tracker.body.model import PosedBody
+from tracker.errors import FormatError, Remedy, SessionError, TrackerError
+from tracker.exports.keypoints import project_through_lens
+from tracker.exports.mended_points import MendedPoints, PoseChoice, mended_points
+from tracker.formats.c3d import patch_c3d
+from tracker.formats.file_axes import axes_matrix
+from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
+from tracker.formats.keypoints.openpose import patch_openpose
+from tracker.formats.points_csv import patch_points_csv
+from tracker.formats.trc import patch_trc
+from tracker.geometry.arrays import Array, IntArray
+from tracker.motion.velocity import velocity
+from tracker.observations.joints import observed_joints, triangulate_observations
+from tracker.observations.observed import ObservationSet
+from tracker.observations.placing import rescaled
+from tracker.observations.readers import FORMATS
+from tracker.observations.stored import checksum, source_path
+from tracker.observations.stored_files import StoredPictures, picture_size, stored_pictures
+from tracker.session.session import Session
+
+Files = dict[str, bytes]
+"""Content of files that differ from those that came, by their path."""
+Changes = dict[int, list[tuple[int, Array]]]
+"""Number of a person in the file and x, y, confidence of the points, (n_points, 3), by row."""
+
+
+@dataclass(frozen=True)
+class LikeExport:
+    """Files that were sent back."""
+
+    paths: tuple[Path, ...]
+    """The files."""
+    changed: tuple[Path, ...]
+    """Files that differ from those that came."""
+    frames: tuple[int, ...]
+    """Frames whose points were replaced in some file."""
+
+
+def export_like(
+    session: Session,
+    observations: ObservationSet,
+    out: Path,
+    poses: PoseChoice = "edited",
+    learn_offsets: bool = True,
+) -> LikeExport:
+    """Write the files of observations as they came, with the points of mended poses replaced.
+
+    Args:
+        session: its stored poses.
+        observations: imported ones.
+        out: file to write, or the folder of several files; it must not exist.
+        poses: replace the frames that a person edited, or all that have a pose.
+        learn_offsets: place points as far from the joints as the files usually do.
+
+    Raises:
+        TrackerError: a stored file was changed or is missing, its format cannot be changed in place, or `out` cannot be
+            written.
+    """
+    contents = _stored_contents(session, observations)
+    cameras = [c.camera for c in session.cameras]
+    mended = mended_points(
+        session, observations, observed_joints(observations, cameras).joints_world, poses, learn_offsets
+    )
+    frames = sorted({f for person in mended for f in person.bodies})
+    if frames and observations.format not in _PATCHED:
+        listed = ", ".join(FORMATS[name].title for name in _PATCHED)
+        raise FormatError(
+            f"expected observations of a format whose points can be replaced in place ({listed}), found "
+            f"{FORMATS[observations.format].title}",
+            Remedy("export_other_format"),
+        )
+    changed: Files = {}
+    if frames:
+        of_pictures = observations.points is not None
+        changed = (_mended_pictures if of_pictures else _mended_space)(session, observations, mended)
+        changed = {path: data for path, data in changed.items() if data != contents[path]}
+    paths = _write(out, contents | changed)
+    return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames))
+
+
+_PATCHED = ("openpose", "deeplabcut", "trc", "csv", "c3d")
+
+
+def _stored_contents(session: Session, observations: ObservationSet) -> Files:
+    """Return the imported files.
+
+    Raises:
+        SessionError: one is missing or changed.
+    """
+    found: Files = {}
+    for source in observations.sources:
+        path = source_path(session, observations.name, source)
+        try:
+            found[source.path] = path.read_bytes()
+        except OSError as error:
+            raise SessionError(f"cannot read the imported file {path}: {error}; import it again") from error
+        if checksum(found[source.path]) != source.sha256:
+            raise SessionError(f"{path} is not as it was imported; import it again")
+    return found
+
+
+def _mended_pictures(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> Files:
+    """Return the files of key points that change."""
+    cameras = [c.camera for c in session.cameras]
+    detections = triangulate_observations(observations, cameras).detections
+    size, names = picture_size(observations), [c.name for c in cameras]
+    by_path = {source_path(session, observations.name, s): s.path for s in observations.sources}
+    out: Files = {}
+    for pictures in stored_pictures(session, observations):
+        view = names.index(pictures.camera)
+        changes: Changes = {}
+        for row, frame in enumerate(pictures.frames.tolist()):
+            for k, person in enumerate(mended):
+                if frame in person.bodies:
+                    values = _seen(session, view, frame, person)
+                    if size is not None:
+                        values[:, :2] = rescaled(values[:, :2], cameras[view].size, size)
+                    detection = int(detections[frame, k, view])
+                    if detection >= 0 or (values[:, 2] > 0).any():  # nobody is added who is not in the picture
+                        changes.setdefault(row, []).append((detection, values))
+        if changes:
+            out |= {
+                by_path[path]: data for path, data in _patch_pictures(observations.format, pictures, changes).items()
+            }
+    return out
+
+
+def _patch_pictures(format_name: str, pictures: StoredPictures, changes: Changes) -> dict[Path, bytes]:
+    if format_name == "openpose":
+        return {pictures.files[row]: patch_openpose(pictures.files[row].read_bytes(), c) for row, c in changes.items()}
+    (path,) = pictures.files
+    # A table has columns for each individual: one who was not found has the first that is free.
+    free = {row: _with_free_individuals(some, pictures.table.points.shape[1]) for row, some in changes.items()}
+    return {path: patch_deeplabcut_csv(path, free)}
+
+
+def _with_free_individuals(some: list[tuple[int, Array]], n: int) -> list[tuple[int, Array]]:
+    taken = {k for k, _ in some}
+    left = [k for k in range(n) if k not in taken]
+    if sum(k < 0 for k, _ in some) > len(left):
+        raise FormatError(
+            f"expected columns for a person who was not found, found those of {n} others alone",
+            Remedy("export_other_format"),
+        )
+    return [(k if k >= 0 else left.pop(0), values) for k, values in some]
+
+
+def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Array:
+    """Return x, y, confidence of a person's points in a view, (n_points, 3); confidence 0 outside of the picture."""
+    source = session.cameras[view]
+    body, ahead = person.bodies[frame], source.clock.ahead(frame)
+    if ahead:
+        near = {f: b.values for f, b in person.all_bodies.items() if abs(f - frame) <= 2 and b.model is body.model}
+        body = PosedBody(body.model, body.values, velocity(body.model, near, frame)).ahead(ahead)
+    points = person.points_world(body)
+    known = np.asarray(np.isfinite(points).all(axis=-1))
+    px = np.full((len(points), 2), np.nan)
+    px[known] = project_through_lens(source.camera, points[known])
+    with np.errstate(invalid="ignore"):
+        inside = np.asarray(((px >= -0.5) & (px <= np.array(source.camera.size) - 0.5)).all(axis=-1))
+    confidence = np.where(known, inside.astype(np.float64), np.nan)
+    return np.column_stack([np.where(inside[:, None], px, 0.0), confidence])
+
+
+def _mended_space(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> Files:
+    """Return the files of points in space that change."""
+    options = dict(observations.options)
+    R_file = axes_matrix(options.get("axes", "x,y,z")).T
+    unit_m = float(options["unit_m"]) if "unit_m" in options else None
+    patch: Mapping[str, Callable[[Path, Mapping[int, Array]], bytes]] = {
+        "trc": patch_trc,
+        "csv": lambda path, changes: patch_points_csv(path, unit_m, changes),
+        "c3d": lambda path, changes: patch_c3d(path, unit_m, changes),
+    }
+    out: Files = {}
+    rows = np.round(observations.row_frames).astype(np.int64)
+    for source, person in zip(observations.sources, mended, strict=True):
+        changes = _rows(rows, observations.row_frames, person)
+        if changes:
+            in_file = {row: points @ R_file.T for row, points in changes.items()}
+            path = source_path(session, observations.name, source)
+            out[source.path] = patch[observations.format](path, in_file)
+    return out
+
+
+def _rows(nearest: IntArray, row_frames: Array, person: MendedPoints) -> dict[int, Array]:
+    """Return the points of each row that is nearest to a replaced frame, between two of them interpolated."""
+    out: dict[int, Array] = {}
+    for row, (frame, at) in enumerate(zip(nearest.tolist(), row_frames.tolist(), strict=True)):
+        if frame not in person.bodies:
+            continue
+        points = person.points_world(person.bodies[frame])
+        other = frame + (1 if at > frame else -1)
+        if at != frame and other in person.bodies:
+            share = abs(at - frame)
+            points = (1 - share) * points + share * person.points_world(person.bodies[other])
+        out[row] = points
+    return out
+
+
+def _write(out: Path, contents: Files) -> dict[str, Path]:
+    """Write one file, or a folder of several; it appears whole or not at all.
+
+    Raises:
+        TrackerError: it exists, or cannot be written.
+    """
+    if out.is_dir() and len(contents) == 1:
+        out = out / Path(next(iter(contents))).name
+    if out.exists():
+        kind = "a folder" if out.is_dir() else "a file"
+        raise TrackerError(f"expected {out} not to exist, found {kind}", Remedy("another_file"))
+    temporary = out.with_name(f".{out.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        if len(contents) == 1:
+            ((path, data),) = contents.items()
+            temporary.write_bytes(data)
+            os.replace(temporary, out)
+            return {path: out}
+        for path, data in contents.items():
+            (temporary / path).parent.mkdir(parents=True, exist_ok=True)
+            (temporary / path).write_bytes(data)
+        os.replace(temporary, out)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise TrackerError(f"cannot write {out}: {reason}; choose a folder that you may write to, with room") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        temporary.unlink(missing_ok=True)
+    return {path: out / path for path in contents}
