@@ -29,6 +29,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
+from app.cli.annotation import compare
 from app.cli.calibration import calibrate, check, sync
 from app.cli.observations import import_, judge
 from app.remedies import command_line_text
@@ -55,6 +56,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "judge": judge.command,
     "check": check.command,
     "evaluate": evaluate.command,
+    "compare": compare.command,
     "observability": observability.command,
     "export": export.command,
     "restore": restore.command,

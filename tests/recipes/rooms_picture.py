@@ -20,7 +20,7 @@ HOUSE = {
     ],
     "app/  the viewer": [
         ["__main__"],
-        ["cli/calibration", "cli/observations"],
+        ["cli/calibration", "cli/observations", "cli/annotation"],
         ["cli"],
         ["bench", "server"],
         ["page", "scene3d"],
@@ -34,7 +34,7 @@ HOUSE = {
     ],
     "tracker/  the library": [
         ["experiments", "judging"],
-        ["pipeline", "export"],
+        ["pipeline", "export", "agreement"],
         ["simulate", "evaluation", "boards"],
         ["calibration", "posing"],
         ["acquisition", "initialization"],

@@ -41,6 +41,7 @@ ROOMS = [
     "tracker.posing",
     "tracker.evaluation",
     "tracker.export",
+    "tracker.agreement",
     "tracker.simulate.people",
     "tracker.simulate.motion",
     "tracker.simulate.stage",
@@ -68,6 +69,7 @@ ROOMS = [
     "app.cli",
     "app.cli.calibration",
     "app.cli.observations",
+    "app.cli.annotation",
     "app.__main__",
 ]
 FLOOR = {room: floor for floor, room in enumerate(ROOMS)}
