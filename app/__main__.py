@@ -29,7 +29,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
-from app.cli.annotation import compare
+from app.cli.annotation import compare, share
 from app.cli.calibration import calibrate, check, sync
 from app.cli.observations import import_, judge
 from app.remedies import command_line_text
@@ -59,6 +59,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "compare": compare.command,
     "observability": observability.command,
     "export": export.command,
+    "share": share.command,
     "restore": restore.command,
     "simulate": simulate.command,
     "experiment": experiment.command,

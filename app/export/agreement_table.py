@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from app.export.report_files import write_text
-from tracker.agreement.comparison import AngleAgreement, Agreement, JointAgreement, compare
+from tracker.agreement.comparison import Agreement, AngleAgreement, JointAgreement, compare
 from tracker.agreement.copies import Copies
 from tracker.agreement.statistics import Icc, Limits
 from tracker.geometry.arrays import Array

@@ -65,6 +65,7 @@ ROOMS = [
     "app.page",
     "app.scene3d",
     "app.server",
+    "app.share",
     "app.bench",
     "app.cli",
     "app.cli.calibration",
@@ -129,6 +130,7 @@ def own_imports():
 
 
 PAGE_ROOMS = [
+    "share",
     "widgets",
     "model",
     "layout",

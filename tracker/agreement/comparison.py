@@ -9,7 +9,6 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tracker.agreement.consensus import mean_points
 from tracker.agreement.copies import Copies, Subject
@@ -107,7 +106,7 @@ def compare(copies: Copies, annotators: Sequence[int] | None = None, people: Seq
     rows = [i for i, s in enumerate(copies.subjects) if people is None or s.person in people]
     names = copies.names if annotators is None else tuple(copies.names[i] for i in annotators)
     points, steps = copies.points[rows][:, some], copies.angle_steps[rows][:, some]
-    known: NDArray[np.bool_] = np.isfinite(points).all(axis=(1, 3))
+    known = np.asarray(np.isfinite(points).all(axis=(1, 3)))
     joints = {
         joint: _joint(points[known[:, i], :, i], names) for i, joint in enumerate(copies.joints) if known[:, i].any()
     }
