@@ -8,10 +8,12 @@ from math import degrees
 from pathlib import Path
 from typing import Any
 
-from app.export.report_files import write_text
+from app.export.report_files import write_text, writing
 from tracker.agreement.comparison import Agreement, AngleAgreement, JointAgreement, compare
+from tracker.agreement.consensus import mean_points
 from tracker.agreement.copies import Copies
 from tracker.agreement.statistics import Icc, Limits
+from tracker.formats.trc import write_trc
 from tracker.geometry.arrays import Array
 
 Pairs = Mapping[tuple[str, str], Agreement]
@@ -87,6 +89,21 @@ def write_table(copies: Copies, path: Path) -> None:
             figures = _row(angle.limits, angle.typical_error_rad, angle.icc, degrees(1))
             writer.writerow([*names, "angle", name, "deg", angle.n, *figures])
     write_text(path, text.getvalue())
+
+
+def write_consensus(copies: Copies, path: Path) -> None:
+    """Write the mean joints of all annotators as TRC, in the names and axes of the session, metres.
+
+    Args:
+        copies: their poses of one person.
+        path: the file.
+
+    Raises:
+        TrackerError: the file cannot be written.
+    """
+    frames = [s.frame for s in copies.subjects]
+    with writing(path):
+        write_trc(path, copies.joints, mean_points(copies.points), copies.fps, frames=frames)
 
 
 def _row(limits: Limits, error: float, icc: Icc, unit: float) -> list[str]:

@@ -1,7 +1,8 @@
 """Write reports: tables, and HTML files that need no other."""
 
 import html
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from tracker.errors import TrackerError
@@ -37,8 +38,19 @@ def write_text(path: Path, text: str) -> None:
     Raises:
         TrackerError: it cannot be written.
     """
-    try:
+    with writing(path):
         write_text_atomic(path, text)
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Say why a file cannot be written.
+
+    Raises:
+        TrackerError: it cannot.
+    """
+    try:
+        yield
     except OSError as error:
         reason = error.strerror or str(error)
         raise TrackerError(

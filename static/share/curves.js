@@ -76,7 +76,10 @@ export const mountCurves = () => {
     option.value = String(i);
     select.append(option);
   });
-  select.onchange = redraw;
+  select.onchange = () => {
+    select.blur(); // the keys play and step again
+    redraw();
+  };
   const canvas = byId("curves");
   canvas.onclick = (event) => {
     const share = (event.offsetX - LEFT) / (canvas.clientWidth - LEFT - RIGHT);

@@ -38,7 +38,7 @@ const BUTTONS = { back: "ArrowLeft", on: "ArrowRight", play: " ", contours: "c",
 const press = (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey) return;
   const target = /** @type {HTMLElement} */ (event.target);
-  if (target.tagName === "SELECT" && event.key !== " ") return;
+  if (target.tagName === "SELECT") return;
   const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
   const act = KEYS[key] ?? (/^[1-9]$/.test(key) ? () => toggleOnly(Number(key) - 1) : null);
   if (!act) return;

@@ -44,6 +44,8 @@ class Copies:
     angle_steps: Array
     """Steps from the consensus to each annotator, (n_subjects, n_annotators, n_angles), rad; NaN where the bodies of a
     person have different degrees of freedom."""
+    fps: float
+    """Frames per second."""
     notes: tuple[str, ...] = ()
     """Differences of the copies that a reader of the figures needs to know, as sentences."""
 
@@ -68,17 +70,19 @@ def read_copies(sessions: Sequence[Session], poses: Poses = "keyframes", people:
             bodies |= {Subject(person.name, frame): tuple(f[frame].body for f in found) for frame in common}
     names = annotator_names([s.folder for s in sessions])
     if not bodies:
-        kind = "keyframe" if poses == "keyframes" else "pose"
+        kind, other = ("keyframe", ", or compare all poses") if poses == "keyframes" else ("pose", "")
         raise SessionError(
             f"expected a frame in which {' and '.join(names)} have a {kind} of the same person, found none; annotate "
-            "the same frames in each copy"
+            f"the same frames in each copy{other}"
         )
     joints = (*JOINTS, *FOOT_POINTS)
     points = np.array([[_points(body, joints) for body in of] for of in bodies.values()])
     known = np.isfinite(points).all(axis=(1, 3)).any(axis=0)
     joints = tuple(joint for joint, is_known in zip(joints, known, strict=True) if is_known)
     notes = _notes(sessions, bodies)
-    return Copies(names, tuple(bodies), joints, points[:, :, known], *_angles(list(bodies.values())), notes)
+    return Copies(
+        names, tuple(bodies), joints, points[:, :, known], *_angles(list(bodies.values())), sessions[0].fps, notes
+    )
 
 
 def check_same_recording(sessions: Sequence[Session]) -> None:

@@ -37,8 +37,10 @@ class CompareArguments:
     """file to write: the table of joints and angles."""
     report: OptionalPath = None
     """HTML file to write: plots, tables and the worst frames."""
+    consensus: OptionalPath = None
+    """TRC file to write: the mean joints of all copies, of one person."""
     overwrite: bool = False
-    """replace the files of --csv and --report."""
+    """replace the files of --csv, --report and --consensus."""
     json: bool = False
     """print one JSON object; docs/annotation.md lists its keys."""
 
@@ -50,24 +52,30 @@ def command(arguments: Annotated[CompareArguments, tyro.conf.arg(name="")]) -> N
     copy less the first.
     """
     from app.export.agreement_report import write_report
-    from app.export.agreement_table import agreement_record, pairs_of, write_table
+    from app.export.agreement_table import agreement_record, pairs_of, write_consensus, write_table
     from tracker.agreement.comparison import compare
 
-    for option, path in (("--csv", arguments.csv), ("--report", arguments.report)):
+    files = {"--csv": arguments.csv, "--report": arguments.report, "--consensus": arguments.consensus}
+    for option, path in files.items():
         if path is not None and path.exists() and not arguments.overwrite:
             raise TrackerError(f"expected {option} at a path that is free, found {path}; say --overwrite to replace it")
     tolerance_m = _tolerance_m(arguments.tolerance)
     copies = _read(arguments)
+    people = dict.fromkeys(s.person for s in copies.subjects)
+    if arguments.consensus is not None and len(people) > 1:
+        raise TrackerError(f"expected one person with --consensus, found {', '.join(people)}; say --person NAME")
     found = compare(copies)
     if arguments.csv is not None:
         write_table(copies, arguments.csv)
     if arguments.report is not None:
         write_report(copies, found, tolerance_m, arguments.report)
+    if arguments.consensus is not None:
+        write_consensus(copies, arguments.consensus)
     if arguments.json:
         print(format_json(agreement_record(copies, found, pairs_of(copies), arguments.poses, tolerance_m)))
         return
     print(_format(copies, found, tolerance_m))
-    for path in (arguments.csv, arguments.report):
+    for path in files.values():
         if path is not None:
             print(f"wrote {path}")
 

@@ -20,7 +20,7 @@ def copies_of(points):
     """Copies without angles of points, (n, k, m, 3)."""
     n, k = points.shape[:2]
     names, subjects = tuple("abcd"[:k]), tuple(Subject("ann", 5 * i) for i in range(n))
-    return Copies(names, subjects, JOINTS, points, (), np.zeros((n, 0)), np.zeros((n, k, 0)))
+    return Copies(names, subjects, JOINTS, points, (), np.zeros((n, 0)), np.zeros((n, k, 0)), 25.0)
 
 
 def white_noise(rng, n, k):
