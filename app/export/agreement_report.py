@@ -28,7 +28,7 @@ svg .bias { stroke: #2a7de1; stroke-width: 1.5; } svg .limit { stroke: #d9622b; 
 svg .band { fill-opacity: .15; } svg .bias.band { fill: #2a7de1; stroke: none; }
 svg .limit.band { fill: #d9622b; stroke: none; }
 svg circle { fill: currentColor; fill-opacity: .6; }
-th { vertical-align: bottom; } th.number { text-align: right; }
+table { font-size: 14px; } td { white-space: nowrap; } th { vertical-align: bottom; } th.number { text-align: right; }
 """
 
 
@@ -51,7 +51,7 @@ def write_report(copies: Copies, found: Agreement, tolerance_m: float | None, pa
         "<h2>Bland-Altman plots of the limb joints</h2>",
         "<p>Difference against mean of two annotators, both along the line of the joint's bias. "
         "Bands are the confidence intervals of bias and limits.</p>",
-        f'<div class="plots">{"".join(_plot(j, found.joints[j]) for j in LIMB_JOINTS if j in found.joints)}</div>',
+        f'<div class="plots">{"".join(_plot(_label(j, found.joints[j].pair, found), found.joints[j]) for j in LIMB_JOINTS if j in found.joints)}</div>',
         *_joints(found),
         *_angles(found),
         *_annotators(found),
@@ -103,22 +103,34 @@ def _scale(values: Array, start: float, end: float) -> Callable[[float], float]:
 
 
 def _joints(found: Agreement) -> list[str]:
-    out = ["<h2>Joints, mm</h2>", _head("bias x", "y", "z", "length", "limits along the bias", *_SHARED)]
+    out = ["<h2>Joints, mm</h2>", _head("bias x", "y", "z", "length", *_SHARED)]
     for name, joint in found.joints.items():
         numbers = [*(1000 * joint.bias_m), 1000 * joint.along.bias]
-        out.append(_row(name, numbers, joint.along, 1000, joint.typical_error_m, joint.icc, joint.n))
+        out.append(
+            _row(_label(name, joint.pair, found), numbers, joint.along, 1000, joint.typical_error_m, joint.icc, joint.n)
+        )
     return [*out, "</table>"]
 
 
 def _angles(found: Agreement) -> list[str]:
-    out = ["<h2>Angles, degrees</h2>", _head("bias", "limits", *_SHARED)]
+    out = ["<h2>Angles, degrees</h2>", _head("bias", *_SHARED)]
     for name, angle in found.angles.items():
         bias = [degrees(angle.limits.bias)]
-        out.append(_row(name, bias, angle.limits, degrees(1), angle.typical_error_rad, angle.icc, angle.n))
+        out.append(
+            _row(
+                _label(name, angle.pair, found),
+                bias,
+                angle.limits,
+                degrees(1),
+                angle.typical_error_rad,
+                angle.icc,
+                angle.n,
+            )
+        )
     return [*out, "</table>"]
 
 
-_SHARED = ("lower limit, interval", "upper limit, interval", "typical error", "ICC(A,1), interval", "poses")
+_SHARED = ("lower limit", "interval", "upper limit", "interval", "typical error", "ICC(A,1)", "interval", "poses")
 """Columns of joints and of angles."""
 
 
@@ -128,10 +140,10 @@ def _head(*columns: str) -> str:
 
 def _row(name: str, numbers: Sequence[float], limits: Limits, unit: float, error: float, icc: Icc, n: int) -> str:
     cells = [f"{x:.1f}" for x in numbers]
-    cells.append(f"{unit * limits.lower:.1f} to {unit * limits.upper:.1f}")
-    cells += [_interval(limits.lower_interval, unit, 1), _interval(limits.upper_interval, unit, 1)]
-    agreement = f"{icc.value:.3f}, {_interval(icc.interval, 1, 3)}" if np.isfinite(icc.value) else "-"
-    cells += [f"{unit * error:.1f}", agreement, str(n)]
+    for value, interval in ((limits.lower, limits.lower_interval), (limits.upper, limits.upper_interval)):
+        cells += [f"{unit * value:.1f}", _interval(interval, unit, 1)]
+    agreement = [f"{icc.value:.3f}", _interval(icc.interval, 1, 3)] if np.isfinite(icc.value) else ["-", "-"]
+    cells += [f"{unit * error:.1f}", *agreement, str(n)]
     return f"<tr><td>{_words(name)}{_numbers(cells)}</tr>"
 
 
@@ -145,8 +157,12 @@ def _annotators(found: Agreement) -> list[str]:
 
 def _worst(found: Agreement, tolerance_m: float | None) -> list[str]:
     worst = [d for d in found.worst if tolerance_m is None or d.distance_m > tolerance_m]
-    title = "Largest differences" if tolerance_m is None else f"Differences above {1000 * tolerance_m:g} mm"
-    out = [f"<h2>{title}: {min(len(worst), _SHOWN)} of {len(found.worst)} poses</h2>"]
+    title = "Largest differences"
+    if tolerance_m is not None:
+        title = f"{len(worst)} of {len(found.worst)} poses differ by more than {1000 * tolerance_m:g} mm"
+    out = [f"<h2>{title}</h2>"]
+    if len(worst) > _SHOWN:
+        out.append(f"<p>The first {_SHOWN} are listed.</p>")
     out.append("<table><tr><th><th>person<th>joint<th class=number>distance, mm<th>between</tr>")
     for d in worst[:_SHOWN]:
         texts = (d.subject.person, d.joint.replace("_", " "))
@@ -163,6 +179,11 @@ def _numbers(cells: Sequence[str]) -> str:
 
 def _interval(interval: Interval, unit: float, digits: int) -> str:
     return f"{unit * interval[0]:.{digits}f} to {unit * interval[1]:.{digits}f}"
+
+
+def _label(name: str, pair: tuple[str, str], found: Agreement) -> str:
+    """Return a name; of more than two annotators, with the pair that the figures are of."""
+    return name if len(found.annotators) == 2 else f"{name} ({pair[0]}, {pair[1]})"
 
 
 def _words(name: str) -> str:

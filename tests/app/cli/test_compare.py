@@ -158,7 +158,9 @@ def test_keyframes_or_all_poses_of_one_or_more_people_and_annotators(run, tmp_pa
         annotate(tmp_path / name, person, tracked, body, keyframe=False)
         annotate(tmp_path / name, person, {k: tracked[k] for k in (2, 5)}, body)
     three = [tmp_path / name for name in "abc"]
-    found = json.loads(run("compare", *three, "--json")[1])
+    found = json.loads(run("compare", *three, "--report", tmp_path / "r.html", "--json")[1])
+    a, b = found["joints"]["left_knee"]["annotators"]
+    assert f"left knee ({a}, {b})" in (tmp_path / "r.html").read_text("utf-8")
     assert (found["n"], set(found["people"]), len(found["pairs"])) == (4, {"ann", "bob"}, 3)
     assert found["people"]["bob"]["joints"]["neck"]["n"] == 2
     assert set(found["joints"]["neck"]["annotators"]) < set("abc")

@@ -1,7 +1,6 @@
 """`quadrille share`: what it writes, what it keeps to itself, what it refuses."""
 
 import json
-import shutil
 from contextlib import closing
 from dataclasses import replace
 
@@ -9,8 +8,9 @@ import cv2
 import numpy as np
 import pytest
 from bodies import MODELS
-from command_line import SAMPLE, assert_refused
+from command_line import assert_refused
 from stored_motions import filmed, store_motion
+from true_poses import sample_with_poses
 
 from app.share import folder as folder_module
 from app.share.content import describe
@@ -19,11 +19,9 @@ from app.share.overlay_lines import UNITS_PER_PX, polylines, view_lines
 from app.share.pictures import GRADES, Encoder
 from tracker.errors import TrackerError
 from tracker.export.motion import read_motion
-from tracker.formats.model_toml import format_model, load_model
-from tracker.formats.pose_csv import read_pose_table
-from tracker.session.session import Person, load_session, save_session
+from tracker.session.session import Person, save_session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.records import PoseChange
 
 LARGE = 30e6
 
@@ -151,16 +149,7 @@ def test_a_failure_at_the_end_leaves_what_was_there(couple, tmp_path, monkeypatc
 
 @pytest.fixture
 def sample(tmp_path):
-    """The sample with the true poses of twelve frames."""
-    session = load_session(shutil.copytree(SAMPLE, tmp_path / "sample"))
-    table = read_pose_table(SAMPLE / "truth.csv")
-    model = load_model(SAMPLE / "truth_model.toml", table.height_m)
-    poses = table.values_for(model)[:12]
-    with closing(AnnotationStore(session.annotations_path)) as store:
-        revision = store.add_model_revision("person", format_model(model))
-        records = [PoseRecord(p, ("imported",) * len(p), revision) for p in poses]
-        store.commit("Import", [PoseChange("person", k, record) for k, record in enumerate(records)])
-    return session
+    return sample_with_poses(tmp_path / "sample", 12)
 
 
 @pytest.mark.slow

@@ -1,23 +1,18 @@
 """Shared pages in Chromium, opened from a file with the network off: they draw, step, play, and ask for nothing."""
 
-import shutil
-from contextlib import asynccontextmanager, closing
+from contextlib import asynccontextmanager
 from dataclasses import replace
 
 import cv2
 import numpy as np
 import pytest
-from command_line import SAMPLE
 from page_driver import shows
+from true_poses import sample_with_poses
 
 from app.share.folder import share
 from tracker.export.motion import read_motion
 from tracker.footage.recording import Recording
-from tracker.formats.model_toml import format_model, load_model
-from tracker.formats.pose_csv import read_pose_table
-from tracker.session.session import Person, load_session
-from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.session.session import Person
 
 EVIL = "</script><script>globalThis.hacked = 1</script><img src=x onerror='globalThis.hacked = 1'>"
 N = 5
@@ -26,30 +21,11 @@ PIXELS = "(id) => document.querySelector(id).toDataURL()"
 """JavaScript: what a canvas shows. Pictures from files cannot be read back: one file has them as data."""
 
 
-def with_poses(folder, n):
-    """A copy of the sample with the true poses, doubtful ones with a remark, in n frames."""
-    session = load_session(shutil.copytree(SAMPLE, folder))
-    table = read_pose_table(SAMPLE / "truth.csv")
-    model = load_model(SAMPLE / "truth_model.toml", table.height_m)
-    poses = table.values_for(model)
-    with closing(AnnotationStore(session.annotations_path)) as store:
-        revision = store.add_model_revision("person", format_model(model))
-        records = [
-            PoseRecord(
-                poses[k % len(poses)], ("tracked",) * len(poses[0]), revision, keyframe=k == 0,
-                status="doubtful" if k in (2, 3) else "good", remark="left arm uncertain" if k in (2, 3) else "",
-            )
-            for k in range(n)
-        ]  # fmt: skip
-        store.commit("Track", [PoseChange("person", k, record) for k, record in enumerate(records)])
-    return session
-
-
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory):
     """A folder and a file of a few frames, whose session and person have names with markup."""
     folder = tmp_path_factory.mktemp("shared")
-    motion = read_motion(with_poses(folder / "session", N), (0,))
+    motion = read_motion(sample_with_poses(folder / "session", N), (0,))
     people = tuple(replace(p, person=Person(EVIL, p.person.model, "#f2a33a")) for p in motion.people)
     motion = replace(motion, session=replace(motion.session, name=EVIL), people=people)
     for name in ("review", "review.html"):
@@ -144,7 +120,7 @@ async def test_the_whole_page_fits_the_window(browser, shared):
 
 @pytest.mark.slow
 async def test_300_frames_of_four_views_take_at_most_30_mb(browser, tmp_path):
-    session = with_poses(tmp_path / "session", 300)
+    session = sample_with_poses(tmp_path / "session", 300)
     cameras = []
     with Recording(session.cameras) as recording:  # 50 frames forth and back, each with its own noise
         for view, source in enumerate(session.cameras):
