@@ -45,13 +45,15 @@ def write_report(copies: Copies, found: Agreement, tolerance_m: float | None, pa
     order = (
         "second annotator less the first" if len(copies.names) == 2 else "second less first annotator of the pair named"
     )
+    plotted = [(joint, found.joints[joint]) for joint in LIMB_JOINTS if joint in found.joints]
+    plots = [_plot(_label(name, joint.pair, found), joint) for name, joint in plotted]
     body = [
         f"<h1>{html.escape(title)}</h1><p>{len(copies.subjects)} poses. Differences: {order}. Intervals are 95%.</p>",
         *(f"<p>Note: {html.escape(note)}.</p>" for note in copies.notes),
         "<h2>Bland-Altman plots of the limb joints</h2>",
         "<p>Difference against mean of two annotators, both along the line of the joint's bias. "
         "Bands are the confidence intervals of bias and limits.</p>",
-        f'<div class="plots">{"".join(_plot(_label(j, found.joints[j].pair, found), found.joints[j]) for j in LIMB_JOINTS if j in found.joints)}</div>',
+        f'<div class="plots">{"".join(plots)}</div>',
         *_joints(found),
         *_angles(found),
         *_annotators(found),
