@@ -25,7 +25,9 @@ _LISTED = 10
 class CompareArguments:
     """Arguments of `quadrille compare`."""
 
-    sessions: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="A B [C ...]")]
+    sessions: Annotated[
+        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="A B [C ...]", help_behavior_hint="")
+    ]
     """copies of one session, each with the work of one annotator, or of one annotator at different times."""
     poses: Annotated[Literal["keyframes", "all"], tyro.conf.arg(metavar="keyframes|all")] = "keyframes"
     """poses that a person set or verified, or tracked ones too."""
