@@ -4,7 +4,7 @@ Names of people are those of the session. Accounts and paths of this machine are
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,13 +19,30 @@ from tracker.store.edit_tree import program_version
 from tracker.store.records import FramePose
 
 
-def describe(motion: ExportedMotion, views: Sequence[WorkingView]) -> dict[str, Any]:
+class SharedComment(NamedTuple):
+    """A comment on a person in a frame."""
+
+    person: str
+    frame: int
+    limb: str
+    """Empty for the whole body."""
+    text: str
+    author: str
+    """Name of an annotator, never that of an account."""
+    resolved: bool
+
+
+def describe(
+    motion: ExportedMotion, views: Sequence[WorkingView], comments: Sequence[SharedComment] = ()
+) -> dict[str, Any]:
     """Return what a shared page shows beside pictures and lines.
 
     Args:
         motion: the poses.
         views: the cameras of the pictures.
+        comments: of the session; those on other frames or people are left out.
     """
+    names, frames = {p.person.name for p in motion.exported}, set(motion.frames)
     session = motion.session
     cameras = zip(session.cameras, views, strict=True)
     return {
@@ -37,6 +54,7 @@ def describe(motion: ExportedMotion, views: Sequence[WorkingView]) -> dict[str, 
         "floor": _floor(session),
         "cameras": [_camera(source.camera.name, view.camera) for source, view in cameras],
         "people": [_person(motion, person) for person in motion.exported],
+        "comments": [c._asdict() for c in comments if c.person in names and c.frame in frames],
     }
 
 

@@ -1,7 +1,7 @@
 """Write the shared pages: a folder, or one file that holds all."""
 
 import base64
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ from app.export.export import moved_at_end, refuse_existing
 from app.server.page_bundle import bundle_script, bundle_styles
 from app.server.static_files import static_folder
 from app.session.footage_indices import footage_indices
-from app.share.content import describe
+from app.share.content import SharedComment, describe
 from app.share.overlay_lines import UNITS_PER_PX, compact, view_lines
 from app.share.pictures import GRADES, Encoder, choose_encoder
 from tracker.errors import TrackerError
@@ -33,6 +33,7 @@ def share(
     most_bytes: float,
     overwrite: bool = False,
     tick: Callable[[], None] = lambda: None,
+    comments: Sequence[SharedComment] = (),
 ) -> int:
     """Write a stretch of a session as a folder with index.html, or as one file.
 
@@ -42,6 +43,7 @@ def share(
         most_bytes: largest size of the whole.
         overwrite: whether to replace a file, or a folder that `share` has made. An empty folder is replaced anyway.
         tick: called after each frame; it may raise to stop, which leaves nothing behind.
+        comments: of the session.
 
     Returns:
         The size, bytes.
@@ -58,11 +60,12 @@ def share(
             moved_at_end([out]) as temporary,
             Recording(motion.session.cameras, indices=footage_indices()) as recording,
         ):
-            room = most_bytes - len(compact(describe(motion, Encoder(motion.session, GRADES[0]).views)))
+            largest = Encoder(motion.session, GRADES[0])
+            room = most_bytes - len(compact(describe(motion, largest.views, comments)))
             encoder = choose_encoder(motion, recording, room, _TEXT_BYTES if is_file else 1.0)
             target = temporary / out.name
             folder = None if is_file else target / "pictures"
-            data = _content(motion, recording, encoder, folder, tick)
+            data = describe(motion, encoder.views, comments) | _content(motion, recording, encoder, folder, tick)
             return _write_file(target, data) if is_file else _write_folder(target, data)
     except OSError as error:
         why = error.strerror or str(error)
@@ -72,7 +75,7 @@ def share(
 def _content(
     motion: ExportedMotion, recording: Recording, encoder: Encoder, folder: Path | None, tick: Callable[[], None]
 ) -> dict[str, Any]:
-    """Return the data of the page; `pictures` are addresses by view, the pictures themselves without a folder."""
+    """Return pictures and lines of the page; without a folder, addresses of pictures are the pictures themselves."""
     n_views = len(encoder.views)
     pictures: list[list[str]] = [[] for _ in range(n_views)]
     lines = []
@@ -89,8 +92,7 @@ def _content(
                 pictures[view].append(f"pictures/{name}")
         lines.append(view_lines(motion, frame, encoder.views))
         tick()
-    data = describe(motion, encoder.views)
-    return {**data, "pictures": pictures, "lines": lines, "units_per_px": UNITS_PER_PX}
+    return {"pictures": pictures, "lines": lines, "units_per_px": UNITS_PER_PX}
 
 
 def _write_folder(target: Path, data: dict[str, Any]) -> int:

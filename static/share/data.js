@@ -30,6 +30,8 @@
  * @typedef {{ person: number, visible: number[][], hidden: number[][], points: (number | null)[] }} Lines
  * Polylines u, v, du, dv, ... and points u, v, ... over a picture, in `units_per_px`.
  *
+ * @typedef {{ person: string, frame: number, limb: string, text: string, author: string, resolved: boolean }} Comment
+ *
  * @typedef {object} Share
  * @property {string} session
  * @property {string} program
@@ -39,6 +41,7 @@
  * @property {{ normal: number[], offset: number }} floor
  * @property {Camera[]} cameras
  * @property {Person[]} people
+ * @property {Comment[]} comments
  * @property {string[][]} pictures addresses by view and frame
  * @property {Lines[][][]} lines by frame, view and person
  * @property {number} units_per_px

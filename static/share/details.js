@@ -1,4 +1,4 @@
-/** Status and provenance of the poses of the shown frame, and the remarks of all frames. */
+/** Status and provenance of the poses of the shown frame, and the remarks and comments of all frames. */
 
 import { data, poseOf } from "./data.js";
 import { byId, element } from "./dom.js";
@@ -47,9 +47,17 @@ const remarks = () =>
     return found;
   });
 
-/** Make the list of remarks, and the details that follow the frame. */
+/** Comments of people, as remarks. */
+const comments = () =>
+  data.comments.map(({ person, frame, limb, text, author, resolved }) => {
+    const at = data.frames.indexOf(frame);
+    const words = [author, limb].filter(Boolean).join(", ");
+    return { person, first: at, last: at, text: `${words && `${words}: `}“${text}”${resolved ? ", resolved" : ""}` };
+  });
+
+/** Make the list of remarks and comments, and the details that follow the frame. */
 export const mountDetails = () => {
-  const found = remarks().sort((a, b) => a.first - b.first);
+  const found = [...comments(), ...remarks()].sort((a, b) => a.first - b.first);
   const list = element("ul");
   for (const { person, first, last, text } of found) {
     const [from, to] = [data.frames[first], data.frames[last]];
@@ -60,6 +68,6 @@ export const mountDetails = () => {
     item.append(button);
     list.append(item);
   }
-  byId("remarks").replaceChildren(element("h2", found.length ? "Remarks" : "No remarks"), list);
+  byId("remarks").replaceChildren(element("h2", found.length ? "Remarks and comments" : "No remarks"), list);
   follow(drawDetails);
 };

@@ -9,6 +9,7 @@ import pytest
 from page_driver import shows
 from true_poses import sample_with_poses
 
+from app.share.content import SharedComment
 from app.share.folder import share
 from tracker.export.motion import read_motion
 from tracker.footage.recording import Recording
@@ -21,6 +22,13 @@ PIXELS = "(id) => document.querySelector(id).toDataURL()"
 """JavaScript: what a canvas shows. Pictures from files cannot be read back: one file has them as data."""
 
 
+COMMENTS = [
+    SharedComment(EVIL, 4, "left arm", f"too far out {EVIL}", "ben", False),
+    SharedComment(EVIL, 4, "", "fine", "", True),
+    SharedComment("nobody", 4, "", "of another", "ben", False),
+]
+
+
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory):
     """A folder and a file of a few frames, whose session and person have names with markup."""
@@ -29,7 +37,7 @@ def shared(tmp_path_factory):
     people = tuple(replace(p, person=Person(EVIL, p.person.model, "#f2a33a")) for p in motion.people)
     motion = replace(motion, session=replace(motion.session, name=EVIL), people=people)
     for name in ("review", "review.html"):
-        share(motion, folder / name, 30e6)
+        share(motion, folder / name, 30e6, comments=COMMENTS)
     return {"folder": folder / "review" / "index.html", "file": folder / "review.html"}
 
 
@@ -73,10 +81,13 @@ async def test_it_opens_steps_plays_and_changes_its_scheme(browser, shared, kind
         assert await page.evaluate(dark)
         await page.keyboard.press("2")
         await shows(page, "document.querySelectorAll('.view:not([hidden])').length === 1")
-        await page.locator("#remarks button").click()
+        await page.locator("#remarks button").first.click()
         await shows(page, f"{FRAME} === 'frame 2'")
         assert "doubtful, tracked" in await page.inner_text("#details")
-        assert "2–3: left arm uncertain" in await page.inner_text("#remarks")
+        listed = await page.locator("#remarks li").all_inner_texts()
+        assert listed == ["2–3: left arm uncertain", f"4: ben, left arm: “too far out {EVIL}”", "4: “fine”, resolved"]
+        await page.locator("#remarks button").last.click()
+        await shows(page, f"{FRAME} === 'frame 4'")
 
 
 async def test_views_3d_and_curves_are_drawn(browser, shared):
