@@ -30,7 +30,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
-from app.cli.annotation import assign, merge, tasks
+from app.cli.annotation import assign, compare, merge, share, tasks
 from app.cli.batches import batch
 from app.cli.calibration import calibrate, check, sync
 from app.cli.observations import import_, judge
@@ -61,8 +61,10 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "merge": merge.command,
     "check": check.command,
     "evaluate": evaluate.command,
+    "compare": compare.command,
     "observability": observability.command,
     "export": export.command,
+    "share": share.command,
     "restore": restore.command,
     "simulate": simulate.command,
     "batch": batch.command,

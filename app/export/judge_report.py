@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from tracker.files import write_text_atomic
+from app.export.report_files import write_html
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array, Image
 from tracker.geometry.cameras import Camera
@@ -25,10 +25,6 @@ _TRUNK = ("left_shoulder", "right_shoulder", "right_hip", "left_hip", "left_shou
 _IMPORTED, _OFF, _TRACKED = (255, 165, 0), (230, 30, 30), (60, 150, 255)
 """Colours of imported joints, of a limb of them that is off, and of tracked joints, RGB."""
 _STYLE = """
-:root { color-scheme: light dark; }
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 75rem; margin: 2rem auto; padding: 0 1rem; }
-table { border-collapse: collapse; } td, th { padding: .2rem .8rem .2rem 0; text-align: left; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; }
 figure { margin: 1.5rem 0; } figure img { height: 300px; margin-right: 4px; border-radius: 3px; }
 .imported { color: #c77700; } .off { color: #d22; } .tracked { color: #2a7de1; }
 """
@@ -51,11 +47,7 @@ def write_report(session: Session, name: str, found: Sequence[Judgement], path: 
     with Recording(session.cameras) as recording:
         for own in found:
             body += _person(own, recording, [c.camera for c in session.cameras])
-    write_text_atomic(
-        path,
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{html.escape(name)}</title>'
-        f"<style>{_STYLE}</style><body>{''.join(body)}</body></html>",
-    )
+    write_html(path, name, body, _STYLE)
 
 
 def shown_doubts(worst: Sequence[Doubt]) -> list[Doubt]:

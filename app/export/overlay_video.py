@@ -61,7 +61,7 @@ def write_overlay_video(
         writer = stack.enter_context(VideoWriter(path, even, session.fps, motion.calibration_note))
         for frame in motion.frames:
             picture = np.zeros((even[1], even[0], 3), np.uint8)
-            drawn = _drawn_paths(motion, frame, shown)
+            drawn = drawn_paths(motion, frame, shown)
             for k, (index, camera) in enumerate(zip(shown, cameras, strict=True)):
                 image = recording.read_view(index, frame)
                 view = placeholder(camera.size, "frame damaged") if image is None else image.copy()
@@ -75,8 +75,11 @@ def write_overlay_video(
             tick()
 
 
-def _drawn_paths(motion: ExportedMotion, frame: int, shown: Sequence[int]) -> list[overlays.Path]:
-    """Return the contours of the exported people who have a pose in a frame, in the views shown."""
+def drawn_paths(motion: ExportedMotion, frame: int, shown: Sequence[int]) -> list[overlays.Path]:
+    """Return the contours of the exported people who have a pose in a frame, in the views shown.
+
+    Their `person` is the index into `motion.bodies(frame)`.
+    """
     people = motion.bodies(frame)
     if not people:
         return []

@@ -41,6 +41,7 @@ ROOMS = [
     "tracker.posing",
     "tracker.evaluation",
     "tracker.exports",
+    "tracker.agreement",
     "tracker.simulate.people",
     "tracker.simulate.motion",
     "tracker.simulate.stage",
@@ -67,6 +68,7 @@ ROOMS = [
     "app.page",
     "app.scene3d",
     "app.server",
+    "app.share",
     "app.bench",
     "app.cli",
     "app.cli.calibration",
@@ -132,6 +134,7 @@ def own_imports():
 
 
 PAGE_ROOMS = [
+    "share",
     "widgets",
     "model",
     "layout",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from tracker.api.work import Tracked
 from tracker.batch.manifest import Manifest
-from tracker.batch.plan import BatchPlan, Recording, Settings
+from tracker.batch.plan import BatchPlan, PlannedRecording, Settings
 from tracker.batch.tasks import Done
 from tracker.batch.worker import work
 from tracker.errors import TrackerError
@@ -15,7 +15,7 @@ from tracker.errors import TrackerError
 def make_batch(folder, n, failing=()):
     """A batch of n recordings; those of the given numbers fail."""
     names = [f"r{i:03d}{' fails' if i in failing else ''}" for i in range(n)]
-    recordings = tuple(Recording(name, str(folder / name), Settings()) for name in names)
+    recordings = tuple(PlannedRecording(name, str(folder / name), Settings()) for name in names)
     return Manifest.create(BatchPlan(folder / "plan.toml", recordings), folder)
 
 

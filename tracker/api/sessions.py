@@ -21,7 +21,7 @@ PersonName: TypeAlias = str | None
 def open_session(folder: SessionOrFolder) -> Session:
     """Return the session of a folder, with its cameras and the present bodies of its people.
 
-    It is a value: it does not change when the folder does. All functions take it or the folder, and read anew.
+    It is a value: it does not change when the folder does. All functions take it or the folder, and read that again.
 
     Args:
         folder: the session folder.

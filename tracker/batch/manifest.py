@@ -1,4 +1,4 @@
-"""The tasks of a batch on disk: one state each, changed by whoever has claimed the task.
+"""The tasks of a batch on disk: one state each, changed by the worker that claimed it.
 
 BATCH/tasks/000007.json     what to do, written once
 BATCH/claims/000007         while a worker does it
@@ -17,13 +17,13 @@ import msgspec
 
 from tracker.batch import claims
 from tracker.batch.claims import Claim
-from tracker.batch.plan import BatchPlan, Recording, from_plain, plain
+from tracker.batch.plan import BatchPlan, PlannedRecording, from_plain, plain
 from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
 from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
 
 State: TypeAlias = Literal["waiting", "running", "done", "failed"]
-_KIND = TextKind("task", DOCUMENT_BYTES, TrackerError, "make the batch anew in another folder")
+_KIND = TextKind("task", DOCUMENT_BYTES, TrackerError, "make the batch again in another folder")
 
 
 class Result(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -52,11 +52,11 @@ class Result(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 @dataclass(frozen=True)
-class Task:
+class RecordingTask:
     """A recording to track."""
 
     number: int
-    recording: Recording
+    recording: PlannedRecording
     after: tuple[int, ...] = ()
     """Numbers of the tasks that must have ended before: those that acquire bodies which it shares."""
     bodies: tuple[str, ...] = ()
@@ -71,7 +71,7 @@ class Task:
 class Manifest:
     """The folder of a batch."""
 
-    def __init__(self, folder: Path, tasks: Sequence[Task]) -> None:
+    def __init__(self, folder: Path, tasks: Sequence[RecordingTask]) -> None:
         """Use `create` or `load`."""
         self.folder, self.tasks = folder, tuple(tasks)
 
@@ -116,17 +116,17 @@ class Manifest:
                 recording, after, bodies = from_plain(data["recording"]), tuple(data["after"]), tuple(data["bodies"])
             except (KeyError, TypeError) as error:
                 raise TrackerError(f"task {file}: expected recording, after and bodies, found other keys") from error
-            tasks.append(Task(number, recording, after, bodies))
+            tasks.append(RecordingTask(number, recording, after, bodies))
         return cls(folder, tasks)
 
-    def result(self, task: Task) -> Result | None:
+    def result(self, task: RecordingTask) -> Result | None:
         """Return how a task ended; None if it has not."""
         try:
             return msgspec.json.decode((self.folder / "results" / f"{task.key}.json").read_bytes(), type=Result)
         except FileNotFoundError:
             return None
 
-    def state(self, task: Task) -> State:
+    def state(self, task: RecordingTask) -> State:
         """Return the state of a task."""
         if (found := self.result(task)) is not None:
             return found.state
@@ -136,7 +136,7 @@ class Manifest:
         """Return the number of tasks in each state."""
         return Counter(map(self.state, self.tasks))
 
-    def claim_next(self) -> tuple[Task, Claim] | None:
+    def claim_next(self) -> tuple[RecordingTask, Claim] | None:
         """Claim a task that can begin; None if there is none at present."""
         for task in self.tasks:
             if self.result(task) is not None or any(self.result(self.tasks[i]) is None for i in task.after):
@@ -154,19 +154,19 @@ class Manifest:
         """Return whether every task has ended."""
         return all(self.result(task) is not None for task in self.tasks)
 
-    def count_attempt(self, task: Task) -> int:
+    def count_attempt(self, task: RecordingTask) -> int:
         """Note that a worker begins a task; return how many have."""
         path = self.folder / "attempts" / task.key
         with path.open("a", encoding="utf-8") as file:
             file.write("begun\n")
         return len(path.read_text("utf-8").splitlines())
 
-    def forget_attempt(self, task: Task) -> None:
+    def forget_attempt(self, task: RecordingTask) -> None:
         """Take the last attempt back: its worker was stopped, and did not die of the task."""
         path = self.folder / "attempts" / task.key
         write_text_atomic(path, "".join(path.read_text("utf-8").splitlines(keepends=True)[1:]))
 
-    def finish(self, task: Task, held: Claim, result: Result) -> bool:
+    def finish(self, task: RecordingTask, held: Claim, result: Result) -> bool:
         """Write the result of a task, and give up its claim.
 
         Returns:
@@ -187,13 +187,13 @@ class Manifest:
             (self.folder / "results" / f"{task.key}.json").unlink(missing_ok=True)
         return len(failed)
 
-    def _claim_path(self, task: Task) -> Path:
+    def _claim_path(self, task: RecordingTask) -> Path:
         return self.folder / "claims" / task.key
 
 
-def _tasks(plan: BatchPlan) -> list[Task]:
+def _tasks(plan: BatchPlan) -> list[RecordingTask]:
     """Return a task for each recording. Of people with shared bodies, the first recording acquires the body."""
-    tasks, first = list[Task](), dict[str, int]()
+    tasks, first = list[RecordingTask](), dict[str, int]()
     for number, recording in enumerate(plan.recordings):
         people = plan.people.get(recording.name, ())
         wanted = recording.settings.people
@@ -201,5 +201,5 @@ def _tasks(plan: BatchPlan) -> list[Task]:
         after = sorted({first[p] for p in shared if p in first})
         for person in shared:
             first.setdefault(person, number)
-        tasks.append(Task(number, recording, tuple(after), tuple(shared)))
+        tasks.append(RecordingTask(number, recording, tuple(after), tuple(shared)))
     return tasks

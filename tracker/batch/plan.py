@@ -85,7 +85,7 @@ class Footage:
 
 
 @dataclass(frozen=True)
-class Recording:
+class PlannedRecording:
     """A recording of a plan."""
 
     name: str
@@ -102,7 +102,7 @@ class BatchPlan:
     """All recordings of a batch, without those that are left out."""
 
     path: Path
-    recordings: tuple[Recording, ...]
+    recordings: tuple[PlannedRecording, ...]
     freeze_bodies: bool = False
     people: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the people of each recording that has a session, as far as it can be read."""
@@ -136,7 +136,7 @@ def read_plan(path: Path, out: Path) -> BatchPlan:
         inherited = _inherited(path.parent, session, row.settings)
         settings = row.recordings.get(name, Settings()).over(inherited)
         if not settings.skip:
-            chosen.append(Recording(name, str(session), settings, footage))
+            chosen.append(PlannedRecording(name, str(session), settings, footage))
     people = {r.name: names for r in chosen if (names := _people_of(r))}
     return BatchPlan(path, tuple(chosen), row.freeze_bodies, people)
 
@@ -181,7 +181,7 @@ def _of_table(row: _PlanFile, path: Path, out: Path) -> dict[str, tuple[Path, Fo
             raise TrackerError(f"{where}: expected a value as '{missing[0]}', found none; fill it in")
         if name in found or Path(name).name != name or name.startswith("."):
             raise TrackerError(
-                f"{where}: expected a name of its own that can be a folder's, found '{name}'; name it anew"
+                f"{where}: expected a name of its own that can be a folder's, found '{name}'; give it another name"
             )
         found[name] = (out / "sessions" / name, _footage(cells, table.parent, where))
     return found
@@ -219,7 +219,7 @@ def _inherited(top: Path, session: Path, settings: Settings) -> Settings:
     return settings
 
 
-def _people_of(recording: Recording) -> tuple[str, ...]:
+def _people_of(recording: PlannedRecording) -> tuple[str, ...]:
     """Return the names of the people of a recording; none where its session cannot be read, which its task says."""
     from tracker.session.session import load_session
 
@@ -231,17 +231,17 @@ def _people_of(recording: Recording) -> tuple[str, ...]:
         return ()
 
 
-def plain(recording: Recording) -> dict[str, Any]:
+def plain(recording: PlannedRecording) -> dict[str, Any]:
     """Return a recording as plain data for a file of tasks; `from_plain` reads it."""
     data: dict[str, Any] = msgspec.to_builtins(recording)
     return data
 
 
-def from_plain(data: Any) -> Recording:
+def from_plain(data: Any) -> PlannedRecording:
     """Return a recording of `plain` data.
 
     Raises:
         TrackerError: it is no recording.
     """
-    found: Recording = check(data, Recording, "task", TrackerError)
+    found: PlannedRecording = check(data, PlannedRecording, "task", TrackerError)
     return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.api.pose_series import PoseSeries
 from tracker.api.results import read_poses
-from tracker.batch.manifest import Manifest, Result, State, Task
+from tracker.batch.manifest import Manifest, RecordingTask, Result, State
 from tracker.errors import SessionError, TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.session import load_session
@@ -17,7 +17,7 @@ from tracker.store.annotation_store import AnnotationStore
 
 
 @dataclass(frozen=True)
-class Row:
+class RecordingRow:
     """A recording of a batch."""
 
     name: str
@@ -66,13 +66,13 @@ class Totals:
         return self.n_verified / max(1, self.n_poses)
 
 
-def summarize(manifest: Manifest) -> list[Row]:
+def summarize(manifest: Manifest) -> list[RecordingRow]:
     """Return a row for each recording: failures first, then by expected error, by doubts, and by name."""
     rows = [_row(manifest, task) for task in manifest.tasks]
     return sorted(rows, key=lambda r: (r.state != "failed", -(r.expected_error_mm or 0.0), -r.share_doubted, r.name))
 
 
-def totals(manifest: Manifest, rows: Sequence[Row]) -> Totals:
+def totals(manifest: Manifest, rows: Sequence[RecordingRow]) -> Totals:
     """Return the sums of a batch."""
     return Totals(
         dict(manifest.counts()),
@@ -83,9 +83,9 @@ def totals(manifest: Manifest, rows: Sequence[Row]) -> Totals:
     )
 
 
-def _row(manifest: Manifest, task: Task) -> Row:
+def _row(manifest: Manifest, task: RecordingTask) -> RecordingRow:
     result, recording = manifest.result(task), task.recording
-    row = Row(recording.name, recording.session, manifest.state(task), result=result)
+    row = RecordingRow(recording.name, recording.session, manifest.state(task), result=result)
     if result is None or result.state == "failed":
         return row
     people = _people(Path(recording.session), recording.settings.people)
@@ -93,7 +93,7 @@ def _row(manifest: Manifest, task: Task) -> Row:
     known = np.concatenate([e[np.isfinite(e)] for e in errors_mm]) if people else np.zeros(0)
     doubted = [np.isin(p.statuses, ("doubtful", "lost")) & ~p.keyframes for p in people]
     worst_frame, worst_person = _worst(people, errors_mm, doubted)
-    return Row(
+    return RecordingRow(
         recording.name,
         recording.session,
         "done",

@@ -11,8 +11,8 @@ import msgspec
 from tracker.api.results import export
 from tracker.api.sessions import frames_of, new_session, open_session
 from tracker.api.work import Progress, Tracked, track
-from tracker.batch.manifest import Task
-from tracker.batch.plan import Recording, plain
+from tracker.batch.manifest import RecordingTask
+from tracker.batch.plan import PlannedRecording, plain
 from tracker.errors import TrackerError
 from tracker.exports.formats import FORMATS
 from tracker.files import write_text_atomic
@@ -36,7 +36,7 @@ class Done(NamedTuple):
     """Exported files."""
 
 
-def do_task(task: Task, folder: Path, progress: Progress) -> Done:
+def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done:
     """Track a recording as its settings say. A task that was interrupted goes on where it was.
 
     Args:
@@ -71,7 +71,7 @@ def do_task(task: Task, folder: Path, progress: Progress) -> Done:
     return Done(tracked, _export(session, recording, folder / "exports"))
 
 
-def _session(recording: Recording) -> Session:
+def _session(recording: PlannedRecording) -> Session:
     """Return the session of a recording; a row of a table gets one."""
     footage = recording.footage
     if footage is None or Path(recording.session).is_dir():
@@ -87,7 +87,7 @@ def _session(recording: Recording) -> Session:
     )
 
 
-def _frames(recording: Recording, n_frames: int) -> list[int] | None:
+def _frames(recording: PlannedRecording, n_frames: int) -> list[int] | None:
     text = recording.settings.frames
     return None if text is None else list(parse_frame_list(text, n_frames, f"frames of {recording.name}"))
 
@@ -101,7 +101,7 @@ def _tracked_before(session: Session, key: str) -> Tracked | None:
     return Tracked(**found["tracked"]) if found is not None and found["task"] == key else None
 
 
-def _with_known_bodies(session: Session, task: Task, bodies: Path) -> Session:
+def _with_known_bodies(session: Session, task: RecordingTask, bodies: Path) -> Session:
     """Give people the bodies that other recordings have acquired, unless they have sizes of their own."""
     known = [
         (i, bodies / f"{identifier(p.name)}.toml")
@@ -118,7 +118,7 @@ def _with_known_bodies(session: Session, task: Task, bodies: Path) -> Session:
     return session
 
 
-def _share_bodies(session: Session, task: Task, bodies: Path) -> None:
+def _share_bodies(session: Session, task: RecordingTask, bodies: Path) -> None:
     """Write the bodies that this recording acquired, for others. The first one stays."""
     for person in session.people:
         path = bodies / f"{identifier(person.name)}.toml"
@@ -126,7 +126,7 @@ def _share_bodies(session: Session, task: Task, bodies: Path) -> None:
             write_text_atomic(path, format_model(person.model))
 
 
-def _export(session: Session, recording: Recording, exports: Path) -> tuple[Path, ...]:
+def _export(session: Session, recording: PlannedRecording, exports: Path) -> tuple[Path, ...]:
     files = list[Path]()
     for name in recording.settings.export or ():
         if name not in FORMATS:

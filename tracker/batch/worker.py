@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 
 from tracker.batch.claims import BEAT_S, Claim
-from tracker.batch.manifest import Manifest, Result, Task
+from tracker.batch.manifest import Manifest, RecordingTask, Result
 from tracker.batch.tasks import Done, do_task
 from tracker.errors import TrackerError
 
@@ -24,7 +24,7 @@ class LostClaimError(Exception):
 def work(
     folder: Path,
     max_tasks: int | None = None,
-    do: Callable[[Task, Path, Callable[[str, float], None]], Done] = do_task,
+    do: Callable[[RecordingTask, Path, Callable[[str, float], None]], Done] = do_task,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> int:
     """Do tasks of a batch until all have ended.
@@ -33,7 +33,7 @@ def work(
         folder: of the batch.
         max_tasks: number of tasks after which it ends; None for no limit.
         do: does a task.
-        is_stopped: asked at each step; the task at hand is then given back, and goes on where it was later.
+        is_stopped: asked at each step; its task is then given back, and goes on where it was later.
 
     Returns:
         Number of tasks that this worker has ended.
@@ -53,9 +53,9 @@ def work(
 
 def _do(
     manifest: Manifest,
-    task: Task,
+    task: RecordingTask,
     held: Claim,
-    do: Callable[[Task, Path, Callable[[str, float], None]], Done],
+    do: Callable[[RecordingTask, Path, Callable[[str, float], None]], Done],
     is_stopped: Callable[[], bool],
 ) -> bool:
     """Do one task; return whether its result was written."""

@@ -127,9 +127,9 @@ def export(
     has_side_files = options.provenance and not chosen.holds_provenance and not chosen.is_folder
     names = [n for files in groups for n in (*files.names, *[files.side_file] * has_side_files)]
     paths = [out.with_name(name) for name in names]
-    _refuse_existing(paths, overwrite, is_export_folder if chosen.is_folder else None)
+    refuse_existing(paths, overwrite, is_export_folder if chosen.is_folder else None)
     try:
-        with _moved_at_end(paths) as folder:
+        with moved_at_end(paths) as folder:
             for files in groups:
                 part = replace(motion, chosen=files.people)
                 chosen.write(part, options, [folder / name for name in files.names], tick)
@@ -141,7 +141,7 @@ def export(
     return paths
 
 
-def _refuse_existing(paths: Sequence[Path], overwrite: bool, may_replace: Callable[[Path], bool] | None) -> None:
+def refuse_existing(paths: Sequence[Path], overwrite: bool, may_replace: Callable[[Path], bool] | None) -> None:
     """Refuse to replace files.
 
     Args:
@@ -161,7 +161,7 @@ def _refuse_existing(paths: Sequence[Path], overwrite: bool, may_replace: Callab
 
 
 @contextmanager
-def _moved_at_end(paths: Sequence[Path]) -> Iterator[Path]:
+def moved_at_end(paths: Sequence[Path]) -> Iterator[Path]:
     """Yield an empty folder beside some files; at the end, files of the same names move from there to their places."""
     folder = paths[0].with_name(f".{paths[0].name}.{secrets.token_hex(4)}.tmp")
     folder.mkdir()

@@ -71,7 +71,7 @@ def n_workers(wanted: int | None, n_tasks: int, cores: int, free: int | None) ->
 
 
 def work_here(folder: Path) -> None:
-    """Do tasks in this process until none is left. SIGTERM and Ctrl+C give the task at hand back."""
+    """Do tasks in this process until none is left. SIGTERM and Ctrl+C give its task back."""
     from tracker.batch.worker import work
 
     stopped = list[int]()

@@ -5,7 +5,7 @@ from typing import Any
 
 from app.remedies import PHRASES
 from tracker.batch.manifest import Manifest, Result
-from tracker.batch.results import Row, summarize, totals
+from tracker.batch.results import RecordingRow, summarize, totals
 
 
 def record(manifest: Manifest) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def format_table(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _record(row: Row) -> dict[str, Any]:
+def _record(row: RecordingRow) -> dict[str, Any]:
     words = ["quadrille", "open", row.session]
     words += [] if row.worst_frame is None else ["--frame", str(row.worst_frame), "--person", row.worst_person]
     return {

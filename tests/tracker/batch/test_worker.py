@@ -15,7 +15,7 @@ import pytest
 from batch_work import make_batch, write_line
 
 from tracker.batch import claims
-from tracker.batch.manifest import Result, Task
+from tracker.batch.manifest import RecordingTask, Result
 from tracker.batch.worker import work
 from tracker.session.holder import this_holder
 from tracker.session.lock import LOCK_FILE
@@ -63,7 +63,7 @@ def test_several_workers_do_each_task_once(tmp_path):
 
 def test_a_task_waits_for_those_before_it_even_if_they_fail(tmp_path):
     manifest = make_batch(tmp_path, 2, failing={0})
-    manifest.tasks = (manifest.tasks[0], Task(1, manifest.tasks[1].recording, after=(0,)))
+    manifest.tasks = (manifest.tasks[0], RecordingTask(1, manifest.tasks[1].recording, after=(0,)))
     first, held = manifest.claim_next()
     assert first.number == 0
     assert manifest.claim_next() is None
