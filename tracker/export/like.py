@@ -60,7 +60,7 @@ def export_like(
         session: its stored poses.
         observations: imported ones.
         out: file to write, or the folder of several files; it must not exist.
-        poses: replace the frames that a person edited, or all that have a pose.
+        poses: replace the points that a person edited, or those of all poses.
         learn_offsets: place points as far from the joints as the files usually do.
 
     Raises:
@@ -164,6 +164,7 @@ def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Arra
         near = {f: b.values for f, b in person.all_bodies.items() if abs(f - frame) <= 2 and b.model is body.model}
         body = PosedBody(body.model, body.values, velocity(body.model, near, frame)).ahead(ahead)
     points = person.points_world(body)
+    points[~person.replaced[frame]] = np.nan
     known = np.asarray(np.isfinite(points).all(axis=-1))
     px = np.full((len(points), 2), np.nan)
     px[known] = project_through_lens(source.camera, points[known])
@@ -205,6 +206,7 @@ def _rows(nearest: IntArray, row_frames: Array, person: MendedPoints) -> dict[in
         if at != frame and other in person.bodies:
             share = abs(at - frame)
             points = (1 - share) * points + share * person.points_world(person.bodies[other])
+        points[~person.replaced[frame]] = np.nan
         out[row] = points
     return out
 

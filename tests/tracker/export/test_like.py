@@ -67,8 +67,10 @@ def observed(session, bodies, offset=OFFSET):
     return out
 
 
-def store(session, bodies, edited=(EDITED,)):
+def store(session, bodies, edited=(EDITED,), joints=None):
+    """Store poses; on edited frames all values are a person's, or those of some joints alone."""
     model = session.people[0].model
+    by_hand = [joints is None or name.rpartition(".")[0] in joints for name in model.value_names]
     with closing(AnnotationStore(session.annotations_path)) as annotations:
         revision = annotations.add_model_revision("ann", format_model(model))
         changes = [
@@ -76,7 +78,10 @@ def store(session, bodies, edited=(EDITED,)):
                 "ann",
                 k,
                 PoseRecord(
-                    b.values, ("manual" if k in edited else "tracked",) * len(b.values), revision, keyframe=k in edited
+                    b.values,
+                    tuple("manual" if k in edited and own else "tracked" for own in by_hand),
+                    revision,
+                    keyframe=k in edited,
                 ),
             )
             for k, b in enumerate(bodies)
@@ -179,6 +184,22 @@ def test_a_mended_frame_alone_differs_in_space(session, tmp_path, kind):
         assert [i for i, (a, b) in enumerate(lines) if a != b] == [6 + EDITED]
     if kind == "c3d":
         assert len(one) == len(other)
+
+
+@pytest.mark.parametrize("kind", ["openpose", "trc"])
+def test_points_that_did_not_move_with_the_edit_stay(session, tmp_path, kind):
+    bodies = poses(session)
+    path, _ = write_kind(kind, session, tmp_path, observed(session, bodies) + 0.2)
+    store(session, bodies, joints=("left_elbow", "right_hip"))
+    done = export_like(session, imported(session, path), tmp_path / f"back{path.suffix}", learn_offsets=False)
+    assert done.frames == (EDITED,)
+    if kind == "trc":
+        before, after = read_trc(path).points[EDITED], read_trc(done.paths[0]).points[EDITED]
+    else:
+        name = f"cam1/cam1_{EDITED:012d}_keypoints.json"
+        before, after = (read_openpose(folder / name)[0] for folder in (path, tmp_path / "back"))
+    differ = {n for n, a, b in zip(BODY_25.points, before, after, strict=True) if not np.array_equal(a, b)}
+    assert differ == {"LWrist", "RKnee", "RAnkle", "RHeel", "RBigToe"}
 
 
 @pytest.mark.parametrize("learn", [True, False])
