@@ -15,6 +15,7 @@ from tracker.export.keypoints import project_through_lens
 from tracker.export.mended_points import MendedPoints, PoseChoice, mended_points
 from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
+from tracker.formats.keypoints.coco_patching import patch_coco
 from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
 from tracker.formats.keypoints.openpose import patch_openpose
 from tracker.formats.points_csv import patch_points_csv
@@ -89,7 +90,7 @@ def export_like(
     return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames))
 
 
-_PATCHED = ("openpose", "deeplabcut", "trc", "csv", "c3d")
+_PATCHED = ("openpose", "coco", "deeplabcut", "trc", "csv", "c3d")
 
 
 def _stored_contents(session: Session, observations: ObservationSet) -> Files:
@@ -116,7 +117,7 @@ def _mended_pictures(session: Session, observations: ObservationSet, mended: Seq
     detections = triangulate_observations(observations, cameras).detections
     size, names = picture_size(observations), [c.name for c in cameras]
     by_path = {source_path(session, observations.name, s): s.path for s in observations.sources}
-    out: Files = {}
+    found: list[tuple[StoredPictures, Changes]] = []
     for pictures in stored_pictures(session, observations):
         view = names.index(pictures.camera)
         changes: Changes = {}
@@ -130,19 +131,26 @@ def _mended_pictures(session: Session, observations: ObservationSet, mended: Seq
                     if detection >= 0 or (values[:, 2] > 0).any():  # nobody is added who is not in the picture
                         changes.setdefault(row, []).append((detection, values))
         if changes:
-            out |= {
-                by_path[path]: data for path, data in _patch_pictures(observations.format, pictures, changes).items()
-            }
-    return out
+            found.append((pictures, changes))
+    return {by_path[path]: data for path, data in _patch_pictures(observations.format, found).items()}
 
 
-def _patch_pictures(format_name: str, pictures: StoredPictures, changes: Changes) -> dict[Path, bytes]:
+def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Changes]]) -> dict[Path, bytes]:
+    out: dict[Path, bytes] = {}
     if format_name == "openpose":
-        return {pictures.files[row]: patch_openpose(pictures.files[row].read_bytes(), c) for row, c in changes.items()}
-    (path,) = pictures.files
-    # A table has columns for each individual: one who was not found has the first that is free.
-    free = {row: _with_free_individuals(some, pictures.table.points.shape[1]) for row, some in changes.items()}
-    return {path: patch_deeplabcut_csv(path, free)}
+        for pictures, changes in found:
+            of_row = {pictures.files[row]: c for row, c in changes.items()}
+            out |= {path: patch_openpose(path.read_bytes(), c) for path, c in of_row.items()}
+    elif format_name == "coco":  # a file may hold several cameras
+        for path in {pictures.files[0] for pictures, _ in found}:
+            out[path] = patch_coco(path, {p.part: changes for p, changes in found if p.files[0] == path})
+    else:
+        for pictures, changes in found:
+            (path,) = pictures.files
+            # A table has columns for each individual: one who was not found has the first that is free.
+            n = pictures.table.points.shape[1]
+            out[path] = patch_deeplabcut_csv(path, {row: _with_free_individuals(c, n) for row, c in changes.items()})
+    return out
 
 
 def _with_free_individuals(some: list[tuple[int, Array]], n: int) -> list[tuple[int, Array]]:

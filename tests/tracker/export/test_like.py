@@ -20,6 +20,7 @@ from tracker.errors import FormatError, SessionError, TrackerError
 from tracker.export.keypoints import project_through_lens
 from tracker.export.like import export_like
 from tracker.formats.c3d import read_c3d
+from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
 from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.model_toml import format_model
@@ -101,8 +102,9 @@ def write_kind(kind, session, folder, truth):
     points = seen(session, [truth])
     if kind == "openpose":
         return write_openpose(folder / "k", session.camera_names, points), {}
-    if kind == "coco":
-        write_coco_images(folder / "c.json", session.camera_names, BODY_25.points, points, "scores")
+    if kind.startswith("coco"):
+        of = kind.removeprefix("coco").strip() or "scores"
+        write_coco_images(folder / "c.json", session.camera_names, BODY_25.points, points, of)
         return folder / "c.json", {}
     if kind.startswith("dlc"):
         for v, name in enumerate(session.camera_names):
@@ -245,6 +247,78 @@ def test_a_mended_frame_alone_differs_in_pictures(session, tmp_path, kind):
     differ = {name for name in before if before[name] != after[name]}
     if kind == "openpose":
         assert differ == {f"{c}/{c}_{EDITED:012d}_keypoints.json" for c in session.camera_names}
+
+
+def numbers_of(path):
+    """The images of a COCO file by id, and the annotations by the image's file name."""
+    data = json.loads(path.read_text())
+    images = {i["id"]: i for i in data["images"]}
+    return data, {
+        (images[a["image_id"]].get("camera"), images[a["image_id"]]["file_name"]): a for a in data["annotations"]
+    }
+
+
+@pytest.mark.parametrize("kind", ["coco scores", "coco cameras"])
+def test_mended_points_of_coco_alone_differ(session, tmp_path, kind):
+    bodies = poses(session)
+    truth = observed(session, bodies, np.zeros(3))
+    path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
+    store(session, bodies, joints=("left_hip",))
+    done = export_like(session, imported(session, path), tmp_path / "back.json")
+    assert done.frames == (EDITED,)
+    (one, before), (other, after) = numbers_of(path), numbers_of(tmp_path / "back.json")
+    assert {k: v for k, v in one.items() if k != "annotations"} == {
+        k: v for k, v in other.items() if k != "annotations"
+    }
+    changed = {key for key in before if before[key] != after[key]}
+    assert len(changed) == len(session.cameras)
+    assert all(f"{EDITED:06d}" in name for _, name in changed)
+    knee = BODY_25.points.index("LKnee")
+    for source in session.cameras:
+        name = source.camera.name
+        key = (name, f"{EDITED:06d}.jpg") if kind == "coco cameras" else (None, f"{name}/{EDITED:06d}.jpg")
+        old, new = (np.reshape(found[key].pop("keypoints"), (-1, 3)) for found in (before, after))
+        assert before[key] == after[key]
+        differ = {n for n, a, b in zip(BODY_25.points, old, new, strict=True) if (a != b).any()}
+        assert differ == {"LKnee", "LAnkle", "LHeel", "LBigToe"}
+        expected = project_through_lens(source.camera, truth[EDITED, knee : knee + 1])[0]
+        assert np.abs(new[knee, :2] - expected).max() < 0.1
+        assert new[knee, 2] == (2 if kind == "coco cameras" else 1)  # a flag, or a confidence
+
+
+@pytest.mark.parametrize("kind", ["coco scores", "coco cameras"])
+def test_a_person_is_added_to_coco_and_read_again(session, tmp_path, kind):
+    bodies = poses(session)
+    path, _ = write_kind(kind, session, tmp_path, observed(session, bodies, np.zeros(3)))
+    data = json.loads(path.read_text())
+    missing = next(a for a in data["annotations"] if a["image_id"] == N + EDITED + 1)  # the second camera
+    data["annotations"].remove(missing)
+    path.write_text(json.dumps(data))
+    store(session, bodies)
+    export_like(session, imported(session, path), tmp_path / "back.json")
+    _, table = read_coco(tmp_path / "back.json")[1]
+    assert table.is_found[EDITED, 0, BODY_25.points.index("LKnee")]
+    added = json.loads((tmp_path / "back.json").read_text())["annotations"][-1]
+    assert added["image_id"] == missing["image_id"]
+    assert added["num_keypoints"] == sum(v > 0 for v in added["keypoints"][2::3]) > 10
+    assert added["id"] > max(a["id"] for a in data["annotations"])
+
+
+def test_a_count_of_points_follows_those_that_are_gone(session, tmp_path):
+    bodies = poses(session)
+    path, _ = write_kind("coco cameras", session, tmp_path, observed(session, bodies, np.zeros(3)))
+    data = json.loads(path.read_text())
+    for annotation in data["annotations"]:
+        annotation["num_keypoints"] = 25
+    path.write_text(json.dumps(data))
+    away = bodies[EDITED].values.copy()
+    away[:2] += 30 * session.cameras[1].camera.T_world_camera[:2, 0]  # far to the right of that camera
+    moved = PosedBody(session.people[0].model, away)
+    store(session, [moved if k == EDITED else b for k, b in enumerate(bodies)])
+    export_like(session, imported(session, path), tmp_path / "back.json")
+    _, after = numbers_of(tmp_path / "back.json")
+    gone = after["cam1", f"{EDITED:06d}.jpg"]
+    assert gone["num_keypoints"] == sum(v > 0 for v in gone["keypoints"][2::3]) < 25
 
 
 def test_a_person_who_was_not_found_is_added(session, tmp_path):
