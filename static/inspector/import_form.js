@@ -1,6 +1,6 @@
 /** Form that imports results of other programs: paths are read and checked, shown over the pictures, then stored. */
 
-import { count } from "../widgets/text.js";
+import { capital, count } from "../widgets/text.js";
 import { textButton } from "./rows.js";
 
 /**
@@ -159,7 +159,7 @@ function describe(plan) {
     list,
     points,
     ...plan.notes.map((text) => line(`Note: ${text}.`)),
-    ...plan.problems.map((text) => line(text, "is-failed")),
+    ...plan.problems.map((text) => line(`${capital(text.replace(/\.$/, ""))}.`, "is-failed")),
     line(plan.problems.length ? "Nothing can be imported." : "The views show these points. Nothing was stored yet."),
   ];
 }
