@@ -17,6 +17,7 @@ from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
 from tracker.formats.keypoints.coco_patching import patch_coco
 from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
+from tracker.formats.keypoints.hdf5 import patch_hdf5_apart
 from tracker.formats.keypoints.openpose import patch_openpose
 from tracker.formats.points_csv import patch_points_csv
 from tracker.formats.trc import patch_trc
@@ -74,7 +75,7 @@ def export_like(
         session, observations, observed_joints(observations, cameras).joints_world, poses, learn_offsets
     )
     frames = sorted({f for person in mended for f in person.bodies})
-    if frames and observations.format not in _PATCHED:
+    if frames and observations.format not in (*_PATCHED, "hdf5"):  # of HDF5, DeepLabCut's tables are replaced
         listed = ", ".join(FORMATS[name].title for name in _PATCHED)
         raise FormatError(
             f"expected observations of a format whose points can be replaced in place ({listed}), found "
@@ -149,7 +150,8 @@ def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Chan
             (path,) = pictures.files
             # A table has columns for each individual: one who was not found has the first that is free.
             n = pictures.table.points.shape[1]
-            out[path] = patch_deeplabcut_csv(path, {row: _with_free_individuals(c, n) for row, c in changes.items()})
+            patch = patch_deeplabcut_csv if format_name == "deeplabcut" else patch_hdf5_apart
+            out[path] = patch(path, {row: _with_free_individuals(c, n) for row, c in changes.items()})
     return out
 
 

@@ -16,12 +16,13 @@ from observed_files import (
 from observed_people import BODY_25, make_session, seen, write_openpose
 
 from tracker.body.model import PosedBody
-from tracker.errors import FormatError, SessionError, TrackerError
+from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.export.keypoints import project_through_lens
 from tracker.export.like import export_like
 from tracker.formats.c3d import read_c3d
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
+from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
 from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.model_toml import format_model
 from tracker.formats.points_csv import read_points_csv
@@ -256,6 +257,38 @@ def numbers_of(path):
     return data, {
         (images[a["image_id"]].get("camera"), images[a["image_id"]]["file_name"]): a for a in data["annotations"]
     }
+
+
+@pytest.mark.slow
+def test_mended_points_of_a_table_of_pandas_alone_differ(session, tmp_path):
+    pytest.importorskip("h5py")
+    bodies = poses(session)
+    truth = observed(session, bodies, np.zeros(3))
+    path, _ = write_kind("dlc h5", session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
+    store(session, bodies, joints=("left_hip",))
+    done = export_like(session, imported(session, path), tmp_path / "back")
+    assert done.frames == (EDITED,)
+    assert len(done.changed) == len(session.cameras)
+    names, knee = BODY_25.points, BODY_25.points.index("LKnee")
+    for source in session.cameras:
+        ((_, before),), ((_, after),) = (
+            read_hdf5_apart(folder / f"{source.camera.name}.h5") for folder in (path, tmp_path / "back")
+        )
+        assert (before.names, before.numbers.tolist()) == (after.names, after.numbers.tolist())
+        differ = np.argwhere((before.points != after.points).any(axis=-1)).tolist()
+        assert {(k, names[i]) for k, _, i in differ} == {(EDITED, n) for n in ("LKnee", "LAnkle", "LHeel", "LBigToe")}
+        expected = project_through_lens(source.camera, truth[EDITED, knee : knee + 1])[0]
+        assert np.abs(after.points[EDITED, 0, knee, :2] - expected).max() < 0.1
+
+
+@pytest.mark.slow
+def test_points_of_other_hdf5_files_are_not_replaced(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "tracks.h5", "w") as file:
+        file["tracks"] = np.zeros((1, 2, 25, N))
+    with pytest.raises(FormatError, match="expected a table of DeepLabCut") as raised:
+        patch_hdf5_apart(tmp_path / "tracks.h5", {0: [(0, np.zeros((25, 3)))]})
+    assert raised.value.remedy == Remedy("export_other_format")
 
 
 @pytest.mark.parametrize("kind", ["coco scores", "coco cameras"])
