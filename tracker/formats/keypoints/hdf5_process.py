@@ -71,9 +71,7 @@ def main(path: Path, folder: Path) -> None:
         answer = ReadAnswer(tuple(VideoHead(str(video), table.names, table.notes) for video, table in found))
     except ImportError as error:
         package = {"sleap_io": "sleap-io"}.get(error.name or "", error.name or "sleap-io")
-        answer = ReadAnswer(
-            error=f"file {path} needs the package {package}, which is not installed", remedy="install_import"
-        )
+        answer = ReadAnswer(error=f"file {path} needs the package {package}, which is not installed", remedy="install")
     except TrackerError as error:
         answer = ReadAnswer(error=str(error), remedy="other format" if error.remedy else "")
     (folder / "answer.json").write_bytes(msgspec.json.encode(answer))
