@@ -58,7 +58,7 @@ class ExportArguments:
     like: OptionalName = None
     """send imported observations back in their own files; --out is a file, or the folder of several."""
     poses: Annotated[Literal["edited", "all"] | None, _choice("edited|all")] = None
-    """with --like: replace the points of frames that were edited by hand, which is the default, or of all poses."""
+    """with --like: replace the points that were edited by hand, which is the default, or those of all poses."""
     plain_joints: bool = False
     """with --like: place points at the joints of the body, not as far from them as the files usually do."""
     skip_lost: bool = False

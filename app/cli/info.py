@@ -35,12 +35,17 @@ def summarize(session: "Session") -> dict[str, Any]:
     from tracker.observations.stored import list_observations
     from tracker.session.missing_files import missing_files
     from tracker.store.annotation_store import AnnotationStore
+    from tracker.store.calibration_log import read_posed_revisions
 
     missing = missing_files(session)
     poses: dict[str, list[FrameRow]] = {p.name: [] for p in session.people}
     if session.annotations_path.exists():
         with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
             poses = {name: store.frames(name) for name in poses}
+    revisions = read_posed_revisions(session.annotations_path, list(poses))
+    outdated = {
+        name: sum(revisions.of(name, r.frame) != revisions.present for r in rows) for name, rows in poses.items()
+    }
     return {
         "name": session.name,
         "folder": str(session.folder),
@@ -69,6 +74,7 @@ def summarize(session: "Session") -> dict[str, Any]:
                 "dofs": p.model.n_dofs,
                 "poses": len(poses[p.name]),
                 "keyframes": sum(row.keyframe for row in poses[p.name]),
+                "earlier_calibration": outdated[p.name],
             }
             for p in session.people
         ],
@@ -112,7 +118,9 @@ def _format(summary: dict[str, Any]) -> str:
         lines.append(f"  camera {c['name']}: {c['size'][0]}x{c['size'][1]}, {c['footage']}{extras}{shift}{missing}")
     for p in summary["people"]:
         body = f"{p['model']} of {p['height_m']:.2f} m, {p['dofs']} degrees of freedom"
-        lines.append(f"  person {p['name']}: {body}, {p['poses']} poses, {p['keyframes']} keyframes")
+        n = p["earlier_calibration"]
+        earlier = f", {n} of an earlier calibration" if n else ""
+        lines.append(f"  person {p['name']}: {body}, {p['poses']} poses, {p['keyframes']} keyframes{earlier}")
     for o in summary["observations"]:
         if "error" in o:
             lines.append(f"warning: observations {o['name']}: {o['error']}")

@@ -100,6 +100,8 @@ def _observations(controller: Controller, _: int, message: UseObservations) -> N
         "show": lambda: observing.show(message.name),
         "judge": lambda: observing.judge(message.name),
         "take": lambda: observing.take(message.name),
+        "track": lambda: observing.track(message.name, as_evidence=True),
+        "track_contours": lambda: observing.track(message.name, as_evidence=False),
         "stop": observing.stop,
         "discard": observing.discard,
     }

@@ -8,13 +8,14 @@ from app.page.message_types import Command, Message, Name, Part
 
 
 class UseObservations(Command, frozen=True, tag="observations"):
-    """Show imported observations, judge them by the footage, take them as poses, or stop that.
+    """Show imported observations, judge them by the footage, take them as poses, track with them, or stop that.
 
     `POST observations/plan` reads files, and `POST observations/import` stores them: paths come by such requests alone.
     """
 
-    action: Literal["show", "judge", "take", "stop", "discard"]
-    """`discard` forgets files that were read and are not imported."""
+    action: Literal["show", "judge", "take", "track", "track_contours", "stop", "discard"]
+    """`track` finds who has no pose by the key points and tracks by contours and key points; `track_contours` tracks by
+    contours alone. `find_people` stops both. `discard` forgets files that were read and are not imported."""
     name: Name = ""
     """Name of the set; with `show`, empty for none."""
 

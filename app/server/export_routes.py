@@ -8,7 +8,7 @@ import asyncio
 import logging
 import tempfile
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger(__name__)
 _CHUNK_BYTES = 1 << 18
+_POSE_OPTIONS = ("frames", "only", "skip_lost")
+"""Options of all formats: which poses are exported."""
 
 
 class _StoppedError(Exception):
@@ -36,7 +38,7 @@ class _StoppedError(Exception):
 
 
 class ExportRoutes:
-    """Answers `/export`: the list of formats, the progress, and the files."""
+    """Answers `/export`: the list of formats and imported observations, the progress, and the files."""
 
     def __init__(self, folder: Path) -> None:
         """Export the session of a folder."""
@@ -50,26 +52,35 @@ class ExportRoutes:
         app.router.add_get("/export", self._list)
         app.router.add_get("/export/progress", self._progress)
         app.router.add_get("/export/{format}", self._export)
+        app.router.add_get("/export/like/{name}", self._send_back)
         app.on_shutdown.append(self._end)
 
     async def _end(self, _: web.Application) -> None:
         self._is_ending = True
 
     async def _list(self, _: web.Request) -> web.Response:
-        return web.json_response(
-            [
-                {
-                    "name": f.name,
-                    "title": f.title,
-                    "options": sorted(f.options),
-                    "axes": f.axes,
-                    "units": f.units,
-                    "holds_provenance": f.holds_provenance or f.is_folder,
-                    "numbering": f.numbering,
-                }
-                for f in FORMATS.values()
-            ]
-        )
+        formats = [
+            {
+                "name": f.name,
+                "title": f.title,
+                "options": [*_POSE_OPTIONS, *sorted(f.options)],
+                "axes": f.axes,
+                "units": f.units,
+                "holds_provenance": f.holds_provenance or f.is_folder,
+                "numbering": f.numbering,
+            }
+            for f in FORMATS.values()
+        ]
+        return web.json_response(formats + await asyncio.to_thread(self._observations))
+
+    def _observations(self) -> list[dict[str, Any]]:
+        """Return imported observations, as formats in which their files are sent back."""
+        from tracker.observations.stored import list_observations
+        from tracker.session.session import load_session
+
+        fields = {"options": ["poses"], "axes": "", "units": "", "holds_provenance": True, "numbering": ""}
+        names = list_observations(load_session(self._folder))
+        return [{"name": f"like/{quote(n)}", "title": f"{n}, as it came"} | fields for n in names]
 
     async def _progress(self, _: web.Request) -> web.Response:
         return web.json_response({"done": self._done, "total": self._total})
@@ -78,6 +89,15 @@ class ExportRoutes:
         chosen = FORMATS.get(request.match_info["format"])
         if chosen is None:
             raise web.HTTPNotFound(text=f"Expected a format of {', '.join(FORMATS)}.\n")
+        return await self._answer(request, lambda folder: self._make(chosen, request, folder))
+
+    async def _send_back(self, request: web.Request) -> web.StreamResponse:
+        """Send the files of observations as they came, with the points of mended poses."""
+        name, poses = request.match_info["name"], request.query.get("poses", "edited")
+        return await self._answer(request, lambda folder: self._make_like(name, poses, folder))
+
+    async def _answer(self, request: web.Request, make: Callable[[Path], Path]) -> web.StreamResponse:
+        """Send the file that `make` returns; it is made in a temporary folder."""
         # Without a token, an image in a foreign page could start the work, though never read the result.
         if request.headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none"):
             raise web.HTTPForbidden(text="Expected a request of this page, found one of another site.")
@@ -87,7 +107,7 @@ class ExportRoutes:
             connections.keep_open(request)
             with closing(TemporaryFolder(tempfile.gettempdir())) as folder:
                 try:
-                    made = await asyncio.to_thread(self._make, chosen, request, folder.path)
+                    made = await asyncio.to_thread(make, folder.path)
                 except TrackerError as error:
                     raise web.HTTPBadRequest(text=page_text(error)) from error
                 except _StoppedError:
@@ -131,11 +151,26 @@ class ExportRoutes:
         paths = export(chosen, motion, options, folder / f"{stem}{chosen.suffixes[0]}", tick=self._tick(request))
         if len(paths) == 1 and not chosen.is_folder:
             return paths[0]
-        archive = folder / f"{stem}_{chosen.name}.zip"
-        with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-            for path in (p for found in paths for p in (sorted(found.rglob("*")) if found.is_dir() else [found])):
-                file.write(path, path.relative_to(folder))
-        return archive
+        return _archive(paths, folder / f"{stem}_{chosen.name}.zip")
+
+    def _make_like(self, name: str, poses: str, folder: Path) -> Path:
+        """Make the file of observations to send: the one that was imported, or a ZIP archive of several.
+
+        Raises:
+            TrackerError: there are no such observations, or their points cannot be replaced.
+        """
+        from tracker.exports.like import export_like
+        from tracker.observations.stored import load_observations
+        from tracker.session.session import load_session
+
+        if poses not in ("edited", "all"):
+            raise TrackerError(f"expected poses as edited or all, found '{poses[:40]}'; reload the page")
+        session = load_session(self._folder)
+        observations = load_observations(session, name)
+        is_one = len(observations.sources) == 1
+        # A single file keeps its name below an existing folder.
+        done = export_like(session, observations, folder if is_one else folder / name, poses)  # type: ignore[arg-type]
+        return done.paths[0] if is_one else _archive([folder / name], folder / f"{name}.zip")
 
     def _tick(self, request: web.Request) -> Callable[[], None]:
         """Return what counts the progress, and stops the work when nobody waits for it."""
@@ -146,6 +181,15 @@ class ExportRoutes:
                 raise _StoppedError
 
         return tick
+
+
+def _archive(paths: Sequence[Path], archive: Path) -> Path:
+    """Pack files and folders, which lie beside the archive."""
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+        for path in (p for one in paths for p in (sorted(one.rglob("*")) if one.is_dir() else [one])):
+            if path.is_file():
+                file.write(path, path.relative_to(archive.parent))
+    return archive
 
 
 def _checked(text: str | None) -> "Checked | None":

@@ -1,6 +1,6 @@
 /** Form that imports results of other programs: paths are read and checked, shown over the pictures, then stored. */
 
-import { count } from "../widgets/text.js";
+import { capital, count } from "../widgets/text.js";
 import { textButton } from "./rows.js";
 
 /**
@@ -30,7 +30,7 @@ export function importForm(store, paths, discard) {
   const people = Object.assign(document.createElement("label"), { className: "import-field", title: "Person of whom they are" });
   const person = Object.assign(document.createElement("select"), { name: "person" });
   people.append(span("Person"), person);
-  const check = Object.assign(document.createElement("button"), { type: "submit", textContent: "Check the files", title: "Read and check the files, and show their points over the pictures; nothing is stored" });
+  const check = Object.assign(document.createElement("button"), { type: "submit", textContent: "Check", title: "Read and check the files, and show their points over the pictures; nothing is stored" });
   const take = textButton("Import", "Store these files with the session", () => void store_());
   take.className = "is-primary";
   const cancel = textButton("Cancel", "Forget these files", () => reset());
@@ -159,7 +159,7 @@ function describe(plan) {
     list,
     points,
     ...plan.notes.map((text) => line(`Note: ${text}.`)),
-    ...plan.problems.map((text) => line(text, "is-failed")),
+    ...plan.problems.map((text) => line(`${capital(text.replace(/\.$/, ""))}.`, "is-failed")),
     line(plan.problems.length ? "Nothing can be imported." : "The views show these points. Nothing was stored yet."),
   ];
 }
@@ -171,7 +171,7 @@ function describe(plan) {
  */
 function field(name, text, title) {
   const label = Object.assign(document.createElement("label"), { className: "import-field", title });
-  const input = Object.assign(document.createElement("input"), { type: "text", name, autocomplete: "off", spellcheck: false, id: `import-${name}` });
+  const input = Object.assign(document.createElement("input"), { type: "text", className: "query-field", name, autocomplete: "off", spellcheck: false, id: `import-${name}` });
   const holder = Object.assign(document.createElement("span"), { className: "path-field" });
   holder.append(input);
   label.append(span(text), holder);

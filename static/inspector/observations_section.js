@@ -39,7 +39,13 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   const take = textButton("Take as poses", "Store them as poses that can be corrected; keyframes stay, and undo takes them back", () => act("take", current()));
   const report = textButton("Write report", "Save the judgement as one HTML file with pictures of the worst frames", () => void writeReport());
   const buttons = group(judge, take, report);
-  const stop = textButton("Stop", "Stop this work; nothing is changed", () => act("stop"));
+  const evidence = document.createElement("select");
+  evidence.title = "Evidence of the run. For poses by the key points alone, take them as poses";
+  evidence.setAttribute("aria-label", "Evidence");
+  evidence.append(new Option("contours and points", "track"), new Option("contours alone", "track_contours"));
+  const track = textButton("Track by", "Find who has no pose by these points, acquire their sizes, and track everybody on all frames; one step to undo", () => startTrack());
+  const tracking = group(track, evidence);
+  const stop = textButton("Stop", "Stop this work", () => (found()?.running ? act("stop") : send({ type: "find_people", action: "stop" })));
   const progress = document.createElement("progress");
   const work = group(progress, stop);
   const status = note();
@@ -53,7 +59,14 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   const form = importForm(store, sessions, () => act("discard"));
   const body = document.createElement("div");
   body.className = "acquisition";
-  body.append(none, list, buttons, work, status, verdict, worst, more, form.element);
+  body.append(none, list, buttons, tracking, work, status, verdict, worst, more, form.element);
+
+  /** Whether the last search for people was begun here. */
+  let isTracking = false;
+  const startTrack = () => {
+    isTracking = true;
+    act(/** @type {Action} */ (evidence.value), current());
+  };
 
   let listed = FEW_LISTED;
   let at = -1;
@@ -62,15 +75,22 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   /** @type {JudgedLimb | null} the entry whose joint is zoomed to once its frame is drawn */
   let zoom = null;
 
-  const writeReport = async () => {
-    report.disabled = true;
+  /**
+   * @param {string} address of a file
+   * @param {string} what it is, to begin a sentence
+   */
+  const save = async (address, what) => {
     try {
-      const name = await download("observations/report");
+      const name = await download(address);
       notify({ type: "notice", level: "info", text: `Saved ${name}.` });
     } catch (error) {
       const reason = error instanceof TypeError ? "the program cannot be reached" : String(/** @type {Error} */ (error).message);
-      notify({ type: "notice", level: "error", text: `The report failed: ${reason}` });
+      notify({ type: "notice", level: "error", text: `${what} failed: ${reason}` });
     }
+  };
+  const writeReport = async () => {
+    report.disabled = true;
+    await save("observations/report", "The report");
     report.disabled = false;
   };
 
@@ -102,7 +122,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     zoom = null;
   };
 
-  const showSets = (/** @type {Observations} */ { sets, shown, running }) => {
+  const showSets = (/** @type {Observations} */ { sets, shown }) => {
     none.hidden = sets.length > 0;
     list.replaceChildren(
       ...sets.map((set) => {
@@ -119,8 +139,19 @@ export function observationsSection({ store, send, notify, navigation, actions, 
         return row;
       }),
     );
-    buttons.hidden = !current() || running;
-    work.hidden = !running;
+  };
+
+  /** Show the work that is under way, or how the last one ended. */
+  const showWork = (/** @type {Observations} */ now) => {
+    const { finding } = store.facts;
+    const search = isTracking && !now.running && finding ? finding : now;
+    const isSearching = finding?.running ?? false;
+    buttons.hidden = tracking.hidden = !current() || now.running || isSearching;
+    work.hidden = !search.running;
+    progress.value = search.share;
+    status.textContent = search.running ? `${capital(search.stage)} …` : search.message;
+    status.hidden = !status.textContent;
+    status.classList.toggle("is-failed", search.failed);
   };
 
   const showWorst = () => {
@@ -152,10 +183,8 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     const now = found();
     if (!now) return;
     showSets(now);
-    progress.value = now.share;
-    status.textContent = now.running ? `${capital(now.stage)} …` : now.message;
-    status.hidden = !status.textContent;
-    status.classList.toggle("is-failed", now.failed);
+    if (now.running) isTracking = false;
+    showWork(now);
     report.hidden = !now.judged;
     verdict.replaceChildren(...now.people.flatMap((person) => describe(person, now)));
     const news = JSON.stringify(now.worst);
@@ -175,11 +204,12 @@ export function observationsSection({ store, send, notify, navigation, actions, 
     body,
     update(changed) {
       if (changed.has("observations") || changed.has("session")) showAll();
+      else if (changed.has("finding") && found()) showWork(/** @type {Observations} */ (found()));
       if (changed.has("overlay") || changed.has("target")) zoomNow();
     },
     bindings(reveal) {
       const noSet = () => (current() ? null : NO_SET);
-      const busy = () => (found()?.running ? "Work on observations is under way." : noSet());
+      const busy = () => (found()?.running ? "Work on observations is under way." : store.facts.finding?.running ? "A search for people is under way." : noSet());
       const noEntry = () => (found()?.worst.length ? null : found()?.judged ? "No imported limb is off." : "Nothing was judged. Judge the observations first.");
       const step = (/** @type {1 | -1} */ way) => visit(Math.max(0, Math.min((found()?.worst.length ?? 0) - 1, at + way)));
       const command = (/** @type {string} */ label, /** @type {string} */ words, /** @type {() => string | null} */ why, /** @type {() => void} */ run) => ({
@@ -207,6 +237,8 @@ export function observationsSection({ store, send, notify, navigation, actions, 
         command("Show imported points (toggle)", "layer key points", noSet, () => show(current())),
         command("Judge the observations by the footage", "wrong off worst", busy, () => act("judge", current())),
         command("Take the observations as poses", "store mend correct", busy, () => act("take", current())),
+        command("Track with the observations", "contours evidence find people", busy, startTrack),
+        command("Send the observations back as they came", "export save file mended", noSet, () => void save(`export/like/${encodeURIComponent(current())}`, "The export")),
         command("Write the report of the judgement", "html save file", () => (found()?.judged ? null : "Nothing was judged. Judge the observations first."), () => void writeReport()),
         command("Import observations…", "key points joints files openpose trc", () => null, form.open),
       ];

@@ -94,8 +94,8 @@
  * @typedef {{type: "find_people", action: "start" | "stop"}} FindPeople
  * @typedef {{type: "calibration_check", action: "start" | "stop" | "preview" | "leave" | "apply" | "track_again"}}
  *   CheckCalibration
- * @typedef {{type: "observations", action: "show" | "judge" | "take" | "stop" | "discard", name?: string}}
- *   UseObservations
+ * @typedef {{type: "observations", action: "show" | "judge" | "take" | "track" | "track_contours" | "stop" | "discard",
+ *   name?: string}} UseObservations
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo

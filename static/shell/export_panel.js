@@ -68,12 +68,14 @@ export class ExportPanel {
 
   /** Fill the choices of the session, and the marked range. */
   async #fill() {
-    if (!this.#formats.length) {
-      const answer = await fetch("export");
-      if (!answer.ok) throw new Error(`status ${answer.status}`);
-      this.#formats = await answer.json();
-      this.#format.replaceChildren(...this.#formats.map(({ name, title }) => new Option(capital(title), name)));
-    }
+    const answer = await fetch("export");
+    if (!answer.ok) throw new Error(`status ${answer.status}`);
+    this.#formats = await answer.json();
+    const isSent = (/** @type {Format} */ { name }) => name.startsWith("like/");
+    const sent = Object.assign(document.createElement("optgroup"), { label: "Imported observations" });
+    sent.append(...this.#formats.filter(isSent).map(({ name, title }) => new Option(title, name)));
+    const formats = this.#formats.filter((one) => !isSent(one)).map(({ name, title }) => new Option(capital(title), name));
+    choices(this.#format, sent.children.length ? [...formats, sent] : formats);
     const { session, range } = this.#store.facts;
     const people = session?.people.map(({ name }) => new Option(name, name)) ?? [];
     const cameras = session?.cameras.map(({ name }) => new Option(name, name)) ?? [];
@@ -87,13 +89,13 @@ export class ExportPanel {
   #show() {
     const format = this.#chosen;
     const has = new Set(format?.options);
-    if ((this.#store.facts.session?.people.length ?? 0) > 1) has.add("person");
+    if (has.has("only") && (this.#store.facts.session?.people.length ?? 0) > 1) has.add("person");
     if (format && !format.holds_provenance) has.add("provenance");
     for (const part of this.#panel.querySelectorAll("[data-option]")) {
       if (part instanceof HTMLElement) part.hidden = !has.has(part.dataset.option ?? "");
     }
-    byId("export-axes", HTMLSelectElement).value = format?.axes ?? "calibration";
-    byId("export-units", HTMLSelectElement).value = format?.units ?? "m";
+    byId("export-axes", HTMLSelectElement).value = format?.axes || "calibration";
+    byId("export-units", HTMLSelectElement).value = format?.units || "m";
     this.#showNumbering();
   }
 
@@ -115,7 +117,7 @@ export class ExportPanel {
       if (field instanceof HTMLSelectElement && !field.hidden && field.value) words.set(field.dataset.option ?? "", field.value);
     }
     const text = this.#frames.value.trim();
-    if (text) {
+    if (text && !this.#frames.hidden) {
       const last = (this.#store.facts.session?.n_frames ?? 1) - 1;
       const frames = framesOf(text, last);
       if (frames === null) {
@@ -124,9 +126,7 @@ export class ExportPanel {
       }
       words.set("frames", frames);
     }
-    const only = byId("export-only", HTMLSelectElement).value;
-    if (only) words.set("only", only);
-    if (byId("export-skip-lost", HTMLInputElement).checked) words.set("skip_lost", "1");
+    if (this.#chosen?.options.includes("skip_lost") && byId("export-skip-lost", HTMLInputElement).checked) words.set("skip_lost", "1");
     if (!this.#chosen?.holds_provenance && byId("export-provenance", HTMLInputElement).checked) words.set("provenance", "1");
     return `export/${this.#format.value}?${words}`;
   }
@@ -199,12 +199,12 @@ export class ExportPanel {
  * Replace the options of a select, and keep what was chosen if it is still there.
  *
  * @param {HTMLSelectElement} select
- * @param {HTMLOptionElement[]} options
+ * @param {(HTMLOptionElement | HTMLOptGroupElement)[]} options
  */
 function choices(select, options) {
   const chosen = select.value;
   select.replaceChildren(...options);
-  if (options.some(({ value }) => value === chosen)) select.value = chosen;
+  if ([...select.options].some(({ value }) => value === chosen)) select.value = chosen;
 }
 
 /**

@@ -109,9 +109,9 @@ READY = "window.quadrille?.state.overlay && quadrille.state.state?.cost_px !== n
 
 
 @contextlib.asynccontextmanager
-async def started(session: Path, *options: str) -> AsyncIterator[Program]:
+async def started(session: Path, *options: str, has_token: bool = False) -> AsyncIterator[Program]:
     """A running program, killed in the end."""
-    program = Program(session, *options)
+    program = Program(session, *options, has_token=has_token)
     try:
         await program.start()
         yield program
@@ -133,6 +133,7 @@ async def visited(browser, address, size=(1280, 720), viser=False):
         if not viser:
             await page.add_init_script(WITHOUT_3D)
         await page.goto(address, timeout=120_000)
+        await page.wait_for_url(lambda url: "token" not in url)  # the page leaves it in a cookie
         await shows(page, READY, 180)
         if viser:
             await page.evaluate(AT_REST)

@@ -15,7 +15,9 @@ from tracker.exports.keypoints import project_through_lens
 from tracker.exports.mended_points import MendedPoints, PoseChoice, mended_points
 from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
+from tracker.formats.keypoints.coco_patching import patch_coco
 from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
+from tracker.formats.keypoints.hdf5 import patch_hdf5_apart
 from tracker.formats.keypoints.openpose import patch_openpose
 from tracker.formats.points_csv import patch_points_csv
 from tracker.formats.trc import patch_trc
@@ -60,7 +62,7 @@ def export_like(
         session: its stored poses.
         observations: imported ones.
         out: file to write, or the folder of several files; it must not exist.
-        poses: replace the frames that a person edited, or all that have a pose.
+        poses: replace the points that a person edited, or those of all poses.
         learn_offsets: place points as far from the joints as the files usually do.
 
     Raises:
@@ -73,7 +75,7 @@ def export_like(
         session, observations, observed_joints(observations, cameras).joints_world, poses, learn_offsets
     )
     frames = sorted({f for person in mended for f in person.bodies})
-    if frames and observations.format not in _PATCHED:
+    if frames and observations.format not in (*_PATCHED, "hdf5"):  # of HDF5, DeepLabCut's tables are replaced
         listed = ", ".join(FORMATS[name].title for name in _PATCHED)
         raise FormatError(
             f"expected observations of a format whose points can be replaced in place ({listed}), found "
@@ -89,7 +91,7 @@ def export_like(
     return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames))
 
 
-_PATCHED = ("openpose", "deeplabcut", "trc", "csv", "c3d")
+_PATCHED = ("openpose", "coco", "deeplabcut", "trc", "csv", "c3d")
 
 
 def _stored_contents(session: Session, observations: ObservationSet) -> Files:
@@ -116,7 +118,7 @@ def _mended_pictures(session: Session, observations: ObservationSet, mended: Seq
     detections = triangulate_observations(observations, cameras).detections
     size, names = picture_size(observations), [c.name for c in cameras]
     by_path = {source_path(session, observations.name, s): s.path for s in observations.sources}
-    out: Files = {}
+    found: list[tuple[StoredPictures, Changes]] = []
     for pictures in stored_pictures(session, observations):
         view = names.index(pictures.camera)
         changes: Changes = {}
@@ -130,19 +132,27 @@ def _mended_pictures(session: Session, observations: ObservationSet, mended: Seq
                     if detection >= 0 or (values[:, 2] > 0).any():  # nobody is added who is not in the picture
                         changes.setdefault(row, []).append((detection, values))
         if changes:
-            out |= {
-                by_path[path]: data for path, data in _patch_pictures(observations.format, pictures, changes).items()
-            }
-    return out
+            found.append((pictures, changes))
+    return {by_path[path]: data for path, data in _patch_pictures(observations.format, found).items()}
 
 
-def _patch_pictures(format_name: str, pictures: StoredPictures, changes: Changes) -> dict[Path, bytes]:
+def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Changes]]) -> dict[Path, bytes]:
+    out: dict[Path, bytes] = {}
     if format_name == "openpose":
-        return {pictures.files[row]: patch_openpose(pictures.files[row].read_bytes(), c) for row, c in changes.items()}
-    (path,) = pictures.files
-    # A table has columns for each individual: one who was not found has the first that is free.
-    free = {row: _with_free_individuals(some, pictures.table.points.shape[1]) for row, some in changes.items()}
-    return {path: patch_deeplabcut_csv(path, free)}
+        for pictures, changes in found:
+            of_row = {pictures.files[row]: c for row, c in changes.items()}
+            out |= {path: patch_openpose(path.read_bytes(), c) for path, c in of_row.items()}
+    elif format_name == "coco":  # a file may hold several cameras
+        for path in {pictures.files[0] for pictures, _ in found}:
+            out[path] = patch_coco(path, {p.part: changes for p, changes in found if p.files[0] == path})
+    else:
+        for pictures, changes in found:
+            (path,) = pictures.files
+            # A table has columns for each individual: one who was not found has the first that is free.
+            n = pictures.table.points.shape[1]
+            patch = patch_deeplabcut_csv if format_name == "deeplabcut" else patch_hdf5_apart
+            out[path] = patch(path, {row: _with_free_individuals(c, n) for row, c in changes.items()})
+    return out
 
 
 def _with_free_individuals(some: list[tuple[int, Array]], n: int) -> list[tuple[int, Array]]:
@@ -164,6 +174,7 @@ def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Arra
         near = {f: b.values for f, b in person.all_bodies.items() if abs(f - frame) <= 2 and b.model is body.model}
         body = PosedBody(body.model, body.values, velocity(body.model, near, frame)).ahead(ahead)
     points = person.points_world(body)
+    points[~person.replaced[frame]] = np.nan
     known = np.asarray(np.isfinite(points).all(axis=-1))
     px = np.full((len(points), 2), np.nan)
     px[known] = project_through_lens(source.camera, points[known])
@@ -205,6 +216,7 @@ def _rows(nearest: IntArray, row_frames: Array, person: MendedPoints) -> dict[in
         if at != frame and other in person.bodies:
             share = abs(at - frame)
             points = (1 - share) * points + share * person.points_world(person.bodies[other])
+        points[~person.replaced[frame]] = np.nan
         out[row] = points
     return out
 

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, Mask
 from tracker.observations.observed import ObservationSet
 from tracker.session.session import Session
 from tracker.store.records import SOURCES
@@ -30,6 +30,8 @@ class MendedPoints:
 
     bodies: Mapping[int, PosedBody]
     """The body by frame, of the frames whose points are replaced."""
+    replaced: Mapping[int, Mask]
+    """Whether each point is replaced, (n_points,), on each of these frames."""
     all_bodies: Mapping[int, PosedBody]
     """The body by frame, of all frames with a pose."""
     counterparts: Sequence[tuple[str, ...]]
@@ -56,7 +58,7 @@ def mended_points(
         session: its stored poses.
         observations: of whose points.
         joints_world: the observed joints, (n_frames, n_people, n_points, 3), metres.
-        poses: replace the frames that a person edited, or all that have a pose.
+        poses: replace the points that move with a value that a person edited, or those of all poses.
         learn_offsets: place points as far from the joints as the files usually do.
     """
     counterparts = tuple(observations.counterparts.values())
@@ -70,13 +72,26 @@ def mended_points(
         offsets = np.zeros((len(counterparts), 3))
         if learn_offsets:
             offsets = _offsets(others, joints_world[:, k], counterparts)
-        chosen = {f: p.body for f, p in inside.items() if poses == "all" or f in edited}
-        out.append(MendedPoints(chosen, {f: p.body for f, p in inside.items()}, counterparts, offsets))
+        chosen = {f: p for f, p in inside.items() if poses == "all" or f in edited}
+        every = np.ones(len(counterparts), np.bool_)
+        replaced = {f: every if poses == "all" else _edited_points(p, counterparts) for f, p in chosen.items()}
+        bodies = {f: p.body for f, p in inside.items()}
+        out.append(MendedPoints({f: bodies[f] for f in chosen}, replaced, bodies, counterparts, offsets))
     return out
 
 
 def _is_edited(pose: StoredPose) -> bool:
     return pose.record.keyframe and SOURCES.index(pose.source) < min(SOURCES.index(s) for s in _BY_PROGRAMS)
+
+
+def _edited_points(pose: StoredPose, counterparts: Sequence[tuple[str, ...]]) -> Mask:
+    """Return which points move with a value that a person edited, (n_points,)."""
+    model, first = pose.body.model, min(SOURCES.index(s) for s in _BY_PROGRAMS)
+    is_edited = np.array([SOURCES.index(s) < first for s in pose.record.sources])
+    edited_dofs = is_edited[model.dof_value]  # the values of a quaternion are edited together
+    is_moved = model.moves[edited_dofs].any(axis=0)[model.proximal_parts]
+    moved = {name for name, moves in zip(model.point_names, is_moved, strict=True) if moves}
+    return np.array([any(p in moved for p in points) for points in counterparts])
 
 
 def _offsets(bodies: Mapping[int, PosedBody], joints_world: Array, counterparts: Sequence[tuple[str, ...]]) -> Array:

@@ -23,6 +23,8 @@ class StoredPictures(NamedTuple):
     """Their content, in the pixels of the file."""
     frames: IntArray
     """Frame of the session of each picture, (n,)."""
+    part: int
+    """Number of this camera among those that the files hold."""
 
 
 def stored_pictures(session: Session, observations: ObservationSet) -> list[StoredPictures]:
@@ -40,9 +42,10 @@ def stored_pictures(session: Session, observations: ObservationSet) -> list[Stor
     tables = {name: table for name, (_, table) in zip(cameras, groups, strict=True) if name}
     first = dict(observations.options).get("first_frame")
     frames, _, _ = place_pictures(tables, session, None if first is None else int(first))
+    first_files = [group.files[0] for group, _ in groups]
     return [
-        StoredPictures(name, group.files, table, frames[name])
-        for name, (group, table) in zip(cameras, groups, strict=True)
+        StoredPictures(name, group.files, table, frames[name], first_files[:i].count(group.files[0]))
+        for i, (name, (group, table)) in enumerate(zip(cameras, groups, strict=True))
         if name
     ]
 

@@ -22,7 +22,8 @@ from tracker.formats.model_toml import format_model
 from tracker.initialization.first_pose import FirstPoses
 from tracker.pipeline.body_acquisition import SIZES_EDITS, resized_start, with_sizes_changed
 from tracker.pipeline.chain import ChainPlan, Sink, run_chain, unplaced
-from tracker.pipeline.find_people import AXES, axes_record, first_record
+from tracker.pipeline.find_people import AXES, FindSettings, axes_record, first_record
+from tracker.pipeline.keypoint_evidence import read_points, stored_seen_bodies, with_keypoints
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.pipeline.track_session import Step, TrackSession
 from tracker.session.session import Session, save_model
@@ -65,11 +66,14 @@ class FindingPeople:
         frame, axes = _axes(session_state.saver.setting(AXES))
         session_state.set(finding=FindState(frame=frame, axes=axes))
 
-    def start(self, acquire: bool = True) -> None:
-        """Begin to find the people who have no pose.
+    def start(self, acquire: bool = True, of: str | None = None, as_evidence: bool = False) -> None:
+        """Begin to find the people who have no pose, and track everybody.
 
         Args:
-            acquire: whether their sizes are acquired from the contours.
+            acquire: whether sizes of those who are found are acquired from the contours.
+            of: observations whose key points show the first poses; everybody may be placed already then. None for
+                silhouettes.
+            as_evidence: whether these key points are evidence of the run, too.
 
         Raises:
             TrackerError: a search for people is at work, or everybody is placed.
@@ -81,7 +85,7 @@ class FindingPeople:
                     "expected no other search for people at work, found one; stop it or wait for its end"
                 )
             people = unplaced(self, range(len(session_state.present)))
-            if not people:
+            if not people and of is None:
                 raise TrackerError(
                     "expected a person without a pose, found that all are placed; track from here (T), or clear a "
                     "person's frames first"
@@ -93,8 +97,11 @@ class FindingPeople:
             session_state.set(finding=finding)
             self._shown, self._first_tried, self._edit = session_state.state.frame, None, None
         self._stopping.clear()
-        sized = people if acquire else ()
-        self._thread = threading.Thread(target=self._work, args=(sized,), name="find people", daemon=True)
+        settings = track_settings.of_run(session_state.state.settings, session_state.state.run_choices)
+        everybody, frames = tuple(range(len(session_state.present))), range(session_state.session.n_frames)
+        track = TrackPlan(frames, everybody, settings, keypoints=of if as_evidence else None)
+        plan = ChainPlan(track, FindSettings(keypoints=of), people if acquire else ())
+        self._thread = threading.Thread(target=self._work, args=(plan,), name="find people", daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -105,12 +112,9 @@ class FindingPeople:
         if self._thread is not None:
             self._thread.join(30)
 
-    def _work(self, acquire: tuple[int, ...]) -> None:
-        session, state = self._session_state.session, self._session_state.state
-        settings = track_settings.of_run(state.settings, state.run_choices)
-        plan = TrackPlan(range(session.n_frames), tuple(range(len(session.people))), settings)
+    def _work(self, plan: ChainPlan) -> None:
         try:
-            run_chain(ChainPlan(plan, acquire=acquire), self, self)
+            run_chain(plan, self, self)
             self._set(running=False, message="Done.")
         except _StoppedError:
             message = "Stopped; nothing was changed." if self._edit is None else "Stopped; what was found stays."
@@ -287,13 +291,17 @@ class FindingPeople:
     def track(self, plan: TrackPlan, sink: Sink) -> TrackPlan:
         """See `OpenSession.track`. The run can be paused; it is shown like any other, so that the sink gets no step."""
         assert plan.start is not None
-        ended, outcome = threading.Event(), list[bool]()
+        ended, outcome, observer = threading.Event(), list[bool](), self._tracking.observer()
+        if plan.keypoints is not None:
+            saver: Any = self._session_state.saver  # reads settings as the store does
+            seen = stored_seen_bodies(self.session, saver, plan.keypoints)
+            observer = with_keypoints(self.session, observer, read_points(self.session, plan.keypoints), seen)
 
         def on_end(is_done: bool) -> None:
             outcome.append(is_done)
             ended.set()
 
-        self._tracking.start_outward(plan.start, plan.people, self._entry(), on_end)
+        self._tracking.start_outward(plan.start, plan.people, self._entry(), on_end, observer=observer)
         ended.wait()
         if not outcome[0]:
             raise _StoppedError

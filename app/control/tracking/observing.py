@@ -78,6 +78,21 @@ class Observing:
         """
         self._begin(name, self._take)
 
+    def track(self, name: str, as_evidence: bool) -> None:
+        """Begin to find who has no pose by the key points of a set, and to track everybody; `FindingPeople` does it.
+
+        Args:
+            name: of the set, which is shown.
+            as_evidence: whether the key points are evidence of the run, beside the contours.
+
+        Raises:
+            TrackerError: other work is under way, or the set cannot be read.
+        """
+        with self._session_state.lock:
+            shown = self._free_to_use(name)
+            self._finding.start(of=name, as_evidence=as_evidence)
+            self._set(shown=shown, plan=None, message="", failed=False)
+
     def stop(self) -> None:
         """Stop the work; nothing of it is stored. The caller must not hold the lock."""
         self._stopping.set()
@@ -118,15 +133,23 @@ class Observing:
 
     def _begin(self, name: str, work: Callable[[str], str]) -> None:
         with self._session_state.lock:
-            if self._session_state.state.observations.running:
-                raise TrackerError(
-                    "expected no other work on observations under way, found some; stop it or wait for its end"
-                )
-            shown = load_observations(self._session_state.session, name)
+            shown = self._free_to_use(name)
             self._set(shown=shown, plan=None, running=True, stage="starting", share=0.0, message="", failed=False)
         self._stopping.clear()
         self._thread = threading.Thread(target=self._work, args=(name, work), name="observations", daemon=True)
         self._thread.start()
+
+    def _free_to_use(self, name: str) -> ObservationSet:
+        """Return a set of which no work is under way.
+
+        Raises:
+            TrackerError: some is, or it cannot be read.
+        """
+        if self._session_state.state.observations.running:
+            raise TrackerError(
+                "expected no other work on observations under way, found some; stop it or wait for its end"
+            )
+        return load_observations(self._session_state.session, name)
 
     def _work(self, name: str, work: Callable[[str], str]) -> None:
         try:

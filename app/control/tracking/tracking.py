@@ -114,7 +114,7 @@ class Tracking:
             shown = self._session_state.state.people
             frames = self._frames(backward, until, from_shown or any(shown[i].source is None for i in people))
             run = TrackingRun(
-                self._observer(),
+                self.observer(),
                 self._subjects(people, frames),
                 self._session_state.present_poses(),
                 frames,
@@ -130,6 +130,7 @@ class Tracking:
         edit: int | None,
         on_end: Callable[[bool], None],
         within: range | None = None,
+        observer: Observer | None = None,
     ) -> None:
         """Begin a run over all frames, or some, that goes out from the poses of one frame in both directions.
 
@@ -139,6 +140,7 @@ class Tracking:
             edit: entry of the history that the run belongs to; None for one of its own.
             on_end: called at the end with whether the run did all its work; must return quickly.
             within: frames that it may track; None for all.
+            observer: `observer` with more evidence; None without.
         """
         session_state = self._session_state
         with self._activities.editing():
@@ -146,7 +148,8 @@ class Tracking:
             stride = session_state.state.run_choices.stride
             every = range(session_state.session.n_frames) if within is None else within
             frames = range(start - (start - every.start) // stride * stride, every.stop, stride)
-            observer, subjects, poses = self._observer(), self._subjects(people, frames), session_state.present_poses()
+            subjects, poses = self._subjects(people, frames), session_state.present_poses()
+            observer = observer or self.observer()
             trusted: Status = "good"
             known = TrackedFrame(start, tuple(poses), (trusted,) * len(poses))
             legs = [
@@ -250,7 +253,7 @@ class Tracking:
                 self.flush()
                 self._session_state.show_frame(at)
 
-    def _observer(self) -> Observer:
+    def observer(self) -> Observer:
         """Return the observer of the chosen cameras."""
         observer, cameras = self._session_state.frames.observer, self._session_state.state.run_choices.cameras
         chosen = [i for i, c in enumerate(observer.cameras) if c.camera.name in cameras]

@@ -10,6 +10,7 @@ import zipfile
 import aiohttp
 import pytest
 from bodies import MODELS
+from observed_people import BODY_25, seen, walking, write_openpose
 from serving import listening
 from stored_motions import store_motion
 
@@ -19,6 +20,10 @@ from app.server.export_routes import ExportRoutes
 from app.server.static_files import static_folder
 from tracker.exports import formats
 from tracker.exports.export_format import ExportFormat
+from tracker.formats.trc import write_trc
+from tracker.observations.importing import plan_import, store_import
+from tracker.observations.request import ImportRequest
+from tracker.session.session import load_session
 
 
 class Nobody:
@@ -50,6 +55,7 @@ async def test_files_are_made_sent_and_deleted(client, temporary):
     async with client.get("/export") as response:
         listed = await response.json()
     assert [f["name"] for f in listed] == list(formats.FORMATS)
+    assert all({"frames", "only", "skip_lost"} <= set(f["options"]) for f in listed)
     assert {f["name"]: f["axes"] for f in listed}["bvh"] == "y-up"
     assert {f["name"] for f in listed if "Frame# {number}" in f["numbering"]} == {"trc"}
     async with client.get("/export/trc?person=ann&frames=1:5&axes=y-up&units=mm") as response:
@@ -73,9 +79,43 @@ async def test_files_are_made_sent_and_deleted(client, temporary):
     assert list(temporary.iterdir()) == []
 
 
+async def test_observations_are_sent_back_in_their_own_files(client, temporary, tmp_path):
+    session = load_session(tmp_path / "dance")
+    points = seen(session, [walking(session.n_frames)])
+    folder = write_openpose(tmp_path / "net", session.camera_names, points)
+    track = tmp_path / "net.trc"
+    write_trc(track, BODY_25.points, walking(session.n_frames), session.fps)
+    for name, path in (("net", folder), ("joints", track)):
+        store_import(session, plan_import(session, ImportRequest(name, (path,), ("ann",))))
+    async with client.get("/export") as response:
+        sent = [f for f in await response.json() if f["name"] not in formats.FORMATS]
+    assert [(f["name"], f["title"], f["options"]) for f in sent] == [
+        ("like/joints", "joints, as it came", ["poses"]), ("like/net", "net, as it came", ["poses"])
+    ]  # fmt: skip
+    async with client.get("/export/like/net") as response:
+        assert response.headers["Content-Disposition"] == "attachment; filename*=UTF-8''net.zip"
+        archive = zipfile.ZipFile(io.BytesIO(await response.read()))
+    came = {f"net/{p.relative_to(folder)}": p.read_bytes() for p in folder.rglob("*.json")}
+    assert set(archive.namelist()) == came.keys()
+    changed = {n for n in came if archive.read(n) != came[n]}
+    assert changed == {f"net/{c}/{c}_000000000001_keypoints.json" for c in session.camera_names}  # the keyframe
+    async with client.get("/export/like/joints") as response:
+        assert response.headers["Content-Disposition"] == "attachment; filename*=UTF-8''net.trc"
+        edited = await response.read()
+    async with client.get("/export/like/joints?poses=all") as response:
+        replaced = await response.read()
+    before = track.read_bytes().split(b"\n")
+    differ = [sum(a != b for a, b in zip(before, now.split(b"\n"), strict=True)) for now in (edited, replaced)]
+    assert differ == [1, session.n_frames - 1]  # frame 3 has no pose
+    assert list(temporary.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("path", "status", "expected"),
     [
+        ("like/none", 400, "expected the name of imported observations, found 'none'"),
+        ("like/..%2F..%2Fetc", 400, "expected the name of imported observations"),
+        ("like/none?poses=best", 400, "expected poses as edited or all, found 'best'"),
         ("mp4?character=%2Fetc%2Fbody.toml", 400, "expected a character among"),
         ("fbx", 404, "Expected a format of trc, csv"),
         ("..%2F..%2Fetc%2Fpasswd", 404, "Expected a format"),
@@ -97,10 +137,11 @@ async def test_wrong_requests_are_answered_with_the_reason(client, temporary, pa
 
 
 async def test_strangers_and_foreign_pages_get_nothing(client):
-    async with client.get("/export/trc", headers={"Sec-Fetch-Site": "cross-site"}) as response:
-        assert response.status == 403
+    for path in ("/export/trc", "/export/like/net"):
+        async with client.get(path, headers={"Sec-Fetch-Site": "cross-site"}) as response:
+            assert response.status == 403
     client.cookie_jar.clear()
-    for path in ("/export", "/export/progress", "/export/trc"):
+    for path in ("/export", "/export/progress", "/export/trc", "/export/like/net"):
         async with client.get(path) as response:
             assert response.status == 403
 

@@ -9,12 +9,16 @@ import tracker.exports.formats
 
 FORMATS = [
     {
-        "name": name, "title": format.title, "options": options, "axes": format.axes,
+        "name": name, "title": format.title, "options": ["frames", "only", "skip_lost", *options], "axes": format.axes,
         "units": format.units, "holds_provenance": format.holds_provenance, "numbering": format.numbering,
     }
     for name, options in (("trc", ["axes", "units"]), ("bvh", ["axes", "units"]), ("mp4", ["view"]))
     for format in [tracker.exports.formats.FORMATS[name]]
 ]  # fmt: skip
+SENT_BACK = {
+    "name": "like/mp", "title": "mp, as it came", "options": ["poses"], "axes": "", "units": "",
+    "holds_provenance": True, "numbering": "",
+}  # fmt: skip
 
 
 @pytest.mark.endpoint(n_people=2)
@@ -24,7 +28,7 @@ async def test_a_format_is_chosen_and_its_file_downloaded(fresh_page):
     async def answer(route):
         asked.append(route.request.url.partition("/export")[2])
         if asked[-1] == "":
-            await route.fulfill(body=json.dumps(FORMATS), content_type="application/json")
+            await route.fulfill(body=json.dumps([*FORMATS, SENT_BACK]), content_type="application/json")
         elif asked[-1].startswith("/bvh"):
             await route.fulfill(status=400, body="expected poses of 'person 1', found none")
         else:
@@ -72,5 +76,12 @@ async def test_a_format_is_chosen_and_its_file_downloaded(fresh_page):
     async with page.expect_download() as download:
         await page.click("#export-start")
     assert (await download.value).suggested_filename == "my dance.mp4"
-    assert "/mp4?person=person+1&frames=3%2C7%2C12&only=reviewed&skip_lost=1&provenance=1" in asked
+    assert "/mp4?person=person+1&only=reviewed&frames=3%2C7%2C12&skip_lost=1&provenance=1" in asked
     await shows(page, "document.querySelector('#export-progress').textContent === 'Saved my dance.mp4'")
+    await page.select_option("#export-format", "like/mp")
+    assert await labels.all_inner_texts() == ["Format", "Replace"]
+    for choice in ("edited", "all"):
+        await page.select_option("#export-poses", choice)
+        async with page.expect_download():
+            await page.click("#export-start")
+        assert f"/like/mp?poses={choice}" in asked

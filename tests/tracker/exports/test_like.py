@@ -16,11 +16,13 @@ from observed_files import (
 from observed_people import BODY_25, make_session, seen, write_openpose
 
 from tracker.body.model import PosedBody
-from tracker.errors import FormatError, SessionError, TrackerError
+from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.keypoints import project_through_lens
 from tracker.exports.like import export_like
 from tracker.formats.c3d import read_c3d
+from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
+from tracker.formats.keypoints.hdf5 import patch_hdf5_apart, read_hdf5_apart
 from tracker.formats.keypoints.openpose import read_openpose
 from tracker.formats.model_toml import format_model
 from tracker.formats.points_csv import read_points_csv
@@ -67,8 +69,10 @@ def observed(session, bodies, offset=OFFSET):
     return out
 
 
-def store(session, bodies, edited=(EDITED,)):
+def store(session, bodies, edited=(EDITED,), joints=None):
+    """Store poses; on edited frames all values are a person's, or those of some joints alone."""
     model = session.people[0].model
+    by_hand = [joints is None or name.rpartition(".")[0] in joints for name in model.value_names]
     with closing(AnnotationStore(session.annotations_path)) as annotations:
         revision = annotations.add_model_revision("ann", format_model(model))
         changes = [
@@ -76,7 +80,10 @@ def store(session, bodies, edited=(EDITED,)):
                 "ann",
                 k,
                 PoseRecord(
-                    b.values, ("manual" if k in edited else "tracked",) * len(b.values), revision, keyframe=k in edited
+                    b.values,
+                    tuple("manual" if k in edited and own else "tracked" for own in by_hand),
+                    revision,
+                    keyframe=k in edited,
                 ),
             )
             for k, b in enumerate(bodies)
@@ -96,8 +103,9 @@ def write_kind(kind, session, folder, truth):
     points = seen(session, [truth])
     if kind == "openpose":
         return write_openpose(folder / "k", session.camera_names, points), {}
-    if kind == "coco":
-        write_coco_images(folder / "c.json", session.camera_names, BODY_25.points, points, "scores")
+    if kind.startswith("coco"):
+        of = kind.removeprefix("coco").strip() or "scores"
+        write_coco_images(folder / "c.json", session.camera_names, BODY_25.points, points, of)
         return folder / "c.json", {}
     if kind.startswith("dlc"):
         for v, name in enumerate(session.camera_names):
@@ -181,6 +189,22 @@ def test_a_mended_frame_alone_differs_in_space(session, tmp_path, kind):
         assert len(one) == len(other)
 
 
+@pytest.mark.parametrize("kind", ["openpose", "trc"])
+def test_points_that_did_not_move_with_the_edit_stay(session, tmp_path, kind):
+    bodies = poses(session)
+    path, _ = write_kind(kind, session, tmp_path, observed(session, bodies) + 0.2)
+    store(session, bodies, joints=("left_elbow", "right_hip"))
+    done = export_like(session, imported(session, path), tmp_path / f"back{path.suffix}", learn_offsets=False)
+    assert done.frames == (EDITED,)
+    if kind == "trc":
+        before, after = read_trc(path).points[EDITED], read_trc(done.paths[0]).points[EDITED]
+    else:
+        name = f"cam1/cam1_{EDITED:012d}_keypoints.json"
+        before, after = (read_openpose(folder / name)[0] for folder in (path, tmp_path / "back"))
+    differ = {n for n, a, b in zip(BODY_25.points, before, after, strict=True) if not np.array_equal(a, b)}
+    assert differ == {"LWrist", "RKnee", "RAnkle", "RHeel", "RBigToe"}
+
+
 @pytest.mark.parametrize("learn", [True, False])
 def test_offsets_are_learnt_or_plain(session, tmp_path, learn):
     bodies = poses(session)
@@ -224,6 +248,110 @@ def test_a_mended_frame_alone_differs_in_pictures(session, tmp_path, kind):
     differ = {name for name in before if before[name] != after[name]}
     if kind == "openpose":
         assert differ == {f"{c}/{c}_{EDITED:012d}_keypoints.json" for c in session.camera_names}
+
+
+def numbers_of(path):
+    """The images of a COCO file by id, and the annotations by the image's file name."""
+    data = json.loads(path.read_text())
+    images = {i["id"]: i for i in data["images"]}
+    return data, {
+        (images[a["image_id"]].get("camera"), images[a["image_id"]]["file_name"]): a for a in data["annotations"]
+    }
+
+
+@pytest.mark.slow
+def test_mended_points_of_a_table_of_pandas_alone_differ(session, tmp_path):
+    pytest.importorskip("h5py")
+    bodies = poses(session)
+    truth = observed(session, bodies, np.zeros(3))
+    path, _ = write_kind("dlc h5", session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
+    store(session, bodies, joints=("left_hip",))
+    done = export_like(session, imported(session, path), tmp_path / "back")
+    assert done.frames == (EDITED,)
+    assert len(done.changed) == len(session.cameras)
+    names, knee = BODY_25.points, BODY_25.points.index("LKnee")
+    for source in session.cameras:
+        ((_, before),), ((_, after),) = (
+            read_hdf5_apart(folder / f"{source.camera.name}.h5") for folder in (path, tmp_path / "back")
+        )
+        assert (before.names, before.numbers.tolist()) == (after.names, after.numbers.tolist())
+        differ = np.argwhere((before.points != after.points).any(axis=-1)).tolist()
+        assert {(k, names[i]) for k, _, i in differ} == {(EDITED, n) for n in ("LKnee", "LAnkle", "LHeel", "LBigToe")}
+        expected = project_through_lens(source.camera, truth[EDITED, knee : knee + 1])[0]
+        assert np.abs(after.points[EDITED, 0, knee, :2] - expected).max() < 0.1
+
+
+@pytest.mark.slow
+def test_points_of_other_hdf5_files_are_not_replaced(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "tracks.h5", "w") as file:
+        file["tracks"] = np.zeros((1, 2, 25, N))
+    with pytest.raises(FormatError, match="expected a table of DeepLabCut") as raised:
+        patch_hdf5_apart(tmp_path / "tracks.h5", {0: [(0, np.zeros((25, 3)))]})
+    assert raised.value.remedy == Remedy("export_other_format")
+
+
+@pytest.mark.parametrize("kind", ["coco scores", "coco cameras"])
+def test_mended_points_of_coco_alone_differ(session, tmp_path, kind):
+    bodies = poses(session)
+    truth = observed(session, bodies, np.zeros(3))
+    path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
+    store(session, bodies, joints=("left_hip",))
+    done = export_like(session, imported(session, path), tmp_path / "back.json")
+    assert done.frames == (EDITED,)
+    (one, before), (other, after) = numbers_of(path), numbers_of(tmp_path / "back.json")
+    assert {k: v for k, v in one.items() if k != "annotations"} == {
+        k: v for k, v in other.items() if k != "annotations"
+    }
+    changed = {key for key in before if before[key] != after[key]}
+    assert len(changed) == len(session.cameras)
+    assert all(f"{EDITED:06d}" in name for _, name in changed)
+    knee = BODY_25.points.index("LKnee")
+    for source in session.cameras:
+        name = source.camera.name
+        key = (name, f"{EDITED:06d}.jpg") if kind == "coco cameras" else (None, f"{name}/{EDITED:06d}.jpg")
+        old, new = (np.reshape(found[key].pop("keypoints"), (-1, 3)) for found in (before, after))
+        assert before[key] == after[key]
+        differ = {n for n, a, b in zip(BODY_25.points, old, new, strict=True) if (a != b).any()}
+        assert differ == {"LKnee", "LAnkle", "LHeel", "LBigToe"}
+        expected = project_through_lens(source.camera, truth[EDITED, knee : knee + 1])[0]
+        assert np.abs(new[knee, :2] - expected).max() < 0.1
+        assert new[knee, 2] == (2 if kind == "coco cameras" else 1)  # a flag, or a confidence
+
+
+@pytest.mark.parametrize("kind", ["coco scores", "coco cameras"])
+def test_a_person_is_added_to_coco_and_read_again(session, tmp_path, kind):
+    bodies = poses(session)
+    path, _ = write_kind(kind, session, tmp_path, observed(session, bodies, np.zeros(3)))
+    data = json.loads(path.read_text())
+    missing = next(a for a in data["annotations"] if a["image_id"] == N + EDITED + 1)  # the second camera
+    data["annotations"].remove(missing)
+    path.write_text(json.dumps(data))
+    store(session, bodies)
+    export_like(session, imported(session, path), tmp_path / "back.json")
+    _, table = read_coco(tmp_path / "back.json")[1]
+    assert table.is_found[EDITED, 0, BODY_25.points.index("LKnee")]
+    added = json.loads((tmp_path / "back.json").read_text())["annotations"][-1]
+    assert added["image_id"] == missing["image_id"]
+    assert added["num_keypoints"] == sum(v > 0 for v in added["keypoints"][2::3]) > 10
+    assert added["id"] > max(a["id"] for a in data["annotations"])
+
+
+def test_a_count_of_points_follows_those_that_are_gone(session, tmp_path):
+    bodies = poses(session)
+    path, _ = write_kind("coco cameras", session, tmp_path, observed(session, bodies, np.zeros(3)))
+    data = json.loads(path.read_text())
+    for annotation in data["annotations"]:
+        annotation["num_keypoints"] = 25
+    path.write_text(json.dumps(data))
+    away = bodies[EDITED].values.copy()
+    away[:2] += 30 * session.cameras[1].camera.T_world_camera[:2, 0]  # far to the right of that camera
+    moved = PosedBody(session.people[0].model, away)
+    store(session, [moved if k == EDITED else b for k, b in enumerate(bodies)])
+    export_like(session, imported(session, path), tmp_path / "back.json")
+    _, after = numbers_of(tmp_path / "back.json")
+    gone = after["cam1", f"{EDITED:06d}.jpg"]
+    assert gone["num_keypoints"] == sum(v > 0 for v in gone["keypoints"][2::3]) < 25
 
 
 def test_a_person_who_was_not_found_is_added(session, tmp_path):

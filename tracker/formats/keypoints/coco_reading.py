@@ -4,8 +4,9 @@ v of a key point is 0, 1 or 2 in datasets, which is no confidence; detectors wri
 person. Images are matched to cameras by `camera`, as this program writes it, or by the folder of their file name.
 """
 
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -57,11 +58,31 @@ def is_coco(data: Any) -> bool:
     return isinstance(data, list) or (isinstance(data, dict) and "annotations" in data)
 
 
-def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
-    """Read a dataset or a list of results.
+class KeypointDataset(NamedTuple):
+    """The content of a file, and what of it are key points of people."""
 
-    Returns:
-        For each camera the names that it may have, best first, and its key points.
+    dataset: _Dataset
+    category: int
+    """The category of the people."""
+    names: tuple[str, ...]
+    """Names of their points; empty if the file has none."""
+    images: Mapping[tuple[str, ...], Mapping[int, _Image]]
+    """The images of each camera by their numbers. The key has the names that it may have, best first."""
+    notes: tuple[str, ...]
+
+    @property
+    def annotations(self) -> list[_Annotation]:
+        """The annotations of people with key points."""
+        return [a for a in self.dataset.annotations if a.category_id == self.category and a.keypoints]
+
+    @property
+    def has_flags(self) -> bool:
+        """Whether the third number of all points is a flag of visibility, not a confidence."""
+        return all(v in (0, 1, 2) for a in self.annotations for v in a.keypoints[2::3])
+
+
+def read_dataset(path: Path) -> KeypointDataset:
+    """Read a dataset or a list of results, without arrays.
 
     Raises:
         FormatError: the file is malformed, or has no key points.
@@ -74,10 +95,6 @@ def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
     else:
         dataset = check(data, _Dataset, where, FormatError)
     category, names, notes = _category(dataset, where)
-    people = _people(dataset, category, len(names), where)
-    n_points = len(names) or max((len(p) for some in people.values() for p in some), default=0)
-    if not n_points:
-        raise FormatError(f"{where}: expected key points of people, found none; export them")
     by_camera: dict[tuple[str, ...], dict[int, _Image]] = {}
     for image in dataset.images:
         labels, number = _place(image)
@@ -88,15 +105,33 @@ def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
                 "; give the images numbers or folders of their cameras"
             )
         taken[number] = image
+    return KeypointDataset(dataset, category, names, by_camera, notes)
+
+
+def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
+    """Read a dataset or a list of results.
+
+    Returns:
+        For each camera the names that it may have, best first, and its key points.
+
+    Raises:
+        FormatError: the file is malformed, or has no key points.
+    """
+    where, found = f"COCO file {path}", read_dataset(path)
+    people = _people(found, where)
+    n_points = len(found.names) or max((len(p) for some in people.values() for p in some), default=0)
+    if not n_points:
+        raise FormatError(f"{where}: expected key points of people, found none; export them")
     out = []
-    for labels, images in by_camera.items():
+    for labels, images in found.images.items():
         numbers = sorted(images)
         points = stack_pictures([people.get(images[n].id, []) for n in numbers], n_points, where)
         sizes = {(i.width, i.height) for i in images.values() if i.width and i.height}
         if len(sizes) > 1:
             raise FormatError(f"{where}: expected images of one size for {labels[0]}, found {sorted(sizes)[:3]}")
         size = next(iter(sizes), None)
-        out.append((labels, PictureTable(names, np.array(numbers, dtype=np.int64), points, size, None, notes)))
+        table = PictureTable(found.names, np.array(numbers, dtype=np.int64), points, size, None, found.notes)
+        out.append((labels, table))
     return out
 
 
@@ -130,14 +165,14 @@ def _category(dataset: _Dataset, where: str) -> tuple[int, tuple[str, ...], tupl
     return chosen, names, notes
 
 
-def _people(dataset: _Dataset, category: int, n_names: int, where: str) -> dict[int, list[Array]]:
+def _people(found: KeypointDataset, where: str) -> dict[int, list[Array]]:
     """Return the people of each image by its id, each (n_points, 3).
 
     Raises:
         FormatError: people have different numbers of points.
     """
-    chosen = [a for a in dataset.annotations if a.category_id == category and a.keypoints]
-    n_points = n_names or len(chosen[0].keypoints) // 3
+    chosen = found.annotations
+    n_points = len(found.names) or len(chosen[0].keypoints) // 3
     values = np.zeros((len(chosen), n_points, 3))
     for row, annotation in zip(values, chosen, strict=True):
         if len(annotation.keypoints) != 3 * n_points:
@@ -147,7 +182,7 @@ def _people(dataset: _Dataset, category: int, n_names: int, where: str) -> dict[
             )
         row[:] = np.array(annotation.keypoints).reshape(-1, 3)
     absent = (values[..., 2] == 0) | (values[..., :2] == 0).all(axis=-1)
-    if np.isin(values[..., 2], (0, 1, 2)).all():  # flags of visibility
+    if found.has_flags:
         scores = np.array([np.nan if a.score is None else a.score for a in chosen])
         values[..., 2] = scores[:, None]
     values[absent] = (np.nan, np.nan, 0.0)

@@ -199,26 +199,52 @@ def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: 
     return PictureTable(tuple(names), numbers, points)
 
 
-def patch_deeplabcut_csv(path: Path, changes: Mapping[int, Sequence[tuple[int, Array]]]) -> bytes:
-    """Return a file with points of some rows replaced; all other bytes stay.
+Changes = Mapping[int, Sequence[tuple[int, Array]]]
+"""By row, from 0: number of the individual and x, y, confidence of all points, (n_points, 3); rows of NaN stay,
+confidence 0 makes a point absent."""
 
-    Args:
-        path: the file, which has been read before.
-        changes: by row, from 0: number of the individual and x, y, confidence of all points, (n_points, 3); rows of
-            NaN stay, confidence 0 makes a point absent.
-    """
+
+def patch_deeplabcut_csv(path: Path, changes: Changes) -> bytes:
+    """Return a file, which has been read before, with points of some rows replaced; all other bytes stay."""
     lines = enumerate(read_lines(path, _KIND), 1)
     columns, n_index, _ = _read_head(lines, str(path))
-    table = read_deeplabcut_csv(path)
+    n_rows = len(read_deeplabcut_csv(path).numbers)
+    new = {
+        row: {n_index + i: value for i, value in cells.items()} for row, cells in _new_cells(columns, changes).items()
+    }
+    exact = exact_text(path.read_bytes())
+    return exact.encoded(replace_cells(exact.text, ",", n_rows, new, PIXEL_DECIMALS))
+
+
+def patch_deeplabcut_hdf5(path: Path, changes: Changes) -> None:
+    """Replace points of some rows in a table of pandas, which has been read before. It needs h5py."""
+    import h5py
+
+    with h5py.File(path, "r+") as file:
+        group = next(g for g in file.values() if "table" in g and "non_index_axes" in g.attrs)
+        ((_, heads),) = _Plain(io.BytesIO(bytes(group.attrs["non_index_axes"]))).load()
+        rows = group["table"][:]
+        blocks = [name for name in rows.dtype.names if name.startswith("values_block_")]
+        values = [rows[name].reshape(len(rows), -1) for name in blocks]  # views
+        ends = np.cumsum([v.shape[1] for v in values])
+        for row, cells in _new_cells([_column(head, str(path)) for head in heads], changes).items():
+            for column, value in cells.items():
+                block = int(np.searchsorted(ends, column, side="right"))
+                values[block][row, column - ends[block]] = value
+        group["table"][:] = rows
+
+
+def _new_cells(columns: Sequence[_Column], changes: Changes) -> dict[int, dict[int, float]]:
+    """Return the numbers that change, by row and column; NaN for the position of an absent point."""
     individuals = list(dict.fromkeys(c.individual for c in columns))
+    names = list(dict.fromkeys(c.point for c in columns))
     new: dict[int, dict[int, float]] = {}
     for row, people in changes.items():
         for person, values in people:
             for i, column in enumerate(columns):
-                value = values[table.names.index(column.point)]
+                value = values[names.index(column.point)]
                 if column.individual == individuals[person] and not np.isnan(value[2]):
                     absent = value[2] == 0 and column.coordinate != "likelihood"
                     cell = np.nan if absent else float(value[_COORDINATES.index(column.coordinate)])
-                    new.setdefault(row, {})[n_index + i] = cell
-    exact = exact_text(path.read_bytes())
-    return exact.encoded(replace_cells(exact.text, ",", len(table.numbers), new, PIXEL_DECIMALS))
+                    new.setdefault(row, {})[i] = cell
+    return new

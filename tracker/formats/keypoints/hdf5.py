@@ -1,13 +1,16 @@
-"""Read HDF5 files (SLEAP, NWB, DeepLabCut) in a process of their own.
+"""Read HDF5 files (SLEAP, NWB, DeepLabCut) in a process of their own, and replace points in DeepLabCut's.
 
 The HDF5 library hangs on some damaged files, or ends the process that reads them. So another process reads a file,
 within a time limit, and hands back plain arrays.
 """
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
@@ -15,10 +18,15 @@ import numpy as np
 
 from tracker.errors import FormatError, Remedy
 from tracker.files import check_regular
+from tracker.formats.keypoints.deeplabcut import Changes
 from tracker.formats.keypoints.picture_table import PictureTable
 
+CHANGES, PATCHED = "changes.npz", "patched"
+"""Names of the file of changes to a table, and of the copy that gets them."""
 SECONDS = 300.0
 """Time that a file may take, s. To load sleap-io takes 2 s; damaged files may take for ever."""
+
+_REMEDIES = {"install": Remedy("install_import"), "other format": Remedy("export_other_format")}
 
 
 class VideoHead(msgspec.Struct):
@@ -36,6 +44,7 @@ class ReadAnswer(msgspec.Struct):
     error: str = ""
     """Sentence on why it cannot be read; empty if it can."""
     remedy: str = ""
+    """One of `_REMEDIES`; empty if there is none."""
 
 
 def read_hdf5_apart(path: Path) -> list[tuple[Path, PictureTable]]:
@@ -44,11 +53,38 @@ def read_hdf5_apart(path: Path) -> list[tuple[Path, PictureTable]]:
     Raises:
         FormatError: the file is malformed, a package is not installed, or the reading process fails or takes too long.
     """
+    with _folder_for(path) as folder:
+        out = []
+        for i, video in enumerate(_answer(path, folder).videos):
+            with np.load(folder / f"{i}.npz", allow_pickle=False) as arrays:
+                table = PictureTable(video.names, arrays["numbers"], arrays["points"], notes=video.notes)
+            out.append((Path(video.video), table))
+        return out
+
+
+def patch_hdf5_apart(path: Path, changes: Changes) -> bytes:
+    """Return DeepLabCut's table with points of some rows replaced; all other numbers stay.
+
+    Raises:
+        FormatError: the file is another one than a table of DeepLabCut; else as `read_hdf5_apart`.
+    """
+    flat = [(row, person, values) for row, people in changes.items() for person, values in people]
+    rows, people, values = zip(*flat, strict=True)
+    with _folder_for(path) as folder:
+        np.savez(folder / CHANGES, rows=np.array(rows), people=np.array(people), values=np.stack(values))
+        shutil.copyfile(path, folder / PATCHED)
+        _answer(path, folder)
+        return (folder / PATCHED).read_bytes()
+
+
+@contextmanager
+def _folder_for(path: Path) -> Iterator[Path]:
+    """Make a temporary folder for a file and its answer; errors within become sentences."""
     where = f"file {path}"
     try:
         check_regular(path)
         with tempfile.TemporaryDirectory() as folder:
-            return _answer(path, Path(folder))
+            yield Path(folder)
     except subprocess.TimeoutExpired as error:
         raise FormatError(
             f"{where} cannot be read: it took over {error.timeout:.0f} s, as damaged files do; export it again"
@@ -57,7 +93,7 @@ def read_hdf5_apart(path: Path) -> list[tuple[Path, PictureTable]]:
         raise FormatError(f"{where} cannot be read: {error.strerror or error}; check the path") from error
 
 
-def _answer(path: Path, folder: Path) -> list[tuple[Path, PictureTable]]:
+def _answer(path: Path, folder: Path) -> ReadAnswer:
     root = str(Path(__file__).resolve().parents[3])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
     words = [sys.executable, "-m", "tracker.formats.keypoints.hdf5_process", str(path.resolve()), str(folder)]
@@ -67,10 +103,5 @@ def _answer(path: Path, folder: Path) -> list[tuple[Path, PictureTable]]:
     except (OSError, msgspec.DecodeError) as error:
         raise FormatError(f"file {path} cannot be read: its library failed; export it again") from error
     if answer.error:
-        raise FormatError(answer.error, Remedy("install_import") if answer.remedy else None)
-    out = []
-    for i, video in enumerate(answer.videos):
-        with np.load(folder / f"{i}.npz", allow_pickle=False) as arrays:
-            table = PictureTable(video.names, arrays["numbers"], arrays["points"], notes=video.notes)
-        out.append((Path(video.video), table))
-    return out
+        raise FormatError(answer.error, _REMEDIES.get(answer.remedy))
+    return answer

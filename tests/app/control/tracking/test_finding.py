@@ -45,7 +45,7 @@ def tracked(monkeypatch):
     """The runs of the tracker that were asked for; each does nothing and ends well."""
     runs = []
 
-    def start(self, frame, people, edit, on_end):
+    def start(self, frame, people, edit, on_end, observer):
         runs.append((frame, people, edit))
         on_end(True)
 

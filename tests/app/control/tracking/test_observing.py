@@ -13,6 +13,7 @@ from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.judging.judge import Judgement, LimbVerdict
 from tracker.observations.request import ImportRequest
+from tracker.pipeline import chain
 from tracker.pipeline.keypoint_evidence import read_points
 
 VIEW = View(frozenset(("imported",)), (1, 1, 1, 1))
@@ -153,3 +154,29 @@ def test_people_without_a_pose_are_placed_in_the_same_entry(imported):
     assert imported.state.undo == "poses of openpose"
     imported.history.undo()
     assert imported.state.undo is None
+
+
+@pytest.mark.parametrize("as_evidence", [pytest.param(True, marks=pytest.mark.slow), False])
+def test_people_are_found_and_tracked_with_key_points(imported, monkeypatch, as_evidence):
+    runs = []
+
+    def start(self, frame, people, edit, on_end, observer):
+        runs.append((people, edit, observer))
+        on_end(True)
+
+    monkeypatch.setattr("app.control.tracking.tracking.Tracking.start_outward", start)
+    monkeypatch.setattr(chain, "_acquire", lambda people, *more: {})
+    imported.observing.track("openpose", as_evidence)
+    with pytest.raises(TrackerError, match="no other search for people"):
+        imported.observing.track("openpose", as_evidence)
+    wait_for(lambda: not imported.state.finding.running, 60)
+    assert imported.state.finding.message == "Done."
+    assert imported.state.undo == "find people"
+    assert imported.state.observations.shown.name == "openpose"
+    ((people, edit, observer),) = runs
+    assert people == (0,)
+    assert edit is not None  # of the same entry of the history
+    assert (observer.keypoints is not None) == as_evidence
+    imported.observing.track("openpose", as_evidence)  # from the pose that is there
+    wait_for(lambda: not imported.state.finding.running, 60)
+    assert len(runs) == 2

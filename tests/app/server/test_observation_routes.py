@@ -1,0 +1,167 @@
+"""Files that the page names to be imported, and the report of a judgement."""
+
+import json
+import math
+
+import aiohttp
+import pytest
+from observed_people import seen, walking, write_openpose
+from serving import listening
+
+from app.server import server
+from app.server.access import Access
+from app.server.observation_routes import ObservationRoutes
+from app.server.static_files import static_folder
+from tracker.body.model import PosedBody
+from tracker.judging.judge import Judgement, LimbVerdict
+from tracker.pipeline.keypoint_evidence import read_points
+from tracker.store.records import PoseRecord
+from tracker.store.stored_poses import StoredPose
+
+PLAN, IMPORT, REPORT = "/observations/plan", "/observations/import", "/observations/report"
+
+
+class Nobody:
+    async def serve(self, socket):
+        pass
+
+
+@pytest.fixture
+def controller(opened):
+    return opened()
+
+
+@pytest.fixture
+async def serve(controller, tmp_path):
+    """Serve the section of the session; gives how the page posts to it, and its client."""
+    clients = []
+
+    async def start(refusal=None):
+        app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), static_folder())
+        ObservationRoutes(controller, refusal).add_to(app)
+        context = listening(app)
+        port = await context.__aenter__()
+        client = aiohttp.ClientSession(f"http://127.0.0.1:{port}")
+        client.cookie_jar.update_cookies({f"quadrille_{port}": "secret"})
+        clients.append((context, client))
+
+        async def post(path, body, **headers):
+            own = {"Origin": f"http://127.0.0.1:{port}", "Content-Type": "application/json"} | headers
+            data = body if isinstance(body, bytes) else json.dumps(body).encode()
+            async with client.post(path, data=data, headers=own) as response:
+                return response.status, await response.text()
+
+        return post, client
+
+    yield start
+    for context, client in clients:
+        await client.close()
+        await context.__aexit__(None, None, None)
+
+
+@pytest.fixture
+def form(controller, tmp_path):
+    """The form of files of a person who walks before the cameras of the session."""
+    session = controller.session
+    points = seen(session, [walking(session.n_frames, step=(0.002, 0.0, 0.0))])
+    folder = write_openpose(tmp_path / "found", session.camera_names, points)
+    return {"paths": str(folder), "name": "net", "people": [session.people[0].name]}
+
+
+async def test_files_are_described_and_then_stored(controller, serve, form):
+    post, _ = await serve()
+    assert (await post(IMPORT, {}))[0] == 400  # nothing was read
+    status, text = await post(PLAN, form)
+    assert status == 200, text
+    found = json.loads(text)
+    assert (found["name"], found["format"], found["problems"]) == ("net", "openpose", [])
+    assert [v["view"] for v in found["views"]] == list(controller.session.camera_names)
+    assert not (controller.session.folder / "observations").exists()
+    assert await post(IMPORT, {}) == (200, '{"stored": true}')
+    assert [s.name for s in controller.state.observations.sets] == ["net"]
+    await post(PLAN, form)
+    status, text = await post(IMPORT, {})
+    assert (status, "exists already; choose another name" in text) == (400, True), text
+    assert [s.name for s in controller.state.observations.sets] == ["net"]
+
+
+async def test_views_without_points_have_no_confidence(controller, serve, form, tmp_path):
+    for path in (tmp_path / "found" / controller.session.camera_names[0]).glob("*.json"):
+        path.write_text('{"version": 1.3, "people": []}')
+    post, _ = await serve()
+    status, text = await post(PLAN, form)
+    assert status == 200, text
+    assert "NaN" not in text
+    confidences = [v["confidence"] for v in json.loads(text)["views"]]
+    assert confidences[0] is None
+    assert all(math.isfinite(c) for c in confidences[1:])
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"paths": "relative/files"}, "expected a path from the root or from ~"),
+        ({"paths": "/nowhere/at/all"}, "/nowhere/at/all"),
+        ({"paths": ""}, "'paths'"),
+        ({"name": "../outside"}, "../outside"),
+        ({"name": "a/b"}, "a/b"),
+        ({"people": ["stranger"]}, "found 'stranger'"),
+        ({"people": []}, "People"),
+        ({"picture_size": [0, 480]}, "Picture size"),
+        ({"confidence": 2}, "Confidence"),
+        ({"first_frame": -1}, "First frame"),
+        ({"format": "pickle"}, "format"),
+    ],
+)
+async def test_wrong_forms_are_answered_with_the_reason(controller, serve, form, changes, expected):
+    post, _ = await serve()
+    status, text = await post(PLAN, form | changes)
+    assert (status, expected in text) == (400, True), text
+    assert controller.state.observations.plan is None
+    assert not (controller.session.folder / "observations").exists()
+
+
+async def test_a_body_that_is_no_form_or_too_large_is_refused(serve):
+    post, _ = await serve()
+    assert (await post(PLAN, b"no JSON"))[0] == 400
+    assert (await post(PLAN, b"[]"))[0] == 400
+    status, _ = await post(PLAN, b" " * (4 << 20))
+    assert status in (400, 413)
+
+
+async def test_only_the_page_itself_may_ask(controller, serve, form):
+    post, client = await serve()
+    assert (await post(PLAN, form, Origin="http://evil.example"))[0] == 403
+    assert (await post(PLAN, form, **{"Sec-Fetch-Site": "cross-site"}))[0] == 403
+    async with client.get(REPORT, headers={"Sec-Fetch-Site": "cross-site"}) as response:
+        assert response.status == 403
+    client.cookie_jar.clear()
+    assert [(await post(path, form))[0] for path in (PLAN, IMPORT)] == [403, 403]
+    async with client.get(REPORT) as response:
+        assert response.status == 403
+    other, _ = await serve("No paths here.")
+    assert await other(PLAN, form) == (403, "No paths here.")
+    assert await other(IMPORT, {}) == (403, "No paths here.")
+    assert controller.state.observations.plan is None
+
+
+async def test_the_report_of_a_judgement_is_downloaded(controller, serve, form):
+    post, client = await serve()
+    async with client.get(REPORT) as response:
+        assert (response.status, "judge imported observations first" in await response.text()) == (400, True)
+    await post(PLAN, form)
+    await post(IMPORT, {})
+    person, points = controller.session.people[0].name, read_points(controller.session, "net")[0]
+    frames = {3: {"left arm": LimbVerdict(0.98, 0.2, "left arm jumps", "left_wrist")}}
+    body = controller.session.people[0].model
+    pose = StoredPose(
+        PosedBody(body, body.neutral()), PoseRecord(body.neutral(), ("tracked",) * len(body.neutral()), 1)
+    )
+    judgement = Judgement(person, frames, {}, {}, points, {3: pose})
+    controller.observing._set(judged="net", judgements=(judgement,))
+    async with client.get(REPORT) as response:
+        assert response.status == 200
+        assert response.headers["Content-Disposition"] == "attachment; filename*=UTF-8''session_net_judged.html"
+        text = await response.text()
+    assert "left arm jumps" in text
+    assert text.count("data:image/jpeg;base64,") == len(controller.session.cameras)

@@ -1,0 +1,120 @@
+"""The section of observations: sets, their judgement, the way through the worst, and what it asks of the program."""
+
+import pytest
+from page_driver import shows, until
+
+SETS = [
+    {"name": "mp", "format": "openpose", "people": ["person"], "is_in_space": False, "frames": 40, "problem": ""},
+    {"name": "old", "format": "", "people": [], "is_in_space": False, "frames": 0, "problem": "Expected a file."},
+]
+EMPTY = {
+    "type": "imported", "sets": SETS, "shown": "", "is_previewed": False, "running": False, "stage": "", "share": 0,
+    "message": "", "failed": False, "judged": "", "people": [], "worst": [], "off": 0,
+}  # fmt: skip
+LIMB = {
+    "person": 0, "frame": 9, "limb": "left arm", "joint": "l_wrist", "reason": "left arm jumps", "probability": 0.98,
+    "distance_mm": 210,
+}  # fmt: skip
+JUDGED = EMPTY | {
+    "shown": "mp", "judged": "mp", "off": 2, "worst": [LIMB, LIMB | {"frame": 4, "reason": "arms exchanged"}],
+    "people": [
+        {"name": "person", "share_in_order": 0.9, "frames": 40, "sentences": ["left hip off by 4 cm throughout"]}
+    ],
+}  # fmt: skip
+
+
+@pytest.fixture
+def section(page):
+    return page.locator("[data-section=observations]")
+
+
+async def opened(page, endpoint, message):
+    await endpoint.broadcast(message)
+    await page.keyboard.press("Alt+j")
+    await shows(page, "document.querySelector('[data-section=observations]').open")
+    await shows(page, "document.querySelector('.observed-sets li')")
+
+
+async def test_sets_are_listed_shown_and_judged(page, endpoint, section):
+    await opened(page, endpoint, EMPTY)
+    rows = await page.locator(".observed-sets li").all_inner_texts()
+    assert "openpose, key points of person, 40 frames" in rows[0]
+    assert "Expected a file." in rows[1]
+    assert await section.get_by_role("button", name="Show old").is_disabled()
+    await section.get_by_role("button", name="Show mp").click()
+    await until(lambda: endpoint.received[-1] == {"type": "observations", "action": "show", "name": "mp"})
+    await section.get_by_role("button", name="Judge", exact=True).click()
+    await until(lambda: endpoint.received[-1] == {"type": "observations", "action": "judge", "name": "mp"})
+    await endpoint.broadcast(EMPTY | {"running": True, "stage": "tracking", "share": 0.4})
+    await section.get_by_text("Tracking …").wait_for()
+    assert await section.get_by_role("button", name="Judge", exact=True).is_hidden()
+    await section.get_by_role("button", name="Stop").click()
+    await until(lambda: endpoint.received[-1]["action"] == "stop")
+
+
+FINDING = {
+    "type": "finding", "running": True, "stage": "acquiring sizes", "share": 0.5, "message": "", "failed": False,
+    "notes": [], "frame": None, "tried": None, "camera": None, "axes": [],
+}  # fmt: skip
+
+
+async def test_people_are_tracked_by_the_evidence_that_is_chosen(page, endpoint, section):
+    await opened(page, endpoint, EMPTY)
+    track = section.get_by_role("button", name="Track by", exact=True)
+    for choice, action in (("contours and points", "track"), ("contours alone", "track_contours")):
+        await section.get_by_label("Evidence").select_option(choice)
+        await track.click()
+        await until(lambda a=action: endpoint.received[-1] == {"type": "observations", "action": a, "name": "mp"})
+    await endpoint.broadcast(FINDING)
+    await section.get_by_text("Acquiring sizes …").wait_for()
+    assert await track.is_hidden()
+    await section.get_by_role("button", name="Stop").click()
+    await until(lambda: endpoint.received[-1] == {"type": "find_people", "action": "stop"})
+    await endpoint.broadcast(FINDING | {"running": False, "failed": True, "message": "No frame shows a person."})
+    await section.locator(".is-failed", has_text="No frame shows a person.").wait_for()
+    assert await track.is_visible()
+
+
+async def test_the_worst_are_gone_through_by_click_and_key(page, endpoint, section):
+    await opened(page, endpoint, JUDGED)
+    assert "90 % of 40 frames in order; 2 limbs are off." in await section.inner_text()
+    assert "Left hip off by 4 cm throughout." in await section.inner_text()
+    await page.locator(".observed-worst button").first.click()
+    await until(lambda: {"type": "select", "person": 0, "point": "l_wrist"} in endpoint.received)
+    await shows(page, "quadrille.state.target === 9")
+    await page.keyboard.press("Alt+Shift+ArrowDown")
+    await shows(page, "quadrille.state.target === 4")
+    assert "exchanged" in await page.locator(".observed-worst [aria-current]").inner_text()
+    await page.keyboard.press("Alt+Shift+ArrowUp")
+    await shows(page, "quadrille.state.target === 9")
+
+
+async def test_problems_of_files_forbid_the_import(fresh_page, endpoint):
+    page, section = fresh_page, fresh_page.locator("[data-section=observations]")
+    await opened(page, endpoint, EMPTY)
+    view = {"view": "FRONT", "place": "/a", "rows": 40, "frames": [0, 39], "most_people": 1, "confidence": 0.9}
+    plan = {
+        "name": "new", "format": "openpose", "people": ["person"], "frames": 40, "views": [view],
+        "skeleton": "BODY_25", "points": {"LWrist": ["l_wrist"], "Nose": []}, "matched": 1, "notes": [],
+        "problems": [],
+    }  # fmt: skip
+    asked = []
+
+    async def answer(route):
+        asked.append(route.request.post_data_json)
+        await route.fulfill(json=plan)
+
+    await page.route("**/observations/plan", answer)
+    await page.route("**/sessions/paths**", lambda route: route.fulfill(json=[]))  # completions
+    await section.get_by_text("Import…").click()
+    await page.fill("#import-paths", "/a")
+    await page.fill("#import-name", "new")
+    check = section.get_by_role("button", name="Check", exact=True)
+    await check.click()
+    await section.get_by_text("FRONT: 40 rows, points in frames 0 to 39, median confidence 0.90").wait_for()
+    assert asked[0]["paths"] == "/a"
+    assert await section.get_by_role("button", name="Import", exact=True).is_enabled()
+    plan["problems"] = ["Expected 40 pictures, found 30."]
+    await check.click()
+    await section.locator(".is-failed", has_text="found 30").wait_for()
+    assert await section.get_by_role("button", name="Import", exact=True).is_disabled()
