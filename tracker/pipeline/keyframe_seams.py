@@ -1,0 +1,123 @@
+"""The seam of a pose between two keyframes: how far the limb joints of the passes from either of them lie apart.
+
+It is stored in the settings of the pose, with the keyframes that it was tracked from.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import numpy as np
+
+from tracker.body.limbs import limbs
+from tracker.body.model import BodyModel
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.geometry.arrays import Array
+from tracker.store.records import PoseRecord
+from tracker.tracking.confidence import (
+    classify_limbs,
+    is_uncertainty,
+    probabilities,
+    status_named,
+    uncertain,
+    worst,
+)
+from tracker.tracking.pose_errors import limb_odds, point_covariances
+
+BETWEEN, SEAM = "between", "seam_mm"
+"""Keys of a pose's settings: the numbers of the two keyframes, as of an interpolated pose, and the seam, mm."""
+_POSES = "keyframe_poses"
+"""Key of a pose's settings: checksums of the poses of the two keyframes."""
+
+
+class Seam(NamedTuple):
+    """Disagreement of the two passes on a frame between two keyframes."""
+
+    steps_m: Array
+    """From each point of the selected pass to that of the other, (n_points, 3), metres."""
+    between: tuple[int, int]
+    """The keyframes."""
+    checksums: tuple[str, ...]
+    """Checksums of their poses."""
+
+    @property
+    def lengths_mm(self) -> Array:
+        """Distance of each point of the body in the two passes, (n_points,), mm."""
+        return 1000 * np.linalg.norm(self.steps_m, axis=1)
+
+    def seam_mm(self, model: BodyModel) -> float:
+        """Return the largest distance of a limb joint, mm; of all points for a body without limb joints.
+
+        Head and spine are left out: a twist that no contour shows would hide what the limbs tell.
+        """
+        of_limbs = [name in LIMB_JOINTS for name in model.point_names]
+        return float(self.lengths_mm[of_limbs if any(of_limbs) else slice(None)].max())
+
+
+def seam_of(model: BodyModel, pose: Array, other: Array, between: tuple[int, int], keyframes: Sequence[Array]) -> Seam:
+    """Return the seam of a frame.
+
+    Args:
+        model: the body.
+        pose: by the selected pass, (n_values,).
+        other: by the other pass, (n_values,).
+        between: frames of the two keyframes.
+        keyframes: their poses, (n_values,) each.
+    """
+    return Seam(model.points_world(other) - model.points_world(pose), between, tuple(map(pose_checksum, keyframes)))
+
+
+def with_seam(model: BodyModel, pose: PoseRecord, seam: Seam) -> PoseRecord:
+    """Return an assessed pose that also counts what the passes from its two keyframes disagree about.
+
+    Where the errors of the passes are independent, the mean square of their difference is twice that of each.
+
+    Args:
+        model: the body.
+        pose: the pose.
+        seam: of the two passes on its frame.
+    """
+    by_seam = np.einsum("pi,pj->pij", seam.steps_m, seam.steps_m) / 2
+    errors = point_covariances(by_seam) if pose.errors is None else pose.errors + by_seam
+    odds, lengths_mm = limb_odds(model, errors), seam.lengths_mm
+    status, lost = classify_limbs(odds), probabilities(odds[:, 1])
+    remark, before = pose.remark, status_named(pose.status)
+    if status != "good" and worst([before, status]) != before:
+        limb = limbs(model)[int(odds[:, 1].argmax())]
+        apart_mm = lengths_mm[np.isin(model.point_parts, limb.parts)].max()
+        first, last = seam.between
+        reason = f": tracked from frames {first} and {last}, it lies {apart_mm:.0f} mm apart"
+        others = [r for r in remark.split(", ") if r and not is_uncertainty(r)]
+        remark = ", ".join([uncertain(limb.name, reason), *others])
+    known = pose.limbs_lost or (0.0,) * len(lost)
+    return replace(
+        pose,
+        errors=errors,
+        status=worst([before, status]),
+        remark=remark,
+        limbs_lost=tuple(float(max(pair)) for pair in zip(known, lost, strict=True)),
+        settings={
+            **pose.settings,
+            BETWEEN: list(seam.between),
+            SEAM: round(seam.seam_mm(model), 1),
+            _POSES: list(seam.checksums),
+        },
+    )
+
+
+def pose_checksum(pose: Array) -> str:
+    """Return a checksum of a pose, (n_values,), by which it is recognized."""
+    return f"{crc32(np.asarray(pose, dtype=np.float64).tobytes()):08x}"
+
+
+def is_tracked_between(settings: Mapping[str, Any], between: tuple[int, int], keyframes: Sequence[Array]) -> bool:
+    """Return whether a pose with some settings was tracked from two keyframes as they are now.
+
+    Args:
+        settings: of the pose.
+        between: frames of the keyframes.
+        keyframes: their poses, (n_values,) each.
+    """
+    now = [list(between), list(map(pose_checksum, keyframes))]
+    return [settings.get(BETWEEN), settings.get(_POSES)] == now
