@@ -14,7 +14,7 @@ from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array
-from tracker.store.records import PoseRecord
+from tracker.store.records import BETWEEN, SEAM, PoseRecord
 from tracker.tracking.confidence import (
     classify_limbs,
     is_uncertainty,
@@ -25,8 +25,6 @@ from tracker.tracking.confidence import (
 )
 from tracker.tracking.pose_errors import limb_odds, point_covariances
 
-BETWEEN, SEAM = "between", "seam_mm"
-"""Keys of a pose's settings: the numbers of the two keyframes, as of an interpolated pose, and the seam, mm."""
 _POSES = "keyframe_poses"
 """Key of a pose's settings: checksums of the poses of the two keyframes."""
 
