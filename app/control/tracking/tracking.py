@@ -174,9 +174,9 @@ class Tracking:
         return people
 
     def _begins_at_keyframe(self, people: tuple[int, ...], frames: Sequence[int]) -> bool:
-        """Return whether the shown frame is a keyframe of all people, and some of the given frames are keyframes, but not all.
+        """Return whether the shown frame is a keyframe of all people, and some of the given frames are keyframes, too.
 
-        Between the two, people are then tracked from both.
+        They are then tracked both ways. Where all of the frames are keyframes, there is nothing to track.
         """
         shown, saver = self._session_state.state.frame, self._session_state.saver
         keyframes = saver.keyframes({shown, *frames})

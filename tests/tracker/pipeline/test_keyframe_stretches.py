@@ -2,6 +2,7 @@
 
 import shutil
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ class TwoPasses:
 
     def backward_pass(self, run, tracked):
         frames = [f.frame for f in tracked]
-        for first, last in zip(KEYFRAMES[:-1], KEYFRAMES[1:], strict=True):
+        for first, last in pairwise(KEYFRAMES):
             if {first, last} <= {*frames}:
                 found = {f.frame: f.poses[0] for f in tracked if first < f.frame < last}
                 others = {k: pose + APART_M.get(k, 0) * (np.arange(len(pose)) == 0) for k, pose in found.items()}
