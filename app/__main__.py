@@ -29,6 +29,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
+from app.cli.annotation import next_
 from app.cli.calibration import calibrate, check, sync
 from app.cli.observations import import_, judge
 from app.remedies import command_line_text
@@ -52,6 +53,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "acquire": acquire.command,
     "track": track.command,
     "audit": audit.command,
+    "next": next_.command,
     "judge": judge.command,
     "check": check.command,
     "evaluate": evaluate.command,

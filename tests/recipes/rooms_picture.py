@@ -20,7 +20,7 @@ HOUSE = {
     ],
     "app/  the viewer": [
         ["__main__"],
-        ["cli/calibration", "cli/observations"],
+        ["cli/calibration", "cli/observations", "cli/annotation"],
         ["cli"],
         ["bench", "server"],
         ["page", "scene3d"],
@@ -33,7 +33,7 @@ HOUSE = {
         ["state", "runtime"],
     ],
     "tracker/  the library": [
-        ["experiments", "judging"],
+        ["experiments", "judging", "annotation"],
         ["pipeline", "export"],
         ["simulate", "evaluation", "boards"],
         ["calibration", "posing"],

@@ -46,6 +46,7 @@ ROOMS = [
     "tracker.simulate.stage",
     "tracker.simulate",
     "tracker.pipeline",
+    "tracker.annotation",
     "tracker.judging",
     "tracker.experiments",
     "app",
@@ -68,6 +69,7 @@ ROOMS = [
     "app.cli",
     "app.cli.calibration",
     "app.cli.observations",
+    "app.cli.annotation",
     "app.__main__",
 ]
 FLOOR = {room: floor for floor, room in enumerate(ROOMS)}

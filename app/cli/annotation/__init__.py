@@ -1,0 +1,1 @@
+"""The commands for datasets: plan, next click, merge, compare, share."""
