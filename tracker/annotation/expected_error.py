@@ -8,6 +8,7 @@ the recording, as the correlation of the logarithms of expected errors of neighb
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +76,7 @@ class ExpectedErrors:
         before, after = logs[:-1][pairs], logs[1:][pairs]
         scale = np.sqrt(np.sum(before**2) * np.sum(after**2))
         n = max(2, len(self.frames))
-        return float(np.clip(np.sum(before * after) / scale, 0.0, 1 - 1 / n)) if scale > 0 else 0.0
+        return float(np.clip(np.sum(before * after) / scale, 0.0, 1 - 1 / n)) if scale > 1e-12 else 0.0
 
     @property
     def mean_variance(self) -> float:
@@ -93,7 +94,7 @@ class ExpectedErrors:
         return float(longer * np.sum(np.square(of_units)) / (n_frames * n_joints) ** 2 + shared)
 
 
-def mean_errors(variances: Array, lost: Array) -> Array:
+def mean_errors(variances: Array, lost: Array | float) -> Array:
     """Return the expected length of errors, metres.
 
     That of a normal vector in three dimensions is sqrt(8 / pi) sigma (Maxwell distribution).
@@ -118,12 +119,8 @@ def expected_errors(model: BodyModel, poses: Mapping[int, StoredPose], hand: Arr
         hand: covariance of a joint that a hand sets, (3, 3), m^2; None: that of other poses.
     """
     alike = {k: p for k, p in sorted(poses.items()) if p.body.model.point_names == model.point_names}
-    joints = tuple(n for n in model.point_names if n in LIMB_JOINTS) or model.point_names
+    joints, names, unit_of, limb_of = joint_units(model)
     columns = [model.point_names.index(n) for n in joints]
-    parts, all_limbs = model.point_parts[columns], limbs(model)
-    limb_of = np.array([next((i for i, x in enumerate(all_limbs) if part in x.parts), -1) for part in parts])
-    used = [i for i in range(-1, len(all_limbs)) if i in limb_of]
-    names = tuple(TRUNK if i < 0 else limb_display_name(all_limbs[i].name) for i in used)
     assessed = [p.record.errors[columns] for p in alike.values() if p.record.errors is not None]
     usual = np.median(assessed, axis=0) if assessed else np.tile(SHARED_M**2 * np.eye(3), (len(columns), 1, 1))
     covariances, lost = np.empty((len(alike), len(columns), 3, 3)), np.zeros((len(alike), len(columns)))
@@ -141,6 +138,29 @@ def expected_errors(model: BodyModel, poses: Mapping[int, StoredPose], hand: Arr
         lost,
         np.array([p.record.keyframe for p in alike.values()], dtype=bool),
         names,
-        np.array([used.index(i) for i in limb_of]),
+        unit_of,
         joints,
     )
+
+
+class JointUnits(NamedTuple):
+    """The limb joints of a body, and what each is corrected with."""
+
+    joints: tuple[str, ...]
+    """Names of the joints, (J,); all points of a body that has no limb joints."""
+    units: tuple[str, ...]
+    """The trunk if a joint belongs to no limb, and limbs with joints, for display."""
+    unit_of: IntArray
+    """Index of the unit of each joint, (J,)."""
+    limb_of: IntArray
+    """Index of the limb of each joint in `tracker.body.limbs.limbs`, (J,); -1 for the trunk."""
+
+
+def joint_units(model: BodyModel) -> JointUnits:
+    """Return the limb joints of a body by the limb that carries them; a hip on the trunk belongs to the trunk."""
+    joints = tuple(n for n in model.point_names if n in LIMB_JOINTS) or model.point_names
+    parts, all_limbs = model.proximal_parts[[model.point_names.index(n) for n in joints]], limbs(model)
+    limb_of = np.array([next((i for i, x in enumerate(all_limbs) if part in x.parts), -1) for part in parts])
+    used = sorted({*limb_of.tolist()})
+    names = tuple(TRUNK if i < 0 else limb_display_name(all_limbs[i].name) for i in used)
+    return JointUnits(joints, names, np.array([used.index(i) for i in limb_of]), limb_of)

@@ -183,14 +183,15 @@ class _Person:
         self.errors = replace(self.errors, covariances=covariances)
         self.looked_at = set[int]()
         """Indices of the frames whose occlusion is known."""
-        self.gains_m = np.stack([self._gains(u) for u in range(len(self.errors.units))], axis=1)
+        self.gains_m = np.zeros((n_frames, len(self.errors.units)))
         """Sum of the errors of all joints and frames that an action lowers, (T, n_units), metres."""
+        self._update(range(n_frames))
 
     @property
     def best_m(self) -> Array:
         """Expected errors if every joint is corrected where that pays, (T, J), metres."""
         errors = self.errors
-        return np.minimum(errors.errors_m, mean_errors(np.minimum(errors.variances, self._variances), 0 * errors.lost))
+        return np.minimum(errors.errors_m, mean_errors(np.minimum(errors.variances, self._variances), 0.0))
 
     def views_of(self, t: int, unit: int) -> list[int]:
         """Return the views in which a limb is to be corrected, the best one first."""
@@ -214,18 +215,14 @@ class _Person:
         before = self._variances[t].copy()
         self._choose(slice(t, t + 1), self._by_hand(slice(t, t + 1)))
         self._variances[t] = np.maximum(before, self._variances[t])
-        for u in range(len(self.errors.units)):
-            self.gains_m[t, u] = self._gains(u, t)
+        self._update(range(t, t + 1))
 
     def take(self, t: int, unit: int) -> tuple[int, int]:
         """Count the effect of an action; return the first and last frame on which it has half of its effect."""
         variances, lost = self.errors.variances.copy(), self.errors.lost.copy()
         at = self.errors.unit_of == unit
-        before_m = self.errors.errors_m[:, at].sum(axis=1)
-        for k in (k for k in self._lags if 0 <= t + k < len(lost)):
-            to, share = self._carried(k, slice(t, t + 1))
-            if share[0] > 0:
-                variances[to, at], lost[to, at] = self._after(share, slice(t, t + 1), to, at)
+        before_m, (to, share) = self.errors.errors_m[:, at].sum(axis=1), self._carried(t)
+        variances[to, at], lost[to, at] = self._after(t, to, share, at)
         scale = variances / self.errors.variances
         keyframes = self.errors.keyframes.copy()
         keyframes[t] = True
@@ -234,12 +231,11 @@ class _Person:
         )
         effect = before_m - self.errors.errors_m[:, at].sum(axis=1)
         first = last = t
-        while first > 0 and effect[first - 1] >= effect[t] / 2 > 0:
+        while first > to.start and effect[first - 1] >= effect[t] / 2:
             first -= 1
-        while last + 1 < len(effect) and effect[last + 1] >= effect[t] / 2 > 0:
+        while last + 1 < to.stop and effect[last + 1] >= effect[t] / 2:
             last += 1
-        for u in range(len(self.errors.units)):  # the frame is a keyframe now, up to which others carry
-            self.gains_m[:, u] = self._gains(u)
+        self._update(range(len(effect)))  # the frame is a keyframe now, up to which others carry
         return int(self.errors.frames[first]), int(self.errors.frames[last])
 
     def _by_hand(self, some: slice) -> Array:
@@ -263,58 +259,40 @@ class _Person:
         """Return the indices of the parts of a unit."""
         at = [self._model.point_names.index(n) for n, u in zip(self.errors.joints, self.errors.unit_of, strict=True)
               if u == unit]  # fmt: skip
-        own = {int(p) for p in self._model.point_parts[at]}
+        own = {int(p) for p in self._model.proximal_parts[at]}
         whole = [x.parts for x in limbs(self._model) if own & {*x.parts.tolist()}]
         return np.unique(np.concatenate(whole)) if whole else np.array(sorted(own))
 
-    @property
-    def _lags(self) -> range:
-        """Numbers of frames by which an action is carried."""
-        r, n = self.errors.persistence, len(self.errors.frames) - 1
-        longest = int(np.log(self._hand.carried) / (2 * np.log(r))) if 0 < r < 1 else 0
-        return range(-min(n, longest), min(n, longest) + 1)
+    def _carried(self, t: int) -> tuple[slice, Array]:
+        """Return the frames to which an action is carried, within the keyframes around it, and its share on each."""
+        r, keyframes = self.errors.persistence, np.flatnonzero(self.errors.keyframes)
+        longest = int(np.log(self._hand.carried) / (2 * np.log(r))) if r > 0 else 0
+        before, after = keyframes[keyframes < t], keyframes[keyframes > t]
+        first = max(t - longest, int(before[-1]) + 1 if len(before) else 0)
+        stop = min(t + longest + 1, int(after[0]) if len(after) else len(self.errors.frames))
+        to = slice(first, stop)
+        return to, r ** (2.0 * np.abs(self.errors.frames[to] - self.errors.frames[t]))
 
-    def _carried(self, k: int, some: slice) -> tuple[slice, Array]:
-        """Return the frames k further than some, and the share of the effect of actions that is carried there.
-
-        Args:
-            k: number of frames, negative for earlier ones.
-            some: frames of the actions; those that k leads out of the recording must be left out.
-        """
-        frames, to = self.errors.frames, slice(some.start + k, some.stop + k)
-        passed = np.concatenate([[0], np.cumsum(self.errors.keyframes)])  # keyframes before each frame
-        a, b = np.arange(some.start, some.stop), np.arange(some.start, some.stop) + k
-        low, high = np.minimum(a, b), np.maximum(a, b)
-        if k == 0:
-            return to, np.ones(len(a))
-        is_open = (passed[high] - passed[low + 1] == 0) & ~self.errors.keyframes[b]
-        return to, np.where(is_open, self.errors.persistence ** (2.0 * np.abs(frames[b] - frames[a])), 0.0)
-
-    def _after(self, share: Array, some: slice, to: slice, at: Array) -> tuple[Array, Array]:
-        """Return variances and odds of loss on frames to which a share of actions is carried, (n, n_joints) each."""
+    def _after(self, t: int, to: slice, share: Array, at: Array) -> tuple[Array, Array]:
+        """Return variances and odds of loss on frames to which an action is carried, (n, n_joints) each."""
         variances, lost, w = self.errors.variances[to][:, at], self.errors.lost[to][:, at], share[:, None]
-        better = np.minimum(self._variances[some][:, at], variances)
+        better = np.minimum(self._variances[t, at], variances)
         return (1 - w) * variances + w * better, (1 - w) * lost
 
-    def _gains(self, unit: int, t: int | None = None) -> Array:
-        """Return the gain of an action on each frame, (T,), or on one frame, metres.
+    def _update(self, frames: range) -> None:
+        """Compute the gains of actions on some frames.
 
-        Where it does not help its own frame, as where it was done already, it helps no other.
+        Where an action does not help its own frame, as where it was done already, it helps no other.
         """
-        at, n = self.errors.unit_of == unit, len(self.errors.frames)
-        out, own = np.zeros(n if t is None else 1), np.zeros(n if t is None else 1)
-        for k in self._lags:
-            first, stop = (max(0, -k), min(n, n - k)) if t is None else (t, t + 1)
-            if t is not None and not 0 <= t + k < n:
-                continue
-            some = slice(first, stop)
-            to, share = self._carried(k, some)
-            lowered = self.errors.errors_m[to][:, at] - mean_errors(*self._after(share, some, to, at))
-            out[first - (t or 0) : stop - (t or 0)] += np.maximum(lowered, 0).sum(axis=1)
-            if k == 0:
-                own = np.maximum(lowered, 0).sum(axis=1)
-        out = np.where(own > 1e-9, out, 0.0)
-        return out if t is None else np.asarray(out[0])
+        helps_m = self.errors.errors_m - mean_errors(np.minimum(self._variances, self.errors.variances), 0.0)
+        for u in range(len(self.errors.units)):
+            at = self.errors.unit_of == u
+            for t in frames:
+                self.gains_m[t, u] = 0.0
+                if helps_m[t, at].sum() > 1e-9:  # rounding
+                    to, share = self._carried(t)
+                    left = mean_errors(*self._after(t, to, share, at))
+                    self.gains_m[t, u] = np.maximum(self.errors.errors_m[to][:, at] - left, 0).sum()
 
 
 def _shown(bodies: Sequence[PosedBody], model: BodyModel, camera: Camera) -> Array:

@@ -198,3 +198,13 @@ def test_neighbouring_keyframes_have_nothing_between_them(scene):
     model, truth, views, _ = scene
     keyframes = {k: {0: truth[k]} for k in (3, 4)}
     assert list(track_back(Shown(views), [model], tracked(truth, ()), TrackSettings(), keyframes=keyframes)) == []
+
+
+def test_alternatives_take_part_where_the_passes_are_apart(scene):
+    model, truth, views, first = scene
+    found = [f._replace(alternatives=((truth[f.frame],),)) for f in tracked(first, ())]
+    keyframes = {k: {0: truth[k]} for k in (0, N - 1)}
+    steps = list(track_back(Shown(views), [model], found, TrackSettings(), keyframes=keyframes))
+    better = {e.frame: e.poses[0] for e in steps[-1].better}
+    assert {*LOST} <= better.keys()
+    assert all(off_m(model, better[k], truth[k]) < 0.03 for k in LOST)
