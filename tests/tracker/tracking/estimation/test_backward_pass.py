@@ -202,7 +202,9 @@ def test_neighbouring_keyframes_have_nothing_between_them(scene):
 
 def test_alternatives_take_part_where_the_passes_are_apart(scene):
     model, truth, views, first = scene
-    found = [f._replace(alternatives=((truth[f.frame],),)) for f in tracked(first, ())]
+    other = truth.copy()
+    other[:, model.dof_names.index("left_shoulder.abduction")] += np.radians(40)
+    found = [f._replace(alternatives=((other[f.frame],),)) for f in tracked(first, ())]
     keyframes = {k: {0: truth[k]} for k in (0, N - 1)}
     steps = list(track_back(Shown(views), [model], found, TrackSettings(), keyframes=keyframes))
     better = {e.frame: e.poses[0] for e in steps[-1].better}
