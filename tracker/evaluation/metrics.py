@@ -226,9 +226,10 @@ def _acceleration_error(vectors: Array, fps: float) -> float | None:
 
 
 def _frame_error(frame: int, joints: Sequence[str], errors_mm: Array, assessed: PoseDoubt) -> FrameError:
-    status, *known = assessed
+    status = assessed.status
+    known = assessed.probability_off, assessed.reason, assessed.seam_mm
     if not np.isfinite(errors_mm).any():
-        return FrameError(frame, status or None, None, None, *known)
+        return FrameError(frame, status or None, None, None, None, *known)
     worst = int(np.nanargmax(errors_mm))
     mean = float(np.nanmean(errors_mm))
     return FrameError(frame, status or None, mean, float(errors_mm[worst]), joints[worst], *known)

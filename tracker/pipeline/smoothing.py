@@ -19,7 +19,7 @@ from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
 from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks, assessed_keyframe, with_repair
-from tracker.pipeline.keyframe_seams import Seam, seam_of, with_seam
+from tracker.pipeline.keyframe_stretches import Seam, seam_of, with_seam
 from tracker.pipeline.run_repair import RepairedPose
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import PoseQuality, frame_features

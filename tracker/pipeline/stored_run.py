@@ -61,7 +61,7 @@ class TrackPlan:
         if self.start is not None:
             return outward(self.frames, self.start)
         steps = np.diff(self.frames)
-        ends = [0, *(i + 1 for i in np.flatnonzero(steps != steps[:1])), len(self.frames)]
+        ends = [0, *(int(i) + 1 for i in np.flatnonzero(steps != steps[:1])), len(self.frames)]
         return [self.frames[a:b] for a, b in pairwise(ends)]
 
     def sources(self, session: Session) -> tuple[CameraSource, ...]:

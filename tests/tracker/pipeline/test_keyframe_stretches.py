@@ -9,7 +9,7 @@ import pytest
 
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model
-from tracker.pipeline.keyframe_stretches import Stretch, frames_of, stretches_to_track
+from tracker.pipeline.keyframe_stretches import KeyframeStretch, frames_of, stretches_to_track
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.session.session import load_session
@@ -97,26 +97,28 @@ def test_after_a_correction_only_the_stretches_beside_it_are_tracked(session, st
     def to_track(within=range(11)):
         return stretches_to_track(session, store, (0,), within)
 
-    assert to_track() == {(0,): [Stretch(0, 5), Stretch(5, 10)]}
+    assert to_track() == {(0,): [KeyframeStretch(0, 5), KeyframeStretch(5, 10)]}
     track(session, store)
     assert to_track() == {}
     set_keyframe(session, store, 10, 0.01)
-    assert to_track() == {(0,): [Stretch(5, 10)]}
+    assert to_track() == {(0,): [KeyframeStretch(5, 10)]}
     assert to_track(range(9)) == {}
     set_keyframe(session, store, 5, 0.01)
-    assert to_track() == {(0,): [Stretch(0, 5), Stretch(5, 10)]}
-    track(session, store, frames_of([Stretch(0, 5)]))
-    assert to_track() == {(0,): [Stretch(5, 10)]}
+    assert to_track() == {(0,): [KeyframeStretch(0, 5), KeyframeStretch(5, 10)]}
+    track(session, store, frames_of([KeyframeStretch(0, 5)]))
+    assert to_track() == {(0,): [KeyframeStretch(5, 10)]}
     store.commit("clear", [PoseChange("person", 2, None)])
-    assert to_track() == {(0,): [Stretch(0, 5), Stretch(5, 10)]}
+    assert to_track() == {(0,): [KeyframeStretch(0, 5), KeyframeStretch(5, 10)]}
     set_keyframe(session, store, 7)  # divides a stretch: both parts are tracked from other keyframes
-    assert to_track()[(0,)][1:] == [Stretch(5, 7), Stretch(7, 10)]
+    assert to_track()[(0,)][1:] == [KeyframeStretch(5, 7), KeyframeStretch(7, 10)]
     with pytest.raises(TrackerError, match="two keyframes with other frames between them in frames 1 to 4"):
         to_track(range(1, 5))
 
 
 def test_frames_with_a_gap_are_tracked_as_legs_of_their_own():
-    plan = TrackPlan(frames_of([Stretch(20, 23), Stretch(5, 8), Stretch(8, 10)]), (0,), SETTINGS)
+    plan = TrackPlan(
+        frames_of([KeyframeStretch(20, 23), KeyframeStretch(5, 8), KeyframeStretch(8, 10)]), (0,), SETTINGS
+    )
     assert plan.legs == [[5, 6, 7, 8, 9, 10], [20, 21, 22, 23]]
     assert TrackPlan(range(9, 0, -4), (0,), SETTINGS).legs == [range(9, -3, -4)]
     assert TrackPlan([4], (0,), SETTINGS).legs == [[4]]
