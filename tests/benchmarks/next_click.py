@@ -21,8 +21,8 @@ from between_keyframes import LOST_MM, errors
 from doc_tables import Conditions, add_write_option, check_places, show, table
 from joint_errors import references_of
 
-from tracker.annotation.expected_error import joint_units
-from tracker.annotation.next_click import propose
+from tracker.annotation.expected_error import contradicted_keyframes, joint_units
+from tracker.annotation.next_click import Proposals, propose
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.evaluation.references import read_joints
 from tracker.geometry.triangulation import PointObservation
@@ -87,6 +87,12 @@ class Annotator:
     def poses(self) -> list[dict[int, StoredPose]]:
         """The stored poses of each person."""
         return [read_stored_poses(self.session.annotations_path, p.name, p.model) for p in self.session.people]
+
+    def proposals(self) -> Proposals:
+        """What is proposed now."""
+        with closing(AnnotationStore(self.session.annotations_path, read_only=True)) as store:
+            contradicted = [contradicted_keyframes(store, p.name) for p in self.session.people]
+        return propose(self.session, self.poses(), contradicted=contradicted)
 
     def measure(self) -> Measured:
         """Add the present errors to the curve."""
@@ -161,7 +167,7 @@ def unit_of(model, unit: str) -> tuple[list[str], np.ndarray]:
 
 def proposed(at: Annotator) -> Action | None:
     """Return what `quadrille next` proposes."""
-    found = propose(at.session, at.poses())
+    found = at.proposals()
     names = [c.camera.name for c in at.session.cameras]
     if not found.clicks:
         return None
@@ -226,7 +232,7 @@ def rows_of(folder: Path, references: list[Path], seed: int) -> dict[str, list[s
 
         at = begin("next")
         followed(at, proposed, True)
-        found, last = propose(at.session, at.poses()), at.curve[-1]
+        found, last = at.proposals(), at.curve[-1]
         low, high = found.interval_mm
         end = f"{last.actions}, {last.mean_mm:.1f}; expected {found.error_mm:.1f} ({low:.1f} to {high:.1f})"
         out[f"{name}: next"] = cells(at.curve, at.target_mm, end)

@@ -5,7 +5,7 @@ limb is lost. Errors persist: a limb that is off on one frame is off on the next
 the recording, as the correlation of the logarithms of expected errors of neighbouring frames.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -18,6 +18,7 @@ from tracker.body.model import BodyModel
 from tracker.evaluation.metrics import LOST_M
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array, IntArray
+from tracker.store.annotation_store import AnnotationStore
 from tracker.store.stored_poses import StoredPose
 from tracker.tracking.pose_errors import SHARED_M
 from tracker.tracking.run_confidence import LOST_FROM
@@ -59,8 +60,8 @@ class ExpectedErrors:
 
     @property
     def is_lost(self) -> NDArray[np.bool_]:
-        """Whether a limb is called lost on a frame that is no keyframe, (T,)."""
-        return np.asarray((self.lost > LOST_FROM).any(axis=1) & ~self.keyframes)
+        """Whether a limb is called lost on a frame, (T,)."""
+        return np.asarray((self.lost > LOST_FROM).any(axis=1))
 
     @cached_property
     def persistence(self) -> float:
@@ -107,16 +108,18 @@ def mean_errors(variances: Array, lost: Array | float) -> Array:
     return np.asarray((1 - lost) * known + lost * np.maximum(known, LOST_M))
 
 
-def expected_errors(model: BodyModel, poses: Mapping[int, StoredPose], hand: Array | None = None) -> ExpectedErrors:
+def expected_errors(
+    model: BodyModel, poses: Mapping[int, StoredPose], contradicted: Collection[int] = ()
+) -> ExpectedErrors:
     """Return the expected errors of the stored poses of a person.
 
-    A pose without errors has the median covariances of those that have some, or those that all views share. A keyframe
-    that nobody assessed counts as set by a hand.
+    A pose without errors has the median covariances of those that have some, or those that all views share. No limb of
+    a keyframe is lost, unless it was contradicted.
 
     Args:
         model: the present body of the person.
         poses: by frame, at least one; those of another skeleton are left out.
-        hand: covariance of a joint that a hand sets, (3, 3), m^2; None: that of other poses.
+        contradicted: see `contradicted_keyframes`.
     """
     alike = {k: p for k, p in sorted(poses.items()) if p.body.model.point_names == model.point_names}
     joints, names, unit_of, limb_of = joint_units(model)
@@ -124,11 +127,10 @@ def expected_errors(model: BodyModel, poses: Mapping[int, StoredPose], hand: Arr
     assessed = [p.record.errors[columns] for p in alike.values() if p.record.errors is not None]
     usual = np.median(assessed, axis=0) if assessed else np.tile(SHARED_M**2 * np.eye(3), (len(columns), 1, 1))
     covariances, lost = np.empty((len(alike), len(columns), 3, 3)), np.zeros((len(alike), len(columns)))
-    for t, pose in enumerate(alike.values()):
+    for t, (frame, pose) in enumerate(alike.items()):
         record = pose.record
-        by_hand = hand is not None and record.keyframe
-        covariances[t] = record.errors[columns] if record.errors is not None else hand if by_hand else usual
-        if record.limbs_lost and not (record.keyframe and record.errors is None):
+        covariances[t] = usual if record.errors is None else record.errors[columns]
+        if record.limbs_lost and (not record.keyframe or frame in contradicted):
             of_limbs = np.append(record.limbs_lost, 0.0)  # the last one is the trunk's
             lost[t] = of_limbs[limb_of]
     return ExpectedErrors(
@@ -141,6 +143,12 @@ def expected_errors(model: BodyModel, poses: Mapping[int, StoredPose], hand: Arr
         unit_of,
         joints,
     )
+
+
+def contradicted_keyframes(store: AnnotationStore, person: str) -> frozenset[int]:
+    """Return the keyframes of a person that were assessed as doubtful or lost after they were set or verified."""
+    rows = store.frames(person)
+    return frozenset(r.frame for r in rows if r.keyframe and r.assessed_since and r.status in ("doubtful", "lost"))
 
 
 class JointUnits(NamedTuple):

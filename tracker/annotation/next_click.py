@@ -6,7 +6,7 @@ persistence r of the recording, up to the nearest keyframe on either side. The g
 action gains nothing where the expected error is below that of the hand.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
@@ -85,7 +85,11 @@ class Proposals(NamedTuple):
 
 
 def propose(
-    session: Session, poses: Sequence[Mapping[int, StoredPose]], n: int = 1, hand: HandSettings | None = None
+    session: Session,
+    poses: Sequence[Mapping[int, StoredPose]],
+    n: int = 1,
+    hand: HandSettings | None = None,
+    contradicted: Sequence[Collection[int]] = (),
 ) -> Proposals:
     """Propose the next actions. Reads no picture.
 
@@ -94,6 +98,8 @@ def propose(
         poses: of each person by frame.
         n: largest number of proposals.
         hand: what is expected of the person who acts.
+        contradicted: for each person the keyframes that an assessment contradicts; none by default. The other ones are
+            as good as a hand.
 
     Raises:
         SessionError: nobody has a pose.
@@ -101,9 +107,8 @@ def propose(
     hand = hand or HandSettings()
     cameras = [s.camera.pinhole for s in session.cameras]
     working = [c.scaled(working_scale(s.camera)) for c, s in zip(cameras, session.cameras, strict=True)]
-    people = {
-        i: _Person(session.people[i].model, own, cameras, hand) for i, own in enumerate(poses) if own
-    }  # fmt: skip
+    doubted = contradicted or [()] * len(poses)
+    people = {i: _Person(session.people[i].model, own, doubted[i], cameras, hand) for i, own in enumerate(poses) if own}
     if not people:
         raise SessionError("expected poses to improve, found none; place the body and track first")
     total = sum(p.errors.errors_m.size for p in people.values())
@@ -156,9 +161,14 @@ class _Person:
     """Expected errors of one person, and the gain of an action on each frame and limb."""
 
     def __init__(
-        self, model: BodyModel, poses: Mapping[int, StoredPose], cameras: Sequence[Camera], hand: HandSettings
+        self,
+        model: BodyModel,
+        poses: Mapping[int, StoredPose],
+        contradicted: Collection[int],
+        cameras: Sequence[Camera],
+        hand: HandSettings,
     ) -> None:
-        self.errors = expected_errors(model, poses)
+        self.errors = expected_errors(model, poses, contradicted)
         if not len(self.errors.frames):
             raise TrackerError("expected poses of the present body, found those of another; track again")
         self._model, self._hand = model, hand
@@ -175,11 +185,9 @@ class _Person:
         self._variances = np.empty((n_frames, n_joints))  # of a joint that is corrected, in the best views of its unit
         self._pair_of = np.empty((n_frames, len(self.errors.units)), dtype=np.int64)
         self._choose(slice(None), by_hand)
-        # A keyframe that nobody assessed is as good as the hand that set it.
-        unknown = np.array([poses[int(k)].record.keyframe and poses[int(k)].record.errors is None
-                            for k in self.errors.frames])  # fmt: skip
+        by_hand_only = self.errors.keyframes & ~np.isin(self.errors.frames, [*contradicted])
         covariances = self.errors.covariances.copy()
-        covariances[unknown] = self._variances[unknown][..., None, None] * np.eye(3)
+        covariances[by_hand_only] = self._variances[by_hand_only][..., None, None] * np.eye(3)
         self.errors = replace(self.errors, covariances=covariances)
         self.looked_at = set[int]()
         """Indices of the frames whose occlusion is known."""

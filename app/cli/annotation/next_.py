@@ -1,5 +1,6 @@
 """`quadrille next`: the frame, limb and view where a correction lowers the expected error of a recording most."""
 
+from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -50,7 +51,9 @@ def next_clicks(at: Target, frames: range, count: int) -> dict[str, Any]:
     Raises:
         SessionError: nobody has a pose on these frames.
     """
+    from tracker.annotation.expected_error import contradicted_keyframes
     from tracker.annotation.next_click import propose
+    from tracker.store.annotation_store import AnnotationStore
     from tracker.store.stored_poses import read_stored_poses
 
     session = at.session
@@ -58,7 +61,11 @@ def next_clicks(at: Target, frames: range, count: int) -> dict[str, Any]:
         read_stored_poses(session.annotations_path, p.name, p.model, frames) if i in at.people else {}
         for i, p in enumerate(session.people)
     ]
-    found = propose(session, poses, count)
+    contradicted: list[frozenset[int]] = []
+    if session.annotations_path.exists():
+        with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+            contradicted = [contradicted_keyframes(store, p.name) for p in session.people]
+    found = propose(session, poses, count, contradicted=contradicted)
     clicks = [_record(c, session.people[c.person].name) for c in found.clicks]
     nothing: dict[str, Any] = dict.fromkeys(("frame", "person", "limb", "view", "views", "frames"))
     best = clicks[0] if clicks else {**nothing, "expected_gain_mm": 0.0, "reason": "nothing is left that pays"}

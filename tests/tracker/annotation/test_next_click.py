@@ -124,11 +124,11 @@ def test_a_view_in_which_the_limb_is_hidden_is_not_proposed(session, model):
     assert plain.views[0] not in hidden.views
 
 
-def test_keyframes_that_nobody_assessed_are_as_good_as_a_hand(session, model):
-    poses = recording(session, keyframes=(0, 24))
-    poses[24] = replace(poses[24], record=replace(poses[24].record, errors=None, limbs_lost=(1.0,) * 5))
-    assert not expected_errors(model, poses).is_lost.any()
-    assert propose(session, [poses]).clicks[0].frame != 24
+def test_keyframes_are_as_good_as_a_hand_unless_they_are_contradicted(session, model):
+    poses = recording(session, lost=0.9, keyframes=(0, 24))
+    assert 24 not in {c.frame for c in propose(session, [poses], 9).clicks}
+    assert propose(session, [poses], 1, None, [{24}]).clicks[0].frame == 24
+    assert not expected_errors(model, poses).is_lost[24]
 
 
 def test_persistence_is_that_of_the_recording(session, model):
