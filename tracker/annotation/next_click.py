@@ -189,6 +189,7 @@ class _Person:
         covariances = self.errors.covariances.copy()
         covariances[by_hand_only] = self._variances[by_hand_only][..., None, None] * np.eye(3)
         self.errors = replace(self.errors, covariances=covariances)
+        self._persistence = self.errors.persistence  # of what is stored, whatever actions are counted
         self.looked_at = set[int]()
         """Indices of the frames whose occlusion is known."""
         self.gains_m = np.zeros((n_frames, len(self.errors.units)))
@@ -273,7 +274,7 @@ class _Person:
 
     def _carried(self, t: int) -> tuple[slice, Array]:
         """Return the frames to which an action is carried, within the keyframes around it, and its share on each."""
-        r, keyframes = self.errors.persistence, np.flatnonzero(self.errors.keyframes)
+        r, keyframes = self._persistence, np.flatnonzero(self.errors.keyframes)
         longest = int(np.log(self._hand.carried) / (2 * np.log(r))) if r > 0 else 0
         before, after = keyframes[keyframes < t], keyframes[keyframes > t]
         first = max(t - longest, int(before[-1]) + 1 if len(before) else 0)
