@@ -1,6 +1,6 @@
 """Count actions until a recording is good enough: `python tests/benchmarks/next_click.py SESSION... --data DIR`.
 
-Each SESSION has bodies and a start, and is named as the recordings in `--data DIR`, or with a folder of the same name in
+Each SESSION has bodies and a start. It is named as a recording in `--data DIR`, or as a folder in
 `--scenes DIR`. A scripted annotator sees the true joints with 3 px of noise and corrects copies, one limb of one frame
 by an action, in two views. The frame becomes a keyframe, and the stretches beside it are tracked again. He follows the
 proposals of `quadrille next`, the list of doubts, or corrects everything on keyframes at equal distances. It is counted
@@ -49,7 +49,7 @@ HEADS = ("actions until good", *(f"{n}" for n in SHOWN), "at the end")
 CONDITIONS = Conditions(
     footage="recordings and simulated people at 10 frames/s, four cameras with backgrounds; seed 1603",
     body="`gavrila38`, acquired from the joints of frame 0",
-    start="tracked anew from the pose fitted to the joints of frame 0, which is a keyframe",
+    start="tracked again from the pose fitted to the joints of frame 0, which is a keyframe",
     settings=f"an action corrects one limb of one frame in two views, with {NOISE_PX:g} px of noise. Good: at most 20 "
     "mm (two people 30 mm) and no frame lost. Mean error over the limb joints, mm, and lost frames after so many "
     f"actions; at most {MAX_ACTIONS} actions. *At the end:* actions, error, and the expected error with its interval",
