@@ -30,7 +30,7 @@ from app.cli import (
     track,
 )
 from app.cli import open as open_
-from app.cli.annotation import assign, compare, merge, share, tasks
+from app.cli.annotation import assign, compare, merge, next_, share, tasks
 from app.cli.batches import batch
 from app.cli.calibration import calibrate, check, sync
 from app.cli.observations import import_, judge
@@ -55,6 +55,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "acquire": acquire.command,
     "track": track.command,
     "audit": audit.command,
+    "next": next_.command,
     "judge": judge.command,
     "assign": assign.command,
     "tasks": tasks.command,

@@ -119,6 +119,9 @@ PHRASES = {
         "make the session with all --people, or give masks of the person",
         "make the session with the names of all people, or give masks of the person",
     ),
+    "set_keyframes": Phrases(
+        "set keyframes in the page, or with init --frame K", "pose the person on two frames and mark them as keyframes"
+    ),
     "place_body": Phrases(
         "place the body in the page, or use quadrille init", "place the body by hand, or press Find people"
     ),

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field, make_dataclass
+from dataclasses import dataclass, field, make_dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
@@ -17,6 +17,7 @@ from tracker.tracking.method import OptionValue, PaperMode
 
 if TYPE_CHECKING:
     from tracker.pipeline.chain import ChainPlan
+    from tracker.pipeline.stored_run import TrackPlan
     from tracker.session.session import Session
     from tracker.tracking.tracker import TrackerSettings
 
@@ -51,6 +52,9 @@ class TrackWords:
     """name of the person to track; all people by default."""
     backward: bool = False
     """from the last frame of the range to the first."""
+    between_keyframes: bool = False
+    """only the stretches between two keyframes that were not tracked from them as they are now: after the correction
+    of a keyframe, the two beside it."""
     paper: bool = False
     """as the method's paper."""
     json: bool = False
@@ -93,9 +97,10 @@ else:
 def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> None:
     """Track people through a range of frames and store the poses.
 
-    Ctrl+C stops it and keeps the poses found so far; run it again to resume.
+    Between two keyframes of a person it tracks from both, and joins the two passes where they agree best. Ctrl+C stops
+    it and keeps the poses found so far; run it again to resume.
     """
-    from app.cli.track_report import format_summary
+    from app.cli.track_report import format_stretches, format_summary
     from tracker.pipeline.chain import ChainPlan
     from tracker.pipeline.find_people import FindSettings
     from tracker.pipeline.stored_run import TrackPlan
@@ -116,6 +121,12 @@ def command(arguments: Annotated[TrackArguments, tyro.conf.arg(name="")]) -> Non
     find = None if arguments.init is None else FindSettings(keypoints=arguments.of)
     keypoints = arguments.of if arguments.evidence == "both" else None
     track_plan = TrackPlan(frames, at.people, settings, tuple(used), keypoints=keypoints)
+    if arguments.between_keyframes:
+        found = track_between(at.session, track_plan, Reporter(silent=arguments.json))
+        print(format_json(found) if arguments.json else format_stretches(found))
+        if any(run["stopped_at"] is not None for run in found["runs"]):
+            sys.exit(130)
+        return
     plan = ChainPlan(track_plan, find, at.people if arguments.acquire else ())
     found = track(at.session, plan, Reporter(silent=arguments.json))
     print(format_json(found) if arguments.json else format_summary(found))
@@ -155,6 +166,12 @@ def _check_chain(arguments: TrackArguments) -> None:
     if arguments.evidence == "keypoints" and arguments.acquire:
         raise TrackerError(
             "expected --evidence both with --acquire, found keypoints: sizes are acquired from the contours"
+        )
+    others = ("init", "acquire", "backward")
+    if arguments.between_keyframes and (any(getattr(arguments, o) for o in others) or arguments.stride != 1):
+        raise TrackerError(
+            "expected --between-keyframes without --init, --acquire, --backward and --stride, found one of them; it "
+            "tracks every frame between keyframes in both directions"
         )
     for option, is_used in (("--init", arguments.init is not None), ("--acquire", arguments.acquire)):
         if is_used and arguments.backward:
@@ -225,3 +242,47 @@ def track(session: "Session", plan: "ChainPlan", progress: Reporter) -> dict[str
         print(f"stopped before tracking; {kept}", file=sys.stderr)
         sys.exit(130)
     return summarize(opened.session, opened.plan, opened.run, is_stopped)
+
+
+def track_between(session: "Session", plan: "TrackPlan", progress: Reporter) -> dict[str, Any]:
+    """Track the stretches between keyframes that were not tracked from them as they are now.
+
+    Args:
+        session: the session.
+        plan: whom to track, within which frames, and how.
+        progress: shows how far it is.
+
+    Returns:
+        `stretches` with `first`, `last` and `people` of each, and `runs`: see `track_report.summarize`. A run is of the
+        people who share its stretches.
+
+    Raises:
+        TrackerError: nobody has two keyframes with other frames between them.
+    """
+    from app.cli.track_report import ChainProgress, summarize
+    from tracker.pipeline.chain import open_stored_session
+    from tracker.pipeline.keyframe_stretches import frames_of
+
+    if not getattr(plan.settings, "backward_pass", False):
+        raise TrackerError(
+            "expected a backward pass with --between-keyframes, found a method without one; leave out "
+            "--no-backward-pass, or choose another --method"
+        )
+    names = [p.name for p in session.people]
+    out: dict[str, Any] = {"stretches": [], "runs": []}
+    with open_stored_session(session) as opened:
+        for people, some in opened.stretches_to_track(plan).items():
+            is_stopped = False
+            with ChainProgress(progress) as sink:
+                try:
+                    opened.track(replace(plan, people=people, frames=frames_of(some)), sink)
+                except KeyboardInterrupt:
+                    is_stopped = opened.run is None or not opened.run.finished
+            assert opened.run is not None
+            assert opened.plan is not None
+            of_all = [names[i] for i in people]
+            out["stretches"] += [{"first": s.first, "last": s.last, "people": of_all} for s in some]
+            out["runs"].append(summarize(opened.session, opened.plan, opened.run, is_stopped))
+            if is_stopped:
+                break
+    return out

@@ -158,3 +158,11 @@ def format_summary(found: dict[str, Any]) -> str:
     if found["stopped_at"] is not None:
         lines.append(f"stopped before frame {found['stopped_at']}; run it again to resume")
     return "\n".join(lines)
+
+
+def format_stretches(found: dict[str, Any]) -> str:
+    """Format the stretches between keyframes that were tracked, for people."""
+    if not found["stretches"]:
+        return "nothing to track: all poses between keyframes were tracked from them as they are now"
+    lines = [f"frames {s['first']} to {s['last']}: {', '.join(s['people'])}" for s in found["stretches"]]
+    return "\n".join([*lines, *map(format_summary, found["runs"])])

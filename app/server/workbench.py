@@ -57,7 +57,7 @@ class NextSession(NamedTuple):
 
 
 class FirstView(NamedTuple):
-    """What the page shows first."""
+    """Frame and person that the page shows first."""
 
     frame: int = 0
     person: int = 0

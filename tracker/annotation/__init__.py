@@ -1,4 +1,5 @@
-"""Annotation for datasets: the plan of frames, states of tasks, comments, blind copies, and joining two copies.
+"""Annotation for datasets: the plan of frames, the next best click, comments, blind copies, and joining two copies.
 
-Imports `pipeline` and below. Callers use `plan`, `frame_choice`, `comments`, `blind_copy` and `merge_sessions`.
+Imports `pipeline` and below. Callers use `plan`, `frame_choice`, `comments`, `next_click`, `expected_error`,
+`blind_copy` and `merge_sessions`.
 """

@@ -18,7 +18,7 @@ from tracker.store.edit_log import EditLog
 
 
 class MergeReport(NamedTuple):
-    """What a merge found."""
+    """The result of a merge."""
 
     n_edits: int
     """Number of edits in the merged history."""

@@ -37,7 +37,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Tracked:
-    """What a tracking run has done."""
+    """The result of a tracking run."""
 
     frames: int
     """Number of frames tracked."""

@@ -25,7 +25,7 @@ _MANY = ";"
 
 
 class Settings(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
-    """What to do with a recording. A value that is not given is inherited."""
+    """Instructions for a recording. A value that is not given is inherited."""
 
     find: bool | None = None
     """Find people who have no pose; true by default."""

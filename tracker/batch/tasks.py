@@ -29,7 +29,7 @@ _TRACKED = "batch"
 
 
 class Done(NamedTuple):
-    """What a task has made."""
+    """The results of a task."""
 
     tracked: Tracked
     files: tuple[Path, ...]

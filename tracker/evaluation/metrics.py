@@ -92,6 +92,8 @@ class FrameError(NamedTuple):
     """Probability that a limb is off, the largest of all limbs; None where it was not assessed."""
     reason: str = ""
     """The tracker's reason against the pose; empty where there is none."""
+    seam_mm: float | None = None
+    """How far the passes from the two keyframes around the frame lie apart; None elsewhere."""
 
 
 class PoseDoubt(NamedTuple):
@@ -102,6 +104,8 @@ class PoseDoubt(NamedTuple):
     probability_off: float | None = None
     """See `FrameError`."""
     reason: str = ""
+    """See `FrameError`."""
+    seam_mm: float | None = None
     """See `FrameError`."""
 
 
@@ -224,12 +228,13 @@ def _acceleration_error(vectors: Array, fps: float) -> float | None:
 
 
 def _frame_error(frame: int, joints: Sequence[str], errors_mm: Array, assessed: PoseDoubt) -> FrameError:
-    status, off, reason = assessed
+    status = assessed.status
+    known = assessed.probability_off, assessed.reason, assessed.seam_mm
     if not np.isfinite(errors_mm).any():
-        return FrameError(frame, status or None, None, None, None, off, reason)
+        return FrameError(frame, status or None, None, None, None, *known)
     worst = int(np.nanargmax(errors_mm))
     mean = float(np.nanmean(errors_mm))
-    return FrameError(frame, status or None, mean, float(errors_mm[worst]), joints[worst], off, reason)
+    return FrameError(frame, status or None, mean, float(errors_mm[worst]), joints[worst], *known)
 
 
 def evaluate_poses(result: Evaluation, estimated: Motion, true: Motion, frames: Sequence[int]) -> Evaluation:

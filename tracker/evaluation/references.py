@@ -118,7 +118,7 @@ def _assessment(record: PoseRecord) -> PoseDoubt:
     from tracker.tracking.run_confidence import probability_off  # imported lazily: it loads kernels
 
     off = float(probability_off(np.array(record.limbs_lost)).max()) if record.limbs_lost else None
-    return PoseDoubt("keyframe" if record.keyframe else record.status, off, record.remark)
+    return PoseDoubt("keyframe" if record.keyframe else record.status, off, record.remark, record.seam_mm)
 
 
 def _merged(tables: Sequence[MarkerTable]) -> MarkerTable:

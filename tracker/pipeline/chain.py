@@ -22,6 +22,7 @@ from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
 from tracker.pipeline.calibration_revisions import follow_history
 from tracker.pipeline.find_people import FindSettings, find_people, sentences, store_found
+from tracker.pipeline.keyframe_stretches import KeyframeStretch, stretches_to_track
 from tracker.pipeline.keypoint_evidence import (
     SEEN_BODIES,
     learn_seen_bodies,
@@ -243,6 +244,11 @@ class StoredSession:
     def store_keypoint_poses(self, people: Sequence[int], frames: Sequence[int], name: str) -> dict[int, int]:
         """Store poses by key points alone; see `keypoint_poses.store_keypoint_poses`."""
         return store_keypoint_poses(self.session, self._store, people, frames, name)
+
+    def stretches_to_track(self, plan: TrackPlan) -> dict[tuple[int, ...], list[KeyframeStretch]]:
+        """Return the stretches between keyframes within the frames of a plan; see `stretches_to_track`."""
+        within = range(min(plan.frames), max(plan.frames) + 1)
+        return stretches_to_track(self.session, self._store, plan.people, within)
 
     def track(self, plan: TrackPlan, sink: Sink) -> TrackPlan:
         """See `OpenSession.track`."""

@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.body.limbs import limbs
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import DamagedStoreError
 from tracker.fitting.consensus import Consensus, agreement, consensus
 from tracker.fitting.gauss_newton import with_locked_dofs
+from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.motion.smoothing import PoseTrack, smooth_poses
 from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks, assessed_keyframe, with_repair
+from tracker.pipeline.keyframe_stretches import Seam, seam_of, with_seam
 from tracker.pipeline.run_repair import RepairedPose
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
-from tracker.tracking.confidence import (
-    PoseQuality,
-    frame_features,
-)
+from tracker.tracking.confidence import PoseQuality, frame_features
+from tracker.tracking.estimate import OtherPass
 from tracker.tracking.run_confidence import LOST_FROM, run_features, smoothing_steps
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.view_tracks import FrameTracks
@@ -41,6 +41,7 @@ class TrackedRows:
         self.tracks: dict[int, FrameTracks] = {}
         """By frame, the poses by tracks without a view each."""
         self._repaired: Mapping[int, RepairedPose] = {}
+        self._other_poses: dict[int, tuple[tuple[int, int], Array]] = {}  # with the keyframes that they lie between
 
     def add(self, change: PoseChange, covariance: Array, quality: PoseQuality | None) -> None:
         """Add a row, or replace that of the same frame.
@@ -67,6 +68,15 @@ class TrackedRows:
     def add_repaired(self, poses: Mapping[int, RepairedPose]) -> None:
         """Add the poses by frame after their repair."""
         self._repaired = poses
+
+    def add_other_pass(self, other: OtherPass) -> None:
+        """Add the poses between two keyframes by the pass that was not selected."""
+        self._other_poses |= {frame: (other.between, pose) for frame, pose in other.poses.items()}
+
+    @property
+    def is_compared(self) -> bool:
+        """Whether other tracks of the same frames are known, with which the poses have a consensus."""
+        return bool(self.tracks or self._other_poses)
 
     def record(self) -> dict[str, list[str]]:
         """Return covariances and features by frame as texts, for a run that is resumed later."""
@@ -104,12 +114,13 @@ class TrackedRows:
             smooth: whether the poses are smoothed.
         """
         model, active = subjects.models[person], subjects.active_dofs[person]
+        seams = self._seams(model, {k: of_one[person] for k, of_one in subjects.keyframes.items() if person in of_one})
         agreed = {f: self.consensus(model, f, active) for f in self._changes.keys() & self.tracks.keys()}
         for frame in agreed.keys() & self._repaired.keys():
             tracks, repaired = self.tracks[frame], self._repaired[frame]
             trust = tracks.trust * repaired.trust
             agreed[frame] = agreement(model, repaired.pose, tracks.poses, trust)
-        tracked, self._changes = self._changes, self._with_poses(model, agreed)
+        tracked, self._changes = self._changes, self._with_poses(model, agreed, active)
         smoothed = self.smoothed(subjects, person, fps) if smooth else [*self._changes.values()]
         self._changes = tracked
         features = self.run_features(model, smoothed)
@@ -126,6 +137,8 @@ class TrackedRows:
                 )
             elif frame in features:
                 pose = assessed_by_features(model, pose, features[frame], is_ambiguous)
+            if frame in seams:
+                pose = with_seam(model, pose, seams[frame])
             out.append(replace(change, pose=pose))
         return out
 
@@ -147,15 +160,52 @@ class TrackedRows:
         return [change for change in found if change is not None]
 
     def consensus(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Consensus:
-        """Return the consensus of the tracked pose of a frame and of those by tracks without a view each."""
-        pose, tracks = self._changes[frame].pose, self.tracks[frame]
-        assert pose is not None
-        lost = np.array(pose.limbs_lost) if pose.limbs_lost else np.zeros(tracks.trust.shape[1])
-        return consensus(model, pose.values, tracks.poses, np.vstack([1 - lost, tracks.trust]), active)
+        """Return the consensus of the tracked pose of a frame and of those by tracks without a view each.
 
-    def _with_poses(self, model: BodyModel, agreed: Mapping[int, Consensus]) -> dict[int, PoseChange]:
-        """Return the rows with the consensus of the tracks, and what of it is lost, on some frames."""
+        Between two keyframes, the pose by the other pass takes part.
+        """
+        tracks = self.tracks[frame]
+        return agreement(model, self._agreed_pose(model, frame, active), tracks.poses, tracks.trust)
+
+    def _agreed_pose(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Array:
+        """Return the pose on which all that is known of a frame agrees, (n_values,)."""
+        pose, n_limbs = self._changes[frame].pose, len(limbs(model))
+        assert pose is not None
+        others, trust = [], [1 - np.array(pose.limbs_lost) if pose.limbs_lost else np.ones(n_limbs)]
+        if frame in self.tracks:
+            others += [*self.tracks[frame].poses]
+            trust += [*self.tracks[frame].trust]
+        if frame in self._other_poses:
+            others.append(self._other_poses[frame][1])
+            apart = limbs_elsewhere(PosedBody(model, pose.values), PosedBody(model, others[-1]))
+            trust.append(np.array([limb.name not in apart for limb in limbs(model)], dtype=np.float64))
+        return consensus(model, pose.values, np.array(others), np.array(trust), active).pose
+
+    def _seams(self, model: BodyModel, keyframes: Mapping[int, Array]) -> dict[int, Seam]:
+        """Return how far the two passes lie apart on each frame between two keyframes."""
+        out = {}
+        for frame in self._changes.keys() & self._other_poses.keys():
+            (between, other), pose = self._other_poses[frame], self._changes[frame].pose
+            assert pose is not None
+            out[frame] = seam_of(model, pose.values, other, between, [keyframes[k] for k in between])
+        return out
+
+    def _with_poses(
+        self, model: BodyModel, agreed: Mapping[int, Consensus], active: NDArray[np.bool_] | None
+    ) -> dict[int, PoseChange]:
+        """Return the rows with the consensus of the tracks, and what of it is lost, on some frames.
+
+        Args:
+            model: the body.
+            agreed: the consensus with the tracks without a view each, by frame.
+            active: degrees of freedom that may move, (n_dofs,); None: all.
+        """
         out = dict(self._changes)
+        for frame in self._changes.keys() & self._other_poses.keys() - agreed.keys():
+            change = out[frame]
+            assert change.pose is not None
+            pose = replace(change.pose, values=self._agreed_pose(model, frame, active))
+            out[frame] = replace(change, pose=pose)
         for frame, found in agreed.items():
             change = out[frame]
             assert change.pose is not None

@@ -4,7 +4,10 @@ import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
+
+import numpy as np
 
 from tracker.errors import Remedy, SessionError
 from tracker.evidence.observer import Observer
@@ -54,8 +57,12 @@ class TrackPlan:
 
     @property
     def legs(self) -> list[Sequence[int]]:
-        """Frames of each leg in the order of tracking."""
-        return [self.frames] if self.start is None else outward(self.frames, self.start)
+        """Frames of each leg in the order of tracking. A leg ends before a gap in the frames."""
+        if self.start is not None:
+            return outward(self.frames, self.start)
+        steps = np.diff(self.frames)
+        ends = [0, *(int(i) + 1 for i in np.flatnonzero(steps != steps[:1])), len(self.frames)]
+        return [self.frames[a:b] for a, b in pairwise(ends)]
 
     def sources(self, session: Session) -> tuple[CameraSource, ...]:
         """Return the cameras to track with, in the order of the session."""
@@ -77,7 +84,7 @@ class TrackPlan:
 def stored_run(session: Session, store: AnnotationStore, observer: Observer, plan: TrackPlan) -> Iterator[TrackSession]:
     """Prepare a run that begins at stored poses. At the end it is saved, and its rest noted if it is not finished.
 
-    Keyframes and locked degrees of freedom stay as they are.
+    Keyframes and locked degrees of freedom stay as they are. People who are not tracked keep their stored poses.
 
     Args:
         session: whose people are tracked.
@@ -94,7 +101,8 @@ def stored_run(session: Session, store: AnnotationStore, observer: Observer, pla
         observer = with_keypoints(session, observer, read_points(session, plan.keypoints), seen)
     locks = load_locks(people, store.setting)
     active = [active_dofs(p.model, locked) for p, locked in zip(people, locks, strict=True)]
-    keyframes = keyframes_of(store, people, frozenset(plan.frames))
+    others = [i for i in range(len(people)) if i not in plan.people]
+    keyframes = keyframes_of(store, people, frozenset(plan.frames), others)
     subjects = Subjects.of([p.model for p in people], plan.people, active, keyframes)
     floor, left = floor_plane(session.up, session.floor), _frames_left(store, plan)
     legs, done = [], list[int]()

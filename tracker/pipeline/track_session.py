@@ -243,7 +243,7 @@ class TrackSession:
                 yield from (found for found in self.tracker.estimates(leg.run) if found.frame != leg.start)
 
     def backward_pass(self) -> Iterator[BackwardStep]:
-        """Improve frames on which people were lost, in this run or before it was interrupted."""
+        """Track backward between keyframes, and where people were lost, in this run or before it was interrupted."""
         for leg in self.legs:
             known = [f.frame for f in leg.before]
             tracked = [self.tracked[k] for k in (*known, *leg.frames)]
@@ -288,7 +288,7 @@ class TrackSession:
     def smoothing(self) -> Iterator[SmoothedRows]:
         """Take the consensus of all tracks, smooth it and assess it, as a single step: as a whole or not at all."""
         smooth = self.tracker.settings.smooth
-        if smooth or any(rows.tracks for rows in self._rows.values()):
+        if smooth or any(rows.is_compared for rows in self._rows.values()):
             held, fps = self._held, self.legs[0].run.fps
             found = (rows.finished(held, person, fps, smooth) for person, rows in self._rows.items())
             assessed = (self._assessed_keyframes(person) for person in self._rows)
@@ -375,6 +375,8 @@ class TrackSession:
             if found.frame in self.costs_px:
                 self.costs_px[found.frame] = found.cost_px
         self.n_improved += len(step.better)
+        if step.other_pass is not None:
+            self._rows[step.person].add_other_pass(step.other_pass)
         self._write(self._rows_of(step.better, [step.person]))
 
     def _take_finished(self, step: SmoothedRows) -> None:

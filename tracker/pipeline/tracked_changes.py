@@ -70,16 +70,23 @@ def tracked_changes(
 
 
 def keyframes_of(
-    store: AnnotationStore, people: Sequence[Person], frames: Collection[int]
+    store: AnnotationStore, people: Sequence[Person], frames: Collection[int], fixed: Collection[int] = ()
 ) -> dict[int, dict[int, Array]]:
     """Return the poses of the keyframes among some frames, by frame and index of the person.
 
     Poses of a body with another number of values are left out.
+
+    Args:
+        store: annotations of the session.
+        people: of the session.
+        frames: that are looked at.
+        fixed: indices of people all of whose poses are taken, because nobody tracks them.
     """
     found: dict[int, dict[int, Array]] = {}
     for index, person in enumerate(people):
         for row in store.frames(person.name):
-            record = store.pose(person.name, row.frame) if row.keyframe and row.frame in frames else None
+            is_taken = row.frame in frames and (row.keyframe or index in fixed)
+            record = store.pose(person.name, row.frame) if is_taken else None
             if record is not None and len(record.values) == len(person.model.value_names):
                 found.setdefault(row.frame, {})[index] = record.values
     return found

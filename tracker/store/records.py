@@ -11,6 +11,9 @@ SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", 
 """Sources of a value, most manual first. Stored by index: add at the end, never reorder."""
 SEEN = "seen"
 """Key of a pose's settings: where a user put points by hand, `{point: {camera: [u, v]}}`, original pixels."""
+BETWEEN, SEAM = "between", "seam_mm"
+"""Keys of a pose's settings: the two keyframes that it was interpolated or tracked between, `[first, last]`, and how
+far the passes from them lie apart, the largest of the limb joints, mm."""
 STATUSES = ("", "good", "doubtful", "lost")
 """Quality of a pose as assessed by its tracker; empty if not assessed."""
 
@@ -54,6 +57,12 @@ class PoseRecord:
     known."""
     trace: tuple[Search, ...] | None = None
     """The searches of the tracker on the frame, in their order; None where they are not known."""
+
+    @property
+    def seam_mm(self) -> float | None:
+        """How far the passes from the two keyframes around the frame lie apart, mm; None elsewhere."""
+        seam = self.settings.get(SEAM)
+        return None if seam is None else float(seam)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """Results that every tracker returns: the poses of a frame, and the steps of a backward pass."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from tracker.body.searches import Search
@@ -82,8 +83,17 @@ class TrackedFrame(NamedTuple):
         return self._replace(poses=poses, statuses=statuses)
 
 
+class OtherPass(NamedTuple):
+    """Poses of one person between two keyframes by the pass, forward or backward, that was not selected there."""
+
+    between: tuple[int, int]
+    """The keyframes, the earlier one first."""
+    poses: Mapping[int, Array]
+    """By frame, (n_values,) each."""
+
+
 class BackwardStep(NamedTuple):
-    """A step of a backward pass: one visit to one frame of a lost interval."""
+    """A step of a backward pass: one visit to one frame of an interval."""
 
     frame: int
     person: int
@@ -94,3 +104,5 @@ class BackwardStep(NamedTuple):
     better: tuple[PoseEstimate, ...] = ()
     """At the end of an interval the estimates that replace former ones, in the order of tracking. They differ in this
     person alone; poses and statuses of the others are unchanged."""
+    other_pass: OtherPass | None = None
+    """At the end of an interval between two keyframes, the poses that the selected ones are compared with."""

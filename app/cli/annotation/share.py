@@ -1,8 +1,9 @@
 """`quadrille share`: write a stretch of a session as a folder that opens in a browser, to be looked at."""
 
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -11,6 +12,10 @@ from app.cli.target import load_target
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
+
+if TYPE_CHECKING:
+    from app.share.content import SharedComment
+    from tracker.session.session import Session
 
 
 @dataclass(frozen=True)
@@ -53,7 +58,8 @@ def command(arguments: Annotated[ShareArguments, tyro.conf.arg(name="")]) -> Non
     require_files(at.session)
     motion = read_motion(at.session, at.people, frames)
     with Reporter(silent=arguments.json).over(len(motion.frames), "sharing") as tick:
-        n_bytes = share(motion, arguments.out, 1e6 * arguments.size, arguments.overwrite, tick)
+        comments = _comments(at.session)
+        n_bytes = share(motion, arguments.out, 1e6 * arguments.size, arguments.overwrite, tick, comments)
     opened = arguments.out if arguments.out.suffix.lower() == ".html" else arguments.out / "index.html"
     found: dict[str, Any] = {
         "open": str(opened),
@@ -67,3 +73,16 @@ def command(arguments: Annotated[ShareArguments, tyro.conf.arg(name="")]) -> Non
         return
     print(f"wrote {arguments.out}, {n_bytes / 1e6:.1f} MB: {frames_text(motion.frames)} in {found['views']} views")
     print(f"open {opened} in a browser; it needs no network")
+
+
+def _comments(session: "Session") -> list["SharedComment"]:
+    """Read the comments of a session."""
+    from app.share.content import SharedComment
+    from tracker.annotation.comments import read_comments
+    from tracker.store.annotation_store import AnnotationStore
+
+    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+        return [
+            SharedComment(c.row.person, c.row.frame, c.row.limb, c.row.text, c.row.author, c.resolved)
+            for c in read_comments(store)
+        ]

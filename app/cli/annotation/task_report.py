@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
-from tracker.body.limbs import limb_display_name
-
 if TYPE_CHECKING:
     from tracker.annotation.comments import Comment
     from tracker.annotation.plan import Task
@@ -61,6 +59,8 @@ def format_plan(tasks: "Sequence[Task]") -> str:
 
 def format_comments(comments: "Sequence[Comment]") -> str:
     """Format the comments that are open, a line each; empty if there are none."""
+    from tracker.body.limbs import limb_display_name  # imported lazily: it loads numpy
+
     lines = []
     for c in comments:
         limb = f", {limb_display_name(c.row.limb)}" if c.row.limb else ""

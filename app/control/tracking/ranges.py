@@ -16,7 +16,7 @@ from app.runtime.jobs import Job
 from app.state.progress import RangeState
 from tracker.errors import TrackerError
 from tracker.motion.interpolation import interpolate_pose
-from tracker.store.records import Change, FrameRow, MarkChange, PoseChange, PoseRecord
+from tracker.store.records import BETWEEN, Change, FrameRow, MarkChange, PoseChange, PoseRecord
 
 Mark = Literal["keyframe", "reviewed", "unreviewed", "none"]
 """`unreviewed` leaves keyframes unchanged; `none` removes the mark of keyframes too."""
@@ -288,7 +288,7 @@ class Ranges:
             piece = frames[at : at + _AT_ONCE]
             shares = (np.array(piece) - start) / (end - start)
             for frame, values in zip(piece, interpolate_pose(model, ends[0], ends[1], shares), strict=True):
-                settings = {"method": "interpolate", "between": [start, end]}
+                settings = {"method": "interpolate", BETWEEN: [start, end]}
                 yield PoseChange(name, frame, PoseRecord(values, sources, revision, settings=settings))
 
 

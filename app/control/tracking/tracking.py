@@ -112,7 +112,10 @@ class Tracking:
         with self._activities.editing():
             people = self._placed()
             shown = self._session_state.state.people
-            frames = self._frames(backward, until, from_shown or any(shown[i].source is None for i in people))
+            from_shown = from_shown or any(shown[i].source is None for i in people)
+            frames = self._frames(backward, until, from_shown)
+            if not from_shown and self._begins_at_keyframe(people, frames):
+                frames = self._frames(backward, until, True)
             run = TrackingRun(
                 self.observer(),
                 self._subjects(people, frames),
@@ -172,6 +175,15 @@ class Tracking:
         if not people:
             raise TrackerError("expected a person who has been placed, found none; pose the body here first")
         return people
+
+    def _begins_at_keyframe(self, people: tuple[int, ...], frames: Sequence[int]) -> bool:
+        """Return whether the shown frame is a keyframe of all people, and some of the given frames are keyframes, too.
+
+        They are then tracked both ways. Where all of the frames are keyframes, there is nothing to track.
+        """
+        shown, saver = self._session_state.state.frame, self._session_state.saver
+        keyframes = saver.keyframes({shown, *frames})
+        return set(people) <= keyframes.pop(shown, {}).keys() and 0 < len(keyframes) < len(frames)
 
     def _subjects(self, people: tuple[int, ...], frames: Sequence[int]) -> Subjects:
         session_state, models = self._session_state, self._session_state.present

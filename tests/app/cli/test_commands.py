@@ -248,7 +248,7 @@ def test_a_backward_pass_that_is_interrupted_keeps_whole_stretches_and_goes_on(r
         yield BackwardStep(3, 0, 2, 2, (elsewhere(3),))
 
     monkeypatch.setattr(ChamferTracker, "estimates", tracked)
-    monkeypatch.setattr("tracker.tracking.chamfer.tracker.track_lost_backward", ways_back)
+    monkeypatch.setattr("tracker.tracking.chamfer.tracker.track_backward", ways_back)
     words = ("track", session, "--no-smooth", "--frames", "0:5", "--json")
     status, out, _ = run(*words)
     summary = json.loads(out)

@@ -66,11 +66,15 @@ def test_each_frame_has_its_worst_joint():
     estimate, truth = (joints_of_poses(MODEL, poses(4), FPS) for _ in range(2))
     truth.points[1, truth.names.index("right_knee"), 2] += 0.06
     truth.points[2, :] = np.nan
-    assessed = {0: PoseDoubt("keyframe"), 1: PoseDoubt("lost", 0.9, "left leg uncertain"), 2: PoseDoubt("")}
+    assessed = {
+        0: PoseDoubt("keyframe"),
+        1: PoseDoubt("lost", 0.9, "left leg uncertain"),
+        2: PoseDoubt("", 0.2, "", 31.5),
+    }
     found = evaluate_joints(estimate, truth, range(4), assessed=assessed).per_frame
     assert [f.frame for f in found] == [0, 1, 2, 3]
     assert [f.status for f in found] == ["keyframe", "lost", None, None]
     assert (found[1].worst_joint, found[1].worst_mm) == ("right_knee", pytest.approx(60))
     assert found[1].mean_mm == pytest.approx(5)
     assert found[2][2:5] == (None, None, None)
-    assert [(f.probability_off, f.reason) for f in found[:2]] == [(None, ""), (0.9, "left leg uncertain")]
+    assert [f[5:] for f in found[:3]] == [(None, "", None), (0.9, "left leg uncertain", None), (0.2, "", 31.5)]

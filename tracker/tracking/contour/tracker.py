@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from tracker.tracking.contour.frame_estimator import ContourEstimator
 from tracker.tracking.contour.settings import ContourSettings
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
-from tracker.tracking.estimation.backward_pass import track_lost_backward
+from tracker.tracking.estimation.backward_pass import track_backward
 from tracker.tracking.estimation.forward_pass import track_forward
 from tracker.tracking.tracker import TrackingRun
 
@@ -25,4 +25,4 @@ class ContourTracker:
         """See `Tracker.backward_pass`; nothing where the settings switch it off."""
         if not self.settings.backward_pass:
             return iter(())
-        return track_lost_backward(run, tracked, self.settings, ContourEstimator)
+        return track_backward(run, tracked, self.settings, ContourEstimator)

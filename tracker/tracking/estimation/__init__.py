@@ -2,6 +2,6 @@
 
 Trackers share it: a method brings settings that extend `settings.EstimationSettings`, and its own
 `frame_estimator.FrameEstimator`. The room may import compute, search, and what `tracker.tracking` may. Public:
-`forward_pass.track_forward`, `backward_pass.track_lost_backward`, `frame_problem.FrameProblem`, `pose_score`,
+`forward_pass.track_forward`, `backward_pass.track_backward`, `frame_problem.FrameProblem`, `pose_score`,
 `settings`.
 """

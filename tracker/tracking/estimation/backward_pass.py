@@ -1,25 +1,31 @@
-"""Track people backward through intervals in which they were lost, from the first trusted poses after them.
+"""Track people backward: between two keyframes, and through intervals in which they were lost.
 
 A limb that is lost in fast motion is found again where the motion slows down. Tracked backward from there, it is often
 found on frames where it was lost. If it is lost in both directions, the two passes are seldom wrong on the same
 frames. Therefore the candidates of both are propagated to neighbouring frames, and one path through all frames of the
 interval is selected (`pose_paths`).
+
+Between two keyframes of a person, all frames are tracked backward from the second one. The path through both passes
+changes from one to the other where they agree best. Their disagreement on a frame is its *seam*.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import lru_cache
-from itertools import takewhile
+from functools import cached_property, lru_cache, partial
+from itertools import pairwise, takewhile
 from typing import NamedTuple
+
+import numpy as np
 
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import with_locked_dofs
+from tracker.fitting.hypothesis import SAME_POSE_M, distance_m
 from tracker.geometry.arrays import Array
 from tracker.tracking.confidence import Status
-from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
+from tracker.tracking.estimate import BackwardStep, OtherPass, PoseEstimate, TrackedFrame
 from tracker.tracking.estimation.assessment import estimate_at, estimate_fixed
 from tracker.tracking.estimation.forward_pass import make_estimate, track_forward
 from tracker.tracking.estimation.frame_estimator import FrameEstimator
@@ -40,11 +46,20 @@ _CACHED_FRAMES = 32
 
 
 class _Interval(NamedTuple):
-    """Frames in which one person was lost."""
+    """Frames on which one person is tracked backward."""
 
     person: int
     frames: range
     """Indices into the tracked frames. Backward tracking begins on the one after the last."""
+    lost: tuple[range, ...]
+    """Those in which the person was lost: candidates are propagated through them."""
+    is_between_keyframes: bool = False
+    """Whether a keyframe lies before the first frame and after the last."""
+
+    @property
+    def n_visits(self) -> int:
+        """How often its frames are visited."""
+        return len(self.frames) + 2 * ROUNDS * sum(map(len, self.lost))
 
 
 def lost_intervals(statuses: Sequence[Status], keyframes: Sequence[bool]) -> list[range]:
@@ -65,13 +80,13 @@ def lost_intervals(statuses: Sequence[Status], keyframes: Sequence[bool]) -> lis
     return [r for r in out if any(statuses[i] == "lost" for i in r)]
 
 
-def track_lost_backward(
+def track_backward(
     run: TrackingRun, tracked: Sequence[TrackedFrame], settings: EstimationSettings,
     make_estimator: type[FrameEstimator] = FrameEstimator,
 ) -> Iterator[BackwardStep]:  # fmt: skip
-    """Track people backward through the intervals in which they were lost. The other people keep their poses.
+    """Track people backward between two keyframes each, and through other intervals in which they were lost.
 
-    Without a lost interval no frame is read.
+    The other people keep their poses. Without such an interval no frame is read.
 
     Args:
         run: gives the observer and the subjects.
@@ -85,14 +100,14 @@ def track_lost_backward(
     known, subjects = list(tracked), run.subjects
     work = [s for person in subjects.tracked for s in _intervals_of(known, person, subjects.keyframes)]
     work.sort(key=lambda s: s.frames.stop)
-    n_visits = 1 + 2 * ROUNDS  # of each frame
-    total, done = n_visits * sum(len(s.frames) for s in work), 0
+    total, done = sum(s.n_visits for s in work), 0
     for interval in work:
-        person, backward, last = interval.person, list[PoseEstimate](), done + n_visits * len(interval.frames)
+        person, backward, last = interval.person, list[PoseEstimate](), done + interval.n_visits
         for estimate in _track_interval(run, known, interval, settings, make_estimator):
             backward.append(estimate)
             done += 1
-            yield BackwardStep(estimate.frame, person, done, total)
+            if done < last:
+                yield BackwardStep(estimate.frame, person, done, total)
         backward.reverse()
         selection = _PathSelection(run, known, interval, backward, settings)
         for i in selection.propagate():
@@ -100,22 +115,34 @@ def track_lost_backward(
             if done < last:
                 yield BackwardStep(backward[i].frame, person, done, total)
         better = selection.better()
+        other = selection.other_pass() if interval.is_between_keyframes else None
         at = {f.frame: i for i, f in enumerate(known)}
         for estimate in better:
             known[at[estimate.frame]] = TrackedFrame.of(estimate)
-        yield BackwardStep(backward[0].frame, person, done, total, better)
+        yield BackwardStep(backward[0].frame, person, done, total, better, other)
 
 
 def _intervals_of(tracked: Sequence[TrackedFrame], person: int, keyframes: Keyframes) -> list[_Interval]:
-    """Return the lost intervals of one person that end on a frame from which backward tracking can begin."""
+    """Return the intervals of one person between two keyframes, and the lost ones elsewhere.
+
+    The latter end on a frame from which backward tracking can begin.
+    """
     statuses = [f.statuses[person] for f in tracked]
-    out = []
-    for frames in lost_intervals(statuses, [person in keyframes.get(f.frame, {}) for f in tracked]):
+    is_keyframe = [person in keyframes.get(f.frame, {}) for f in tracked]
+    out, lost = [], lost_intervals(statuses, is_keyframe)
+    for first, last in pairwise(i for i, fixed in enumerate(is_keyframe) if fixed):
+        frames = range(first + 1, last)
+        if frames:
+            within = tuple(r for r in lost if r.start in frames)
+            lost = [r for r in lost if r.start not in frames]
+            out.append(_Interval(person, frames, within, True))
+    for frames in lost:
         end = frames.stop
         if end == len(tracked):  # no trusted frame follows: begin on the last frame that is not lost
             end = max((i for i in frames if statuses[i] != "lost"), default=frames.start)
         if end > frames.start:
-            out.append(_Interval(person, range(frames.start, end)))
+            whole = range(frames.start, end)
+            out.append(_Interval(person, whole, (whole,)))
     return out
 
 
@@ -156,15 +183,13 @@ class _PathSelection:
         """
         self._observer, self._models, self._settings = run.observer, run.subjects.models, settings
         self._person, (first, end) = interval.person, (interval.frames.start, interval.frames.stop)
+        self._lost = [range(r.start - first, r.stop - first) for r in interval.lost]
         self._model, self._active_dofs = self._models[self._person], run.subjects.active_dofs[self._person]
         self._before, self._after = tracked[max(0, first - 2) : first], tracked[end : end + 2]
         self._velocities: Callable[[int], list[Array | None]] = lambda frame: [None] * len(self._models)
         if any(any(run.observer.ahead_frames(f.frame)) for f in tracked[first : end + 1]):
             self._velocities = velocities_of(self._models, {f.frame: f.poses for f in tracked})
         self._forward, self._backward = tracked[first:end], backward
-        self._part_colors: PartColors | None = None
-        for good in (*self._before[-1:], self._after[0]):
-            self._part_colors = self._colors(good).learn(self._part_colors, 0.5)
         self._candidates = [
             self._candidates_of(f, TrackedFrame.of(b)) for f, b in zip(self._forward, backward, strict=True)
         ]
@@ -172,24 +197,61 @@ class _PathSelection:
         self._scorer = lru_cache(_CACHED_FRAMES)(self._make_scorer)
 
     def propagate(self) -> Iterator[int]:
-        """Propagate the candidates through the interval. Yields the index of each frame that is visited."""
+        """Propagate the candidates through the lost frames. Yields the index of each frame that is visited."""
         locked = self._forward[0].poses[self._person]
-        ends = [e[i].poses[self._person] if e else None for e, i in ((self._before, -1), (self._after, 0))]
-        ends = [None if e is None else with_locked_dofs(self._model, e, locked, self._active_dofs) for e in ends]
-        sigma = trust(self._model, self._settings)
-        yield from propagate_candidates(self._model, self._candidates, self._scorer, ends, sigma)
+        around = [*self._before[-1:], *self._forward, *self._after[:1]]
+        n_before, sigma = len(self._before[-1:]), trust(self._model, self._settings)
+        for lost in self._lost:
+            known = [around[i] if i >= 0 else None for i in (lost.start + n_before - 1, lost.stop + n_before)]
+            ends = [None if f is None else f.poses[self._person] for f in known]
+            ends = [None if e is None else with_locked_dofs(self._model, e, locked, self._active_dofs) for e in ends]
+            scorers = partial(self._scorer_from, lost.start)
+            visits = propagate_candidates(self._model, self._candidates[lost.start : lost.stop], scorers, ends, sigma)
+            yield from (lost.start + i for i in visits)
 
     def better(self) -> tuple[PoseEstimate, ...]:
         """Return the estimates of the selected path that replace those of forward tracking, in tracking order."""
-        ends = [[self._model.points_world(e.poses[self._person]) for e in some] for some in (self._before, self._after)]
-        points, costs = [c.points for c in self._candidates], [c.costs for c in self._candidates]
         out = []
-        for i, chosen in enumerate(viterbi_path(points, costs, *ends)):
+        for i, chosen in enumerate(self._path):
             if chosen == 1:
                 out.append(self._merged(i, 1, self._backward[i], f"tracked back from frame {self._after[0].frame}"))
             elif chosen > 1:
                 out.append(self._merged(i, chosen, self._estimate(i, chosen), "taken over from neighbouring frames"))
         return tuple(out)
+
+    def other_pass(self) -> OtherPass:
+        """Return the poses of the pass that was not selected."""
+        found = [(self._forward if chosen == 1 else self._backward)[i] for i, chosen in enumerate(self._path)]
+        ends = self._before[-1].frame, self._after[0].frame
+        return OtherPass((min(ends), max(ends)), {f.frame: f.poses[self._person] for f in found})
+
+    @cached_property
+    def _path(self) -> list[int]:
+        """The index of the selected candidate of each frame."""
+        ends = [[self._model.points_world(e.poses[self._person]) for e in some] for some in (self._before, self._after)]
+        costs = [self._costs(i) for i in range(len(self._candidates))]  # may add alternatives to the candidates
+        return viterbi_path([c.points for c in self._candidates], costs, *ends)
+
+    def _costs(self, i: int) -> Array:
+        """Return the costs of the candidates of a frame, nats; 0 for all where the passes agree, and none is known."""
+        candidates = self._candidates[i]
+        if not np.isfinite(candidates.costs).all():
+            forward, backward = (h.body for h in candidates.hypotheses)
+            if distance_m(forward, backward) <= SAME_POSE_M:
+                return np.zeros(len(candidates.poses))
+            candidates.score(self._scorer(i))
+        return candidates.costs
+
+    def _scorer_from(self, first: int, i: int) -> PoseScorer:
+        return self._scorer(first + i)
+
+    @cached_property
+    def _part_colors(self) -> PartColors | None:
+        """Colours of the person on the trusted frames around the interval."""
+        out: PartColors | None = None
+        for good in (*self._before[-1:], self._after[0]):
+            out = self._colors(good).learn(out, 0.5)
+        return out
 
     def _candidates_of(self, *passes: TrackedFrame) -> Candidates:
         p = self._person
@@ -234,7 +296,7 @@ class _PathSelection:
         person, statuses, notes = self._person, list(self._forward[i].statuses), list(estimate.notes)
         statuses[person] = estimate.statuses[person]
         notes[person] = ", ".join(filter(None, (notes[person], note)))
-        costs, traces = self._candidates[i].costs, list(estimate.traces or (None,) * len(notes))
+        costs, traces = self._costs(i), list(estimate.traces or (None,) * len(notes))
         entry = Search.of("path", (), costs[0], costs[chosen], True)  # the forward pass is candidate 0
         traces[person] = (*(traces[person] or ()), entry)
         return estimate._replace(statuses=tuple(statuses), notes=tuple(notes), traces=tuple(traces))

@@ -38,7 +38,7 @@ RECOVER = Option(
 )  # fmt: skip
 BACKWARD_PASS = Option(
     "backward_pass", "Backward pass",
-    "at the end, track lost people backward from the first trusted poses after the loss", "", "switch",
+    "at the end, track backward between two keyframes, and from the first trusted poses after a loss", "", "switch",
     lambda s: s.backward_pass, lambda s, on: replace(s, backward_pass=on),
 )  # fmt: skip
 SMOOTH = Option(

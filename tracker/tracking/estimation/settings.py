@@ -79,7 +79,8 @@ class EstimationSettings:
     rounds: int = 2
     """Largest number of rounds in which all people are refined again with the others where they were found."""
     backward_pass: bool = True
-    """Whether people are tracked backward through intervals in which they were lost, see `backward_pass`."""
+    """Whether people are tracked backward between two keyframes, and through intervals in which they were lost; see
+    `backward_pass`."""
     smooth: bool = True
     """Whether the poses are smoothed at the end of a run."""
     audit: bool = True

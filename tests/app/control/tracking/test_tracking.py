@@ -141,7 +141,7 @@ def test_keyframes_are_taken_as_they_are(placed, tracker):
     placed.navigation.seek(2)
     placed.tracking.start(backward=False, until=5)
     np.testing.assert_array_equal(tracker_fixed(placed, tracker)[4][0], keyframe)
-    tracker.let_go(2)
+    tracker.let_go(3)  # the shown keyframe is tracked, too: between both, people are tracked both ways
     wait_for(at(placed, 4))
     assert placed.state.people[0].source == "manual"
     np.testing.assert_array_equal(placed.state.poses[0], keyframe)

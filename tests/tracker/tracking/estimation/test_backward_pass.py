@@ -161,3 +161,52 @@ def test_lost_intervals(statuses, expected):
     names = {"g": "good", "d": "doubtful", "l": "lost", "K": "good"}
     found = lost_intervals([names[s] for s in statuses], [s == "K" for s in statuses])
     assert [(r.start, r.stop) for r in found] == expected
+
+
+def between_keyframes(model, truth, first, views, **settings):
+    """The steps between keyframes on the first and last frame."""
+    keyframes = {k: {0: truth[k]} for k in (0, N - 1)}
+    return list(track_back(Shown(views), [model], tracked(first, ()), TrackSettings(**settings), keyframes=keyframes))
+
+
+def test_between_keyframes_all_is_tracked_from_both_and_the_passes_are_joined_where_they_agree(scene):
+    """Nothing says that the arm was lost on the way: the costs of the frames where the passes are apart tell."""
+    model, truth, views, first = scene
+    steps = between_keyframes(model, truth, first, views)
+    assert [s.frame for s in steps] == list(range(N - 2, 0, -1))  # once each, without a search
+    assert (steps[-1].done, steps[-1].total) == (N - 2, N - 2)
+    better, other = steps[-1].better, steps[-1].other_pass
+    assert {*LOST} <= {e.frame for e in better}
+    for estimate in better:
+        assert off_m(model, estimate.poses[0], truth[estimate.frame]) < 0.03
+    assert other.between == (0, N - 1)
+    assert sorted(other.poses) == list(range(1, N - 1))
+    for k in LOST:  # the pass that was not taken
+        np.testing.assert_array_equal(other.poses[k], first[k])
+
+
+def test_a_stretch_is_tracked_backward_whatever_the_direction_of_the_run(scene):
+    model, truth, views, _ = scene
+    found = tracked(truth, ())[::-1]
+    keyframes = {k: {0: truth[k]} for k in (2, 5)}
+    steps = list(track_back(Shown(views), [model], found, TrackSettings(), keyframes=keyframes))
+    assert [s.frame for s in steps] == [3, 4]
+    assert steps[-1].other_pass.between == (2, 5)
+
+
+def test_neighbouring_keyframes_have_nothing_between_them(scene):
+    model, truth, views, _ = scene
+    keyframes = {k: {0: truth[k]} for k in (3, 4)}
+    assert list(track_back(Shown(views), [model], tracked(truth, ()), TrackSettings(), keyframes=keyframes)) == []
+
+
+def test_alternatives_take_part_where_the_passes_are_apart(scene):
+    model, truth, views, first = scene
+    other = truth.copy()
+    other[:, model.dof_names.index("left_shoulder.abduction")] += np.radians(40)
+    found = [f._replace(alternatives=((other[f.frame],),)) for f in tracked(first, ())]
+    keyframes = {k: {0: truth[k]} for k in (0, N - 1)}
+    steps = list(track_back(Shown(views), [model], found, TrackSettings(), keyframes=keyframes))
+    better = {e.frame: e.poses[0] for e in steps[-1].better}
+    assert {*LOST} <= better.keys()
+    assert all(off_m(model, better[k], truth[k]) < 0.03 for k in LOST)

@@ -1,0 +1,169 @@
+"""Measure poses between keyframes: `python tests/benchmarks/between_keyframes.py SESSIONS --data DIR`.
+
+SESSIONS is a folder of sessions with acquired bodies, named as the recordings in `--data DIR`. In copies of them every
+15th frame becomes a keyframe, fitted to the reference joints. The frames between are tracked from both keyframes,
+tracked forward alone, or interpolated on the pose manifold. Errors are of the frames between two keyframes. The rank
+correlation is that of the seam, the largest distance of a limb joint in the two passes, with the mean error of the
+frame.
+"""
+
+import argparse
+import shutil
+import tempfile
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from acquisition import RECORDED, quadrille
+from doc_tables import Conditions, add_write_option, check_places, show, table
+from joint_errors import processor_s, references_of
+from scipy.stats import spearmanr
+
+from tracker.body.model import PosedBody
+from tracker.evaluation.references import read_joints
+from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.motion.interpolation import interpolate_pose
+from tracker.session.assemble import DEFAULT_MODEL
+from tracker.session.session import load_session
+from tracker.store.stored_poses import read_stored_poses
+
+EVERY = 15
+"""Frames from a keyframe to the next."""
+LOST_MM = 150.0
+TABLES = ("between_keyframes",)
+HEADS = ("frames", "from both", "forward", "interpolated", "lost", "seam and error", "processor time")
+CONDITIONS = Conditions(
+    footage="recordings, four cameras with backgrounds",
+    body=f"`{DEFAULT_MODEL}`, acquired from the reference joints of frame 0",
+    start=f"keyframes on every {EVERY}th frame, fitted to the reference joints",
+    settings="defaults. Mean error over the limb joints of frames between two keyframes, without the audit → with it, "
+    "mm. *Lost:* frames with a joint off by more than 150 mm, with the audit: from both, forward, interpolated. *Seam "
+    "and error:* rank correlation, without the audit → with it. Processor time: from both, as a multiple of forward",
+    chosen="rules of tracking; none of the passes from both keyframes",
+    command="python tests/benchmarks/between_keyframes.py SESSIONS --data DIR --write docs/annotation.md",
+)
+
+
+class Between(NamedTuple):
+    """Errors of the frames between two keyframes."""
+
+    errors_mm: np.ndarray
+    """Of each limb joint, (T, 12); NaN where unknown."""
+    seams_mm: np.ndarray
+    """(T,); NaN where there is none."""
+    seconds: float
+    """Processor time."""
+
+    @property
+    def mean_mm(self) -> float:
+        """Mean error, mm."""
+        return float(np.nanmean(self.errors_mm))
+
+    @property
+    def n_lost(self) -> int:
+        """Number of lost frames."""
+        return int((np.nanmax(self.errors_mm, axis=1) > LOST_MM).sum())
+
+    @property
+    def correlation(self) -> float:
+        """Rank correlation of the seam with the mean error of the frame."""
+        return float(spearmanr(self.seams_mm, np.nanmean(self.errors_mm, axis=1))[0])
+
+
+def with_keyframes(folder: Path, references: list[Path]) -> list[int]:
+    """Make every 15th frame of a session a keyframe, fitted to the reference joints; return their numbers."""
+    session = load_session(folder)
+    frames = list(range(0, session.n_frames, EVERY))
+    for person, reference in zip(session.people, references, strict=True):
+        for k in frames:
+            quadrille("init", folder, "--joints", reference, "--frame", k, "--person", person.name)
+    return frames
+
+
+def measured(folder: Path, person: int, reference: Path, keyframes: list[int], seconds: float = 0.0) -> Between:
+    """Compare the stored poses between keyframes with known joints."""
+    who = load_session(folder).people[person]
+    stored = read_stored_poses(load_session(folder).annotations_path, who.name, who.model)
+    bodies = {k: s.body for k, s in stored.items() if keyframes[0] < k < keyframes[-1] and k not in keyframes}
+    seams = [stored[k].record.seam_mm for k in bodies]
+    return Between(errors(bodies, reference, load_session(folder).fps), np.array(seams, dtype=float), seconds)
+
+
+def interpolated(folder: Path, person: int, reference: Path, keyframes: list[int]) -> Between:
+    """Compare poses that are interpolated between keyframes with known joints."""
+    session = load_session(folder)
+    who = session.people[person]
+    stored, bodies = read_stored_poses(session.annotations_path, who.name, who.model), {}
+    for a, b in pairwise(keyframes):
+        frames = np.arange(a + 1, b)
+        poses = interpolate_pose(who.model, stored[a].body.values, stored[b].body.values, (frames - a) / (b - a))
+        bodies |= {int(k): PosedBody(who.model, pose) for k, pose in zip(frames, poses, strict=True)}
+    return Between(errors(bodies, reference, session.fps), np.full(len(bodies), np.nan), 0.0)
+
+
+def errors(bodies: Mapping[int, PosedBody], reference: Path, fps: float) -> np.ndarray:
+    """Return the errors of the limb joints, (T, n), mm."""
+    joints = read_joints(reference, fps)
+    known = dict(zip(joints.frames.tolist(), joints.points, strict=True))
+    names = [n for n in joints.names if n in LIMB_JOINTS]
+    columns = [joints.names.index(n) for n in names]
+    rows = []
+    for k, body in bodies.items():
+        at = [body.model.point_names.index(n) for n in names]
+        rows.append(1000 * np.linalg.norm(body.joint_centers_world[at] - known[k][columns], axis=1))
+    return np.array(rows)
+
+
+def rows_of(folder: Path, references: list[Path]) -> dict[str, list[str]]:
+    """Track copies of a session in all ways; return the cells of each person."""
+    runs: dict[tuple[bool, bool], list[Between]] = {}
+    with tempfile.TemporaryDirectory() as scratch:
+        start = Path(shutil.copytree(folder, Path(scratch) / "start"))
+        keyframes = with_keyframes(start, references)
+        by_hand = [interpolated(start, i, path, keyframes) for i, path in enumerate(references)]
+        for audit in (False, True):
+            for both in (True, False):
+                at = Path(shutil.copytree(start, Path(scratch) / f"{audit}-{both}"))
+                before = processor_s()
+                options = ["--no-audit"] * (not audit) + ["--no-backward-pass"] * (not both)
+                quadrille("track", at, *options)
+                seconds = processor_s() - before
+                found = [measured(at, i, path, keyframes, seconds) for i, path in enumerate(references)]
+                runs[audit, both] = found
+    out = {}
+    for i, reference in enumerate(references):
+        plain, audited = ([runs[a, both][i] for both in (True, False)] for a in (False, True))
+        name = folder.name.replace("_", " ") + (f", {reference.stem}" if len(references) > 1 else "")
+        out[name] = [
+            str(len(plain[0].seams_mm)),
+            f"{plain[0].mean_mm:.1f} → {audited[0].mean_mm:.1f}",
+            f"{plain[1].mean_mm:.1f} → {audited[1].mean_mm:.1f}",
+            f"{by_hand[i].mean_mm:.1f}",
+            f"{audited[0].n_lost}, {audited[1].n_lost}, {by_hand[i].n_lost}",
+            f"{plain[0].correlation:.2f} → {audited[0].correlation:.2f}",
+            f"x {plain[0].seconds / plain[1].seconds:.1f} → x {audited[0].seconds / audited[1].seconds:.1f}",
+        ]
+    return out
+
+
+def main() -> None:
+    """Measure all recordings, and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sessions", type=Path)
+    parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
+    parser.add_argument("--only", nargs="+", help="names of the recordings to measure")
+    add_write_option(parser)
+    given = parser.parse_args()
+    check_places(given.write, TABLES)
+    rows: dict[str, list[str]] = {}
+    for name in (n for n in RECORDED if n in (given.only or RECORDED)):
+        for row, cells in rows_of(given.sessions / name, references_of(name, given.data, None)).items():
+            rows[row] = cells
+            print(f"{row}: {' | '.join(cells)}", flush=True)
+    show(given.write, TABLES[0], CONDITIONS, table(HEADS, rows, "recording"))
+
+
+if __name__ == "__main__":
+    main()
