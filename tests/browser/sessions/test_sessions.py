@@ -106,6 +106,7 @@ async def test_a_recording_of_a_batch_is_opened_at_its_worst_frame(fresh_page):
             await route.fulfill(json=RECENT | {"batches": [BATCH]})
 
     await page.route(re.compile(r"/sessions(/|$)"), answer)
+    await page.route("**/starting.json", lambda route: route.fulfill(json=STARTED))
     await page.keyboard.press("Control+o")
     await page.get_by_text("night_batch").click()
     table = page.locator(".batch table")
