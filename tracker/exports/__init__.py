@@ -4,3 +4,5 @@ Imports all that it gathers: `session`, `store`, `contours`, `posing`; `formats`
 to read what is exported, and one function for each format of `writers`, `array_writers`, `nwb_writer`, `label_writers`,
 `mask_writers` and `dataset`. `provenance` tells who made each pose, and how.
 """
+
+__all__ = ["export_files", "export_format", "formats", "like", "motion", "options", "pose_arrays", "provenance"]
