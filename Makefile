@@ -76,7 +76,7 @@ format: $(VENV)/.tested
 
 # The documents as a site, with the library's reference: below .venv, which git ignores.
 docs: $(VENV)/.documented
-	$(BIN)/mkdocs build --quiet --strict --site-dir $(CURDIR)/$(SITE)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir $(CURDIR)/$(SITE)
 	@echo "file://$(CURDIR)/$(SITE)/index.html"
 
 # Wheel and sdist in dist/, installed and tried with each of RELEASE_PYTHONS; needs a package index.
@@ -103,9 +103,9 @@ $(VENV)/.tested: $(VENV)/.installed tests/support/chromium.py
 	$(BIN)/python tests/support/chromium.py
 	touch $@
 
-# .slow: the programs that write imported files and read exported ones; OpenSim is big.
+# .slow: the programs that write imported files and read exported ones, and the site's; OpenSim is big.
 $(VENV)/.slow: $(VENV)/.tested
-	$(PIP_INSTALL) '.[dev,slow,import,export]'
+	$(PIP_INSTALL) '.[dev,slow,import,export,docs]'
 	touch $@
 
 # .documented: what makes a site of the documents.
