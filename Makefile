@@ -76,7 +76,7 @@ format: $(VENV)/.tested
 
 # The documents as a site, with the library's reference: below .venv, which git ignores.
 docs: $(VENV)/.documented
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict --site-dir $(CURDIR)/$(SITE)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir $(CURDIR)/$(SITE)
 	@echo "file://$(CURDIR)/$(SITE)/index.html"
 
 # Wheel and sdist in dist/, installed and tried with each of RELEASE_PYTHONS; needs a package index.
