@@ -19,6 +19,7 @@ from pathlib import Path
 
 import aiohttp
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from platformdirs import user_cache_path
 from yarl import URL
@@ -142,12 +143,17 @@ def test_the_sdist_holds_sources_and_documents_and_nothing_else(built):
     assert tops == {*FOLDERS, *DOCUMENTS, "docs", "pyproject.toml", "PKG-INFO", ".gitignore"}
 
 
-def test_the_metadata_name_each_python_that_was_tried(built):
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+def version():
+    """Version of the project."""
+    return tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+
+
+def test_the_metadata_name_the_version_and_each_python(built):
     with zipfile.ZipFile(built[0]) as archive:
         (name,) = [n for n in archive.namelist() if n.endswith(".dist-info/METADATA")]
         text = archive.read(name).decode()
-    assert f"\nVersion: {declared['version']}\n" in text
+    assert f"\nVersion: {version()}\n" in text
+    assert yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))["version"] == version()
     assert re.findall(r"^Classifier: Programming Language :: Python :: (3\.\d+)$", text, re.MULTILINE) == [
         "3.11",
         "3.12",
@@ -165,8 +171,7 @@ def test_its_requirements_are_met(environment, tmp_path):
 
 
 def test_every_command_answers_help(environment, tmp_path):
-    version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
-    assert run(environment / "quadrille", "--version", cwd=tmp_path) == f"quadrille {version}\n"
+    assert run(environment / "quadrille", "--version", cwd=tmp_path) == f"quadrille {version()}\n"
     shown = run(environment / "python", "-c", EVERY_HELP, cwd=tmp_path)
     assert shown.count("usage: quadrille ") > 20
 
