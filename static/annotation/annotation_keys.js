@@ -12,21 +12,21 @@ export function annotationBindings(section, review, reveal) {
   const noVerdict = () => review.whyNoVerdict;
   const words = "dataset plan annotation task";
   return inArea("Annotation", [
-    { keys: ["Alt U"], label: "Annotation: plan, tasks, comments", words, matches: alt("KeyU", false), run: () => reveal() },
+    { keys: ["Alt U"], label: "Plan, tasks and comments", words, matches: alt("KeyU", false), run: () => reveal() },
     { keys: ["Alt T"], label: "Next task", words, matches: alt("KeyT", false), why: noTask, run: () => review.step(1) },
-    { keys: ["Alt Shift T"], label: "Previous task", words, matches: alt("KeyT", true), why: noTask, run: () => review.step(-1) },
+    { keys: [], label: "Previous task", words, matches: () => false, why: noTask, run: () => review.step(-1) },
     {
       keys: ["Alt K"],
-      label: "Accept the planned pose, and go to the next one to review",
-      words: `${words} verify reviewer`,
+      label: "Accept the planned pose",
+      words: `${words} verify reviewer next`,
       matches: alt("KeyK", false),
       why: noVerdict,
       run: () => review.accept(),
     },
     {
       keys: ["Alt R"],
-      label: "Reject the planned pose with a comment",
-      words: `${words} reviewer`,
+      label: "Reject the planned pose",
+      words: `${words} reviewer comment`,
       matches: alt("KeyR", false),
       why: noVerdict,
       run: () => {
@@ -37,8 +37,8 @@ export function annotationBindings(section, review, reveal) {
     },
     {
       keys: ["Alt C"],
-      label: "Next best click: where a correction lowers the expected error most",
-      words: `${words} propose`,
+      label: "Next best click",
+      words: `${words} propose where a correction lowers the expected error most`,
       matches: alt("KeyC", false),
       why: section.click.why,
       run: () => {

@@ -70,6 +70,7 @@ export function planForm({ store, send, notify }) {
 function select(text, options) {
   const label = make("label", "plan-field");
   const input = make("select", "");
+  input.setAttribute("aria-label", text);
   input.append(...options.map(([value, words]) => new Option(words, value)));
   label.append(make("span", "", text), input);
   return { label, input };

@@ -17,7 +17,7 @@ const SOURCE_MEANINGS = /** @type {Record<string, string>} */ ({
   smoothed: "smoothed over a range",
   imported: "imported from a file",
 });
-const TASK_MEANINGS = { draft: "task: to be annotated", annotated: "task: annotated, to be reviewed", verified: "task: verified", rejected: "task: rejected" };
+const TASK_STATES = ["draft", "annotated", "verified", "rejected"];
 /** @type {[Kind, "neutral" | "proposal" | "mark", string][]} */
 const LINES = [
   ["candidate", "neutral", "pose under test"],
@@ -42,11 +42,19 @@ export function markSection() {
     row(diamondSwatch(), "keyframe; larger with an exclamation mark: check it"),
     ...SOURCES.map((source) => row(sourceSwatch(source), SOURCE_MEANINGS[source])),
     row(earlierSwatch(), "of an earlier calibration"),
-    ...Object.entries(TASK_MEANINGS).map(([state, meaning]) => row(taskSwatch(state), meaning)),
+    row(taskSamples(), `task: ${TASK_STATES.join(", ")}`),
     ...LINES.map(([kind, color, meaning]) => row(sampleOf(kind, `var(--image-${color})`), meaning)),
   );
   section.append(heading, list);
   return section;
+}
+
+/** Samples of all states of a task, side by side. */
+function taskSamples() {
+  const samples = document.createElement("span");
+  samples.className = "task-samples";
+  samples.append(...TASK_STATES.map(taskSwatch));
+  return samples;
 }
 
 /**
