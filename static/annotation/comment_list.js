@@ -51,7 +51,7 @@ export function commentList({ store, send }, review, visits) {
   };
 
   const showPlace = () => {
-    line.input.placeholder = `Comment on ${place()}`;
+    line.input.placeholder = `On ${place()}`;
   };
   const show = () => {
     const all = store.facts.annotation?.comments ?? [];

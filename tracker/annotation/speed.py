@@ -76,7 +76,7 @@ def _speed(name: str, verified: int, events: list[tuple[datetime, bool]], pause_
 def _verified_poses(store: AnnotationStore, tasks: list[Task]) -> dict[str, set[tuple[str, int]]]:
     """Return person and frame of the verified poses by the name of their annotator.
 
-    A pose of a task for anybody belongs to whoever made the last keyframe there.
+    A pose of a task for anybody belongs to the author of the last keyframe there.
     """
     last: dict[tuple[str, int], str] = {}
     makers: dict[tuple[str, int], set[str]] = defaultdict(set)

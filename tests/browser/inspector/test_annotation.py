@@ -123,7 +123,7 @@ async def test_comments_are_written_at_the_limb_gone_to_and_resolved(page, endpo
     await at(page, 9)
     await shows(page, "quadrille.state.state.point === 'l_wrist'")
     await page.keyboard.press("Alt+m")
-    assert await page.evaluate("document.activeElement.placeholder") == "Comment on left arm, frame 9"
+    assert await page.evaluate("document.activeElement.placeholder") == "On left arm, frame 9"
     await page.keyboard.type("look again")
     await page.keyboard.press("Enter")
     await sent(endpoint, action="comment", person=0, frame=9, limb=0, text="look again")
