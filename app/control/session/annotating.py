@@ -4,6 +4,7 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
@@ -19,6 +20,8 @@ from tracker.store.annotation_store import AnnotationStore
 from tracker.store.annotator import checked_annotator
 from tracker.store.records import MarkChange
 from tracker.store.task_log import State as Decision
+
+T = TypeVar("T")
 
 _LOG = logging.getLogger(__name__)
 _REST_S = 0.3
@@ -136,7 +139,7 @@ class Annotating:
     def _decide(self, person: str, frame: int, decision: Decision, comment: str = "") -> None:
         self._write(lambda store, author: decide(store, (person, frame), decision, comment, author=author))
 
-    def _write(self, write: Callable[[AnnotationStore, str], object]) -> object:
+    def _write(self, write: Callable[[AnnotationStore, str], T]) -> T:
         """Write rows of the plan, and show them."""
         saver = self._session_state.saver
         with self._session_state.lock:
