@@ -36,7 +36,8 @@ export function clickCard({ store, send }, visits) {
   const show = () => {
     const now = proposal();
     const isBusy = !!now?.running || (awaited !== null && (now?.number ?? 0) < awaited);
-    if (awaited !== null && !isBusy) {
+    const isAnswered = awaited !== null && !isBusy;
+    if (isAnswered) {
       awaited = null;
       visit();
     }
@@ -46,6 +47,7 @@ export function clickCard({ store, send }, visits) {
     text.textContent = isBusy ? "Looking for the next best click …" : now ? describe(now, views) : "";
     text.hidden = !text.textContent;
     text.classList.toggle("is-failed", !isBusy && !!now?.message);
+    if (isAnswered) text.scrollIntoView({ block: "center" }); // sections above may still grow
   };
 
   return { elements: [buttons, text], text, ask, show, why: () => (proposal()?.running ? "The next best click is being looked for." : null) };
@@ -70,6 +72,6 @@ export function describe({ message, click, error_mm, interval_mm, after_mm }, vi
  */
 function gained(before, after) {
   const fall = before - after;
-  const words = Math.abs(fall) < 0.005 ? "no gain yet" : `${Math.abs(fall).toFixed(2)} mm ${fall > 0 ? "gained" : "lost"}`;
+  const words = fall < 0.005 ? "no gain yet" : `${fall.toFixed(2)} mm gained`;
   return ` Now ${after.toFixed(1)} mm expected: ${words}.`;
 }

@@ -150,6 +150,10 @@ async def test_the_next_best_click_is_gone_to_explained_and_measured(page, endpo
     await shows(page, "quadrille.state.views.some(({ zoom }) => zoom > 1)")
     await section.get_by_text("Right arm, frames 34 to 38, seen best in LEFT").wait_for()
     await section.get_by_text("Correct it in LEFT and FRONT: gains 2.97 mm").wait_for()
+    box, column = [await page.locator(one).bounding_box() for one in (".plan [role=status]", "#inspector")]
+    assert box["y"] + box["height"] <= column["y"] + column["height"]  # scrolled to
+    await endpoint.broadcast(PLAN | {"proposal": PROPOSED | {"after_mm": 16.7}})
+    await section.get_by_text("Now 16.7 mm expected: no gain yet.").wait_for()
     await endpoint.broadcast(PLAN | {"proposal": PROPOSED | {"after_mm": 14.1}})
     await section.get_by_text("Now 14.1 mm expected: 2.50 mm gained.").wait_for()
     await endpoint.broadcast(PLAN | {"proposal": PROPOSED | {"number": 2, "click": None, "error_mm": 9.5}})
