@@ -1,5 +1,6 @@
 /** Mount the rooms of the page in order, then connect to the program, once it has started. */
 
+import * as annotationRoom from "./annotation/index.js";
 import * as inspectorRoom from "./inspector/index.js";
 import * as model from "./model/index.js";
 import * as panesRoom from "./panes/index.js";
@@ -20,7 +21,8 @@ const search = searchRoom.mount(context, timeline);
 const scene = sceneRoom.mount(context, panes);
 const sessions = sessionsRoom.mount(context);
 const inspector = inspectorRoom.mount(context, { panes, posing, scene, sessions });
-const bindings = shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector, sessions });
+const annotation = annotationRoom.mount(context, { panes, inspector });
+const bindings = shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector, annotation, sessions });
 exposeState(context, panes.grid, bindings);
 
 await started;

@@ -27,10 +27,12 @@ from app.control.search.replay import Replay
 from app.control.search.search_runs import SearchRuns
 from app.control.search.searching import SearchRunner
 from app.control.session.activities import Activities
+from app.control.session.annotating import Annotating
 from app.control.session.comparing import Comparing
 from app.control.session.footage_scan import FootageScan
 from app.control.session.history import History
 from app.control.session.kernel_warmup import KernelWarmup
+from app.control.session.proposing import Proposing
 from app.control.session.save_retry import SaveRetry
 from app.control.session.session_state import SessionState
 from app.control.session.stored_poses import StoredPoses
@@ -115,6 +117,10 @@ class Controller:
         """Checks and corrects the cameras."""
         self.observing = Observing(session_state, activities, self.finding)
         """Shows, judges and imports observations of other programs."""
+        self.annotating = Annotating(session_state, activities)
+        """Plans tasks, decides on them, and comments."""
+        self.proposing = Proposing(session_state)
+        """Proposes the next best click."""
         self.history = History(session_state, activities, (self.body_sizes.follow, self.calibrating.follow))
         """Moves along the history."""
         self.cost_landscape = CostLandscapes(session_state, activities)
@@ -180,6 +186,8 @@ class Controller:
             self.history.save()
         self.dragging.close()
         self.inconsistent_frames.close()
+        self.annotating.close()
+        self.proposing.close()
         self.comparing_runs.close()
         self._footage_scan.close()
         if self._compiling is not None:

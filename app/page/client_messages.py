@@ -11,6 +11,7 @@ from typing import Annotated, Literal, TypeAlias, Union, get_args
 from msgspec import Meta
 
 from app.drawing.curves import CurveGroup
+from app.page.annotation_messages import AskNextClick, DecideTask, PlanTasks, ResolveComment, WriteComment
 from app.page.inspector_messages import (
     AcquireSizes,
     ApplySizes,
@@ -259,6 +260,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
     DraftSizes, AcquireSizes, FindPeople, CheckCalibration, UseObservations,
+    PlanTasks, DecideTask, WriteComment, ResolveComment, AskNextClick,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

@@ -7,10 +7,12 @@ import msgspec
 
 from app.control.controller import Controller
 from app.control.tracking import track_settings
+from app.page import annotation_messages as plan_wire
 from app.page import inspector_messages as wire
 from app.page.message_parsing import MessageError
 from app.page.message_types import Command
 from app.page.observation_messages import UseObservations
+from tracker.annotation.frame_choice import FrameChoice
 from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.formats.model_toml import PRESETS
 from tracker.validation import quoted
@@ -108,6 +110,32 @@ def _observations(controller: Controller, _: int, message: UseObservations) -> N
     actions[message.action]()
 
 
+def _plan(controller: Controller, _: int, message: plan_wire.PlanTasks) -> None:
+    choice = FrameChoice(
+        message.n if message.by == "every" else 0,
+        (message.frames.strip() or "-") if message.by == "frames" else "",
+        message.n if message.by == "diverse" else 0,
+        message.by == "doubted",
+    )
+    controller.annotating.plan(choice, message.person, message.to, message.each)
+
+
+def _decide(controller: Controller, _: int, message: plan_wire.DecideTask) -> None:
+    annotating, person, frame = controller.annotating, message.person, message.frame
+    actions: dict[str, Callable[[], None]] = {
+        "verify": lambda: annotating.verify(person, frame),
+        "reject": lambda: annotating.reject(person, frame, message.comment),
+        "withdraw": lambda: annotating.withdraw(person, frame),
+    }
+    actions[message.action]()
+
+
+def _comment(controller: Controller, _: int, message: plan_wire.WriteComment) -> None:
+    if message.frame >= controller.session.n_frames:
+        raise MessageError(f"a frame below {controller.session.n_frames} as 'frame'", str(message.frame))
+    controller.annotating.comment(message.person, message.frame, message.limb, message.text)
+
+
 INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetTrackSettings: _track_settings,
     wire.SetView3d: _view_3d,
@@ -122,4 +150,9 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.FindPeople: _find_people,
     wire.CheckCalibration: _calibration,
     UseObservations: _observations,
+    plan_wire.PlanTasks: _plan,
+    plan_wire.DecideTask: _decide,
+    plan_wire.WriteComment: _comment,
+    plan_wire.ResolveComment: lambda controller, _, m: controller.annotating.resolve(m.uid, m.action == "resolve"),
+    plan_wire.AskNextClick: lambda controller, _, m: controller.proposing.start(),
 }

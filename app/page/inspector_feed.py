@@ -1,6 +1,7 @@
 """Updates for the inspector of a page: only what changed since the last ones (docs/protocol.md)."""
 
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
@@ -8,10 +9,12 @@ from app.control.controller import Controller
 from app.control.tracking import track_settings
 from app.drawing import dof_labels
 from app.drawing.misfit_field import NO_MISFITS, MisfitField, misfit_field
+from app.page import annotation_messages as plan_wire
 from app.page import inspector_messages as wire
 from app.page import observation_messages as observed
 from app.page.message_types import Message
 from app.page.search_messages import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
+from app.state.annotation import AnnotationState, ProposedClick
 from app.state.calibration import CalibrationState
 from app.state.floor_picking import FloorState
 from app.state.identity import Identity
@@ -58,6 +61,7 @@ class InspectorFeed:
             acquisition(state.acquisition), finding(state.finding, [c.camera.name for c in controller.session.cameras]),
             calibration(state.calibration, len(state.people), self._misfits(controller, state.calibration.check)),
             observations(state.observations, [p.name for p in controller.session.people]),
+            annotation(state.annotation, [p.name for p in controller.session.people], controller.session.camera_names),
             reason(state, controller.session.camera_names), *cost_map(state),
         ]  # fmt: skip
         changed = [message for message in now if message not in self._sent]
@@ -77,8 +81,8 @@ def _ingredients(state: State) -> tuple[Identity, ...]:
     made_from = (
         state.settings, state.run_choices, state.view_3d, state.floor, state.prediction_note, state.person, state.draft,
         state.present, state.sides_alike, state.sizes_message, state.acquisition,
-        state.finding, state.calibration, state.observations, state.reasons, state.reason, state.frame,
-        state.people[state.person].trace, state.cost_map,
+        state.finding, state.calibration, state.observations, state.annotation, state.reasons, state.reason,
+        state.frame, state.people[state.person].trace, state.cost_map,
     )  # fmt: skip
     return tuple(map(Identity, made_from))
 
@@ -242,6 +246,54 @@ def _judged_limb(person: int, doubt: Doubt) -> observed.JudgedLimb:
     return observed.JudgedLimb(
         person, doubt.frame, doubt.limb, verdict.joint, verdict.reason, round(verdict.probability_off, 3),
         round(1000 * verdict.distance_m),
+    )  # fmt: skip
+
+
+def annotation(found: AnnotationState, people: Sequence[str], cameras: Sequence[str]) -> plan_wire.AnnotationMessage:
+    """Describe the plan of annotation.
+
+    Args:
+        found: its state.
+        people: names of the people of the session; rows of others are left out.
+        cameras: names of all cameras.
+    """
+    index = {name: i for i, name in enumerate(people)}
+    tasks = tuple(
+        plan_wire.TaskInfo(
+            index[t.row.person], t.row.frame, t.row.annotator, cast(plan_wire.TaskState, t.state), t.comment, t.by,
+            t.row.kind == "disagreement",
+        )
+        for t in found.tasks
+        if t.row.person in index
+    )  # fmt: skip
+    comments = tuple(
+        plan_wire.CommentInfo(
+            c.row.uid, index[c.row.person], c.row.frame, limb_display_name(c.row.limb) if c.row.limb else "",
+            c.row.text, c.row.author, c.resolved,
+        )
+        for c in found.comments
+        if c.row.person in index
+    )  # fmt: skip
+    speeds = tuple(
+        plan_wire.SpeedInfo(
+            s.name, s.verified, s.seconds_per_frame, s.edits_per_frame, s.decisions, s.seconds_per_decision
+        )
+        for s in found.speeds
+    )
+    return plan_wire.AnnotationMessage(found.author, tasks, comments, speeds, _proposal(found.proposed, cameras))
+
+
+def _proposal(found: ProposedClick, cameras: Sequence[str]) -> plan_wire.ClickProposal:
+    click = found.click
+    described = None if click is None else plan_wire.NextClick(
+        click.frame, click.person, click.limb, tuple(cameras.index(v) for v in click.views), round(click.gain_mm, 3),
+        click.reason,
+    )  # fmt: skip
+    error = None if found.found is None else round(found.found.error_mm, 2)
+    interval = None if found.found is None else found.found.interval_mm
+    return plan_wire.ClickProposal(
+        found.number, found.running, found.message, described, error, interval,
+        None if found.after_mm is None else round(found.after_mm, 2),
     )  # fmt: skip
 
 

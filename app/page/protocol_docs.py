@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 import msgspec
 
 from app.page import (
+    annotation_messages,
     binary_headers,
     client_messages,
     inspector_messages,
@@ -36,7 +37,7 @@ _PLAIN = {int: "number", float: "number", str: "string", bool: "boolean", type(N
 
 _LITERALS = (
     "PictureLayer", "Layer", "Status", "CurveGroup", "RangeAction", "DragMode", "GesturePhase", "PathKind", "RunState",
-    "Side",
+    "Side", "TaskState",
 )  # fmt: skip
 """Literal types with a name of their own in the page."""
 
@@ -172,7 +173,7 @@ def _names() -> dict[Any, str]:
 def _named(name: str) -> Any:
     modules = (
         message_types, client_messages, pose_messages, search_messages, inspector_messages,
-        observation_messages, server_messages,
+        observation_messages, annotation_messages, server_messages,
         binary_headers,
     )  # fmt: skip
     return next(getattr(module, name) for module in modules if hasattr(module, name))

@@ -8,6 +8,7 @@ from them.
 from typing import Literal, TypeAlias, Union, get_args
 
 from app.drawing.epipolar_check import EpipolarDistance, EpipolarLine
+from app.page.annotation_messages import AnnotationMessage
 from app.page.inspector_messages import (
     AcquisitionMessage,
     BodySizesMessage,
@@ -404,6 +405,7 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     RangeComparisonMessage, ObservabilityMessage, EpipolarMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
     AcquisitionMessage, FindingMessage, CalibrationMessage, ObservationsMessage, ReasonMessage, CostMapMessage,
+    AnnotationMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

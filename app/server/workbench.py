@@ -13,7 +13,6 @@ from platformdirs import user_state_path
 
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
-from app.page.thumbnails import Thumbnails
 from app.remedies import command_line_text, page_text
 from app.runtime.kernel_compiler import KernelCompiler
 from app.scene3d.gizmos import Gizmos
@@ -27,6 +26,7 @@ from app.server.server import create_app, serve_forever
 from app.server.session_routes import SessionRoutes, refusal
 from app.server.static_files import static_folder
 from app.server.thumbnail_routes import ThumbnailRoutes
+from app.server.thumbnails import Thumbnails
 from app.session import proxies
 from app.session.annotator import annotator_or_login
 from app.session.footage_crops import FootageCrops

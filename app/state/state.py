@@ -5,6 +5,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from app.state.annotation import AnnotationState
 from app.state.calibration import CalibrationState
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import FloorState
@@ -84,6 +85,8 @@ class State:
     """Check of the cameras."""
     observations: ObservationsState = field(default_factory=ObservationsState)
     """Imported observations."""
+    annotation: AnnotationState = field(default_factory=AnnotationState)
+    """The plan of annotation, comments, and the next best click."""
     follow: bool = True
     """Whether each frame is shown as it is tracked."""
     locked: tuple[frozenset[int], ...] = ()
@@ -261,6 +264,7 @@ class StateChanges(TypedDict, total=False):
     finding: FindState
     calibration: CalibrationState
     observations: ObservationsState
+    annotation: AnnotationState
     follow: bool
     locked: tuple[frozenset[int], ...]
     ranges: RangeState

@@ -75,6 +75,16 @@ class Saver:
         """Why an edit is not on disk; None if all are."""
         return self._queue.error
 
+    @property
+    def store(self) -> AnnotationStore:
+        """The annotations, for the plan, decisions and comments, which are no part of the history."""
+        return self._store
+
+    @property
+    def author(self) -> str:
+        """Name of the author of the edits."""
+        return self._author
+
     def set_body_models(self, session: Session) -> None:
         """Continue with a session whose people have other bodies, which new poses belong to."""
         self._session = session

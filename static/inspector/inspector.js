@@ -26,7 +26,7 @@ export class Inspector {
    */
   constructor(store, sections) {
     this.#button = button("show-inspector", () => this.toggle());
-    for (const section of sections) this.#add(section);
+    for (const section of sections) this.add(section);
     this.#show();
     store.subscribe((changed) => {
       if (changed.has("connected")) this.#column.inert = !store.facts.connected;
@@ -69,8 +69,11 @@ export class Inspector {
     });
   }
 
-  /** @param {Section} section */
-  #add(section) {
+  /**
+   * @param {Section} section
+   * @param {string} [before] the section that it stands above; at the end without one
+   */
+  add(section, before) {
     const fold = document.createElement("details");
     fold.className = "section";
     fold.dataset.section = section.id;
@@ -81,7 +84,7 @@ export class Inspector {
     section.body.classList.add("section-body");
     fold.append(head, section.body);
     fold.addEventListener("toggle", () => this.#keep());
-    this.#column.append(fold);
+    this.#column.insertBefore(fold, (before && this.#sections.get(before)?.fold) || null);
     this.#sections.set(section.id, { section, fold });
   }
 

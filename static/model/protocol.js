@@ -17,6 +17,7 @@
  *   "floor_sight" | "error" | "imported" | "imported_off"} PathKind
  * @typedef {"running" | "paused" | "over"} RunState
  * @typedef {"left" | "right" | ""} Side
+ * @typedef {"draft" | "annotated" | "verified" | "rejected"} TaskState
  * @typedef {{type: "seek", frame: number}} Seek
  * @typedef {{type: "select", person: number, point?: string | null}} Select
  * @typedef {{type: "view", layers: Layer[], reductions: number[], by_part: boolean}} SetView
@@ -96,6 +97,14 @@
  *   CheckCalibration
  * @typedef {{type: "observations", action: "show" | "judge" | "take" | "track" | "track_contours" | "stop" | "discard",
  *   name?: string}} UseObservations
+ * @typedef {{type: "annotation", action: "plan", by: "every" | "frames" | "diverse" | "doubted", n?: number, frames?:
+ *   string, person?: number | null, to?: string[], each?: boolean}} PlanTasks
+ * @typedef {{type: "annotation", action: "verify" | "reject" | "withdraw", person: number, frame: number, comment?:
+ *   string}} DecideTask
+ * @typedef {{type: "annotation", action: "comment", person: number, frame: number, limb: number | null, text: string}}
+ *   WriteComment
+ * @typedef {{type: "annotation", action: "resolve" | "reopen", uid: string}} ResolveComment
+ * @typedef {{type: "annotation", action: "next_click"}} AskNextClick
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo
@@ -224,6 +233,18 @@
  *   notes: string[], searched: string[], alternatives: GhostPose[], tried: TriedSearch[] | null}} ReasonMessage
  * @typedef {{type: "cost_map", person: number, dofs: [number, number], current: [number, number], across: number[], up:
  *   number[], nats: number[][]}} CostMapMessage
+ * @typedef {{person: number, frame: number, annotator: string, state: TaskState, comment: string, by: string,
+ *   is_disagreement: boolean}} TaskInfo
+ * @typedef {{uid: string, person: number, frame: number, limb: string, text: string, author: string, resolved:
+ *   boolean}} CommentInfo
+ * @typedef {{name: string, verified: number, seconds_per_verified: number | null, edits_per_verified: number | null,
+ *   decisions: number, seconds_per_decision: number | null}} SpeedInfo
+ * @typedef {{frame: number, person: number, limb: string, cameras: number[], gain_mm: number, reason: string}}
+ *   NextClick
+ * @typedef {{number: number, running: boolean, message: string, click: NextClick | null, error_mm: number | null,
+ *   interval_mm: [number, number] | null, after_mm: number | null}} ClickProposal
+ * @typedef {{type: "annotation", annotator: string, tasks: TaskInfo[], comments: CommentInfo[], speeds: SpeedInfo[],
+ *   proposal: ClickProposal}} AnnotationMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
@@ -259,11 +280,12 @@
  *   ShowLandscape | SetLandscapeDof | ShowCostMap | SetCostMapPlace | AskReason | StartTracking | ControlTracking |
  *   EditRange | CompareRange | StopRange | ToggleMark | ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d
  *   | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | ChangeBody | DraftSizes | AcquireSizes |
- *   FindPeople | CheckCalibration | UseObservations | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ *   FindPeople | CheckCalibration | UseObservations | PlanTasks | DecideTask | WriteComment | ResolveComment |
+ *   AskNextClick | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | EpipolarMessage | SearchSetupMessage | SearchRunsMessage |
  *   SettingsMessage | View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | CalibrationMessage |
- *   ObservationsMessage | ReasonMessage | CostMapMessage} TextMessage
+ *   ObservationsMessage | ReasonMessage | CostMapMessage | AnnotationMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

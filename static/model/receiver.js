@@ -69,6 +69,9 @@ export class Receiver {
       case "imported":
         this.#store.set({ observations: message });
         break;
+      case "annotation":
+        this.#store.set({ annotation: message });
+        break;
       case "acquisition":
         this.#store.set({ acquisition: message });
         break;

@@ -42,6 +42,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("./protocol.js").FindingMessage | null} finding the search for people whom nobody has placed
  * @property {import("./protocol.js").CalibrationMessage | null} calibration the check of the cameras
  * @property {import("./protocol.js").ObservationsMessage | null} observations imported observations and their judgement
+ * @property {import("./protocol.js").AnnotationMessage | null} annotation the plan, comments, and the next best click
  * @property {boolean} showsMisfits whether the views show where the contours of the last check miss the edges
  * @property {number | null} exporting share of an export that is done, 0 to 1; null without one
  * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
@@ -111,6 +112,7 @@ export class Store {
     finding: null,
     calibration: null,
     observations: null,
+    annotation: null,
     showsMisfits: false,
     exporting: null,
     searchSetup: null,

@@ -31,6 +31,7 @@ import { Workspace } from "./workspace.js";
  * @property {import("../search/index.js").SearchRoom} search
  * @property {import("../scene/index.js").SceneRoom} scene
  * @property {import("../inspector/index.js").InspectorRoom} inspector
+ * @property {import("../annotation/index.js").AnnotationRoom} annotation
  * @property {import("../sessions/index.js").SessionsRoom} sessions
  */
 
@@ -69,10 +70,10 @@ export function mount(context, rooms) {
     ...peopleBindings({ actions, posing, people, reasons }),
     ...workspace.bindings,
   ];
-  const { panes, timeline, search, scene, inspector } = rooms;
+  const { panes, timeline, search, scene, inspector, annotation } = rooms;
   const table = orderedByArea([
     own,
-    ...[scene, search, timeline, rooms.posing, panes, inspector].map(({ bindings }) => bindings),
+    ...[scene, search, timeline, rooms.posing, panes, inspector, annotation].map(({ bindings }) => bindings),
   ]);
   palette.setBindings(table);
   keyList.setBindings(table);

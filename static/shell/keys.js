@@ -15,6 +15,7 @@ const AREAS = [
   "Posing",
   "People",
   "Pins",
+  "Annotation",
   "Views",
   "Inspector",
 ];

@@ -88,6 +88,50 @@ export function diamondSwatch() {
   return mark;
 }
 
+/** Colours of the states of tasks. Besides its colour, each has its own shape. */
+export const TASK_COLORS = { draft: "--muted", annotated: "--accent", verified: "--good", rejected: "--bad" };
+
+/**
+ * Draw the mark of a task: a frame for a draft, half filled once annotated, filled once verified, a cross if rejected.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("../model/protocol.js").TaskState} state
+ * @param {number} x middle
+ * @param {{top: number, bottom: number}} lane
+ * @param {CSSStyleDeclaration} style
+ */
+export function drawTask(context, state, x, { top, bottom }, style) {
+  const size = bottom - top;
+  const left = Math.round(x - size / 2);
+  context.fillStyle = style.getPropertyValue("--chrome");
+  context.fillRect(left, top, size, size);
+  context.fillStyle = context.strokeStyle = style.getPropertyValue(TASK_COLORS[state]);
+  context.lineWidth = state === "rejected" ? 2 : 1;
+  if (state === "rejected") {
+    context.beginPath();
+    context.moveTo(left + 1, top + 1);
+    context.lineTo(left + size - 1, bottom - 1);
+    context.moveTo(left + size - 1, top + 1);
+    context.lineTo(left + 1, bottom - 1);
+    context.stroke();
+    return;
+  }
+  context.strokeRect(left + 0.5, top + 0.5, size - 1, size - 1);
+  if (state === "annotated") context.fillRect(left, top + size / 2, size, size / 2);
+  if (state === "verified") context.fillRect(left, top, size, size);
+}
+
+/**
+ * Sample of a task for the legend.
+ *
+ * @param {string} state
+ */
+export function taskSwatch(state) {
+  const mark = document.createElement("i");
+  mark.className = `task-mark is-${state}`;
+  return mark;
+}
+
 /**
  * Make a pattern of diagonal stripes in one direction, or in both.
  *

@@ -51,6 +51,30 @@ export function describeLimbs(cell, person, session) {
  * @returns {string[]} lines
  */
 export function describeFrame(frame, facts, person = null) {
+  return [...describePoses(frame, facts, person), ...describeTasks(frame, facts, person)];
+}
+
+/**
+ * @param {number} frame
+ * @param {import("../model/store.js").Facts} facts
+ * @param {number | null} person
+ */
+function describeTasks(frame, { annotation, session }, person) {
+  const own = annotation?.tasks.filter((task) => task.frame === frame && (person === null || task.person === person)) ?? [];
+  const several = (session?.people.length ?? 1) > 1 && person === null;
+  return own.map((task) => {
+    const who = [several ? session?.people[task.person]?.name : "", task.annotator].filter(Boolean).join(", ");
+    return `task${who ? ` of ${who}` : ""}: ${task.state}${task.comment ? `: ${task.comment}` : ""}`;
+  });
+}
+
+/**
+ * @param {number} frame
+ * @param {import("../model/store.js").Facts} facts
+ * @param {number | null} person
+ * @returns {string[]} lines
+ */
+function describePoses(frame, facts, person) {
   const { timeline, lanes, session, disagreeing } = facts;
   const cell = timeline.get(frame);
   if (!cell || !session) return [`Frame ${frame}: no pose`];

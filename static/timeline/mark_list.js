@@ -2,7 +2,7 @@
 
 import { sampleOf } from "../panes/pose_legend.js";
 import { SOURCES } from "../model/cells.js";
-import { STATUSES, diamondSwatch, earlierSwatch, sourceSwatch, statusSwatch } from "./cell_marks.js";
+import { STATUSES, diamondSwatch, earlierSwatch, sourceSwatch, statusSwatch, taskSwatch } from "./cell_marks.js";
 
 /** @typedef {import("../model/protocol.js").Path["kind"]} Kind */
 
@@ -17,6 +17,7 @@ const SOURCE_MEANINGS = /** @type {Record<string, string>} */ ({
   smoothed: "smoothed over a range",
   imported: "imported from a file",
 });
+const TASK_STATES = ["draft", "annotated", "verified", "rejected"];
 /** @type {[Kind, "neutral" | "proposal" | "mark", string][]} */
 const LINES = [
   ["candidate", "neutral", "pose under test"],
@@ -41,10 +42,19 @@ export function markSection() {
     row(diamondSwatch(), "keyframe; larger with an exclamation mark: check it"),
     ...SOURCES.map((source) => row(sourceSwatch(source), SOURCE_MEANINGS[source])),
     row(earlierSwatch(), "of an earlier calibration"),
+    row(taskSamples(), `task: ${TASK_STATES.join(", ")}`),
     ...LINES.map(([kind, color, meaning]) => row(sampleOf(kind, `var(--image-${color})`), meaning)),
   );
   section.append(heading, list);
   return section;
+}
+
+/** Samples of all states of a task, side by side. */
+function taskSamples() {
+  const samples = document.createElement("span");
+  samples.className = "task-samples";
+  samples.append(...TASK_STATES.map(taskSwatch));
+  return samples;
 }
 
 /**

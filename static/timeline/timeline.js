@@ -5,6 +5,7 @@
 
 import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
 import { earlierCalibration } from "../model/selectors.js";
+import { statesByFrame } from "../model/tasks.js";
 import { prepare } from "../panes/drawing.js";
 import { describeFrame } from "./cell_text.js";
 import { CellTip } from "./cell_tip.js";
@@ -49,9 +50,9 @@ export class Timeline {
     this.#tip = new CellTip(element);
     store.subscribe((changed) => {
       const has = (/** @type {(keyof import("../model/store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
-      if (has("session")) element.style.height = `${this.#layout.height}px`;
-      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts", "calibration")) this.#drawCells();
-      if (has("target", "session", "range", "visible")) this.#drawCursor();
+      if (has("session", "annotation")) element.style.height = `${this.#layout.height}px`;
+      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts", "calibration", "annotation")) this.#drawCells();
+      if (has("target", "session", "range", "visible", "annotation")) this.#drawCursor();
       if (has("target", "timeline", "lanes", "session", "keyframeDoubts", "calibration")) this.#describe();
     });
     new ResizeObserver(() => this.#drawAll()).observe(element);
@@ -60,7 +61,8 @@ export class Timeline {
   }
 
   get #layout() {
-    return drawing.layout(this.#store.facts.session?.people.length ?? 1);
+    const { session, annotation } = this.#store.facts;
+    return drawing.layout(session?.people.length ?? 1, !!annotation?.tasks.length);
   }
 
   get #axis() {
@@ -181,12 +183,13 @@ export class Timeline {
   #drawCells() {
     const { clientWidth, clientHeight } = this.#element;
     const context = prepare(this.#cells, clientWidth, clientHeight, true);
-    const { timeline, lanes, session, keyframeDoubts } = this.#store.facts;
+    const { timeline, lanes, session, keyframeDoubts, annotation } = this.#store.facts;
     if (!session) return;
     const style = getComputedStyle(this.#element);
     const axis = this.#axis;
-    const { lanes: bands, review, overview } = this.#layout;
+    const { lanes: bands, review, tasks, overview } = this.#layout;
     drawing.drawLabels(context, axis, style, bands, session.people);
+    if (annotation?.tasks.length) drawing.drawTasks(context, axis, statesByFrame(annotation.tasks), style, tasks);
     context.save();
     context.beginPath();
     context.rect(axis.left, 0, axis.right - axis.left + 2, overview.top);

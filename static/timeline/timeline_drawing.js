@@ -4,9 +4,10 @@
  */
 
 import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
+import { TASK_STATES } from "../model/tasks.js";
 import { trace } from "../model/series.js";
 import { shortened } from "../widgets/text.js";
-import { DARK_INK, EARLIER_DASH, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, fillBands, hatch } from "./cell_marks.js";
+import { DARK_INK, EARLIER_DASH, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, drawTask, fillBands, hatch } from "./cell_marks.js";
 
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
@@ -21,6 +22,8 @@ const CELLS_TOP = 44;
 const [CELL_HEIGHT, LANE_HEIGHT, LANE_GAP] = [12, 15, 3];
 /** Height of the strip of sources below the colour of a person, and the gap between them. */
 const [SOURCE_STRIP, STRIP_GAP] = [5, 1];
+/** Height of the lane of tasks. */
+const TASK_HEIGHT = 8;
 /** Width of a run from which its status is drawn as a pattern; a narrower one would show a random part of it. */
 const PATTERN_FROM = 4;
 
@@ -30,9 +33,10 @@ const PATTERN_FROM = 4;
  * Vertical layout. Each person has a lane of cells.
  *
  * @param {number} people
- * @returns {{cells: Band, lanes: Band[], review: Band, overview: Band, height: number}}
+ * @param {boolean} hasTasks whether there is a lane of tasks
+ * @returns {{cells: Band, lanes: Band[], review: Band, tasks: Band, overview: Band, height: number}}
  */
-export function layout(people) {
+export function layout(people, hasTasks = false) {
   const several = people > 1;
   const height = several ? LANE_HEIGHT : CELL_HEIGHT;
   const lanes = Array.from({ length: Math.max(1, people) }, (_, lane) => {
@@ -40,9 +44,11 @@ export function layout(people) {
     return { top, bottom: top + height };
   });
   const { bottom } = lanes[lanes.length - 1];
-  const overview = { top: bottom + 8, bottom: bottom + 14 };
+  const tasks = { top: bottom + 7, bottom: bottom + 7 + (hasTasks ? TASK_HEIGHT : 0) };
+  const top = hasTasks ? tasks.bottom + 5 : bottom + 8;
+  const overview = { top, bottom: top + 6 };
   const cells = { top: CELLS_TOP, bottom };
-  return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, overview, height: overview.bottom + 2 };
+  return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, tasks, overview, height: overview.bottom + 2 };
 }
 
 /**
@@ -271,6 +277,28 @@ export function drawReviewed(context, axis, cells, style, { top, bottom }) {
   eachRun(axis, (frame) => (marks[frame] & REVIEWED ? 0 : -1), 0, (_, x, width) => {
     context.fillRect(x, top, width, bottom - top);
   });
+}
+
+/**
+ * Draw a mark at each planned frame, and the name of the lane.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {FrameAxis} axis
+ * @param {Map<number, import("../model/protocol.js").TaskState>} tasks state by frame
+ * @param {CSSStyleDeclaration} style
+ * @param {Band} lane
+ */
+export function drawTasks(context, axis, tasks, style, { top, bottom }) {
+  context.font = "10.5px system-ui, sans-serif";
+  context.textAlign = "right";
+  context.textBaseline = "middle";
+  context.fillStyle = style.getPropertyValue("--muted");
+  context.fillText("tasks", axis.left - 8, (top + bottom) / 2);
+  // The states that need work last: where frames share a pixel, they stay visible.
+  const inOrder = [...tasks].sort(([, a], [, b]) => TASK_STATES.indexOf(b) - TASK_STATES.indexOf(a));
+  for (const [frame, state] of inOrder) {
+    if (axis.shows(frame)) drawTask(context, state, axis.middle(frame), { top, bottom }, style);
+  }
 }
 
 /**

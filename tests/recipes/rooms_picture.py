@@ -11,6 +11,7 @@ HOUSE = {
     "static/  the page": [
         ["main.js"],
         ["shell"],
+        ["annotation"],
         ["inspector", "sessions"],
         ["search", "scene"],
         ["posing", "timeline"],

@@ -144,6 +144,7 @@ PAGE_ROOMS = [
     "search",
     "scene",
     "inspector",
+    "annotation",
     "sessions",
     "shell",
     "starting",

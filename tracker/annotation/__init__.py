@@ -4,4 +4,4 @@ Imports `pipeline` and below. Callers use `plan`, `frame_choice`, `comments`, `n
 `blind_copy` and `merge_sessions`.
 """
 
-__all__ = ["blind_copy", "comments", "expected_error", "frame_choice", "merge_sessions", "next_click", "plan"]
+__all__ = ["blind_copy", "comments", "expected_error", "frame_choice", "merge_sessions", "next_click", "plan", "speed"]

@@ -19,7 +19,9 @@ class Comment(NamedTuple):
     """Name of the person who resolved it; empty while it is open."""
 
 
-def add_comment(store: AnnotationStore, at: tuple[str, int], text: str, limb: str = "") -> str:
+def add_comment(
+    store: AnnotationStore, at: tuple[str, int], text: str, limb: str = "", author: str | None = None
+) -> str:
     """Comment on a person in a frame; returns the identity of the comment.
 
     Args:
@@ -27,24 +29,26 @@ def add_comment(store: AnnotationStore, at: tuple[str, int], text: str, limb: st
         at: person and frame.
         text: the comment.
         limb: name of a limb (`tracker.body.limbs`); empty for the whole body.
+        author: of the comment; by default the annotator of this process.
 
     Raises:
         TrackerError: the text is empty.
     """
     if not text.strip():
         raise TrackerError("expected a comment, found an empty text; write what is to be done")
-    row = CommentRow(new_uid(), "", *at, limb, text.strip(), 0, annotator(), now())
+    row = CommentRow(new_uid(), "", *at, limb, text.strip(), 0, _by(author), now())
     store.tasks.add(comments=[row])
     return row.uid
 
 
-def resolve_comment(store: AnnotationStore, start: str, resolved: bool = True) -> Comment:
+def resolve_comment(store: AnnotationStore, start: str, resolved: bool = True, author: str | None = None) -> Comment:
     """Resolve a comment, or open it again; returns it as it was.
 
     Args:
         store: annotations of the session.
         start: its identity, or enough of its first digits.
         resolved: False opens it again.
+        author: of the change; by default the annotator of this process.
 
     Raises:
         TrackerError: no comment or several begin so.
@@ -55,7 +59,7 @@ def resolve_comment(store: AnnotationStore, start: str, resolved: bool = True) -
             f"expected the first digits of one comment, found {len(found)} that begin with '{start}'; list the comments"
         )
     row = found[0].row
-    change = row._replace(uid=new_uid(), about=row.uid, text="", resolved=int(resolved), author=annotator(), time=now())
+    change = row._replace(uid=new_uid(), about=row.uid, text="", resolved=int(resolved), author=_by(author), time=now())
     store.tasks.add(comments=[change])
     return found[0]
 
@@ -70,3 +74,7 @@ def read_comments(store: AnnotationStore) -> list[Comment]:
         if not row.about
         for state in [last.get(row.uid)]
     ]
+
+
+def _by(author: str | None) -> str:
+    return annotator() if author is None else author

@@ -1,11 +1,50 @@
 """Choose the frames of a plan."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, IntArray
-from tracker.store.stored_poses import StoredPose
+from tracker.session.frame_list import parse_frames_and_ranges
+from tracker.session.session import Person, Session
+from tracker.store.stored_poses import StoredPose, read_stored_poses
+
+
+class FrameChoice(NamedTuple):
+    """The frames of a plan, chosen in one of four ways."""
+
+    every: int = 0
+    """Every n-th frame; 0 for another way."""
+    frames: str = ""
+    """Frames and ranges, such as `0,40,100:110`; empty for another way."""
+    diverse: int = 0
+    """Number of frames with the most diverse stored poses; 0 for another way."""
+    doubted: bool = False
+    """Frames whose pose is doubtful or lost."""
+
+
+def choose_frames(session: Session, person: Person, choice: FrameChoice, name: str = "frames") -> list[int]:
+    """Choose the frames of a person that are to be annotated, ascending.
+
+    Args:
+        session: with the person.
+        person: whose stored poses are compared.
+        choice: exactly one way.
+        name: of the option with frames, for messages.
+
+    Raises:
+        TrackerError: frames are none of the session, or the person has no poses to choose from.
+    """
+    if choice.every:
+        return list(range(0, session.n_frames, choice.every))
+    if choice.frames:
+        return parse_frames_and_ranges(choice.frames, session.n_frames, name)
+    poses = read_stored_poses(session.annotations_path, person.name, person.model)
+    if not poses:
+        raise TrackerError(f"expected poses of {person.name} to choose from, found none; track first")
+    return doubted_frames(poses) if choice.doubted else diverse_frames(poses, choice.diverse)
 
 
 def spread_choice(points: Array, n: int) -> IntArray:

@@ -92,7 +92,14 @@ def count_states(tasks: Sequence[Task]) -> dict[str, int]:
     return counts | {"total": sum(counts.values())}
 
 
-def decide(store: AnnotationStore, at: tuple[str, int], state: State, comment: str = "", of: str | None = None) -> int:
+def decide(
+    store: AnnotationStore,
+    at: tuple[str, int],
+    state: State,
+    comment: str = "",
+    of: str | None = None,
+    author: str | None = None,
+) -> int:
     """Verify, reject or withdraw the tasks of a person in a frame. A verified pose is marked as reviewed, too.
 
     Args:
@@ -101,6 +108,7 @@ def decide(store: AnnotationStore, at: tuple[str, int], state: State, comment: s
         state: `verified`, `rejected` or `withdrawn`.
         comment: for the annotator.
         of: decide on the tasks of this annotator alone; None for all.
+        author: of the decision; by default the annotator of this process.
 
     Returns:
         Number of tasks.
@@ -119,6 +127,6 @@ def decide(store: AnnotationStore, at: tuple[str, int], state: State, comment: s
             raise TrackerError(f"expected a pose of {person} in frame {frame} to verify, found none; annotate it first")
         if not pose.keyframe and not pose.reviewed:
             store.commit(f"Verify frame {frame}", [MarkChange(person, frame, keyframe=False, reviewed=True)])
-    by, time = annotator(), now()
+    by, time = annotator() if author is None else author, now()
     store.tasks.add(states=[StateRow(new_uid(), row.uid, state, comment, by, time) for row in rows])
     return len(rows)

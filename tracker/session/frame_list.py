@@ -1,4 +1,4 @@
-"""Parse the frames of an export."""
+"""Parse lists of frames."""
 
 from collections.abc import Sequence
 
@@ -32,6 +32,30 @@ def parse_frame_list(text: str, n_frames: int, name: str) -> Sequence[int]:
         f"expected {name} as A:B within 0:{n_frames} (A included, B not), or as a list such as 0,{n_frames - 1}, found "
         f"'{text[:40]}'"
     )
+
+
+def parse_frames_and_ranges(text: str, n_frames: int, name: str) -> list[int]:
+    """Parse frames and half-open ranges, such as `0,40,100:110`; returns the frames, ascending.
+
+    Args:
+        text: what a user gave.
+        n_frames: number of frames of the session.
+        name: of the option, for messages.
+
+    Raises:
+        TrackerError: they are none of the session.
+    """
+    found = set[int]()
+    for word in text.split(","):
+        first, colon, last = word.partition(":")
+        is_number = _is_whole(first) and (not colon or _is_whole(last))
+        frames = range(int(first), int(last) if colon else int(first) + 1) if is_number else range(0)
+        if not frames or frames.stop > n_frames:
+            raise TrackerError(
+                f"expected {name} such as 0,40,100:110 within 0:{n_frames}, found '{word[:40]}'; correct it"
+            )
+        found |= set(frames)
+    return sorted(found)
 
 
 def _is_whole(word: str) -> bool:

@@ -143,6 +143,12 @@ class TaskLog:
             _made,
         )
 
+    def edit_times(self) -> list[tuple[str, str]]:
+        """Return author and time of all edits, undone ones too, earliest first."""
+        return self._connection.all(
+            "SELECT author, time FROM edits ORDER BY time", (), lambda row: (str(row[0]), str(row[1]))
+        )
+
     def _all(self, table: str, row_type: Callable[..., T], order: str) -> list[T]:
         def convert(row: tuple[Any, ...]) -> T:
             found: T = check(list(row), row_type, f"row {row[0]!r:.40} of {table}", DamagedStoreError)

@@ -111,46 +111,17 @@ def _wishes(at: Target, arguments: AssignArguments) -> list[tuple[str, int, str]
     Raises:
         TrackerError: frames are none of the session, or a person has no such poses.
     """
-    from tracker.annotation.frame_choice import dealt, diverse_frames, doubted_frames
-    from tracker.store.stored_poses import read_stored_poses
+    from tracker.annotation.frame_choice import FrameChoice, choose_frames, dealt
 
     session, people = at
-    wishes: list[tuple[str, int, str]] = []
-    for person in (session.people[i] for i in people):
-        if arguments.every:
-            frames = list(range(0, session.n_frames, arguments.every))
-        elif arguments.frames:
-            frames = parse_frame_list(arguments.frames, session)
-        elif arguments.diverse or arguments.doubted:
-            poses = read_stored_poses(session.annotations_path, person.name, person.model)
-            frames = doubted_frames(poses) if arguments.doubted else diverse_frames(poses, arguments.diverse or 0)
-            if not poses:
-                raise TrackerError(f"expected poses of {person.name} to choose from, found none; track first")
-        else:
-            return []
-        wishes += [(person.name, *pair) for pair in dealt(frames, arguments.to, arguments.each)]
-    return wishes
-
-
-def parse_frame_list(text: str, session: "Session") -> list[int]:
-    """Parse frames and half-open ranges, such as `0,40,100:110`; returns the frames, ascending.
-
-    Raises:
-        TrackerError: they are none of the session.
-    """
-    found = set[int]()
-    for word in text.split(","):
-        first, colon, last = word.partition(":")
-        try:
-            frames = range(int(first), int(last) if colon else int(first) + 1)
-        except ValueError:
-            frames = range(0)
-        if not frames or frames.start < 0 or frames.stop > session.n_frames:
-            raise TrackerError(
-                f"expected --frames such as 0,40,100:110 within 0:{session.n_frames}, found '{word}'; correct it"
-            )
-        found |= set(frames)
-    return sorted(found)
+    choice = FrameChoice(arguments.every or 0, arguments.frames or "", arguments.diverse or 0, arguments.doubted)
+    if not any(choice):
+        return []
+    return [
+        (person.name, *pair)
+        for person in (session.people[i] for i in people)
+        for pair in dealt(choose_frames(session, person, choice, "--frames"), arguments.to, arguments.each)
+    ]
 
 
 def _write_copies(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from tracker.annotation.comments import Comment
     from tracker.annotation.plan import Task
+    from tracker.annotation.speed import Speed
 
 _UID_DIGITS = 8
 """Digits of the identity of a comment that are shown: enough to tell thousands apart."""
@@ -33,6 +34,18 @@ def record(tasks: "Sequence[Task]", comments: "Sequence[Comment]") -> dict[str, 
             }
             for c in comments
         ],
+    }  # fmt: skip
+
+
+def speed_record(speeds: "Sequence[Speed]") -> dict[str, dict[str, Any]]:
+    """Return how quickly each person annotates and reviews, by name, as a JSON object."""
+    return {
+        s.name: {
+            "verified": s.verified, "edits": s.edits, "seconds": s.edit_seconds,
+            "seconds_per_verified": s.seconds_per_frame, "edits_per_verified": s.edits_per_frame,
+            "decisions": s.decisions, "seconds_per_decision": s.seconds_per_decision,
+        }
+        for s in speeds
     }  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.cli.annotation.task_report import format_comments, format_plan, record
+from app.cli.annotation.task_report import format_comments, format_plan, record, speed_record
 from app.cli.arguments import OptionalName, OptionalWhole, SessionArg
 from app.cli.target import load_target
 from app.runtime.json_output import format_json
@@ -57,6 +57,7 @@ def command(arguments: Annotated[TasksArguments, tyro.conf.arg(name="")]) -> Non
     from app.session.annotator import set_annotator
     from tracker.annotation.comments import read_comments
     from tracker.annotation.plan import read_tasks
+    from tracker.annotation.speed import measure_speed
     from tracker.session.lock import SessionLock
     from tracker.store.annotation_store import AnnotationStore
 
@@ -77,8 +78,9 @@ def command(arguments: Annotated[TasksArguments, tyro.conf.arg(name="")]) -> Non
     with closing(AnnotationStore(path, read_only=True)) as store:
         tasks = [t for t in read_tasks(store) if t.row.person in names and arguments.of in (None, t.row.annotator)]
         comments = [c for c in read_comments(store) if c.row.person in names]
+        speed = speed_record(measure_speed(store)) if arguments.json else {}
     if arguments.json:
-        print(format_json(record(tasks, comments)))
+        print(format_json({**record(tasks, comments), "speed": speed}))
     else:
         print("\n".join(filter(None, (format_comments(comments), format_plan(tasks)))))
 

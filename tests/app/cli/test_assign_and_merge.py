@@ -59,6 +59,9 @@ def test_a_plan_is_shown_and_grows(run, session):
     assert run("tasks", session, "--reject", "left elbow", "--frame", "0")[0] == 0
     (rejected,) = [t for t in asked(run("tasks", session, "--json"))["tasks"] if t["state"] == "rejected"]
     assert (rejected["frame"], rejected["comment"], rejected["by"]) == (0, "left elbow", "rita")  # remembered
+    speed = asked(run("tasks", session, "--json"))["speed"]
+    assert (speed["rita"]["decisions"], speed["rita"]["verified"], speed["anna"]["verified"]) == (2, 0, 1)
+    assert speed["anna"]["edits_per_verified"] == speed["anna"]["edits"]
     run("tasks", session, "--comment", "see the hand", "--frame", "0", "--limb", "left_forearm")
     (comment,) = asked(run("tasks", session, "--json"))["comments"]
     assert "person, frame 0, left arm: see the hand (rita)" in run("tasks", session)[1]

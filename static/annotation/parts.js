@@ -1,0 +1,64 @@
+/** Small pieces that the parts of the section share. */
+
+/**
+ * @template {keyof HTMLElementTagNameMap} K
+ * @param {K} tag
+ * @param {string} className
+ * @param {string} [text]
+ * @returns {HTMLElementTagNameMap[K]}
+ */
+export function make(tag, className, text = "") {
+  return Object.assign(document.createElement(tag), { className, textContent: text });
+}
+
+/**
+ * Line that opens a form below it, with its content.
+ *
+ * @param {string} title
+ * @param {string} hint
+ * @param {HTMLElement[]} content
+ */
+export function fold(title, hint, ...content) {
+  const element = make("details", "plan-fold");
+  const head = make("summary", "", title);
+  head.title = hint;
+  element.append(head, ...content);
+  return element;
+}
+
+/**
+ * Field for a line of text that Enter sends and Esc empties.
+ *
+ * @param {string} name for screen readers
+ * @param {string} action label of the button
+ * @param {(text: string) => void} send
+ */
+export function lineForm(name, action, send) {
+  const form = make("form", "plan-line");
+  const input = Object.assign(make("input", "query-field"), { type: "text", placeholder: name, autocomplete: "off", maxLength: 2000 });
+  input.setAttribute("aria-label", name);
+  const button = Object.assign(make("button", "", action), { type: "submit" });
+  form.append(input, button);
+  const enable = () => {
+    button.disabled = !input.value.trim();
+  };
+  enable();
+  input.addEventListener("input", enable);
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const text = input.value.trim();
+    if (!text) return;
+    input.value = "";
+    enable();
+    input.blur();
+    send(text);
+  });
+  return {
+    form,
+    input,
+    clear() {
+      input.value = "";
+      enable();
+    },
+  };
+}

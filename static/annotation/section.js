@@ -1,0 +1,102 @@
+/** Annotation: the plan, its tasks and verdicts, the next best click, comments, and speed. */
+
+import { textButton } from "../inspector/rows.js";
+import { capital } from "../widgets/text.js";
+import { clickCard } from "./click_card.js";
+import { commentList } from "./comment_list.js";
+import { lineForm, make } from "./parts.js";
+import { planForm } from "./plan_form.js";
+import { speedTable } from "./speed_table.js";
+import { taskList } from "./task_list.js";
+
+/** Facts that the tasks and comments depend on. @type {(keyof import("../model/store.js").Facts)[]} */
+const LISTED_FROM = ["annotation", "session", "target"];
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {import("./review.js").Review} review
+ * @param {import("./visits.js").Visits} visits
+ */
+export function annotationSection(context, review, visits) {
+  const { store } = context;
+  const none = make("p", "section-note", "Nothing is planned yet. Plan the frames of a dataset, annotate them, and let somebody verify them.");
+  const tasks = taskList(store, review, visits);
+  const next = textButton("Next task", "Go to the next listed task (Alt+T)", () => review.step(1));
+  const accept = textButton("Accept", "Verify the pose of the active person here (Alt+K)", () => review.accept());
+  const refuse = textButton("Reject …", "Reject the pose here, and say what is to be corrected (Alt+R)", () => askReason());
+  const leave = textButton("Withdraw", "Take this frame out of the plan", () => review.withdraw());
+  const buttons = make("div", "plan-buttons");
+  buttons.append(next, accept, refuse, leave);
+  const here = make("p", "section-note");
+  const reason = lineForm("What is to be corrected", "Reject", (text) => {
+    reason.form.hidden = true;
+    review.reject(text);
+  });
+  reason.form.hidden = true;
+  reason.input.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape") return;
+    event.stopPropagation();
+    reason.clear();
+    reason.form.hidden = true;
+    reason.input.blur();
+  });
+  const askReason = () => {
+    if (!review.tasksHere.length) return;
+    reason.form.hidden = false;
+    reason.input.focus();
+  };
+  const click = clickCard(context, visits);
+  const comments = commentList(context, review, visits);
+  const speed = speedTable(store);
+  const plan = planForm(context);
+  const body = make("div", "acquisition plan");
+  body.append(
+    none, ...tasks.head, buttons, here, reason.form, tasks.filter, ...tasks.body,
+    make("h4", "", "Next best click"), ...click.elements,
+    make("h4", "", "Comments"), ...comments.elements, speed.element, plan.element,
+  ); // prettier-ignore
+
+  const showHere = () => {
+    const own = review.tasksHere;
+    here.textContent = own
+      .map(({ state, by, comment, annotator }) => `${capital(state)}${by ? ` by ${by}` : annotator ? `, for ${annotator}` : ""}${comment ? `: ${comment}` : ""}.`)
+      .join(" ");
+    here.hidden = !own.length;
+    here.classList.toggle("is-failed", own.some(({ state }) => state === "rejected"));
+    accept.disabled = refuse.disabled = leave.disabled = !own.length;
+    next.disabled = !!review.whyNoTask;
+    if (!own.length) reason.form.hidden = true;
+  };
+  const showAll = () => {
+    none.hidden = review.tasks.length > 0;
+    buttons.hidden = !none.hidden;
+    tasks.show();
+    comments.show();
+    speed.show();
+    click.show();
+    plan.showPeople();
+    showHere();
+  };
+  tasks.filter.addEventListener("change", showHere);
+  showAll();
+
+  return {
+    id: "annotation",
+    title: "Annotation",
+    hint: "The plan of a dataset: tasks, verdicts, the next best click, comments",
+    body,
+    click,
+    plan,
+    comments,
+    askReason,
+    /** @param {Set<keyof import("../model/store.js").Facts>} changed */
+    update(changed) {
+      if (changed.has("annotation") || changed.has("session")) showAll();
+      else if (LISTED_FROM.some((fact) => changed.has(fact))) tasks.show();
+      if (changed.has("target") || changed.has("state")) {
+        showHere();
+        comments.showPlace();
+      }
+    },
+  };
+}

@@ -1,0 +1,48 @@
+/** Go to a person on a frame, with a limb selected and the views zoomed to it once the frame is drawn. */
+
+/** @typedef {{person: number, frame: number, limb?: string}} Goal limb: name for display; empty or missing for none */
+
+/** Limb of shoulders and hips in proposals. */
+const TRUNK = "trunk";
+
+export class Visits {
+  #context;
+  #panes;
+  /** @type {{person: number, frame: number, points: string[]} | null} the joints to zoom to */
+  #zoom = null;
+
+  /**
+   * @param {import("../model/index.js").Context} context
+   * @param {import("../panes/index.js").Panes} panes
+   */
+  constructor(context, panes) {
+    this.#context = context;
+    this.#panes = panes;
+    context.store.subscribe((changed) => {
+      if (changed.has("overlay") || changed.has("target")) this.#zoomNow();
+    });
+  }
+
+  /** @param {Goal} goal */
+  go({ person, frame, limb = "" }) {
+    const { store, navigation, actions } = this.#context;
+    const info = store.facts.session?.people[person];
+    if (!info) return;
+    navigation.pause();
+    navigation.goTo(frame);
+    const points = limb === TRUNK ? info.heading : info.points.filter((point) => limb && info.point_limbs[point]?.name === limb);
+    const point = points.filter((one) => !info.minor.includes(one)).at(-1) ?? points.at(-1) ?? null;
+    const { state } = store.facts;
+    if (state?.person !== person || (point && state.point !== point)) actions.selectPerson(person, point);
+    this.#zoom = points.length ? { person, frame, points } : null;
+    this.#zoomNow();
+  }
+
+  #zoomNow() {
+    const { overlay, shown, target } = this.#context.store.facts;
+    if (this.#zoom && target !== this.#zoom.frame) this.#zoom = null;
+    if (!this.#zoom || overlay?.frame !== this.#zoom.frame || shown?.frame !== this.#zoom.frame) return;
+    this.#panes.grid.frameJoints(this.#zoom.person, this.#zoom.points);
+    this.#zoom = null;
+  }
+}
