@@ -218,7 +218,7 @@ class FakeEndpoint:
         """All messages of a type, in order."""
         return [m for m in self.received if m["type"] == kind]
 
-    async def serve(self, socket):
+    async def serve(self, socket, visitor):
         self.sockets.add(socket)
         self.seq = 0
         try:
@@ -445,7 +445,7 @@ class FakeEndpoint:
         ]
         await socket.send_str(encoded({
             "type": "session", "name": self.name, "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
-            "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start,
+            "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start, "role": "annotate",
         }))  # fmt: skip
         for message in (self.state, self.settings, self.view_3d, self.body_sizes):
             await socket.send_str(encoded(message))

@@ -10,6 +10,9 @@ from aiohttp import web
 from declared_messages import checked
 
 from app.page.socket import PaneSocket
+from app.state.visitor import Visitor
+
+_ANNOTATOR = Visitor()
 
 
 class Page:
@@ -48,11 +51,11 @@ class Page:
 
 
 @asynccontextmanager
-async def visiting(controller, notices=()):
+async def visiting(controller, notices=(), visitor=_ANNOTATOR):
     async def serve(request):
         socket = web.WebSocketResponse(decode_text=False)
         await socket.prepare(request)
-        await PaneSocket(controller, notices).serve(socket)
+        await PaneSocket(controller, notices).serve(socket, visitor)
         return socket
 
     app = web.Application()
