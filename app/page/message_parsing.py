@@ -8,7 +8,7 @@ import msgspec
 from app.page import client_messages as wire
 from app.page.client_messages import CLIENT_MESSAGES, ClientMessage
 from app.page.message_types import Command
-from app.state.visitor import Role
+from app.state.role import Role
 from tracker.errors import TrackerError
 from tracker.validation import explain, quoted
 

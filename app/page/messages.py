@@ -24,9 +24,9 @@ from app.state.floor_picking import Picking
 from app.state.page_view import View
 from app.state.people import DepthNote
 from app.state.progress import TrackState
+from app.state.role import Role
 from app.state.search import PreviewState, ReplayState, SearchState
 from app.state.state import State
-from app.state.visitor import Role
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import FloatArray

@@ -30,7 +30,7 @@ from app.page.search_messages import (
 )
 from app.state.comparison import ComparedWork
 from app.state.progress import TrackStage
-from app.state.visitor import Role
+from app.state.role import Role
 
 # --- session -------------------------------------------------------------------------------------------------------
 

@@ -25,8 +25,8 @@ from app.remedies import page_text
 from app.state import page_view
 from app.state.identity import Identity
 from app.state.page_view import View
+from app.state.role import Role
 from app.state.state import State
-from app.state.visitor import Visitor
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.session.session import Session
@@ -42,7 +42,6 @@ _EDGES = ("accepted", "rejected")
 """Layers of lines that are drawn from the evidence."""
 _COALESCED = (wire.Seek, wire.SetView, wire.CheckEpipolar, ReplayStep, PreviewCandidate, SetSearchSpeed)
 """Messages of which only the newest in the queue is carried out."""
-_ANNOTATOR = Visitor()
 
 
 class PaneSocket:
@@ -58,9 +57,9 @@ class PaneSocket:
         self._controller, self._notices = controller, notices
         self._pages = itertools.count(1)
 
-    async def serve(self, socket: web.WebSocketResponse, visitor: Visitor = _ANNOTATOR) -> None:
+    async def serve(self, socket: web.WebSocketResponse, role: Role = "annotate") -> None:
         """Serve one page until its socket closes."""
-        page = PageConnection(next(self._pages), self._controller, socket, visitor)
+        page = PageConnection(next(self._pages), self._controller, socket, role)
         await page.serve(self._notices)
 
 
@@ -68,7 +67,7 @@ class PageConnection:
     """The connection to one page."""
 
     def __init__(
-        self, number: int, controller: Controller, socket: web.WebSocketResponse, visitor: Visitor = _ANNOTATOR
+        self, number: int, controller: Controller, socket: web.WebSocketResponse, role: Role = "annotate"
     ) -> None:
         """Prepare to serve a page.
 
@@ -76,9 +75,9 @@ class PageConnection:
             number: of the page, unique while the program runs.
             controller: of the session.
             socket: to the page.
-            visitor: who has joined, by which messages are refused.
+            role: of the page; messages that it does not allow are refused.
         """
-        self._number, self._controller, self._socket, self._visitor = number, controller, socket, visitor
+        self._number, self._controller, self._socket, self._role = number, controller, socket, role
         self._changed = asyncio.Event()
         self._arrived = asyncio.Event()
         self._waiting: deque[wire.ClientMessage] = deque()
@@ -147,9 +146,9 @@ class PageConnection:
             if received.type is aiohttp.WSMsgType.BINARY:
                 raise MessageError("a text message", f"a binary one of {len(received.data)} bytes")
             message = parse(received.data)
-            if self._visitor.role != "annotate" and isinstance(message, wire.Pause3d):
+            if self._role != "annotate" and isinstance(message, wire.Pause3d):
                 return  # sent on connecting, before the page knows that it has no 3-D view
-            check_allowed(self._visitor.role, message)
+            check_allowed(self._role, message)
         except TrackerError as error:
             await self._refuse(error)
             return
@@ -198,7 +197,7 @@ class PageConnection:
 
     async def _send_all(self, notices: Sequence[str]) -> None:
         names = _value_names(self._controller.session)
-        await self._send(messages.session(self._controller.session, self._visitor.role))
+        await self._send(messages.session(self._controller.session, self._role))
         for notice in notices:
             await self._send(NoticeMessage("info", notice))
         while True:

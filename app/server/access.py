@@ -17,7 +17,7 @@ from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from app.server.token_file import kept_token
-from app.state.visitor import Role
+from app.state.role import Role
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)

@@ -26,7 +26,7 @@ from app.runtime.restart import inherited
 from app.server.access import Access, Invitation, access_for
 from app.server.address import Serving, listen, page_address, port_of
 from app.server.static_files import KEPT, POLICY, PREFIX, PageFiles, connect_sources, static_folder
-from app.state.visitor import Role
+from app.state.role import Role
 
 STEPS = ("Loading the program", "Opening the session", "Preparing the views")
 _ICON = "icon.svg"

@@ -5,7 +5,7 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
-from app.state.visitor import Role
+from app.state.role import Role
 from tracker.errors import SessionError
 from tracker.validation import check
 

@@ -21,7 +21,7 @@ from app.server import connections, viser_proxy
 from app.server.access import NO_TOKEN, Access, root_of
 from app.server.page_requests import ROLE
 from app.server.static_files import KEPT, POLICY, PREFIX, ROUTE, PageFiles, connect_sources
-from app.state.visitor import MAX_NAME, Role, Visitor
+from app.state.role import Role
 
 _LOG = logging.getLogger(__name__)
 _SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
@@ -43,7 +43,7 @@ _CLOSE_TIMEOUT_S = 1.0
 class PaneEndpoint(Protocol):
     """Answers the pane socket (docs/protocol.md)."""
 
-    async def serve(self, socket: web.WebSocketResponse, visitor: Visitor) -> None:
+    async def serve(self, socket: web.WebSocketResponse, role: Role) -> None:
         """Serve one page until its socket closes."""
 
 
@@ -93,8 +93,7 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
         await socket.prepare(request)
         request.app[_SOCKETS].add(socket)
         try:
-            name = " ".join(request.query.get("name", "").split())
-            await panes.serve(socket, Visitor(request[ROLE], name[:MAX_NAME] if name.isprintable() else ""))
+            await panes.serve(socket, request[ROLE])
         except ConnectionError:
             _LOG.debug("a page closed its socket during a message")
         except Exception:

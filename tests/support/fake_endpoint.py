@@ -218,7 +218,7 @@ class FakeEndpoint:
         """All messages of a type, in order."""
         return [m for m in self.received if m["type"] == kind]
 
-    async def serve(self, socket, visitor):
+    async def serve(self, socket, role):
         self.sockets.add(socket)
         self.seq = 0
         try:

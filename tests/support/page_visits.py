@@ -10,9 +10,6 @@ from aiohttp import web
 from declared_messages import checked
 
 from app.page.socket import PaneSocket
-from app.state.visitor import Visitor
-
-_ANNOTATOR = Visitor()
 
 
 class Page:
@@ -51,11 +48,11 @@ class Page:
 
 
 @asynccontextmanager
-async def visiting(controller, notices=(), visitor=_ANNOTATOR):
+async def visiting(controller, notices=(), role="annotate"):
     async def serve(request):
         socket = web.WebSocketResponse(decode_text=False)
         await socket.prepare(request)
-        await PaneSocket(controller, notices).serve(socket, visitor)
+        await PaneSocket(controller, notices).serve(socket, role)
         return socket
 
     app = web.Application()

@@ -8,7 +8,6 @@ from page_visits import visiting
 from app.page import client_messages as wire
 from app.page.message_parsing import check_allowed
 from app.page.message_types import Command
-from app.state.visitor import Visitor
 from tracker.errors import TrackerError
 
 
@@ -51,7 +50,7 @@ def test_a_page_that_looks_sees_what_the_annotator_sees():
 
 async def test_the_program_refuses_and_goes_on(opened):
     controller = opened()
-    async with visiting(controller, visitor=Visitor("look")) as page:
+    async with visiting(controller, role="look") as page:
         assert (await page.hear("session"))["role"] == "look"
         await page.send("seek", frame=3)
         assert "only look" in (await page.hear("notice"))["text"]

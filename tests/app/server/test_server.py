@@ -23,7 +23,7 @@ NAMED = Access(frozenset({"lab.example.org"}), "secret", Invitation())
 class EchoPanes:
     """A pane endpoint that answers every message with itself."""
 
-    async def serve(self, socket, visitor):
+    async def serve(self, socket, role):
         async for message in socket:
             if message.type is aiohttp.WSMsgType.TEXT:
                 await socket.send_str(message.data.decode())
@@ -344,15 +344,19 @@ def test_page_address_carries_name_and_token():
 class TellingPanes:
     """A pane endpoint that says who has joined."""
 
-    async def serve(self, socket, visitor):
-        await socket.send_str(f"{visitor.role} {visitor.name}")
+    async def serve(self, socket, role):
+        await socket.send_str(role)
+
+
+async def _answer(_):
+    return web.Response()
 
 
 @pytest.mark.parametrize("role", ["review", "look"])
 async def test_a_shared_link_shows_the_session_and_no_more(fake_viser, role):
     access = access_for("127.0.0.1", share=True)
     app = server.create_app(TellingPanes(), fake_viser.socket_path, access, static_folder())
-    app.router.add_get("/sessions", lambda _: web.Response())
+    app.router.add_get("/sessions", _answer)
     async with running(LimitedRunner(app, access.roots)) as port, aiohttp.ClientSession() as client:
         start = f"http://127.0.0.1:{port}"
         async with client.get(start, params={"token": access.token_of(role)}) as entry:
@@ -363,8 +367,8 @@ async def test_a_shared_link_shows_the_session_and_no_more(fake_viser, role):
         client.headers["Cookie"] = kept.partition(";")[0]
         async with client.get(start + root) as page:
             assert page.status == 200
-        async with client.ws_connect(f"{start}{root}ws?name=Ben") as socket:
-            assert await socket.receive_str() == f"{role} Ben"
+        async with client.ws_connect(f"{start}{root}ws") as socket:
+            assert await socket.receive_str() == role
         for path in ("viser/", "sessions", "export"):
             async with client.get(start + root + path) as refused:
                 assert refused.status == 403
