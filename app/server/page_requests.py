@@ -9,7 +9,7 @@ from app.state.role import Role
 from tracker.errors import SessionError
 from tracker.validation import check
 
-ROLE: web.RequestKey[Role] = web.RequestKey("role", str)
+ROLE: web.RequestKey[Role] = web.RequestKey("role")
 """The role that the token of a request gives."""
 
 

@@ -25,7 +25,7 @@ from app.state.role import Role
 
 _LOG = logging.getLogger(__name__)
 _SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
-_ROOTS: web.AppKey[tuple[str, ...]] = web.AppKey("roots", tuple)
+_ROOTS: web.AppKey[Sequence[str]] = web.AppKey("roots", tuple)
 _ENTRY = (
     '<!doctype html><title>Quadrille</title><link rel="icon" href="data:,">'
     '<meta http-equiv="refresh" content="0; url={root}">'

@@ -190,7 +190,7 @@ class AnnotationStore:
         return self._edits.redo()
 
     def undo_own(self, author: str | None = None) -> OwnMove | None:
-        """Undo the last edit of an annotator, whoever has edited since; see `own_undo`.
+        """Undo the last edit of an annotator, also among later edits of others; see `own_undo`.
 
         Args:
             author: the annotator; by default the one of the store.

@@ -104,13 +104,15 @@ def _take_back(db: sqlite3.Connection, tree: EditTree, edit: int, author: str) -
     if any(str(edit) in _setting(db, name) for name in _BY_NUMBER):
         raise SessionError(
             f"expected an edit of poses, found '{label}', which others have worked on since; "
-            "go back in the history before it, or change sizes or cameras anew"
+            "go back in the history before it, or change sizes or cameras again"
         )
     changes = [(kind, *change) for kind in KEYS for change in _last_changes(db, kind, edit)]
     free = [(kind, change, before) for kind, change, before, is_current in changes if is_current]
     if not free:
         whose = _changed_by(db, edit)
-        raise SessionError(f"expected '{label}' as you left it, found that {whose} changed it since; set the pose anew")
+        raise SessionError(
+            f"expected '{label}' as you left it, found that {whose} changed it since; set the pose again"
+        )
     added = tree.add(db, f"{'redo' if depth % 2 else 'undo'}: {label}", author)
     for kind, change, before in free:
         _show_again(db, kind, added, change, before)
