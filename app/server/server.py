@@ -155,6 +155,7 @@ def _guard(access: Access) -> Middleware:
             why = f"expected a page that may annotate, found one with a link to {role}; ask for another link"
         if why is not None:
             return _refused(403, f"Quadrille refused this request: {why}.\n")
+        assert role is not None
         request[ROLE] = role
         if len(request.raw_path) > _MAX_PATH_CHARACTERS:
             return _refused(414, f"Expected an address of at most {_MAX_PATH_CHARACTERS} characters.\n")
