@@ -21,6 +21,7 @@ def command(
     allow_host: Names = (),
     browser: bool = True,
     token: bool = True,
+    share: bool = False,
     sample: OptionalName = None,
     start_again: bool = False,
     frame: OptionalWhole = None,
@@ -36,6 +37,7 @@ def command(
         allow_host: names by which browsers may call this machine.
         browser: open the page in the default browser.
         token: require the token in the printed address. Without it every account of this machine can use the page.
+        share: print links for other people too: one to review, one to look. They end with this start.
         sample: name of the sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
         start_again: discard the working copy of the sample and make a new one.
         frame: frame to show first.
@@ -59,7 +61,7 @@ def command(
     set_annotator(annotator)
     folder = sample_copy(sample or DEFAULT_SAMPLE, start_again) if session is None else session
     folder = session_folder(folder)
-    serving = Serving(host, port, allow_host, browser, token)
+    serving = Serving(host, port, allow_host, browser, token, share)
     with SessionLock(folder), Doorway(serving) as doorway, closing(KernelCompiler()) as compiler:
         # These imports take seconds: the doorway answers meanwhile, and kernels are compiled. Objects made here stay.
         gc.disable()

@@ -1,17 +1,27 @@
-"""Parse messages of a page, and explain what is wrong with one."""
+"""Parse messages of a page, explain what is wrong with one, and check what a role may send."""
 
 from collections.abc import Iterator
 from typing import Any, get_args
 
 import msgspec
 
+from app.page import client_messages as wire
 from app.page.client_messages import CLIENT_MESSAGES, ClientMessage
 from app.page.message_types import Command
+from app.state.role import Role
 from tracker.errors import TrackerError
 from tracker.validation import explain, quoted
 
 MISUNDERSTOOD = "expected a message that this program knows, found one of another version of the page; reload the page"
 """Notice of a page that has sent a wrong message. Its user typed none of it, so that only the log has the details."""
+_SEEN: tuple[type[Command], ...] = (
+    wire.SetView, wire.CheckEpipolar, wire.ShowCurves, wire.ShowHistory,
+)  # fmt: skip
+"""Subscriptions of one page alone. A page that may only look sees the frame that the annotator works on."""
+_MOVED: tuple[type[Command], ...] = (wire.Seek, wire.Select)
+"""All pages show one frame and person, which a review moves too."""
+_REVIEWED = ("reviewed", "unreviewed")
+"""Marks that a review may set on a range."""
 
 
 class MessageError(TrackerError):
@@ -82,3 +92,21 @@ def _value(data: str | bytes) -> Any:
         return msgspec.json.decode(data)
     except (msgspec.DecodeError, UnicodeError, RecursionError):
         return None
+
+
+def check_allowed(role: Role, message: Command) -> None:
+    """Check that a page may send a message.
+
+    Raises:
+        TrackerError: its role does not allow it.
+    """
+    if role == "annotate" or isinstance(message, _SEEN) or (role == "review" and _is_review(message)):
+        return
+    only = "look" if role == "look" else "look and mark poses as reviewed"
+    raise TrackerError(f"expected a page that may annotate, found one that may only {only}; ask for another link")
+
+
+def _is_review(message: Command) -> bool:
+    if isinstance(message, wire.EditRange):
+        return message.action in _REVIEWED
+    return isinstance(message, _MOVED) or (isinstance(message, wire.ToggleMark) and message.toggle == "reviewed")

@@ -24,6 +24,7 @@ from app.state.floor_picking import Picking
 from app.state.page_view import View
 from app.state.people import DepthNote
 from app.state.progress import TrackState
+from app.state.role import Role
 from app.state.search import PreviewState, ReplayState, SearchState
 from app.state.state import State
 from tracker.body.limbs import limb_display_name, limbs
@@ -50,12 +51,12 @@ _NO_CELL: dict[str, Any] = {
 }
 
 
-def session(session: Session) -> wire.SessionMessage:
-    """Describe the session."""
+def session(session: Session, role: Role = "annotate") -> wire.SessionMessage:
+    """Describe the session to a page of a role."""
     cameras = tuple(wire.CameraInfo(c.camera.name, *c.camera.pinhole.size) for c in session.cameras)
     people = tuple(_person(p) for p in session.people)
     return wire.SessionMessage(
-        session.name, session.fps, session.n_frames, cameras, people, DOUBTFUL_FROM, LOST_FROM, _START
+        session.name, session.fps, session.n_frames, cameras, people, DOUBTFUL_FROM, LOST_FROM, _START, role
     )
 
 

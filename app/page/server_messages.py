@@ -31,6 +31,7 @@ from app.page.search_messages import (
 )
 from app.state.comparison import ComparedWork
 from app.state.progress import TrackStage
+from app.state.role import Role
 
 # --- session -------------------------------------------------------------------------------------------------------
 
@@ -108,6 +109,8 @@ class SessionMessage(Message, frozen=True, tag="session"):
     """A limb that is lost with a higher probability counts as lost."""
     start: str
     """Identifies the start of the program. After another start a page goes back to the frame and person it showed."""
+    role: Role
+    """Messages that the page's link allows; others are refused."""
 
 
 # --- state ---------------------------------------------------------------------------------------------------------

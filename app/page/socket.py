@@ -15,7 +15,7 @@ from app.drawing.curves import CurveGroup
 from app.page import client_messages as wire
 from app.page import commands, messages, picture_sets
 from app.page.inspector_feed import InspectorFeed
-from app.page.message_parsing import MISUNDERSTOOD, MessageError, parse
+from app.page.message_parsing import MISUNDERSTOOD, MessageError, check_allowed, parse
 from app.page.message_types import Message, encode_text
 from app.page.observability_feed import ObservabilityFeed
 from app.page.search_feed import SearchFeed
@@ -25,6 +25,7 @@ from app.remedies import page_text
 from app.state import page_view
 from app.state.identity import Identity
 from app.state.page_view import View
+from app.state.role import Role
 from app.state.state import State
 from tracker.errors import TrackerError
 from tracker.evidence.view_evidence import ViewEvidence
@@ -56,24 +57,27 @@ class PaneSocket:
         self._controller, self._notices = controller, notices
         self._pages = itertools.count(1)
 
-    async def serve(self, socket: web.WebSocketResponse) -> None:
+    async def serve(self, socket: web.WebSocketResponse, role: Role = "annotate") -> None:
         """Serve one page until its socket closes."""
-        page = PageConnection(next(self._pages), self._controller, socket)
+        page = PageConnection(next(self._pages), self._controller, socket, role)
         await page.serve(self._notices)
 
 
 class PageConnection:
     """The connection to one page."""
 
-    def __init__(self, number: int, controller: Controller, socket: web.WebSocketResponse) -> None:
+    def __init__(
+        self, number: int, controller: Controller, socket: web.WebSocketResponse, role: Role = "annotate"
+    ) -> None:
         """Prepare to serve a page.
 
         Args:
             number: of the page, unique while the program runs.
             controller: of the session.
             socket: to the page.
+            role: of the page; messages that it does not allow are refused.
         """
-        self._number, self._controller, self._socket = number, controller, socket
+        self._number, self._controller, self._socket, self._role = number, controller, socket, role
         self._changed = asyncio.Event()
         self._arrived = asyncio.Event()
         self._waiting: deque[wire.ClientMessage] = deque()
@@ -142,7 +146,10 @@ class PageConnection:
             if received.type is aiohttp.WSMsgType.BINARY:
                 raise MessageError("a text message", f"a binary one of {len(received.data)} bytes")
             message = parse(received.data)
-        except MessageError as error:
+            if self._role != "annotate" and isinstance(message, wire.Pause3d):
+                return  # sent on connecting, before the page knows that it has no 3-D view
+            check_allowed(self._role, message)
+        except TrackerError as error:
             await self._refuse(error)
             return
         last = self._waiting[-1] if self._waiting else None
@@ -190,7 +197,7 @@ class PageConnection:
 
     async def _send_all(self, notices: Sequence[str]) -> None:
         names = _value_names(self._controller.session)
-        await self._send(messages.session(self._controller.session))
+        await self._send(messages.session(self._controller.session, self._role))
         for notice in notices:
             await self._send(NoticeMessage("info", notice))
         while True:

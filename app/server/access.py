@@ -13,14 +13,23 @@ import secrets
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import urlsplit
 
 from app.server.token_file import kept_token
+from app.state.role import Role
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
 _HOST = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9_.-]+)(?::(?P<port>[0-9]{1,5}))?")
 _DEFAULT_PORTS = {"http": "80", "https": "443"}
+
+
+class SharedLink(NamedTuple):
+    """A link for other people."""
+
+    role: Role
+    token: str
 
 
 @dataclass(frozen=True)
@@ -34,6 +43,18 @@ class Access:
     invitation: "Invitation | None" = None
     """Stands for the token once, in the address that a browser is started with."""
 
+    links: tuple[SharedLink, ...] = ()
+    """Links that admit to less than everything; none without a token."""
+
+    @property
+    def roots(self) -> tuple[str, ...]:
+        """Paths below which the page is served, one per token."""
+        return (self.root, *(root_of(link.token) for link in self.links))
+
+    def token_of(self, role: Role) -> str | None:
+        """Return the token that gives a role."""
+        return self.token if role == "annotate" else next(link.token for link in self.links if link.role == role)
+
     @property
     def root(self) -> str:
         """Path below which the page is served to those who have the token; "/" without a token.
@@ -41,7 +62,7 @@ class Access:
         A browser sends cookies to every port of a machine, also to the server of another account. It sends the token's
         cookie only below this path, which nobody can guess and which does not admit by itself.
         """
-        return "/" if self.token is None else f"/{hashlib.sha256(f'root {self.token}'.encode()).hexdigest()[:32]}/"
+        return "/" if self.token is None else root_of(self.token)
 
     def cookie(self, host: str) -> str:
         """Return the name of the token's cookie for a Host header.
@@ -51,13 +72,12 @@ class Access:
         called = _HOST.fullmatch(host)
         return f"quadrille_{(called and called['port']) or _DEFAULT_PORTS['http']}"
 
-    def refusal(self, host: str | None, origin: str | None, tokens: Iterable[str] = ()) -> str | None:
-        """Return why a request is refused, or None if it may pass.
+    def refusal(self, host: str | None, origin: str | None) -> str | None:
+        """Return why a request is refused whatever its token, or None.
 
         Args:
             host: the Host header.
             origin: the Origin header, which browsers send with every WebSocket and every request of a foreign page.
-            tokens: those in the request's address and cookie.
         """
         called = _HOST.fullmatch(host or "")
         if called is None or not (is_loopback(called["name"]) or called["name"].lower() in self.hosts):
@@ -67,16 +87,37 @@ class Access:
             )
         if origin is not None and not _same(origin, called):
             return f"expected a request of this page, found one of '{_shown(origin)}'; open the page itself"
-        if self.token is not None and not any(self._admits(t) for t in tokens):
-            return (
-                "expected the token of this start, found none or another; open the address that quadrille open "
-                "printed on its terminal, with everything after the question mark"
-            )
+        return None
+
+    def role(self, tokens: Iterable[str] = ()) -> Role | None:
+        """Return the role that the first known token gives; None if a token is required and none is known.
+
+        Args:
+            tokens: those in the request's address and cookie.
+        """
+        if self.token is None:
+            return "annotate"
+        for token in tokens:
+            shared = [link.role for link in self.links if _equal(link.token, token)]
+            if shared or self._admits(token):
+                return shared[0] if shared else "annotate"
         return None
 
     def _admits(self, token: str) -> bool:
         assert self.token is not None
         return _equal(self.token, token) or (self.invitation is not None and self.invitation.redeem(token))
+
+
+NO_TOKEN = (
+    "expected the token of this start, found none or another; open the address that quadrille open "
+    "printed on its terminal, with everything after the question mark"
+)
+"""Why a request without a known token is refused."""
+
+
+def root_of(token: str) -> str:
+    """Return the path below which the page is served to those who have a token."""
+    return f"/{hashlib.sha256(f'root {token}'.encode()).hexdigest()[:32]}/"
 
 
 class Invitation:
@@ -103,7 +144,9 @@ class Invitation:
         return not was_used
 
 
-def access_for(host: str, allow_hosts: Iterable[str] = (), token: bool = True, tokens: Path | None = None) -> Access:
+def access_for(
+    host: str, allow_hosts: Iterable[str] = (), token: bool = True, tokens: Path | None = None, share: bool = False
+) -> Access:
     """Return the checks for a server that listens at `host`.
 
     Args:
@@ -112,6 +155,7 @@ def access_for(host: str, allow_hosts: Iterable[str] = (), token: bool = True, t
         token: whether requests need a token.
         tokens: private folder that keeps the token of loopback servers between starts, so that open tabs connect
             again; None makes a new one.
+        share: make links for other people too, which end with this start.
 
     Raises:
         TrackerError: `host` is not loopback and `allow_hosts` is empty or no token is wanted, or a name is malformed.
@@ -133,10 +177,16 @@ def access_for(host: str, allow_hosts: Iterable[str] = (), token: bool = True, t
             f"listening on '{host}' needs the names by which browsers may call this machine, found none; "
             "add --allow-host NAME, or use --host 127.0.0.1 and an SSH tunnel"
         )
+    if not token and share:
+        raise TrackerError(
+            "expected a token for a page that is shared, found --no-token with --share; leave out one of them"
+        )
     if not token:
         return Access(names)
     kept = None if tokens is None or not is_loopback(host) or names else kept_token(tokens)
-    return Access(names, kept or secrets.token_urlsafe(32), Invitation())
+    roles: tuple[Role, ...] = ("review", "look") if share else ()
+    links = tuple(SharedLink(role, secrets.token_urlsafe(32)) for role in roles)
+    return Access(names, kept or secrets.token_urlsafe(32), Invitation(), links)
 
 
 def is_loopback(name: str) -> bool:

@@ -22,6 +22,8 @@ class Serving:
     """Whether to open the page in the default browser."""
     token: bool = True
     """Whether requests need a token."""
+    share: bool = False
+    """Whether to make links for other people."""
 
 
 def listen(host: str, port: int) -> list[socket.socket]:

@@ -1,7 +1,7 @@
 """Bound the number and the age of connections, so that idle or hostile ones leave room for the page."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from aiohttp import web
@@ -27,14 +27,14 @@ _FULL = (
 class LimitedRunner(web.AppRunner):
     """A runner whose sites limit the number and the age of their connections."""
 
-    def __init__(self, app: web.Application, root: str = "/") -> None:
+    def __init__(self, app: web.Application, roots: Sequence[str] = ()) -> None:
         """Prepare to run an application, without a log of its requests.
 
         Args:
             app: the application.
-            root: path below which it is served, besides its own paths.
+            roots: paths below which it is served, besides its own paths.
         """
-        self._root = root
+        self._roots = [root for root in roots if root != "/"]
         super().__init__(
             app, access_log=None, handle_signals=False, shutdown_timeout=2.0, keepalive_timeout=KEEPALIVE_S,
             lingering_time=LINGER_S,
@@ -43,10 +43,11 @@ class LimitedRunner(web.AppRunner):
 
     async def _make_server(self) -> web.Server:
         server = await super()._make_server()
-        make_request, root = server.request_factory, self._root
+        make_request, roots = server.request_factory, self._roots
 
         def make_routed(message: RawRequestMessage, *args: Any) -> web.BaseRequest:
-            if root != "/" and message.path.startswith(root):
+            root = next((root for root in roots if message.path.startswith(root)), None)
+            if root is not None:
                 path = message.path.removeprefix(root[:-1])
                 message = message._replace(path=path, url=URL(path, encoded=True))
             return make_request(message, *args)

@@ -26,6 +26,7 @@ from app.runtime.restart import inherited
 from app.server.access import Access, Invitation, access_for
 from app.server.address import Serving, listen, page_address, port_of
 from app.server.static_files import KEPT, POLICY, PREFIX, PageFiles, connect_sources, static_folder
+from app.state.role import Role
 
 STEPS = ("Loading the program", "Opening the session", "Preparing the views")
 _ICON = "icon.svg"
@@ -62,9 +63,8 @@ class Doorway:
         """
         self.serving = serving
         tokens = user_state_path("quadrille", appauthor=False)
-        self.access = access_for(serving.host, serving.allow_hosts, serving.token, tokens)
+        self.access = access_for(serving.host, serving.allow_hosts, serving.token, tokens, serving.share)
         """Requirements of the program; the doorway asks for no token."""
-        self._without_token = replace(self.access, token=None, invitation=None)
         static = static_folder()
         self._icon = (static / _ICON).read_bytes()
         self._page_files = PageFiles(static)
@@ -81,6 +81,12 @@ class Doorway:
     def address(self) -> str:
         """The page's address, with the token if one is required."""
         return page_address(self.access, self.serving.host, self.port)
+
+    @property
+    def shared_addresses(self) -> dict[Role, str]:
+        """Addresses for other people, by role."""
+        links = {link.role: replace(self.access, token=link.token) for link in self.access.links}
+        return {role: page_address(access, self.serving.host, self.port) for role, access in links.items()}
 
     def __enter__(self) -> Self:
         """Begin to answer."""
@@ -155,7 +161,7 @@ class Doorway:
 
     def answer(self, path: str, host: str | None, origin: str | None) -> Answer:
         """Answer a request."""
-        why = self._without_token.refusal(host, origin)
+        why = self.access.refusal(host, origin)
         if why is not None:
             return Answer(HTTPStatus.FORBIDDEN, f"Quadrille refused this request: {why}.\n".encode(), "text/plain")
         if path == "/starting.json":
@@ -191,8 +197,9 @@ class _Handler(BaseHTTPRequestHandler):
         hosts = self.headers.get_all("Host", [])
         host = hosts[0] if len(hosts) == 1 else None
         path = self.path.partition("?")[0]
-        if path.startswith(root := self.server.doorway.access.root):
-            path = "/" + path.removeprefix(root)
+        for root in self.server.doorway.access.roots:
+            if path.startswith(root):
+                path = "/" + path.removeprefix(root)
         answer = self.server.doorway.answer(path, host, self.headers.get("Origin"))
         sources = "'none'" if host is None or answer.status == HTTPStatus.FORBIDDEN else connect_sources(host)
         with suppress(OSError):

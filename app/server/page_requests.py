@@ -5,8 +5,12 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
+from app.state.role import Role
 from tracker.errors import SessionError
 from tracker.validation import check
+
+ROLE: web.RequestKey[Role] = web.RequestKey("role")
+"""The role that the token of a request gives."""
 
 
 def require_page(request: web.Request, refusal: str | None) -> None:

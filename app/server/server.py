@@ -18,17 +18,21 @@ from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
 from app.server import connections, viser_proxy
-from app.server.access import Access
+from app.server.access import NO_TOKEN, Access, root_of
+from app.server.page_requests import ROLE
 from app.server.static_files import KEPT, POLICY, PREFIX, ROUTE, PageFiles, connect_sources
+from app.state.role import Role
 
 _LOG = logging.getLogger(__name__)
 _SOCKETS: web.AppKey[weakref.WeakSet[web.WebSocketResponse]] = web.AppKey("sockets", weakref.WeakSet)
-_ROOT: web.AppKey[str] = web.AppKey("root", str)
+_ROOTS: web.AppKey[Sequence[str]] = web.AppKey("roots", tuple)
 _ENTRY = (
     '<!doctype html><title>Quadrille</title><link rel="icon" href="data:,">'
     '<meta http-equiv="refresh" content="0; url={root}">'
 )
 """Answer to an address with a token: the browser goes on to the page's own address, and does not keep this one."""
+_SHOWN, _SHOWN_BELOW = ("/", "/ws", "/starting.json"), (f"/{PREFIX}", "/thumbnail/", "/silhouette/")
+"""Paths that a shared link may ask for, and beginnings of such paths; 3-D view, exports and other sessions are none."""
 _MAX_MESSAGE_BYTES = 1 << 20  # what a page sends is a line or two of JSON
 _MAX_PATH_CHARACTERS = 2000
 _MAX_NAME_BYTES = 255
@@ -39,7 +43,7 @@ _CLOSE_TIMEOUT_S = 1.0
 class PaneEndpoint(Protocol):
     """Answers the pane socket (docs/protocol.md)."""
 
-    async def serve(self, socket: web.WebSocketResponse) -> None:
+    async def serve(self, socket: web.WebSocketResponse, role: Role) -> None:
         """Serve one page until its socket closes."""
 
 
@@ -54,17 +58,19 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
     """
     app = web.Application(middlewares=[_guard(access)])
     app[_SOCKETS] = weakref.WeakSet()
-    app[_ROOT] = access.root
+    app[_ROOTS] = access.roots
     proxy, files = viser_proxy.ViserProxy(viser_socket), PageFiles(static)
 
     async def page(request: web.Request) -> web.StreamResponse:
         if access.token is None or "token" not in request.query:
             return web.Response(text=files.index(), content_type="text/html")
         # No redirect: after one, a browser that followed a link would not send a Strict cookie.
-        response = web.Response(text=_ENTRY.format(root=access.root), content_type="text/html")
-        response.headers["Content-Location"] = access.root
-        name = access.cookie(request.headers["Host"])
-        response.set_cookie(name, access.token, httponly=True, samesite="Strict", path=access.root)
+        token = access.token_of(request[ROLE])
+        assert token is not None
+        root, name = root_of(token), access.cookie(request.headers["Host"])
+        response = web.Response(text=_ENTRY.format(root=root), content_type="text/html")
+        response.headers["Content-Location"] = root
+        response.set_cookie(name, token, httponly=True, samesite="Strict", path=root)
         return response
 
     async def page_file(request: web.Request) -> web.StreamResponse:
@@ -87,7 +93,7 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
         await socket.prepare(request)
         request.app[_SOCKETS].add(socket)
         try:
-            await panes.serve(socket)
+            await panes.serve(socket, request[ROLE])
         except ConnectionError:
             _LOG.debug("a page closed its socket during a message")
         except Exception:
@@ -121,7 +127,7 @@ async def serve_forever(app: web.Application, sockets: Sequence[socket.socket], 
         sockets: that listen (`address.listen`).
         on_ready: called once when the server answers.
     """
-    runner = connections.LimitedRunner(app, app[_ROOT])
+    runner = connections.LimitedRunner(app, app[_ROOTS])
     await runner.setup()
     try:
         for each in sockets:
@@ -141,13 +147,16 @@ def _guard(access: Access) -> Middleware:
         cookie = request.cookies.get(access.cookie(hosts[0])) if hosts else None
         # The cookie first: a page that is loaded again must not use up its invitation twice.
         tokens = [] if access.token is None else [cookie, request.query.get("token")]
-        why = access.refusal(
-            hosts[0] if len(hosts) == 1 else None,
-            request.headers.get("Origin"),
-            [token for token in tokens if token is not None],
-        )
+        why = access.refusal(hosts[0] if len(hosts) == 1 else None, request.headers.get("Origin"))
+        role = None if why is not None else access.role(token for token in tokens if token is not None)
+        if role is None:
+            why = why or NO_TOKEN
+        elif not _may_ask(role, request):
+            why = f"expected a page that may annotate, found one with a link to {role}; ask for another link"
         if why is not None:
             return _refused(403, f"Quadrille refused this request: {why}.\n")
+        assert role is not None
+        request[ROLE] = role
         if len(request.raw_path) > _MAX_PATH_CHARACTERS:
             return _refused(414, f"Expected an address of at most {_MAX_PATH_CHARACTERS} characters.\n")
         if max(map(len, os.fsencode(request.path).split(b"/"))) > _MAX_NAME_BYTES:
@@ -155,6 +164,14 @@ def _guard(access: Access) -> Middleware:
         return await handler(request)
 
     return guard
+
+
+def _may_ask(role: Role, request: web.Request) -> bool:
+    """Return whether a role may send a request: with a shared link, only those that show the session."""
+    if role == "annotate":
+        return True
+    path = request.path
+    return request.method in ("GET", "HEAD") and (path in _SHOWN or path.startswith(_SHOWN_BELOW))
 
 
 def _refused(status: int, text: str) -> web.Response:

@@ -15,7 +15,7 @@ from aiohttp import web
 
 from app.remedies import page_text
 from app.server.new_session_routes import NewSessionRoutes
-from app.server.page_requests import read_body, require_page
+from app.server.page_requests import ROLE, read_body, require_page
 from app.session.path_choice import TypedPath, completions, typed_path
 from app.session.recent_sessions import TABLE_FILE, recent_batches, recent_sessions
 from tracker.errors import SessionError, TrackerError
@@ -75,9 +75,10 @@ class SessionRoutes:
         app.router.add_post("/sessions/open", self._open)
         NewSessionRoutes(self._refusal).add_to(app)
 
-    async def _started(self, _: web.Request) -> web.Response:
+    async def _started(self, request: web.Request) -> web.Response:
         """Answer a page that waits for the program, as `Doorway` does before: no step is left."""
-        folder = "" if self._refusal is not None else str(self._folder)
+        is_told = self._refusal is None and request[ROLE] == "annotate"
+        folder = str(self._folder) if is_told else ""
         return web.json_response({"steps": [], "at": 0, "folder": folder})
 
     async def _list(self, _: web.Request) -> web.Response:

@@ -131,6 +131,8 @@ def open_session(
                 for name in proxies.stale(session):
                     say(f"the proxy of camera {name} is of other footage: run quadrille index {session.folder} again")
                 say(f"{session.name}: {doorway.address}")
+                for role, address in doorway.shared_addresses.items():
+                    say(f"to {role}: {address}")
                 loop = asyncio.get_running_loop()
                 begun(controller, partial(_end_from_a_thread, loop, others.is_chosen))
 

@@ -12,6 +12,7 @@ import { Layers } from "./layers.js";
 import { Navigation } from "./navigation.js";
 import { Receiver } from "./receiver.js";
 import { RecentImages } from "./recent_images.js";
+import { isAllowed, isAsked } from "./roles.js";
 import { Store } from "./store.js";
 import { Themes } from "./theme.js";
 import { unavailableReasons } from "./unavailable_reasons.js";
@@ -36,6 +37,11 @@ export function mount() {
   /** @type {Connection | null} */
   let connection = null;
   const send = (/** @type {ClientMessage} */ message) => {
+    const role = store.facts.session?.role ?? "annotate";
+    if (!isAllowed(message, role)) {
+      if (isAsked(message)) notify({ type: "notice", level: "info", text: `This link is to ${role}: ask for another to change anything.` });
+      return;
+    }
     if (MOVING.includes(message.type)) navigation.expectMove();
     connection?.send(message);
   };

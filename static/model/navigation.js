@@ -44,7 +44,8 @@ export class Navigation {
    * @param {number} frame
    */
   goTo(frame) {
-    if (!this.#store.facts.session || !this.#store.facts.connected) return;
+    const { session, connected } = this.#store.facts;
+    if (!session || !connected || session.role === "look") return;
     this.request(Math.max(0, Math.min(this.#last, Math.round(frame))));
   }
 

@@ -118,7 +118,7 @@
  *   string[], bones: [string, string][], parts: string[], limbs: string[], dofs: DofInfo[], point_dofs: Record<string,
  *   number[]>, point_limbs: Record<string, Limb>}} PersonInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[], people: PersonInfo[],
- *   doubtful_from: number, lost_from: number, start: string}} SessionMessage
+ *   doubtful_from: number, lost_from: number, start: string, role: "annotate" | "review" | "look"}} SessionMessage
  * @typedef {{source: string | null, status: Status, shown: boolean, alternatives: number}} PersonState
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job

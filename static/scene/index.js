@@ -33,6 +33,12 @@ export function mount({ store, send, reasons }, { grid }) {
   return { frame, floor, isSoftware, bindings: sceneBindings(cameraView, floor, reasons.away) };
 }
 
+/** A gizmo of the 3-D view moves people: shared links have none. */
+function showNoScene() {
+  const note = byId("scene-note", HTMLElement);
+  [note.hidden, note.textContent] = [false, "This link shows the cameras. The 3-D view is the annotator's."];
+}
+
 /**
  * Load the 3-D view after the first images: viser is a large program. Without a graphics card its start stops the page
  * for seconds, so that it comes after the first cost where kernels are being compiled.
@@ -44,8 +50,9 @@ export function mount({ store, send, reasons }, { grid }) {
 function loadLate(frame, store, isSoftware) {
   let isLoaded = false;
   store.subscribe(() => {
-    const { shown, state } = store.facts;
+    const { shown, state, session } = store.facts;
     if (isLoaded || shown === null || state === null) return;
+    if (session && session.role !== "annotate") return showNoScene();
     const waits = isSoftware && BEFORE_COST.has(state.compiling ?? "") && state.cost_px === null;
     byId("scene-note", HTMLElement).hidden = !waits;
     if (waits) return;

@@ -17,6 +17,7 @@ import { Notices, watchConnection } from "./notices.js";
 import { Palette } from "./palette.js";
 import { People } from "./people.js";
 import { peopleBindings } from "./people_keys.js";
+import { showRole } from "./role_badge.js";
 import { SavedMark } from "./saved_mark.js";
 import { escapeBinding, helpBindings } from "./shell_keys.js";
 import { TopBar } from "./top_bar.js";
@@ -57,6 +58,7 @@ export function mount(context, rooms) {
   const exporting = new ExportPanel(store, context.notify);
   new WorkList(context, () => exporting.cancel());
   new SavedMark(store, send);
+  showRole(store);
   new Announcer(byId("announcer", HTMLElement), store);
   const firstSteps = new FirstSteps(store);
   const palette = new Palette({ store, navigation, grid, posing, layers, actions, inspector: rooms.inspector.inspector, away: reasons.away });

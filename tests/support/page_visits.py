@@ -48,11 +48,11 @@ class Page:
 
 
 @asynccontextmanager
-async def visiting(controller, notices=()):
+async def visiting(controller, notices=(), role="annotate"):
     async def serve(request):
         socket = web.WebSocketResponse(decode_text=False)
         await socket.prepare(request)
-        await PaneSocket(controller, notices).serve(socket)
+        await PaneSocket(controller, notices).serve(socket, role)
         return socket
 
     app = web.Application()

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from tracker.errors import DamagedStoreError
@@ -9,8 +10,9 @@ from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
 from tracker.pipeline.stored_run import UNFINISHED
 from tracker.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, CALIBRATIONS_OF_EDITS
 from tracker.store.edit_log import Body, EditLog, Written
+from tracker.store.own_undo import TAKEN_BACK
 
-_NUMBERED = (SIZES_EDITS, CALIBRATIONS, CALIBRATION_EDITS, CALIBRATIONS_OF_EDITS, UNFINISHED)
+_NUMBERED = (SIZES_EDITS, CALIBRATIONS, CALIBRATION_EDITS, CALIBRATIONS_OF_EDITS, TAKEN_BACK, UNFINISHED)
 """These settings; an unfinished run is dropped: it would go on in another store."""
 
 
@@ -25,6 +27,8 @@ class Numbered(NamedTuple):
     """The calibrations before and after each edit that changed them."""
     posed: Mapping[str, str]
     """The calibration that the poses of each edit were made with; empty if the calibration has never been changed."""
+    taken_back: Mapping[str, str] = MappingProxyType({})
+    """For each edit that took back an earlier one, the earlier one."""
 
 
 def plain_settings(log: EditLog) -> dict[str, Any]:
@@ -63,7 +67,12 @@ def numbered_settings(log: EditLog) -> Numbered:
     for number, uid in log.numbers.items() if changes else ():
         present = changes[uid][1] if uid in changes and uid in log.done else present
         posed[uid] = texts[stated[str(number)] - 1] if str(number) in stated else present
-    return Numbered(sizes, dict(zip(texts, known, strict=True)), changes, posed)
+    taken_back = {
+        log.numbers[int(taker)]: log.numbers[taken]
+        for taker, taken in log.settings.get(TAKEN_BACK, {}).items()
+        if int(taker) in log.numbers and taken in log.numbers
+    }
+    return Numbered(sizes, dict(zip(texts, known, strict=True)), changes, posed, taken_back)
 
 
 def join_numbered(a: Numbered, b: Numbered) -> Numbered:
@@ -72,7 +81,8 @@ def join_numbered(a: Numbered, b: Numbered) -> Numbered:
     calibrations = dict(
         reversed({text: known for text, known in reversed(pairs)}.items())
     )  # the earliest of equal ones
-    return Numbered({**a.sizes, **b.sizes}, calibrations, {**a.changes, **b.changes}, {**a.posed, **b.posed})
+    changes, taken_back = {**a.changes, **b.changes}, {**a.taken_back, **b.taken_back}
+    return Numbered({**a.sizes, **b.sizes}, calibrations, changes, {**a.posed, **b.posed}, taken_back)
 
 
 def renumbered(found: Numbered, order: Sequence[str], done: frozenset[str], written: Written) -> dict[str, Any]:
@@ -89,6 +99,9 @@ def renumbered(found: Numbered, order: Sequence[str], done: frozenset[str], writ
     if found.sizes:
         rows = {uid: [[name, bodies[b], bodies[a]] for name, b, a in changed] for uid, changed in found.sizes.items()}
         out[SIZES_EDITS] = {str(edits[uid]): changed for uid, changed in rows.items()}
+    if found.taken_back:
+        taken_back = found.taken_back.items()
+        out[TAKEN_BACK] = {str(edits[taker]): edits[of] for taker, of in taken_back if taker in edits and of in edits}
     if not found.changes:
         return out
     numbers = {text: n for n, text in enumerate(found.calibrations, 1)}

@@ -12,6 +12,7 @@ __all__ = [
     "edit_log",
     "edit_tree",
     "identities",
+    "own_undo",
     "records",
     "stored_poses",
     "task_log",

@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from tracker.errors import SessionError
-from tracker.store import edit_tree, rows
+from tracker.store import edit_tree, own_undo, rows
 from tracker.store.annotator import annotator
 from tracker.store.changes import write_changes
 from tracker.store.connection import Connection
 from tracker.store.edit_log import EditLog, Written, read_log, write_log
+from tracker.store.own_undo import OwnMove
 from tracker.store.records import (
     Alternative,
     Change,
@@ -187,6 +188,18 @@ class AnnotationStore:
     def redo(self) -> str | None:
         """Redo the edit that was undone last; returns its label, or None if there is none."""
         return self._edits.redo()
+
+    def undo_own(self, author: str | None = None) -> OwnMove | None:
+        """Undo the last edit of an annotator, also among later edits of others; see `own_undo`.
+
+        Args:
+            author: the annotator; by default the one of the store.
+        """
+        return own_undo.undo_own(self._connection, self._edits, self._author if author is None else author)
+
+    def redo_own(self, author: str | None = None) -> OwnMove | None:
+        """Redo the last edit of an annotator that was undone; arguments as for `undo_own`."""
+        return own_undo.redo_own(self._connection, self._edits, self._author if author is None else author)
 
     def go_to(self, edit: int | None) -> list[int]:
         """Undo or redo until an edit is the last one done; see `EditTree.go_to`."""

@@ -17,7 +17,7 @@ from tracker.store.connection import Connection
 from tracker.store.identities import new_uid
 from tracker.store.records import HistoryEntry
 
-_KEYS = {"pose": ("person, frame", "numbers"), "pin": ("person, frame, point, camera", "u")}
+KEYS = {"pose": ("person, frame", "numbers"), "pin": ("person, frame, point, camera", "u")}
 """For each kind of annotation its key, and the column that is NULL in a change that clears it."""
 _YOUNGEST = "(SELECT max(id) FROM edits WHERE parent IS {})"
 
@@ -45,7 +45,7 @@ class EditTree:
             row = db.execute("SELECT e.id, e.label FROM head h JOIN edits e ON e.id = h.edit").fetchone()
             if row is None:
                 return None
-            _undo(db, row[0])
+            undo_edit(db, row[0])
             return str(row[1])
 
     def redo(self) -> str | None:
@@ -56,7 +56,7 @@ class EditTree:
             ).fetchone()
             if row is None:
                 return None
-            _redo(db, row[0])
+            redo_edit(db, row[0])
             return str(row[1])
 
     def go_to(self, edit: int | None) -> list[int]:
@@ -74,14 +74,14 @@ class EditTree:
             if edit in back:
                 path = back[: back.index(edit)]
                 for last in path:
-                    _undo(db, last)
+                    undo_edit(db, last)
                 return path
             onward = _chain(db, _YOUNGEST.format("?"), _YOUNGEST.format("line.id"), start)
             if edit not in onward:
                 raise SessionError(f"entry {edit} of the history cannot be reached any more; look at the list again")
             path = onward[: onward.index(edit) + 1]
             for following in path:
-                _redo(db, following)
+                redo_edit(db, following)
             return path
 
     def history(self, limit: int) -> list[HistoryEntry]:
@@ -130,7 +130,7 @@ def show_change(db: sqlite3.Connection, kind: str, change: int | None, shown: in
         change: id of a change, which names the pose or pin.
         shown: id of the change that becomes current; None leaves the pose or pin cleared.
     """
-    key, content = _KEYS[kind]
+    key, content = KEYS[kind]
     db.execute(f"DELETE FROM {kind}s WHERE ({key}) = (SELECT {key} FROM {kind}_changes WHERE id = ?)", (change,))
     db.execute(
         f"INSERT INTO {kind}s ({key}, change) SELECT {key}, id FROM {kind}_changes "
@@ -144,7 +144,8 @@ def now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
-def _undo(db: sqlite3.Connection, edit: int) -> None:
+def undo_edit(db: sqlite3.Connection, edit: int) -> None:
+    """Undo the last edit done, within a transaction."""
     (parent,) = db.execute("SELECT parent FROM edits WHERE id = ?", (edit,)).fetchone()
     _move_head(db, "undo", edit, parent)
     for kind in ("pose", "pin"):
@@ -152,7 +153,8 @@ def _undo(db: sqlite3.Connection, edit: int) -> None:
             show_change(db, kind, change, previous)
 
 
-def _redo(db: sqlite3.Connection, edit: int) -> None:
+def redo_edit(db: sqlite3.Connection, edit: int) -> None:
+    """Redo an edit that was undone, within a transaction."""
     _move_head(db, "redo", edit, edit)
     for kind in ("pose", "pin"):
         for change, _ in _changes(db, kind, edit):

@@ -15,7 +15,7 @@ from app.server.static_files import static_folder
 
 
 class Nobody:
-    async def serve(self, socket):
+    async def serve(self, socket, role):
         pass
 
 

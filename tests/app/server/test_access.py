@@ -50,11 +50,22 @@ def test_other_origins_are_refused(origin):
 
 
 def test_beyond_loopback_wants_name_and_token():
-    assert REMOTE.refusal("lab.example.org:8080", None, ["secret"]) is None
-    assert REMOTE.refusal("lab.example.org:8080", None, ["guess", "secret"]) is None
-    assert "token" in REMOTE.refusal("lab.example.org:8080", None, ["guess"])
-    assert "token" in REMOTE.refusal("localhost:8080", None)
-    assert "Host" in REMOTE.refusal("other.example.org:8080", None, ["secret"])
+    assert REMOTE.refusal("lab.example.org:8080", None) is None
+    assert REMOTE.role(["secret"]) == REMOTE.role(["guess", "secret"]) == "annotate"
+    assert REMOTE.role(["guess"]) is REMOTE.role() is None
+    assert "Host" in REMOTE.refusal("other.example.org:8080", None)
+
+
+def test_shared_links_have_roles_tokens_and_paths_of_their_own():
+    shared = access_for("127.0.0.1", share=True)
+    tokens = [shared.token_of(role) for role in ("annotate", "review", "look")]
+    assert [shared.role([token]) for token in tokens] == ["annotate", "review", "look"]
+    assert len(set(shared.roots)) == len(set(tokens)) == 3
+    assert shared.role([tokens[2] + "x"]) is None
+    assert access_for("127.0.0.1", share=True).role([tokens[2]]) is None, "links end with their start"
+    assert access_for("127.0.0.1").links == ()
+    with pytest.raises(TrackerError, match="--share"):
+        access_for("127.0.0.1", token=False, share=True)
 
 
 def test_loopback_needs_a_token_unless_none_is_wanted():
@@ -90,7 +101,7 @@ def test_a_page_that_other_machines_reach_cannot_do_without_a_token():
 
 @pytest.mark.parametrize("found", ["\xe9", "\ud800", "\x00", "\U0001f600", "secret\xe9"])
 def test_any_text_can_be_compared_with_the_token(found):
-    assert "token" in REMOTE.refusal("localhost:8080", None, [found])
+    assert REMOTE.role([found]) is None
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ PLAN, IMPORT, REPORT = "/observations/plan", "/observations/import", "/observati
 
 
 class Nobody:
-    async def serve(self, socket):
+    async def serve(self, socket, role):
         pass
 
 

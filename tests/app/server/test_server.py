@@ -11,7 +11,7 @@ from serving import listening, running
 from yarl import URL
 
 from app.server import address, server
-from app.server.access import Access, Invitation
+from app.server.access import Access, Invitation, access_for
 from app.server.connections import LimitedRunner
 from app.server.static_files import static_folder
 from tracker.errors import TrackerError
@@ -23,7 +23,7 @@ NAMED = Access(frozenset({"lab.example.org"}), "secret", Invitation())
 class EchoPanes:
     """A pane endpoint that answers every message with itself."""
 
-    async def serve(self, socket):
+    async def serve(self, socket, role):
         async for message in socket:
             if message.type is aiohttp.WSMsgType.TEXT:
                 await socket.send_str(message.data.decode())
@@ -261,7 +261,7 @@ class TestToken:
 
     async def test_everything_is_served_below_the_root_to_those_who_have_the_cookie(self, fake_viser):
         app = server.create_app(EchoPanes(), fake_viser.socket_path, NAMED, static_folder())
-        async with running(LimitedRunner(app, NAMED.root)) as port, aiohttp.ClientSession() as session:
+        async with running(LimitedRunner(app, NAMED.roots)) as port, aiohttp.ClientSession() as session:
             root, name = f"http://127.0.0.1:{port}{NAMED.root}", NAMED.cookie(f"127.0.0.1:{port}")
             for path in ("", "static/main.js", "viser/", "ws"):
                 async with session.get(root + path) as response:  # the path alone does not admit
@@ -339,3 +339,39 @@ def test_page_address_carries_name_and_token():
     assert address.page_address(Access(), "127.0.0.1", 8080) == "http://127.0.0.1:8080/"
     assert address.page_address(Access(), "::1", 8080) == "http://[::1]:8080/"
     assert address.page_address(NAMED, "0.0.0.0", 8080) == "http://lab.example.org:8080/?token=secret"
+
+
+class TellingPanes:
+    """A pane endpoint that says who has joined."""
+
+    async def serve(self, socket, role):
+        await socket.send_str(role)
+
+
+async def _answer(_):
+    return web.Response()
+
+
+@pytest.mark.parametrize("role", ["review", "look"])
+async def test_a_shared_link_shows_the_session_and_no_more(fake_viser, role):
+    access = access_for("127.0.0.1", share=True)
+    app = server.create_app(TellingPanes(), fake_viser.socket_path, access, static_folder())
+    app.router.add_get("/sessions", _answer)
+    async with running(LimitedRunner(app, access.roots)) as port, aiohttp.ClientSession() as client:
+        start = f"http://127.0.0.1:{port}"
+        async with client.get(start, params={"token": access.token_of(role)}) as entry:
+            assert entry.status == 200
+            root, kept = entry.headers["Content-Location"], entry.headers["Set-Cookie"]
+        assert f"Path={root}" in kept
+        assert access.token not in kept
+        client.headers["Cookie"] = kept.partition(";")[0]
+        async with client.get(start + root) as page:
+            assert page.status == 200
+        async with client.ws_connect(f"{start}{root}ws") as socket:
+            assert await socket.receive_str() == role
+        for path in ("viser/", "sessions", "export"):
+            async with client.get(start + root + path) as refused:
+                assert refused.status == 403
+                assert "may annotate" in await refused.text()
+        async with client.post(start + root) as refused:
+            assert refused.status == 403

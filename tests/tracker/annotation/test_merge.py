@@ -201,6 +201,19 @@ def test_settings_without_numbers_find_their_numbers_again(copies):
     }
 
 
+def test_an_undo_among_other_edits_finds_its_edit_again(copies):
+    a, _, _ = copies
+    edit = a.commit("mine", put(2, 1), author="eve").edit
+    a.commit("other", put(3, 1), author="ben")
+    taker = a.undo_own("eve").edit
+    found = numbered_settings(a.read_log())
+    order = [e.uid for e in a.read_log().edits]
+    numbers = {uid: 100 + i for i, uid in enumerate(order)}
+    at = {e.edit: 100 + i for i, e in enumerate(reversed(a.history(9)))}
+    again = renumbered(join_numbered(found, found), order, frozenset(order), Written(numbers, {}))
+    assert again == {"taken_back": {str(at[taker]): at[edit]}}
+
+
 @pytest.mark.parametrize(
     ("one", "other", "joined"),
     [

@@ -1,0 +1,203 @@
+"""Undo and redo the edits of one annotator, among those of others.
+
+The last edit of all is undone in the tree. An earlier one is taken back by a new edit, which shows again what the
+earlier one replaced. Poses and pins that are no longer as the earlier edit left them stay; if all are, it is refused.
+"""
+
+import json
+import sqlite3
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from tracker.errors import SessionError
+from tracker.store import rows
+from tracker.store.connection import Connection
+from tracker.store.edit_tree import KEYS, EditTree, head, redo_edit, show_change, undo_edit
+
+TAKEN_BACK = "taken_back"
+"""Setting: for each edit that took back an earlier one, the number of that one."""
+_BY_NUMBER = ("sizes_edits", "calibration_edits")
+"""Settings that name the edits that changed bodies or cameras, which a new edit cannot restore."""
+
+
+class OwnMove(NamedTuple):
+    """An edit that was undone or redone."""
+
+    label: str
+    edit: int
+    """The edit that was undone or redone in the tree, or the new one that takes back another."""
+    in_tree: bool
+    n_kept: int
+    """Number of poses and pins that stay as somebody else changed them since."""
+
+
+def undo_own(connection: Connection, tree: EditTree, author: str) -> OwnMove | None:
+    """Undo the last edit of an annotator that still holds; returns None if there is none.
+
+    Raises:
+        SessionError: others have changed all that it changed, or it changed bodies or cameras and is not the last.
+    """
+    with connection.transaction() as db:
+        edit = _last_own(db, author, is_taker=False)
+        return None if edit is None else _take_back(db, tree, edit, author)
+
+
+def redo_own(connection: Connection, tree: EditTree, author: str) -> OwnMove | None:
+    """Redo the last edit of an annotator that was undone; returns None if there is none.
+
+    Raises:
+        SessionError: as for `undo_own`.
+    """
+    with connection.transaction() as db:
+        undone = db.execute(
+            "SELECT id, label, author FROM edits WHERE parent IS (SELECT edit FROM head) ORDER BY id DESC LIMIT 1"
+        ).fetchone()
+        if undone is not None and undone[2] == author and str(undone[0]) not in _setting(db, TAKEN_BACK):
+            redo_edit(db, undone[0])
+            return OwnMove(str(undone[1]), int(undone[0]), True, 0)
+        edit = _last_own(db, author, is_taker=True)
+        return None if edit is None else _take_back(db, tree, edit, author)
+
+
+def _last_own(db: sqlite3.Connection, author: str, is_taker: bool) -> int | None:
+    """Return the last edit of an annotator that is done and holds.
+
+    A redo must follow its undo: an edit made after a taker ends what could be redone.
+
+    Args:
+        db: connection within a transaction.
+        author: the annotator.
+        is_taker: whether an edit is sought that takes back an undone one, or one that changed poses by itself.
+    """
+    done = _done(db)
+    takers = {int(taker): taken for taker, taken in _setting(db, TAKEN_BACK).items()}
+    held: set[int] = set()
+    taken: set[int] = set()
+    for edit in sorted(done, reverse=True):
+        if edit not in taken:
+            held.add(edit)
+            if edit in takers:
+                taken.add(takers[edit])
+    own = [e for e in sorted(held, reverse=True) if done[e] == author]
+    if not is_taker:
+        return next((e for e in own if e not in takers), None)
+    last = next((e for e in own if _depth(e, takers)[0] % 2), None)
+    made = (int(e) for (e,) in db.execute("SELECT id FROM edits WHERE author = ?", (author,)))
+    return None if last is None or any(e > last and e not in takers for e in made) else last
+
+
+def _depth(edit: int, takers: Mapping[int, int]) -> tuple[int, int]:
+    """Return how many edits take back one another, from one on, odd for an undo, even for a redo; and the first."""
+    depth = 0
+    while edit in takers:
+        edit, depth = takers[edit], depth + 1
+    return depth, edit
+
+
+def _take_back(db: sqlite3.Connection, tree: EditTree, edit: int, author: str) -> OwnMove:
+    taken = _setting(db, TAKEN_BACK)
+    depth, first = _depth(edit, {int(taker): of for taker, of in taken.items()})
+    (label,) = db.execute("SELECT label FROM edits WHERE id = ?", (first,)).fetchone()
+    if head(db) == edit:
+        undo_edit(db, edit)
+        return OwnMove(str(label), edit, True, 0)
+    if any(str(edit) in _setting(db, name) for name in _BY_NUMBER):
+        raise SessionError(
+            f"expected an edit of poses, found '{label}', which others have worked on since; "
+            "go back in the history before it, or change sizes or cameras again"
+        )
+    changes = [(kind, *change) for kind in KEYS for change in _last_changes(db, kind, edit)]
+    free = [(kind, change, before) for kind, change, before, is_current in changes if is_current]
+    if not free:
+        whose = _changed_by(db, edit)
+        raise SessionError(
+            f"expected '{label}' as you left it, found that {whose} changed it since; set the pose again"
+        )
+    added = tree.add(db, f"{'redo' if depth % 2 else 'undo'}: {label}", author)
+    for kind, change, before in free:
+        _show_again(db, kind, added, change, before)
+    takers = {**taken, str(added): edit}
+    db.execute("INSERT OR REPLACE INTO settings (key, value) VALUES (?, ?)", (TAKEN_BACK, json.dumps(takers)))
+    return OwnMove(str(label), added, False, len(changes) - len(free))
+
+
+def _last_changes(db: sqlite3.Connection, kind: str, edit: int) -> list[tuple[int, int | None, bool]]:
+    """Return for each pose or pin that an edit changed the last change, the one before the edit, and if it holds."""
+    key, content = KEYS[kind]
+    found = db.execute(
+        f"SELECT max(c.id), p.previous FROM {kind}_changes c JOIN (SELECT min(id) AS first, {key} FROM {kind}_changes "
+        f"WHERE edit = ?1 GROUP BY {key}) f USING ({key}) JOIN {kind}_changes p ON p.id = f.first "
+        f"WHERE c.edit = ?1 GROUP BY f.first",
+        (edit,),
+    ).fetchall()
+    columns = _copied(db, kind)
+    changes = []
+    for last, before in found:
+        sql = f"SELECT {columns} FROM {kind}_changes WHERE {content} IS NOT NULL AND id = "
+        left = db.execute(f"{sql} ?", (last,)).fetchone()
+        of = f"({key}) = (SELECT {key} FROM {kind}_changes WHERE id = ?)"
+        now = db.execute(f"{sql} (SELECT change FROM {kind}s WHERE {of})", (last,)).fetchone()
+        changes.append((int(last), before, left == now))
+    return changes
+
+
+def _show_again(db: sqlite3.Connection, kind: str, edit: int, change: int, before: int | None) -> None:
+    """Add a change to an edit that shows again what a change replaced.
+
+    Args:
+        db: connection within a transaction.
+        kind: `pose` or `pin`.
+        edit: to add to.
+        change: the last one of the pose or pin in the edit that is taken back.
+        before: the one to show again; None clears the pose or pin.
+    """
+    key, _ = KEYS[kind]
+    table = f"{kind}_changes"
+    made, origin = (", made_in", ", coalesce(made_in, edit)") if kind == "pose" and before is not None else ("", "")
+    same = key if before is None else _copied(db, kind)
+    shown = f"(SELECT change FROM {kind}s WHERE ({key}) = (SELECT {key} FROM {table} WHERE id = ?2))"
+    added = db.execute(
+        f"INSERT INTO {table} (edit, previous{made}, {same}) SELECT ?1, {shown}{origin}, {same} FROM {table} "
+        "WHERE id = coalesce(?3, ?2)",
+        (edit, change, before),
+    ).lastrowid
+    if kind == "pose":
+        copied = "rank, numbers, model_revision, cost_px"
+        db.execute(
+            f"INSERT INTO alternatives (change, {copied}) SELECT ?, {copied} FROM alternatives WHERE change = ?",
+            (added, before),
+        )
+    show_change(db, kind, added, added)
+
+
+def _copied(db: sqlite3.Connection, kind: str) -> str:
+    """Return the columns of a change that say what it shows, for SQL."""
+    log = ("id", "edit", "previous", "made_in", "checksum")
+    return ", ".join(row[1] for row in db.execute(f"PRAGMA table_info({kind}_changes)") if row[1] not in log)
+
+
+def _changed_by(db: sqlite3.Connection, edit: int) -> str:
+    """Name the authors of the edits that hold what an edit had changed."""
+    authors = {
+        str(author)
+        for (author,) in db.execute(
+            "SELECT DISTINCT e.author FROM pose_changes c JOIN poses p USING (person, frame) "
+            "JOIN pose_changes d ON d.id = p.change JOIN edits e ON e.id = d.edit WHERE c.edit = ?",
+            (edit,),
+        )
+    }
+    return " and ".join(sorted(authors)) or "somebody"
+
+
+def _done(db: sqlite3.Connection) -> dict[int, str]:
+    """Return the author of each edit that is done."""
+    sql = (
+        "WITH RECURSIVE line (id) AS (SELECT edit FROM head UNION ALL SELECT parent FROM line JOIN edits USING (id)) "
+        "SELECT id, author FROM line JOIN edits USING (id)"
+    )
+    return {int(edit): str(author) for edit, author in db.execute(sql)}
+
+
+def _setting(db: sqlite3.Connection, name: str) -> dict[str, int]:
+    row = db.execute("SELECT value FROM settings WHERE key = ?", (name,)).fetchone()
+    return {} if row is None else dict(rows.decoded_json(row[0], f"setting '{name}'"))
