@@ -26,7 +26,7 @@ from app.page.inspector_messages import (
     SetView3d,
 )
 from app.page.message_types import Command, Frame, Index, Name, Number
-from app.page.observation_messages import UseObservations
+from app.page.observation_messages import SetCopyTolerance, UseCopy, UseObservations, WatchProvenance
 from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack
 from app.page.search_messages import (
     AskReason,
@@ -258,7 +258,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
     FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
-    DraftSizes, AcquireSizes, FindPeople, CheckCalibration, UseObservations,
+    DraftSizes, AcquireSizes, FindPeople, CheckCalibration, UseObservations, WatchProvenance, UseCopy, SetCopyTolerance,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip
 

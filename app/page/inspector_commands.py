@@ -10,7 +10,7 @@ from app.control.tracking import track_settings
 from app.page import inspector_messages as wire
 from app.page.message_parsing import MessageError
 from app.page.message_types import Command
-from app.page.observation_messages import UseObservations
+from app.page.observation_messages import SetCopyTolerance, UseCopy, UseObservations
 from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.formats.model_toml import PRESETS
 from tracker.validation import quoted
@@ -108,6 +108,13 @@ def _observations(controller: Controller, _: int, message: UseObservations) -> N
     actions[message.action]()
 
 
+def _copy(controller: Controller, _: int, message: UseCopy) -> None:
+    if message.action == "leave":
+        controller.other_copies.leave()
+    else:
+        controller.other_copies.decide(message.person, message.frame, message.action)
+
+
 INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetTrackSettings: _track_settings,
     wire.SetView3d: _view_3d,
@@ -122,4 +129,6 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     wire.FindPeople: _find_people,
     wire.CheckCalibration: _calibration,
     UseObservations: _observations,
+    UseCopy: _copy,
+    SetCopyTolerance: lambda controller, _, m: controller.other_copies.set_tolerance(m.tolerance_mm / 1000),
 }

@@ -17,7 +17,7 @@ from app.page.inspector_messages import (
     View3dMessage,
 )
 from app.page.message_types import Message, Part, Status
-from app.page.observation_messages import ObservationsMessage
+from app.page.observation_messages import AnnotatorsMessage, ObservationsMessage, OtherCopyMessage, ProvenanceMessage
 from app.page.search_messages import (
     CostMapMessage,
     InconsistentMessage,
@@ -404,6 +404,7 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     RangeComparisonMessage, ObservabilityMessage, EpipolarMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
     AcquisitionMessage, FindingMessage, CalibrationMessage, ObservationsMessage, ReasonMessage, CostMapMessage,
+    ProvenanceMessage, AnnotatorsMessage, OtherCopyMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

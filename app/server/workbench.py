@@ -13,12 +13,12 @@ from platformdirs import user_state_path
 
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
-from app.page.thumbnails import Thumbnails
 from app.remedies import command_line_text, page_text
 from app.runtime.kernel_compiler import KernelCompiler
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.scene import SceneView
 from app.server.access import is_loopback
+from app.server.copy_routes import CopyRoutes
 from app.server.doorway import Doorway
 from app.server.export_routes import ExportRoutes
 from app.server.observation_routes import ObservationRoutes
@@ -27,6 +27,7 @@ from app.server.server import create_app, serve_forever
 from app.server.session_routes import SessionRoutes, refusal
 from app.server.static_files import static_folder
 from app.server.thumbnail_routes import ThumbnailRoutes
+from app.server.thumbnails import Thumbnails
 from app.session import proxies
 from app.session.annotator import annotator_or_login
 from app.session.footage_crops import FootageCrops
@@ -121,6 +122,7 @@ def open_session(
             others = SessionRoutes(session.folder, tokens, no_paths, lambda: controller.state.save_error)
             others.add_to(app)
             ObservationRoutes(controller, no_paths).add_to(app)
+            CopyRoutes(controller, no_paths).add_to(app)
             ThumbnailRoutes(thumbnails.jpeg, thumbnails.silhouette, lambda: not _can_draw(controller)).add_to(app)
 
             def ready() -> None:

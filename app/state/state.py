@@ -9,6 +9,7 @@ from app.state.calibration import CalibrationState
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import FloorState
 from app.state.observations import ObservationsState
+from app.state.other_copy import OtherCopy
 from app.state.people import (
     AcquisitionState,
     DepthNote,
@@ -84,6 +85,8 @@ class State:
     """Check of the cameras."""
     observations: ObservationsState = field(default_factory=ObservationsState)
     """Imported observations."""
+    other_copy: OtherCopy | None = None
+    """The copy of the session that is compared with it."""
     follow: bool = True
     """Whether each frame is shown as it is tracked."""
     locked: tuple[frozenset[int], ...] = ()
@@ -261,6 +264,7 @@ class StateChanges(TypedDict, total=False):
     finding: FindState
     calibration: CalibrationState
     observations: ObservationsState
+    other_copy: OtherCopy | None
     follow: bool
     locked: tuple[frozenset[int], ...]
     ranges: RangeState

@@ -14,7 +14,7 @@
  * @typedef {"start" | "move" | "end" | "cancel"} GesturePhase
  * @typedef {"model" | "hidden" | "facing" | "facing_away" | "candidate" | "compared" | "preview" | "alternative" |
  *   "new_sizes" | "former" | "result" | "residual" | "part_edge" | "epipolar" | "accepted" | "rejected" | "floor" |
- *   "floor_sight" | "error" | "imported" | "imported_off"} PathKind
+ *   "floor_sight" | "error" | "imported" | "imported_off" | "other_copy"} PathKind
  * @typedef {"running" | "paused" | "over"} RunState
  * @typedef {"left" | "right" | ""} Side
  * @typedef {{type: "seek", frame: number}} Seek
@@ -96,6 +96,9 @@
  *   CheckCalibration
  * @typedef {{type: "observations", action: "show" | "judge" | "take" | "track" | "track_contours" | "stop" | "discard",
  *   name?: string}} UseObservations
+ * @typedef {{type: "provenance", person: number | null, annotators?: boolean}} WatchProvenance
+ * @typedef {{type: "other_copy", action: "keep" | "take" | "mean" | "leave", person?: number, frame?: number}} UseCopy
+ * @typedef {{type: "other_copy", action: "tolerance", tolerance_mm: number}} SetCopyTolerance
  * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo
@@ -224,6 +227,17 @@
  *   notes: string[], searched: string[], alternatives: GhostPose[], tried: TriedSearch[] | null}} ReasonMessage
  * @typedef {{type: "cost_map", person: number, dofs: [number, number], current: [number, number], across: number[], up:
  *   number[], nats: number[][]}} CostMapMessage
+ * @typedef {{point: string, source: string, author: string, time: string, views: string[], lost: number | null}}
+ *   PointProvenance
+ * @typedef {{type: "provenance", frame: number, person: number, source: string | null, author: string, time: string,
+ *   program: string, keyframe: boolean, reviewed: boolean, method: string, between: [number, number] | null, seam_mm:
+ *   number | null, imported_from: string, taken_from: string, body: string, body_revision: number, is_earlier_body:
+ *   boolean, calibration_revision: number, is_earlier_calibration: boolean, points: PointProvenance[]}}
+ *   ProvenanceMessage
+ * @typedef {{type: "annotators", people: Record<string, number[]>[]}} AnnotatorsMessage
+ * @typedef {{frame: number, joint: string, distance_mm: number, decided: boolean}} CopyDifferenceInfo
+ * @typedef {{type: "other_copy", name: string, own_name: string, tolerance_mm: number, notes: string[], posed:
+ *   boolean[], people: CopyDifferenceInfo[][]}} OtherCopyMessage
  * @typedef {{type: "image", layer: PictureLayer, camera: number, frame: number, set: number, of: number, limit_px:
  *   number | null}} ImageHeader
  * @typedef {{camera: number, person: number, kind: PathKind, color: string, side: Side, first: number, count: number}}
@@ -259,11 +273,13 @@
  *   ShowLandscape | SetLandscapeDof | ShowCostMap | SetCostMapPlace | AskReason | StartTracking | ControlTracking |
  *   EditRange | CompareRange | StopRange | ToggleMark | ConfirmKeyframe | FollowTracking | SetTrackSettings | SetView3d
  *   | SetHeight | SetPartSizes | SetGirdleWidth | CoupleSides | ApplySizes | ChangeBody | DraftSizes | AcquireSizes |
- *   FindPeople | CheckCalibration | UseObservations | EditFloor | MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
+ *   FindPeople | CheckCalibration | UseObservations | WatchProvenance | UseCopy | SetCopyTolerance | EditFloor |
+ *   MarkFloor | Undo | Redo | GoTo | Save} ClientMessage
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | EpipolarMessage | SearchSetupMessage | SearchRunsMessage |
  *   SettingsMessage | View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | CalibrationMessage |
- *   ObservationsMessage | ReasonMessage | CostMapMessage} TextMessage
+ *   ObservationsMessage | ReasonMessage | CostMapMessage | ProvenanceMessage | AnnotatorsMessage | OtherCopyMessage}
+ *   TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

@@ -4,9 +4,11 @@
  */
 
 import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
+import { filterTest } from "../model/provenance.js";
 import { earlierCalibration } from "../model/selectors.js";
 import { prepare } from "../panes/drawing.js";
 import { describeFrame } from "./cell_text.js";
+import { drawCopy, drawDimmed } from "./cell_marks.js";
 import { CellTip } from "./cell_tip.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { zoomByWheel } from "./frame_window.js";
@@ -49,8 +51,8 @@ export class Timeline {
     this.#tip = new CellTip(element);
     store.subscribe((changed) => {
       const has = (/** @type {(keyof import("../model/store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
-      if (has("session")) element.style.height = `${this.#layout.height}px`;
-      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts", "calibration")) this.#drawCells();
+      if (has("session", "otherCopy")) element.style.height = `${this.#layout.height}px`;
+      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts", "calibration", "otherCopy", "provenanceFilter", "annotators")) this.#drawCells();
       if (has("target", "session", "range", "visible")) this.#drawCursor();
       if (has("target", "timeline", "lanes", "session", "keyframeDoubts", "calibration")) this.#describe();
     });
@@ -60,7 +62,8 @@ export class Timeline {
   }
 
   get #layout() {
-    return drawing.layout(this.#store.facts.session?.people.length ?? 1);
+    const { session, otherCopy } = this.#store.facts;
+    return drawing.layout(session?.people.length ?? 1, otherCopy !== null);
   }
 
   get #axis() {
@@ -181,12 +184,12 @@ export class Timeline {
   #drawCells() {
     const { clientWidth, clientHeight } = this.#element;
     const context = prepare(this.#cells, clientWidth, clientHeight, true);
-    const { timeline, lanes, session, keyframeDoubts } = this.#store.facts;
+    const { timeline, lanes, session, keyframeDoubts, otherCopy } = this.#store.facts;
     if (!session) return;
     const style = getComputedStyle(this.#element);
     const axis = this.#axis;
-    const { lanes: bands, review, overview } = this.#layout;
-    drawing.drawLabels(context, axis, style, bands, session.people);
+    const { lanes: bands, review, copy, overview } = this.#layout;
+    drawing.drawLabels(context, axis, style, bands, session.people, copy);
     context.save();
     context.beginPath();
     context.rect(axis.left, 0, axis.right - axis.left + 2, overview.top);
@@ -202,8 +205,11 @@ export class Timeline {
       const doubted = keyframeDoubts.filter(({ person }) => bands.length === 1 || person === lane).map(({ frame }) => frame);
       drawing.drawDoubtedKeyframes(context, axis, doubted, style, band);
       drawing.drawAmbiguous(context, axis, framesWith(cells, AMBIGUOUS), band);
+      const isKept = filterTest(this.#store.facts, bands.length > 1 ? lane : null);
+      if (isKept) drawDimmed(context, axis, isKept, style, band);
     }
     drawing.drawReviewed(context, axis, timeline, style, review);
+    if (otherCopy && copy) drawCopy(context, axis, otherCopy, style, copy);
     drawing.drawStatuses(context, axis, timeline, style);
     drawing.drawCosts(context, axis, timeline, style);
     context.restore();

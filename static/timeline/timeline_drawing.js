@@ -6,7 +6,7 @@
 import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../model/cells.js";
 import { trace } from "../model/series.js";
 import { shortened } from "../widgets/text.js";
-import { DARK_INK, EARLIER_DASH, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, fillBands, hatch } from "./cell_marks.js";
+import { DARK_INK, EARLIER_DASH, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, eachRun, fillBands, gapOf, hatch } from "./cell_marks.js";
 
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
@@ -19,6 +19,8 @@ const KEYFRAME_GAP = 5;
 const CELLS_TOP = 44;
 /** Height of the cells of a single person, and of each of several people; gap between lanes. */
 const [CELL_HEIGHT, LANE_HEIGHT, LANE_GAP] = [12, 15, 3];
+/** Height of the lane of differences from another copy. */
+const COPY_HEIGHT = 12;
 /** Height of the strip of sources below the colour of a person, and the gap between them. */
 const [SOURCE_STRIP, STRIP_GAP] = [5, 1];
 /** Width of a run from which its status is drawn as a pattern; a narrower one would show a random part of it. */
@@ -30,9 +32,10 @@ const PATTERN_FROM = 4;
  * Vertical layout. Each person has a lane of cells.
  *
  * @param {number} people
- * @returns {{cells: Band, lanes: Band[], review: Band, overview: Band, height: number}}
+ * @param {boolean} hasCopy whether another copy is compared, which has a lane of its own
+ * @returns {{cells: Band, lanes: Band[], review: Band, copy: Band | null, overview: Band, height: number}}
  */
-export function layout(people) {
+export function layout(people, hasCopy) {
   const several = people > 1;
   const height = several ? LANE_HEIGHT : CELL_HEIGHT;
   const lanes = Array.from({ length: Math.max(1, people) }, (_, lane) => {
@@ -40,9 +43,11 @@ export function layout(people) {
     return { top, bottom: top + height };
   });
   const { bottom } = lanes[lanes.length - 1];
-  const overview = { top: bottom + 8, bottom: bottom + 14 };
+  const copy = hasCopy ? { top: bottom + 8, bottom: bottom + 8 + COPY_HEIGHT } : null;
+  const end = copy?.bottom ?? bottom;
+  const overview = { top: end + 8, bottom: end + 14 };
   const cells = { top: CELLS_TOP, bottom };
-  return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, overview, height: overview.bottom + 2 };
+  return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, copy, overview, height: overview.bottom + 2 };
 }
 
 /**
@@ -51,8 +56,9 @@ export function layout(people) {
  * @param {CSSStyleDeclaration} style
  * @param {Band[]} lanes one per person
  * @param {import("../model/protocol.js").PersonInfo[]} people
+ * @param {Band | null} copy lane of the differences from another copy
  */
-export function drawLabels(context, axis, style, lanes, people) {
+export function drawLabels(context, axis, style, lanes, people, copy) {
   context.font = "10.5px system-ui, sans-serif";
   context.textAlign = "right";
   context.textBaseline = "middle";
@@ -60,6 +66,7 @@ export function drawLabels(context, axis, style, lanes, people) {
   /** @type {[string, Band][]} */
   const rows = [["cost", COST], ["status", STATUS]]; // prettier-ignore
   if (people.length < 2) rows.push(["pose", lanes[0]]);
+  if (copy) rows.push(["differs", copy]);
   for (const [text, { top, bottom }] of rows) context.fillText(text, axis.left - 8, (top + bottom) / 2);
   if (people.length > 1) people.forEach((person, lane) => drawName(context, axis, style, person, lanes[lane]));
 }
@@ -83,30 +90,6 @@ function drawName(context, axis, style, { name, color }, { top, bottom }) {
   context.fillStyle = color;
   context.fillRect(axis.left - 6, top, 4, bottom - top);
   context.fillStyle = fillStyle;
-}
-
-/**
- * Draw runs of equal neighbouring frames as rectangles. Their number is bounded by the number of changes, and by that of
- * pixels.
- *
- * @param {FrameAxis} axis
- * @param {(frame: number) => number} look value of a frame; below 0 for nothing to draw
- * @param {number} gap between frames, CSS pixels
- * @param {(look: number, x: number, width: number) => void} draw
- */
-function eachRun(axis, look, gap, draw) {
-  for (let frame = axis.first; frame <= axis.last; ) {
-    const found = look(frame);
-    let next = frame + 1;
-    if (gap === 0) while (next <= axis.last && look(next) === found) next += 1;
-    if (found >= 0) draw(found, axis.start(frame), Math.max(1, (next - frame) * axis.pitch - gap));
-    frame = next;
-  }
-}
-
-/** @param {FrameAxis} axis */
-function gapOf(axis) {
-  return axis.pitch >= 5 ? 1 : 0;
 }
 
 /**

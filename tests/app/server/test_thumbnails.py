@@ -10,7 +10,7 @@ import pytest
 from gestures import drag, pixel_of
 
 from app.drawing import overlay_colors
-from app.page import thumbnails
+from app.server import thumbnails
 from app.session.footage_crops import FootageCrops
 from tracker.calibration.camera_correction import N_CORRECTIONS, ROTATION, corrected
 
