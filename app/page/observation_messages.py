@@ -158,7 +158,7 @@ class ProvenanceMessage(Message, frozen=True, tag="provenance"):
     imported_from: str
     """Set of observations, or empty."""
     taken_from: str
-    """Copy of the session that it was taken from, or empty."""
+    """Copy of the session that it was taken from, in words; or empty."""
     body: str
     """Name of the body model."""
     body_revision: int

@@ -51,7 +51,7 @@ export function copySection({ store, send, notify, navigation, actions }, { jump
   });
   const keep = textButton("Keep mine", "Keep this session's pose as a keyframe, and count the difference as decided", () => decide("keep"));
   const take = textButton("Take theirs", "Take the pose of the other copy as a keyframe; can be undone", () => decide("take"));
-  const mean = textButton("Take the mean", "Take the mean of both poses as a keyframe: angles the shorter way round; can be undone", () => decide("mean"));
+  const mean = textButton("Mean", "Take the mean of both poses as a keyframe: angles the shorter way round; can be undone", () => decide("mean"));
   const buttons = group(keep, take, mean);
   const previous = textButton("Previous", "Previous frame where the copies differ (Alt+Shift+C)", () => step(-1));
   const next = textButton("Next", "Next frame where the copies differ (Alt+C)", () => step(1));

@@ -1,6 +1,6 @@
 /** Provenance: where the selected person's pose and each of its joints come from, and the timeline's filter by it. */
 
-import { KINDS, annotatorName, pointText, poseLines } from "../model/provenance.js";
+import { KINDS, annotatorName, pointPhrases, poseLines } from "../model/provenance.js";
 import { capital, count, displayName } from "../widgets/text.js";
 import { choiceRow, textButton } from "./rows.js";
 
@@ -83,12 +83,12 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
     if (!state || (provenance && !isOfSelected)) return; // of a joint under the pointer: the panel stays as it is
     const isKnown = isOfSelected && provenance.source !== null;
     const lines = isKnown ? poseLines(provenance) : provenance ? ["No pose is stored on this frame."] : [];
-    const joints = isKnown ? provenance.points.map((point) => ({ point: point.point, text: pointText(point, provenance) })) : [];
+    const joints = isKnown ? grouped(provenance) : [];
     const news = JSON.stringify([lines, joints, state.point]);
     if (news === listed) return;
     listed = news;
     pose.replaceChildren(...lines.map((textContent) => Object.assign(document.createElement("p"), { className: "section-note", textContent })));
-    list.replaceChildren(...joints.map(({ point, text }) => jointRow(point, text, point === state.point, () => actions.selectPerson(provenance?.person ?? 0, point))));
+    list.replaceChildren(...joints.map(([text, points]) => originRow(text, points, state.point, (point) => actions.selectPerson(state.person, point))));
     list.hidden = joints.length === 0;
   };
   showFilter();
@@ -126,17 +126,37 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
 }
 
 /**
- * @param {string} point
- * @param {string} text
- * @param {boolean} isSelected
- * @param {() => void} select
+ * Joints of the same origin together, in the order of the body: the words for it, and the names of its points.
+ *
+ * @param {import("../model/protocol.js").ProvenanceMessage} pose
  */
-function jointRow(point, text, isSelected, select) {
+function grouped(pose) {
+  /** @type {Map<string, string[]>} */
+  const found = new Map();
+  for (const point of pose.points) {
+    const text = pointPhrases(point, pose).join(", ");
+    found.set(text, [...(found.get(text) ?? []), point.point]);
+  }
+  return [...found];
+}
+
+/**
+ * @param {string} text
+ * @param {string[]} points
+ * @param {string | null} selected
+ * @param {(point: string) => void} select
+ */
+function originRow(text, points, selected, select) {
   const row = document.createElement("li");
-  const name = textButton(capital(displayName(point)), `Select the ${displayName(point)}`, select);
-  name.dataset.noCommand = "";
-  if (isSelected) name.setAttribute("aria-current", "true");
-  row.append(name, Object.assign(document.createElement("span"), { textContent: text }));
+  const names = points.map((point) => {
+    const name = textButton(displayName(point), `Select the ${displayName(point)}`, () => select(point));
+    name.dataset.noCommand = "";
+    if (point === selected) name.setAttribute("aria-current", "true");
+    return name;
+  });
+  const joints = Object.assign(document.createElement("span"), { className: "provenance-points" });
+  joints.append(...names);
+  row.append(Object.assign(document.createElement("span"), { textContent: capital(text) }), joints);
   return row;
 }
 

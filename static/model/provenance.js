@@ -1,7 +1,7 @@
 /** Where poses come from: words for it, and the filter of the timeline by it. */
 
 import { KEYFRAME, NO_POSE, SOURCES } from "./cells.js";
-import { displayName, percent } from "../widgets/text.js";
+import { capital, displayName, percent } from "../widgets/text.js";
 
 /**
  * @typedef {import("./protocol.js").ProvenanceMessage} Provenance
@@ -28,6 +28,8 @@ const WORDS = /** @type {Record<string, string>} */ ({
   smoothed: "smoothed",
   imported: "imported",
 });
+/** Smallest probability that a limb is lost that is named: below, it is displayed as nothing. */
+const LEAST_LOST = 0.01;
 /** Sources that are somebody's own work, whose author and views are named. */
 const BY_HAND = ["manual", "pinned"];
 const WHEN = new Intl.DateTimeFormat("en-GB", { dateStyle: "medium", timeStyle: "short" });
@@ -69,16 +71,17 @@ export function filterTest({ provenanceFilter: filter, annotators, timeline, lan
 }
 
 /**
- * How a point was placed, as in "by hand by anna, 3 Mar 2026, 14:02, in FRONT and LEFT".
+ * How a point was placed, in phrases: "by hand by anna", "3 Mar 2026, 14:02", "in FRONT and LEFT".
  *
  * @param {PointProvenance} point
  * @param {Provenance} pose
  */
-export function pointText({ source, author, time, views, lost }, pose) {
+export function pointPhrases({ source, author, time, views, lost }, pose) {
   const isOwn = BY_HAND.includes(source);
+  const isTaken = pose.taken_from !== "" && time === pose.time;
   const where = views.length ? `in ${listed(views)}` : "";
-  const parts = isOwn ? [`${WORDS[source]} by ${annotatorName(author)}`, when(time), where] : [`${WORDS[source]}${how(source, pose)}`, where && `put by hand ${where}`];
-  return [...parts, lost ? `${percent(lost)} lost` : ""].filter(Boolean).join(", ");
+  const parts = isOwn ? [`${isTaken ? `taken from ${pose.taken_from}` : WORDS[source]} by ${annotatorName(author)}`, when(time), where] : [`${WORDS[source]}${how(source, pose)}`, where && `put by hand ${where}`];
+  return [...parts, lost !== null && lost >= LEAST_LOST ? `${percent(lost)} chance that the limb is lost` : ""].filter(Boolean);
 }
 
 /**
@@ -103,7 +106,7 @@ export function poseLines(pose) {
   return [
     `${mark} by ${annotatorName(pose.author)}, ${when(pose.time)}`,
     pose.taken_from && `Taken from ${pose.taken_from}`,
-    `Most manual source: ${WORDS[pose.source ?? ""] ?? pose.source}${how(pose.source ?? "", pose)}`,
+    capital(`${WORDS[pose.source ?? ""] ?? pose.source}${how(pose.source ?? "", pose)}`),
     pose.seam_mm === null ? "" : `Both passes lie up to ${Math.round(pose.seam_mm)} mm apart`,
     `Body ${pose.body}, revision ${pose.body_revision}${pose.is_earlier_body ? ": earlier than the present one" : ""}`,
     `Calibration revision ${pose.calibration_revision}${pose.is_earlier_calibration ? ": earlier than the present one" : ""}`,
@@ -112,15 +115,15 @@ export function poseLines(pose) {
 }
 
 /**
- * The provenance of a joint of the shown pose, if the page has it.
+ * The provenance of a joint of the shown pose in phrases; none where the page does not have it.
  *
  * @param {import("./store.js").Facts} facts
  * @param {{person: number, point: string}} joint
  */
 export function provenanceOf({ provenance, state }, { person, point }) {
-  if (!provenance || provenance.person !== person || provenance.frame !== state?.frame) return "";
+  if (!provenance || provenance.person !== person || provenance.frame !== state?.frame) return [];
   const found = provenance.points.find((one) => one.point === point);
-  return found ? pointText(found, provenance) : "";
+  return found ? pointPhrases(found, provenance) : [];
 }
 
 /** @param {string[]} names */

@@ -303,8 +303,8 @@ export class Pane {
       offered.some(({ person, point }) => person === handle.person && point === handle.point),
     );
     const observed = ofJoint(this.#store.facts, named.handle);
-    const origin = dragging ? "" : provenanceOf(this.#store.facts, named.handle);
-    return [...jointLabel(named, overlapping, people), ...(origin ? [origin] : []), ...(observed ? observed.sentence.split(/(?<=:) /) : [])];
+    const origin = dragging ? [] : provenanceOf(this.#store.facts, named.handle);
+    return [...jointLabel(named, overlapping, people), ...origin, ...(observed ? observed.sentence.split(/(?<=:) /) : [])];
   }
 
   /**

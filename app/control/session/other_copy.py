@@ -1,6 +1,6 @@
 """Compare the session with another copy of it, and decide between the poses of both."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -72,7 +72,7 @@ class OtherCopies:
             self._compared = self._session_state.state.timeline_version
             copy = OtherCopy(name, own_name, tuple(poses), tuple(annotated), ((),) * len(poses), TOLERANCE_MM / 1000)
             differences = tuple(self._differences(copy, person, frames) for person, frames in enumerate(annotated))
-            notes = _notes(own, other, differences, poses)
+            notes = self._notes(other, copy)
             self._session_state.set(other_copy=replace(copy, differences=differences, notes=notes))
 
     def leave(self) -> None:
@@ -152,7 +152,8 @@ class OtherCopies:
                     "place it anew first"
                 )
             values = mean_pose(model, [now, values])
-        sources, settings = ("manual",) * len(values), {TAKEN_FROM: copy.name}
+        origin = copy.name if decision == "take" else f"the mean of {copy.own_name} and {copy.name}"
+        sources, settings = ("manual",) * len(values), {TAKEN_FROM: origin}
         record = PoseRecord(values, sources, saver.revisions.current(person), True, settings=settings, reviewed=True)
         back = () if own is None else (Alternative(own.values, own.model_revision, own.cost_px),)
         return PoseChange(name, frame, record, (*back, *saver.alternatives(person, frame)))
@@ -182,15 +183,27 @@ class OtherCopies:
         return record is not None and np.array_equal(record.values, values)
 
     def _differences(self, copy: OtherCopy, person: int, frames: frozenset[int]) -> tuple[CopyDifference, ...]:
-        """Compare the poses of a person on those of some frames that this copy has annotated, too."""
-        saver, out = self._session_state.saver, []
+        """Compare the poses of a person on those of some frames that this session has annotated, too."""
+        pairs = self._pairs(copy, person, frames).items()
+        return tuple(CopyDifference(frame, *farthest_joint(*bodies)) for frame, bodies in pairs)
+
+    def _pairs(self, copy: OtherCopy, person: int, frames: frozenset[int]) -> dict[int, tuple[PosedBody, PosedBody]]:
+        """Return the poses of both copies, by frame, where this session has annotated the person, too."""
+        saver, out = self._session_state.saver, dict[int, tuple[PosedBody, PosedBody]]()
         for row in saver.rows(person, range(min(frames), max(frames) + 1)) if frames else ():
             if row.frame in frames and is_annotated(row.keyframe, row.source):
                 record = saver.record(person, row.frame)
                 if record is not None:
-                    body = PosedBody(saver.revisions.body(record.model_revision), record.values)
-                    out.append(CopyDifference(row.frame, *farthest_joint(body, copy.poses[person][row.frame])))
-        return tuple(out)
+                    own = PosedBody(saver.revisions.body(record.model_revision), record.values)
+                    out[row.frame] = own, copy.poses[person][row.frame]
+        return out
+
+    def _notes(self, other: Session, copy: OtherCopy) -> tuple[str, ...]:
+        """Return sentences on what else differs between both copies, where they are compared."""
+        own = self._session_state.session
+        pairs = [self._pairs(copy, i, frames) for i, frames in enumerate(copy.annotated)]
+        people = zip(own.people, pairs, strict=True)
+        return notes_on([own, other], {Subject(p.name, f): bodies for p, of in people for f, bodies in of.items()})
 
 
 def _updated(
@@ -198,18 +211,3 @@ def _updated(
 ) -> tuple[CopyDifference, ...]:
     """Return differences with those of changed frames replaced, ascending by frame."""
     return tuple(sorted((*(d for d in old if d.frame not in changed), *new)))
-
-
-def _notes(
-    own: Session,
-    other: Session,
-    differences: tuple[tuple[CopyDifference, ...], ...],
-    poses: list[Mapping[int, PosedBody]],
-) -> tuple[str, ...]:
-    """Return sentences on what else differs between two copies."""
-    bodies = {
-        Subject(person.name, d.frame): (PosedBody(person.model, poses[i][d.frame].values), poses[i][d.frame])
-        for i, person in enumerate(own.people)
-        for d in differences[i]
-    }
-    return notes_on([own, other], bodies)

@@ -46,7 +46,7 @@ def compared(both):
 
 def test_frames_that_both_annotated_are_compared_by_their_farthest_joint(both):
     _, copy = compared(both)
-    assert (copy.name, copy.own_name) == ("ben", "session")
+    assert (copy.name, copy.own_name, copy.notes) == ("ben", "session", ())
     ((same, other),) = copy.differences  # frame 2 is ben's alone
     assert (same.frame, other.frame) == (0, 1)
     assert same.distance_m == pytest.approx(0.0, abs=1e-9)
@@ -76,7 +76,7 @@ def test_a_decision_is_one_step_and_undone_as_one(both, decision):
     assert controller.state.frame == 1
     record = controller._session_state.saver.record(0, 1)
     assert record.keyframe
-    assert record.settings.get(TAKEN_FROM) == (None if decision == "keep" else "ben")
+    assert record.settings.get(TAKEN_FROM) == {"take": "ben", "mean": "the mean of session and ben"}.get(decision)
     wait_for(lambda: (0, 1) in controller.state.other_copy.decided and not controller.state.checked)
     if decision == "take":
         wait_for(lambda: controller.state.other_copy.differences[0][1].distance_m < 1e-9)
