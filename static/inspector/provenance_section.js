@@ -43,9 +43,9 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
   /** Ask for what is in sight: the panel, a joint under the pointer, or the filter by annotator. */
   const ask = (wanted = store.facts.provenanceFilter) => {
     const { connected, state, hover, dragging } = store.facts;
-    if (!connected || !state) return;
+    if (!connected || !state || dragging) return;
     const isSeen = body.getClientRects().length > 0;
-    const person = hover && !dragging ? hover.person : isSeen ? state.person : null;
+    const person = hover ? hover.person : isSeen ? state.person : null;
     const annotators = isSeen || wanted?.kind === "annotator";
     const request = JSON.stringify({ person, annotators });
     if (request === asked) return;

@@ -151,6 +151,8 @@ class FakeEndpoint:
     """Held while a frame is sent."""
     greetings: list = field(default_factory=list)
     """What the pages said when they connected."""
+    asked: list = field(default_factory=list)
+    """What the pages asked about where poses come from, as the pointer passes joints."""
     views: list = field(default_factory=list)
     """What the pages said that they show."""
     sizes: tuple = ((WIDTH, HEIGHT),)
@@ -227,7 +229,9 @@ class FakeEndpoint:
                 if message.type is WSMsgType.TEXT:
                     parse(message.data)
                     told = json.loads(message.data)
-                    kept = {"pause_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
+                    kept = {"pause_3d": self.greetings, "view": self.views, "provenance": self.asked}.get(
+                        told["type"], self.received
+                    )
                     kept.append(told)
                     await self.answer(told)
         finally:

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tracker.agreement.consensus import mean_pose, pose_steps
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import PosedBody
 from tracker.errors import SessionError
 from tracker.formats.joint_maps import FOOT_POINTS, JOINTS
 from tracker.formats.model_toml import format_model
@@ -180,12 +180,11 @@ def notes_on(sessions: Sequence[Session], bodies: Mapping[Subject, tuple[PosedBo
     matrices = [np.array([(c.K @ c.T_camera_world[:3]) for c in of]) for of in cameras]
     if not all(np.allclose(m, matrices[0]) for m in matrices):
         out.append("the copies have different calibrations, and distances include that difference")
-    of_person: dict[str, dict[BodyModel, None]] = {}
-    for subject, of in bodies.items():
-        of_person.setdefault(subject.person, {}).update(dict.fromkeys(b.model for b in of))
-    for person, models in of_person.items():
-        if len({m.dof_names for m in models}) > 1:
+    texts = {body.model: format_model(body.model) for of in bodies.values() for body in of}
+    for person in dict.fromkeys(subject.person for subject in bodies):
+        of_person = [[body.model for body in of] for subject, of in bodies.items() if subject.person == person]
+        if any(len({m.dof_names for m in models}) > 1 for models in of_person):
             out.append(f"the bodies of '{person}' have different degrees of freedom, and their angles are not compared")
-        if len({format_model(m) for m in models}) > 1:
+        if any(len({texts[m] for m in models}) > 1 for models in of_person):
             out.append(f"the bodies of '{person}' have different sizes, and distances of joints include them")
     return tuple(out)
