@@ -44,13 +44,13 @@ export function mount(context, { panes, posing, timeline, scene, sessions }) {
   const sections = [
     joint,
     reasonSection(context, panes, posing),
-    provenance,
     findSection(context),
     new BodySection(context),
     trackSection(context),
     searchSection(context),
     calibration,
     observations,
+    provenance,
     copy,
     viewSection(context, scene, panes),
   ];

@@ -229,10 +229,8 @@ class FakeEndpoint:
                 if message.type is WSMsgType.TEXT:
                     parse(message.data)
                     told = json.loads(message.data)
-                    kept = {"pause_3d": self.greetings, "view": self.views, "provenance": self.asked}.get(
-                        told["type"], self.received
-                    )
-                    kept.append(told)
+                    apart = {"pause_3d": self.greetings, "view": self.views, "provenance": self.asked}
+                    apart.get(told["type"], self.received).append(told)
                     await self.answer(told)
         finally:
             self.sockets.discard(socket)

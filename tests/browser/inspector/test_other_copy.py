@@ -77,9 +77,11 @@ async def test_where_the_other_copy_has_no_pose_there_is_nothing_to_decide(page,
 async def test_a_folder_that_is_refused_is_said_beside_the_field(page, endpoint, section):
     await page.keyboard.press("Alt+i")
     await page.evaluate("document.querySelector('[data-section=copy]').open = true")
+    await page.route("**/sessions/paths*", lambda route: route.fulfill(body="[]", content_type="application/json"))
     await page.route("**/copies/open", lambda route: route.fulfill(status=400, body="expected a copy, found none"))
     await section.get_by_label("Folder", exact=True).fill("/nowhere")
     await section.get_by_role("button", name="Compare", exact=True).click()
     await section.get_by_text("expected a copy, found none").wait_for()
-    await page.unroute("**/copies/open")
+    for address in ("**/copies/open", "**/sessions/paths*"):
+        await page.unroute(address)
     page.errors.clear()  # the browser reports the refusal, too

@@ -93,7 +93,8 @@ async def test_the_label_of_a_joint_says_who_put_it_there(page, endpoint):
       const canvas = document.querySelectorAll(".pane-overlay")[0];
       const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
       let words = 0;
-      for (let i = 0; i < data.length; i += 4) words += Number(data[i] === 195 && data[i + 1] === 199 && data[i + 2] === 207);
+      for (let i = 0; i < data.length; i += 4)
+        words += Number(data[i] === 195 && data[i + 1] === 199 && data[i + 2] === 207);
       return words;
     }"""
     before = await page.evaluate(drawn)
