@@ -149,7 +149,7 @@ class OtherCopies:
             if now is None:
                 raise TrackerError(
                     f"expected a pose of the present body of {name} on frame {frame}, found one with other angles; "
-                    "place it anew first"
+                    "place it again first"
                 )
             values = mean_pose(model, [now, values])
         origin = copy.name if decision == "take" else f"the mean of {copy.own_name} and {copy.name}"

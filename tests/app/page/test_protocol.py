@@ -5,14 +5,14 @@ from typing import get_args
 import msgspec
 import pytest
 
-from app.page import client_messages, pose_messages, protocol_docs, socket
+from app.page import client_messages, observation_messages, pose_messages, protocol_docs, socket
 from app.page.client_messages import CLIENT_MESSAGES
 from app.page.commands import COMMANDS
 from app.page.message_parsing import MessageError, parse
 
 SUBSCRIPTIONS = {
     client_messages.SetView, client_messages.CheckEpipolar, client_messages.ShowCurves, client_messages.WatchTab,
-    client_messages.ShowHistory,
+    client_messages.ShowHistory, observation_messages.WatchProvenance,
 }  # fmt: skip
 
 DRAG = '{"type":"drag","phase":"move","frame":2,"camera":0,"person":0,"point":"torso","seq":1,"u":%s,"v":2}'
