@@ -6,6 +6,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 # Without compiling to bytecode: the first import of a module does that, and most modules are never imported.
 PIP_INSTALL := $(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile --constraint constraints.txt --editable
+SITE := $(VENV)/site
+# Interpreters that a release is tried with.
+RELEASE_PYTHONS ?= $(foreach version,3.11 3.12 3.13,$(shell command -v python$(version)))
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := app tracker tests
 PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
@@ -13,7 +16,7 @@ PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sy
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: install run test test-all test-quick test-library test-page test-slow kernels bench check lint types \
-	page-types format clean
+	page-types format docs release clean
 
 install: $(VENV)/.installed
 
@@ -71,8 +74,21 @@ format: $(VENV)/.tested
 	$(BIN)/ruff check --fix $(PYTHON_FILES)
 	$(BIN)/ruff format $(PYTHON_FILES)
 
+# The documents as a site, with the library's reference: below .venv, which git ignores.
+docs: $(VENV)/.documented
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir $(CURDIR)/$(SITE)
+	@echo "file://$(CURDIR)/$(SITE)/index.html"
+
+# Wheel and sdist in dist/, installed and tried with each of RELEASE_PYTHONS; needs a package index.
+release: $(VENV)/.tested
+	@test -n "$(RELEASE_PYTHONS)" || { echo "expected python3.11 to python3.13, found none: make release RELEASE_PYTHONS=..."; exit 1; }
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist
+	QUADRILLE_RELEASE_DIST=dist QUADRILLE_RELEASE_PYTHONS="$(RELEASE_PYTHONS)" $(BIN)/python -m pytest -m slow tests/release
+	ls -l dist
+
 clean:
-	rm -rf $(VENV) node_modules .mypy_cache .ruff_cache .hypothesis
+	rm -rf dist $(VENV) node_modules .mypy_cache .ruff_cache .hypothesis
 
 $(BIN)/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Quadrille needs Python 3.11 or newer: make PYTHON=...")'
@@ -88,9 +104,14 @@ $(VENV)/.tested: $(VENV)/.installed tests/support/chromium.py
 	$(BIN)/python tests/support/chromium.py
 	touch $@
 
-# .slow: the programs that write imported files and read exported ones; OpenSim is big.
+# .slow: the programs that write imported files and read exported ones, and the site's; OpenSim is big.
 $(VENV)/.slow: $(VENV)/.tested
-	$(PIP_INSTALL) '.[dev,slow,import,export]'
+	$(PIP_INSTALL) '.[dev,slow,import,export,docs]'
+	touch $@
+
+# .documented: what makes a site of the documents.
+$(VENV)/.documented: $(VENV)/.installed
+	$(PIP_INSTALL) '.[docs]'
 	touch $@
 
 # The path is for npm's own scripts, which look for node there.

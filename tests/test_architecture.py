@@ -8,6 +8,7 @@ from architecture import (
     FLOOR,
     OF_THE_SCREEN,
     PAGE_FLOOR,
+    ROOMS,
     ROOT,
     SCRIPTS,
     STATIC,
@@ -80,6 +81,21 @@ def _is_offered(room, file, name):
         return True
     module = FILES.get(f"{room}.{file}")
     return module is not None and bool(re.search(rf"^(def |class )?{name}\b", module.read_text("utf-8"), re.MULTILINE))
+
+
+def test_each_room_of_the_library_names_what_others_use():
+    """`__all__` of a room has the modules that other rooms import, so that a new use is made on purpose."""
+    used = {room: set() for room in ROOMS if room.startswith("tracker.")}
+    for module, needs in own_imports().items():
+        for m in needs:
+            if room_of(m) in used and room_of(m) != room_of(module) and m != room_of(m):
+                used[room_of(m)].add(m.rpartition(".")[2])
+    stated = {}
+    for room in used:
+        names = [n for n in trees()[room].body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "__all__"]
+        stated[room] = {e.value for n in names for e in n.value.elts}
+    stated["tracker.simulate"] = used["tracker.simulate"]  # it offers functions instead
+    assert stated == used
 
 
 def test_no_folder_is_crowded():

@@ -60,6 +60,16 @@ def test_files_that_are_named_exist(page):
     assert missing == []
 
 
+def test_the_site_has_each_document_once():
+    """mkdocs.yml lists the documents; docs/site/hooks.py brings in those outside of docs."""
+    listed = re.findall(r"(\S+\.md)$", (ROOT / "mkdocs.yml").read_text("utf-8"), re.MULTILINE)
+    outside = dict(
+        re.findall(r'^    "(\S+\.md)": "(\S+\.md)"', (ROOT / "docs/site/hooks.py").read_text("utf-8"), re.MULTILINE)
+    )
+    places = [outside.get(page.relative_to(ROOT).as_posix(), page.name) for page in PAGES]
+    assert sorted(listed) == sorted(places)
+
+
 def test_targets_of_make_exist():
     makefile = (ROOT / "Makefile").read_text("utf-8")
     named = {t for page in PAGES for t in re.findall(r"(?:`| {4})make ([a-z-]+)", page.read_text("utf-8"))}

@@ -81,4 +81,6 @@ def command(
         chosen = open_session(found, doorway, compiler, lambda line: print(line, flush=True), first)
     if chosen is not None:
         words = ["open", str(chosen.folder), "--host", host, "--port", str(chosen.port), "--no-browser"]
+        words += ["--frame", str(chosen.frame)] if chosen.frame else []
+        words += ["--person", chosen.person] if chosen.person else []
         restart(words, chosen.listening)

@@ -73,7 +73,7 @@ class Doorway:
         """They listen until the end of the `with` block; who serves copies of them calls `close` before."""
         self.port = port_of(self.sockets)
         self._servers = [_Server(each, self) for each in self.sockets]
-        self._threads = [threading.Thread(target=s.serve_forever, args=(_POLL_S,), daemon=True) for s in self._servers]
+        self._threads: list[tuple[_Server, threading.Thread]] = []
         self._process: ForkProcess | None = None
         self._steps = -1  # pipe to the process
 
@@ -96,8 +96,11 @@ class Doorway:
         return self
 
     def _start_threads(self) -> None:
-        for thread in self._threads:
+        """Answer, each server in a thread. Python 3.13 does not start threads that were made before a fork."""
+        for server in self._servers:
+            thread = threading.Thread(target=server.serve_forever, args=(_POLL_S,), daemon=True)
             thread.start()
+            self._threads.append((server, thread))
 
     def _answer_until_closed(self, steps: int) -> None:
         """Answer in a process of its own until the program closes the doorway, or ends in whatever way.
@@ -145,10 +148,10 @@ class Doorway:
             os.close(self._steps)
             self._process.join()
             self._process = None
-        for server, thread in zip(self._servers, self._threads, strict=True):
-            if thread.is_alive():
-                server.shutdown()
-                thread.join()
+        while self._threads:
+            server, thread = self._threads.pop()
+            server.shutdown()
+            thread.join()
 
     def answer(self, path: str, host: str | None, origin: str | None) -> Answer:
         """Answer a request."""

@@ -6,7 +6,9 @@ nobody but the user can send them: the server listens on loopback under no other
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import msgspec
 from aiohttp import web
@@ -15,14 +17,33 @@ from app.remedies import page_text
 from app.server.new_session_routes import NewSessionRoutes
 from app.server.page_requests import read_body, require_page
 from app.session.path_choice import TypedPath, completions, typed_path
-from app.session.recent_sessions import recent_sessions
+from app.session.recent_sessions import TABLE_FILE, recent_batches, recent_sessions
 from tracker.errors import SessionError, TrackerError
+from tracker.text_files import TextKind, read_json
+
+_BATCHES = 3
+"""Number of batches that are listed."""
+_TABLE_KIND = TextKind("table", 5_000_000, SessionError)
 
 
 class _OpenRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A session to open."""
 
     folder: TypedPath
+    frame: int = 0
+    """Frame to show first."""
+    person: str = ""
+    """Name of the person to select; empty for the first one."""
+
+
+class ChosenSession(NamedTuple):
+    """A session to open next."""
+
+    folder: Path
+    frame: int
+    """Frame to show first."""
+    person: str
+    """Name of the person to select; empty for the first one."""
 
 
 class SessionRoutes:
@@ -41,7 +62,7 @@ class SessionRoutes:
         """
         self._folder, self._state_folder = folder.resolve(), state_folder
         self._refusal, self._unsaved = refusal, unsaved
-        self.chosen: Path | None = None
+        self.chosen: ChosenSession | None = None
         """The session to open next."""
         self.is_chosen = asyncio.Event()
         """Whether the page has asked for another session."""
@@ -61,14 +82,16 @@ class SessionRoutes:
 
     async def _list(self, _: web.Request) -> web.Response:
         if self._refusal is not None:
-            return web.json_response({"refusal": self._refusal, "folder": "", "recent": []})
+            return web.json_response({"refusal": self._refusal, "folder": "", "recent": [], "batches": []})
         found = await asyncio.to_thread(recent_sessions, self._state_folder)
+        batches = await asyncio.to_thread(recent_tables, self._state_folder)
         recent = [
             {"folder": str(s.folder), "name": s.folder.name, "opened": s.opened}
             for s in found
             if s.folder != self._folder
         ]
-        return web.json_response({"refusal": None, "folder": str(self._folder), "recent": recent})
+        here = {"refusal": None, "folder": str(self._folder)}
+        return web.json_response({**here, "recent": recent, "batches": batches})
 
     async def _complete(self, request: web.Request) -> web.Response:
         require_page(request, self._refusal)
@@ -80,14 +103,14 @@ class SessionRoutes:
         if self.is_chosen.is_set():
             raise web.HTTPConflict(text="Another session is being opened; wait for it.")
         try:
-            folder = await asyncio.to_thread(self._checked, body.folder)
+            folder = await asyncio.to_thread(self._checked, body)
         except TrackerError as error:
             raise web.HTTPBadRequest(text=page_text(error)) from error
-        self.chosen = folder
+        self.chosen = ChosenSession(folder, body.frame, body.person)
         self.is_chosen.set()
         return web.json_response({"name": folder.name})
 
-    def _checked(self, text: str) -> Path:
+    def _checked(self, body: _OpenRequest) -> Path:
         """Return the folder of a session that can be opened in place of the present one.
 
         Raises:
@@ -97,16 +120,30 @@ class SessionRoutes:
         from tracker.session.relink import require_files
         from tracker.session.session import load_session
 
-        folder = typed_path(text).resolve()
+        folder = typed_path(body.folder).resolve()
         if folder == self._folder:
             raise SessionError(f"expected another session, found the one that is open, {folder}; choose another folder")
         session = load_session(folder)
+        if not 0 <= body.frame < session.n_frames:
+            raise SessionError(f"expected a frame from 0 to {session.n_frames - 1}, found {body.frame}; open its start")
+        if body.person and body.person not in [p.name for p in session.people]:
+            raise SessionError(f"expected a person of the session, found '{body.person}'; open it without one")
         require_files(session)
         with SessionLock(session.folder):
             pass  # not open in another program
         if why := self._unsaved():
             raise SessionError(f"expected all edits to be saved, found some that are not: {why}; retry saving first")
         return folder
+
+
+def recent_tables(state_folder: Path) -> list[dict[str, Any]]:
+    """Return the tables of the last batches, as `quadrille batch --json` prints them; unreadable ones are left out."""
+    tables = []
+    for folder in recent_batches(state_folder)[:_BATCHES]:
+        with suppress(TrackerError, OSError, KeyError, TypeError):
+            found = read_json(folder / TABLE_FILE, _TABLE_KIND)
+            tables.append({"name": folder.name, "totals": found["totals"], "recordings": found["recordings"]})
+    return tables
 
 
 def refusal(host_is_private: bool, has_token: bool) -> str | None:

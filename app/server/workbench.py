@@ -51,6 +51,10 @@ class NextSession(NamedTuple):
     """A session that the page has asked for."""
 
     folder: Path
+    frame: int
+    """Frame to show first."""
+    person: str
+    """Name of the person to select; empty for the first one."""
     port: int
     """Port of the page, which connects again there."""
     listening: tuple[socket.socket, ...]
@@ -147,7 +151,7 @@ def open_session(
                 raise TrackerError(unsaved)
     if others.chosen is None:
         return None
-    return NextSession(others.chosen, doorway.port, tuple(each.dup() for each in doorway.sockets))
+    return NextSession(*others.chosen, doorway.port, tuple(each.dup() for each in doorway.sockets))
 
 
 def _end_from_a_thread(loop: asyncio.AbstractEventLoop, ended: asyncio.Event) -> None:

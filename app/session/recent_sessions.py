@@ -1,4 +1,4 @@
-"""Remember the sessions that the user has opened, in the user's state folder."""
+"""Remember the sessions that the user has opened, and the batches that were run, in the user's state folder."""
 
 from contextlib import suppress
 from datetime import UTC, datetime
@@ -14,7 +14,9 @@ from tracker.session.folder import SESSION_FILE
 from tracker.text_files import TextKind, read_json
 from tracker.validation import check
 
-_FILE = "recent_sessions.json"
+_FILE, _BATCHES_FILE = "recent_sessions.json", "recent_batches.json"
+TABLE_FILE = "table.json"
+"""Name of the file in the folder of a batch that holds its last table."""
 _KIND = TextKind("list of recent sessions", 200_000, SessionError)
 _MAX = 20
 
@@ -38,6 +40,12 @@ def recent_sessions(state_folder: Path) -> list[RecentSession]:
     return [session for session in listed if is_session(session.folder)]
 
 
+def recent_batches(state_folder: Path) -> list[Path]:
+    """Return the folders of batches that still exist, the last one first."""
+    folders = (Path(entry.folder) for entry in _read(state_folder, _BATCHES_FILE))
+    return [folder for folder in folders if (folder / TABLE_FILE).is_file()]
+
+
 def remember(state_folder: Path, folder: Path) -> None:
     """Put a session first. If the state folder cannot be written, nothing is remembered.
 
@@ -45,13 +53,22 @@ def remember(state_folder: Path, folder: Path) -> None:
         state_folder: private to this user; made where it is missing.
         folder: of the session.
     """
+    _remember(state_folder, folder, _FILE)
+
+
+def remember_batch(state_folder: Path, folder: Path) -> None:
+    """Put a batch first; see `remember`."""
+    _remember(state_folder, folder, _BATCHES_FILE)
+
+
+def _remember(state_folder: Path, folder: Path, file: str) -> None:
     path = str(folder.resolve())
-    others = [entry for entry in _read(state_folder) if entry.folder != path]
+    others = [entry for entry in _read(state_folder, file) if entry.folder != path]
     entries = [_Entry(path, datetime.now(UTC).isoformat(timespec="seconds")), *others][:_MAX]
     # A path that is no Unicode cannot be written as JSON.
     with suppress(OSError, TrackerError, UnicodeError):
         state_folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        write_text_atomic(state_folder / _FILE, msgspec.json.encode(entries).decode(), mode=0o600)
+        write_text_atomic(state_folder / file, msgspec.json.encode(entries).decode(), mode=0o600)
 
 
 def is_session(folder: Path) -> bool:
@@ -61,8 +78,8 @@ def is_session(folder: Path) -> bool:
     return False
 
 
-def _read(state_folder: Path) -> list[_Entry]:
+def _read(state_folder: Path, file: str = _FILE) -> list[_Entry]:
     try:
-        return check(read_json(state_folder / _FILE, _KIND), list[_Entry], "the list of recent sessions", SessionError)
+        return check(read_json(state_folder / file, _KIND), list[_Entry], "the list of recent sessions", SessionError)
     except (TrackerError, OSError):
         return []

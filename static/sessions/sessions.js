@@ -2,6 +2,7 @@
 
 import { byId } from "../widgets/elements.js";
 import { opensPopover, togglePopover } from "../widgets/popovers.js";
+import { batchTable } from "./batch_table.js";
 import { NewSession } from "./new_session.js";
 import { completePaths, postJson } from "./session_requests.js";
 
@@ -9,7 +10,11 @@ const POLL_MS = 300;
 /** A slow disk and an old processor need half of it. */
 const PATIENCE_MS = 60_000;
 
-/** @typedef {{refusal: string | null, folder: string, recent: {folder: string, name: string, opened: string}[]}} Listed */
+/**
+ * @typedef {{folder: string, name: string, opened: string}} Recent
+ * @typedef {import("./batch_table.js").Batch} Batch
+ * @typedef {{refusal: string | null, folder: string, recent: Recent[], batches: Batch[]}} Listed
+ */
 
 export class Sessions {
   #panel = byId("sessions-panel", HTMLElement);
@@ -91,6 +96,9 @@ export class Sessions {
     }
     if (found.refusal) this.#say(found.refusal, true);
     this.#list.replaceChildren(...found.recent.map((one) => this.#row(one)));
+    byId("batches", HTMLElement).replaceChildren(
+      ...found.batches.map((batch) => batchTable(batch, (folder, at) => void this.#choose(folder, at))),
+    );
     if (!found.recent.length && !found.refusal) this.#list.append(this.#firstRow());
     if (document.activeElement === document.body) this.#folder.focus();
   }
@@ -106,7 +114,7 @@ export class Sessions {
     return item;
   }
 
-  /** @param {Listed["recent"][number]} session */
+  /** @param {Recent} session */
   #row({ folder, name, opened }) {
     const item = document.createElement("li");
     const open = document.createElement("button");
@@ -125,11 +133,14 @@ export class Sessions {
     return item;
   }
 
-  /** @param {string} folder */
-  async #choose(folder) {
+  /**
+   * @param {string} folder
+   * @param {{frame?: number, person?: string}} at what it shows first
+   */
+  async #choose(folder, at = {}) {
     this.#say("Checking…");
     try {
-      await postJson("sessions/open", { folder }, (answer) => this.#store.set({ opening: JSON.parse(answer).name }));
+      await postJson("sessions/open", { folder, ...at }, (answer) => this.#store.set({ opening: JSON.parse(answer).name }));
       this.#panel.hidePopover();
     } catch (error) {
       this.#say(error instanceof Error ? error.message : String(error), true);
@@ -181,6 +192,6 @@ async function listed() {
   try {
     return await (await fetch("sessions")).json();
   } catch {
-    return { refusal: "The program does not answer.", folder: "", recent: [] };
+    return { refusal: "The program does not answer.", folder: "", recent: [], batches: [] };
   }
 }

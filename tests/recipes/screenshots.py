@@ -301,6 +301,7 @@ async def opened(browser: Browser, folder: Path, screen: Screenshot):
         try:
             page = await context.new_page()
             await page.goto(program.address, timeout=120_000)
+            await page.wait_for_url(lambda url: "token" not in url)  # the page goes on to an address without it
             await shows(page, "window.quadrille?.state.overlay && quadrille.state.state.cost_px !== null", 180)
             yield page
         finally:

@@ -13,6 +13,7 @@ import pytest
 from command_line import SAMPLE
 
 import tracker
+from tracker.compute.kernel_cache import compiled_mark
 from tracker.evaluation.references import read_joints
 from tracker.pipeline.given_pose import set_pose_at_joints
 
@@ -66,6 +67,12 @@ def expected(recordings, tmp_path_factory):
     assert status == 1
     assert found["totals"]["done"] == 10
     return poses_of(lab)
+
+
+def kernels():
+    """Names and times of the compiled kernels in the cache of this account."""
+    folder = compiled_mark().parent
+    return {p.name: p.stat().st_mtime_ns for p in folder.glob("*.nb?")}
 
 
 def check(lab, found, expected):
@@ -146,3 +153,11 @@ def test_a_cluster_of_which_a_worker_is_killed(lab, expected):
             process.kill()
             process.wait()
     check(lab, json.loads(out), expected)
+
+
+def test_kernels_are_compiled_by_no_worker(lab, expected):
+    """All workers load what one program has compiled: none adds a file to the cache."""
+    before = kernels()
+    assert batch(lab, "--workers", "2")[1]["totals"]["done"] == 10
+    assert before
+    assert kernels() == before

@@ -3,3 +3,16 @@
 May import the rooms below it, up to `tracking.voxel`. Callers use `from_joints` to prepare, and
 `from_contours.acquire_from_contours` or `two_views.acquire_from_two_views`; `size_report` lists what changed.
 """
+
+__all__ = [
+    "from_contours",
+    "from_joints",
+    "from_keypoints",
+    "from_voxels",
+    "part_motions",
+    "segment_lengths",
+    "size_fit",
+    "size_parameters",
+    "size_report",
+    "two_views",
+]

@@ -3,3 +3,5 @@
 Imports `body`, `formats`, `session` and `store`. Callers use `copies.read_copies`, `comparison.compare` and
 `consensus.mean_pose`.
 """
+
+__all__ = ["comparison", "consensus", "copies", "statistics"]

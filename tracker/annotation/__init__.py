@@ -3,3 +3,5 @@
 Imports `pipeline` and below. Callers use `plan`, `frame_choice`, `comments`, `next_click`, `expected_error`,
 `blind_copy` and `merge_sessions`.
 """
+
+__all__ = ["blind_copy", "comments", "expected_error", "frame_choice", "merge_sessions", "next_click", "plan"]

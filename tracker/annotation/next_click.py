@@ -37,7 +37,7 @@ class HandSettings:
     carried: float = 0.01
     """Smallest share of an action's effect on a neighbouring frame that is counted."""
     tolerance: float = 0.2
-    """As long as nobody is lost, no action pays once the expected error is within this share of the best achievable one."""
+    """With nobody lost, no action pays once the expected error is within this share of the best achievable one."""
 
 
 class Click(NamedTuple):

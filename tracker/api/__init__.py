@@ -2,3 +2,5 @@
 
 Imports all rooms of the tracker; none imports it. docs/library.md describes it.
 """
+
+__all__ = ["pose_series", "results", "sessions", "work"]

@@ -4,3 +4,14 @@ The room imports `compute`, `geometry`, `body`, `images`, `contours` and `eviden
 and the `limb_score.LimbScorer` that it makes; `region_learning.learn_regions`, the `region_model.RegionModel` that it
 returns, `region_limb_scorer.RegionLimbScorer` and `region_deficit.elsewhere_nats`.
 """
+
+__all__ = [
+    "background_density",
+    "part_colors",
+    "part_drawing",
+    "region_cells",
+    "region_deficit",
+    "region_learning",
+    "region_limb_scorer",
+    "region_model",
+]

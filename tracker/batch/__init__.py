@@ -3,3 +3,5 @@
 Imports `pipeline`, `api` and what stands below them. Callers use `plan.read_plan`, `manifest.Manifest`, `worker.work`
 and `results.summarize`; local processes, a job array and a cluster all run `worker.work`.
 """
+
+__all__ = ["manifest", "plan", "results", "worker"]

@@ -134,11 +134,14 @@ def _errors_mm(poses: PoseSeries) -> np.ndarray:
 def _worst(
     people: Sequence[PoseSeries], errors_mm: Sequence[np.ndarray], doubted: Sequence[np.ndarray]
 ) -> tuple[int | None, str]:
-    """Return the frame and the person to look at first: doubted ones before others, then the largest error."""
+    """Return the frame and the person to look at first: doubted ones before others, then the largest error.
+
+    Keyframes are left out unless there is nothing else: a person has seen them.
+    """
     found = [
-        (bool(d), float(np.nan_to_num(e)), -int(frame), poses.person)
+        (not seen, bool(d), float(np.nan_to_num(e)), -int(frame), poses.person)
         for poses, errors, doubts in zip(people, errors_mm, doubted, strict=True)
-        for frame, e, d in zip(poses.frames, errors, doubts, strict=True)
+        for frame, e, d, seen in zip(poses.frames, errors, doubts, poses.keyframes, strict=True)
     ]
     if not found:
         return None, ""

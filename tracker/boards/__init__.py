@@ -3,3 +3,5 @@
 Imports `calibration`, `footage` and `formats`; knows no session. Callers use `board_description.read_board`,
 `board_footage.read_corners` and `board_calibration.calibrate_rig`.
 """
+
+__all__ = ["board_description", "footage_calibration"]

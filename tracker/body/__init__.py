@@ -3,3 +3,5 @@
 Imports `compute` and `geometry`. Callers use `model.BodyModel` and `PosedBody`, the schema in `parts`, `dimensions`,
 `limbs`, and the kernels of `kinematics`.
 """
+
+__all__ = ["dimensions", "kinematics", "limbs", "model", "parts", "searches"]

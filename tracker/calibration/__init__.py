@@ -4,3 +4,16 @@
 `acquisition` and the rooms below. `camera_columns.project_with_columns` differentiates projections by a camera, and
 `point_adjustment.adjust_points` fits cameras and points to reprojection errors.
 """
+
+__all__ = [
+    "camera_columns",
+    "camera_correction",
+    "diagnosis",
+    "findings",
+    "lens_priors",
+    "point_adjustment",
+    "reprojection",
+    "residual_pieces",
+    "single_frames",
+    "viewed_frames",
+]

@@ -3,3 +3,5 @@
 Imports `geometry` and `formats`; knows no session. `reading.read_cameras` reads files, `layouts.LAYOUTS` is the table,
 `pose_conventions` tests where the cameras look and stand.
 """
+
+__all__ = ["calibration_layout", "convention_names", "pose_conventions", "reading", "units", "writing"]

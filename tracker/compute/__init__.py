@@ -4,3 +4,15 @@ It imports no other room.
 
 Public: `numba_options`, `threads`, `quantiles`, `progress`, and of `kernel_cache` which kernels are compiled.
 """
+
+__all__ = [
+    "extensions",
+    "float32",
+    "interpretation",
+    "jit",
+    "kernel_cache",
+    "numba_options",
+    "progress",
+    "quantiles",
+    "threads",
+]

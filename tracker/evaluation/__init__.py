@@ -3,3 +3,5 @@
 Imports `geometry`, `body`, `formats`, `session` and `store`. Callers use `metrics.evaluate_joints`,
 `metrics.evaluate_poses` and `references.read_reference`.
 """
+
+__all__ = ["metric", "metrics", "references", "stored_evaluation"]

@@ -4,3 +4,5 @@ view.
 The room imports `geometry`, `footage` and `images`, and knows no body. Callers use `observer.Observer` and
 `view_evidence`.
 """
+
+__all__ = ["camera_exchange", "keypoints", "observer", "shared_observers", "silhouettes", "view_evidence"]

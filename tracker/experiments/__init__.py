@@ -4,3 +4,5 @@ The room imports every room of the tracker below it. Callers use `contour_experi
 `contour_report.write_contour_report`. Evidence is synthetic: contours of a posed body or of a skinned person, drawn
 without an image.
 """
+
+__all__ = ["contour_experiment", "contour_report"]

@@ -5,3 +5,21 @@ The room imports `compute`, `geometry`, `body`, `images`, `contours` and `eviden
 `contour_residuals`, `interpenetration`, `pins` and `retarget`. `observability`, `observability_reasons` and
 `added_camera` say how well views constrain a pose.
 """
+
+__all__ = [
+    "added_camera",
+    "bundle",
+    "clocked_residuals",
+    "consensus",
+    "contour_residuals",
+    "gauss_newton",
+    "gauss_newton_compiled",
+    "hypothesis",
+    "interpenetration",
+    "keypoints",
+    "limb_exchange",
+    "observability",
+    "observability_reasons",
+    "pins",
+    "retarget",
+]

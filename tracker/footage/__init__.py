@@ -3,3 +3,16 @@
 A frame is bit-identical however it is reached. Imports `geometry`. Callers use `recording.Recording`,
 `camera_source.CameraSource`, `video.open_footage`, `proxy.Proxy` and `video_writer.VideoWriter`.
 """
+
+__all__ = [
+    "camera_source",
+    "flash",
+    "frame_rates",
+    "image_file",
+    "image_folder",
+    "proxy",
+    "recording",
+    "sound",
+    "video",
+    "video_writer",
+]

@@ -3,3 +3,25 @@
 Imports `geometry` and `body`; knows no session. Callers use the modules: `anipose`, `model_toml`, `pose_csv`, `trc`,
 `joint_maps`.
 """
+
+__all__ = [
+    "anipose",
+    "bvh",
+    "bvh_reading",
+    "c3d",
+    "camera_section",
+    "exact_text",
+    "file_axes",
+    "file_names",
+    "joint_maps",
+    "json_numbers",
+    "model_toml",
+    "motion_csv",
+    "number_rows",
+    "opensim_model",
+    "opensim_mot",
+    "plain_data",
+    "points_csv",
+    "pose_csv",
+    "trc",
+]

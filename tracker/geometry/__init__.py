@@ -3,3 +3,18 @@
 Imports `compute`. Callers use the modules: `arrays`, `rigid`, `cameras`, `ground_plane`, `shapes`, `segment_distance`,
 `triangulation`.
 """
+
+__all__ = [
+    "arrays",
+    "camera_rig",
+    "cameras",
+    "euler",
+    "framing",
+    "ground_plane",
+    "lens_tables",
+    "lenses",
+    "rigid",
+    "segment_distance",
+    "shapes",
+    "triangulation",
+]

@@ -4,3 +4,18 @@ The room knows neither bodies nor footage and imports only `compute` and `geomet
 `background_subtraction`, `image_statistics`, `edges`, `edge_segments`, `silhouette_contour`, `static_edges`,
 `distance_transform` and `color_histogram`.
 """
+
+__all__ = [
+    "background_model",
+    "background_subtraction",
+    "change",
+    "color_histogram",
+    "distance_transform",
+    "edge_segments",
+    "edges",
+    "image_statistics",
+    "silhouette_cleaning",
+    "silhouette_contour",
+    "static_edges",
+    "working_view",
+]

@@ -4,3 +4,5 @@ May import the rooms below it, up to `tracking.chamfer`. Callers ask `first_pose
 people on given frames, and `first_pose.find_first_poses_anywhere` for those on the best of them. Generators propose
 (`tracker.initialization.generators`). This room fits, searches, tracks and compares (`start_choice.compare_starts`).
 """
+
+__all__ = ["first_pose"]

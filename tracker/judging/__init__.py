@@ -2,3 +2,5 @@
 
 The top room of the library. Contours and colours are evidence that detectors of key points do not use.
 """
+
+__all__ = ["judge", "verdicts"]

@@ -3,3 +3,5 @@
 Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose`,
 `smoothing.smooth_poses`, `consistency.inconsistent_frames` and `keyframe_doubts`.
 """
+
+__all__ = ["consistency", "interpolation", "keyframe_doubts", "prediction", "smoothing", "velocity"]

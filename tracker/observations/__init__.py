@@ -4,3 +4,5 @@ Imports `geometry`, `body`, `formats`, `footage` and `session`. Callers use `obs
 `observed.ObservedJoints`, `stored.load_observations`, `stored.list_observations`, `importing.plan_import`,
 `importing.store_import`, `joints.observed_joints` and `joints.triangulate_observations`.
 """
+
+__all__ = ["body_points", "importing", "joints", "observed", "placing", "readers", "request", "stored", "stored_files"]

@@ -7,7 +7,6 @@ reprojected points of the frame before are nearest (the Hungarian method, in eac
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.observations.triangulation import INLIER_M, Views, triangulate_points
@@ -59,6 +58,8 @@ def _follow(
     views: Views, points_px: Array, confidence: Array, is_present: Mask, frame: int, tracks: list[_Track]
 ) -> None:
     """Assign the detections of a frame to the tracks, and begin tracks with those that are left."""
+    from scipy.optimize import linear_sum_assignment  # imported lazily: it takes a third of a second
+
     taken: dict[int, dict[int, int]] = {}
     left = {(v, int(d)) for v in range(len(is_present)) for d in np.flatnonzero(is_present[v])}
     for v in range(len(is_present)):

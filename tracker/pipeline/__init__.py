@@ -3,3 +3,25 @@
 The top of the library: it may import every room of `tracker`. The command line and the page use
 `find_people.find_people`, `body_acquisition.acquire_body`, `stored_run.stored_run` and `track_session.TrackSession`.
 """
+
+__all__ = [
+    "audit",
+    "body_acquisition",
+    "body_change",
+    "calibration_check",
+    "calibration_revisions",
+    "chain",
+    "find_people",
+    "given_pose",
+    "keyframe_stretches",
+    "keypoint_evidence",
+    "keypoint_poses",
+    "methods",
+    "pose_check",
+    "posed_recording",
+    "run_repair",
+    "seen_points",
+    "stored_run",
+    "track_session",
+    "tracked_changes",
+]

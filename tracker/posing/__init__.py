@@ -3,3 +3,16 @@
 The room imports `geometry`, `body`, `evidence`, `fitting` and `tracking.chamfer`. Callers use `grab`, `drag`,
 `edits`, `orient`, `picking`, `pinned_fit` and `default_pose`.
 """
+
+__all__ = [
+    "character",
+    "default_pose",
+    "drag",
+    "edits",
+    "grab",
+    "limb_moves",
+    "orient",
+    "picking",
+    "pinned_fit",
+    "placed_depth",
+]

@@ -3,3 +3,20 @@
 Imports `geometry`, `body`, `formats` and `footage`. Callers use `session.load_session`, `lock.SessionLock`,
 `assemble.assemble` and `locked_dofs`.
 """
+
+__all__ = [
+    "assemble",
+    "clocks",
+    "folder",
+    "frame_list",
+    "holder",
+    "lock",
+    "locked_dofs",
+    "matching",
+    "missing_files",
+    "relink",
+    "rig_summary",
+    "session",
+    "session_file",
+    "synchronize",
+]

@@ -3,3 +3,16 @@
 Imports `geometry`, `body`, `formats` and the lock of `session`. Callers use `annotation_store.AnnotationStore`, the
 records of `records`, the rows of `task_log`, `annotator`, `stored_poses` and `backups`.
 """
+
+__all__ = [
+    "annotation_store",
+    "annotator",
+    "backups",
+    "calibration_log",
+    "edit_log",
+    "edit_tree",
+    "identities",
+    "records",
+    "stored_poses",
+    "task_log",
+]

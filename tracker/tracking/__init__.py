@@ -3,3 +3,17 @@
 It may import geometry, body, motion, images, contours, evidence, fitting and appearance. Public: `tracker.Tracker` and
 `TrackingRun`, `subjects.Subjects`, `estimate.PoseEstimate`, `confidence.Status`.
 """
+
+__all__ = [
+    "confidence",
+    "estimate",
+    "evidence_assignment",
+    "method",
+    "person_memory",
+    "pose_errors",
+    "run_confidence",
+    "subjects",
+    "tracker",
+    "view_regions",
+    "view_tracks",
+]

@@ -49,9 +49,13 @@ def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> Non
 
     Ctrl+C stops it; run it again to go on. Recordings that fail are listed with the reason, and the others go on.
     """
+    from platformdirs import user_state_path
+
     from app.cli.batches import local, morning
+    from app.session.recent_sessions import TABLE_FILE, remember_batch
     from tracker.batch.manifest import Manifest
     from tracker.batch.plan import read_plan
+    from tracker.files import write_text_atomic
 
     out = arguments.out or arguments.plan.with_name(arguments.plan.stem + _SUFFIX)
     _check(arguments)
@@ -73,6 +77,8 @@ def command(arguments: Annotated[BatchArguments, tyro.conf.arg(name="")]) -> Non
     if not arguments.table and not manifest.is_finished():
         is_stopped = _run(manifest, arguments, progress)
     found = morning.record(manifest)
+    write_text_atomic(manifest.folder / TABLE_FILE, format_json(found))
+    remember_batch(user_state_path("quadrille", appauthor=False), manifest.folder)
     if arguments.report is not None:
         from app.export.batch_report import write_batch_report
 

@@ -6,7 +6,7 @@ import pytest
 
 from app.runtime import restart
 from app.server.session_routes import refusal
-from app.session.recent_sessions import recent_sessions, remember
+from app.session.recent_sessions import TABLE_FILE, recent_sessions, remember, remember_batch
 from tracker.session.lock import SessionLock
 from tracker.session.session import load_session
 
@@ -24,8 +24,26 @@ async def test_recent_sessions_are_listed_and_one_is_opened(folders, serve):
         (str(dance), "dance")
     ]  # neither this one nor a lost one
     assert json.loads((await client.open({"folder": str(dance)}))[1]) == {"name": "dance"}
-    assert client.routes.chosen == dance
+    assert client.routes.chosen == (dance, 0, "")
     assert client.routes.is_chosen.is_set()
+
+
+async def test_the_last_batches_are_listed_and_a_recording_is_opened_at_a_frame(folders, serve, tmp_path):
+    _, dance, state = folders
+    for name, text in {"a": '{"totals": {}, "recordings": []}', "broken": "{", "odd": "[1]"}.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / TABLE_FILE).write_text(text)
+        remember_batch(state, tmp_path / name)
+    client = await serve()
+    listed = json.loads((await client.get("/sessions"))[1])
+    assert listed["batches"] == [{"name": "a", "totals": {}, "recordings": []}]
+    assert [r["name"] for r in listed["recent"]] == []
+    person = load_session(dance).people[0].name
+    for body, expected in (({"frame": 10**6}, "expected a frame from 0"), ({"person": "eve"}, "expected a person")):
+        status, text = await client.open({"folder": str(dance)} | body)
+        assert (status, expected in text) == (400, True)
+    assert (await client.open({"folder": str(dance), "frame": 1, "person": person}))[0] == 200
+    assert client.routes.chosen == (dance, 1, person)
 
 
 async def test_what_is_no_session_to_open_is_refused_in_a_sentence(folders, serve, tmp_path):

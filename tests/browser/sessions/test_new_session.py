@@ -9,7 +9,7 @@ import pytest
 import pytest_asyncio
 from page_driver import shows, until
 
-LISTED = {"refusal": None, "folder": "/data/here", "recent": []}
+LISTED = {"refusal": None, "folder": "/data/here", "recent": [], "batches": []}
 STARTED = {"steps": [], "at": 0, "folder": "/data/new"}
 NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")
 FOLDERS = {

@@ -8,7 +8,19 @@ from page_driver import shows
 
 RECENT = {"refusal": None, "folder": "/data/here", "recent": [
     {"folder": "/data/walks/dance", "name": "dance", "opened": "2026-03-04T10:00:00+00:00"},
-]}  # fmt: skip
+], "batches": []}  # fmt: skip
+BATCH = {
+    "name": "night_batch",
+    "totals": {"done": 1, "failed": 1, "running": 0, "waiting": 0, "hours": 3.25, "share_verified": 0.1},
+    "recordings": [
+        {"name": "<b>lab</b>", "session": "/data/lab", "state": "failed", "expected_error_mm": None, "share_doubted": 0,
+         "poses": 0, "verified": 0, "worst_frame": None, "worst_person": "", "seconds": 1, "contradiction": "",
+         "error": "expected footage, found none; put it back"},
+        {"name": "walk", "session": "/data/walk", "state": "done", "expected_error_mm": 21.34, "share_doubted": 0.25,
+         "poses": 40, "verified": 4, "worst_frame": 17, "worst_person": "ann", "seconds": 63.2,
+         "contradiction": "camera 'LEFT' seems off", "error": ""},
+    ],
+}  # fmt: skip
 STARTED = {"steps": [], "at": 0, "folder": "/data/here"}
 WHY = "expected a page that only its user can open, found one without a token"
 
@@ -73,10 +85,35 @@ async def test_where_no_session_was_opened_before_a_new_one_is_offered(fresh_pag
 async def test_where_no_session_can_be_made_the_page_says_why(fresh_page):
     page = fresh_page
     await page.route(
-        re.compile(r"/sessions(/|$)"), lambda route: route.fulfill(json={"refusal": WHY, "folder": "", "recent": []})
+        re.compile(r"/sessions(/|$)"),
+        lambda route: route.fulfill(json={"refusal": WHY, "folder": "", "recent": [], "batches": []}),
     )
     await page.keyboard.press("Control+k")
     await page.keyboard.type("new session")
     await page.keyboard.press("Enter")
     await page.get_by_text(WHY).first.wait_for()
     assert not await page.locator("#new-session").is_visible()
+
+
+async def test_a_recording_of_a_batch_is_opened_at_its_worst_frame(fresh_page):
+    page, posted = fresh_page, []
+
+    async def answer(route):
+        if route.request.url.endswith("/open"):
+            posted.append(json.loads(route.request.post_data))
+            await route.fulfill(json={"name": "walk"})
+        else:
+            await route.fulfill(json=RECENT | {"batches": [BATCH]})
+
+    await page.route(re.compile(r"/sessions(/|$)"), answer)
+    await page.route("**/starting.json", lambda route: route.fulfill(json=STARTED))
+    await page.keyboard.press("Control+o")
+    await page.get_by_text("night_batch").click()
+    table = page.locator(".batch table")
+    assert (await table.locator("tbody tr").all_inner_texts())[1].split("\t")[1:] == ["21.3", "25%", "4/40", "63"]
+    assert "<b>lab</b>" in await table.inner_text()
+    assert "camera 'LEFT' seems off" in await table.inner_text()
+    assert await table.locator("button").count() == 1
+    await table.get_by_role("button", name="walk").click()
+    await shows(page, "!document.querySelector('#sessions-panel').matches(':popover-open')")
+    assert posted == [{"folder": "/data/walk", "frame": 17, "person": "ann"}]

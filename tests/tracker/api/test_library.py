@@ -9,6 +9,7 @@ from command_line import SAMPLE
 from stored_motions import store_motion
 
 import tracker
+from tracker.api.sessions import frames_of
 from tracker.evaluation.references import read_joints
 from tracker.pipeline.given_pose import set_pose_at_joints
 
@@ -58,6 +59,11 @@ def test_a_range_of_frames_is_read_and_exported(stored, tmp_path):
 def test_wrong_arguments_are_a_sentence(stored, call, words):
     with pytest.raises(tracker.TrackerError, match=words):
         call(stored[0])
+
+
+@pytest.mark.parametrize("frames", [[3], range(3, 4), [1, 3, 5], None])
+def test_frames_at_one_distance_are_a_range(stored, frames):
+    assert isinstance(frames_of(stored[0], frames), range)
 
 
 def test_a_name_alone_is_no_list_of_names(stored):

@@ -64,7 +64,7 @@ def test_a_leg_is_found_that_all_tracks_have_elsewhere(walk):
     found = last.found[0]
     assert sorted(found) == list(range(N_FRAMES))
     for k, is_wrong in enumerate(walk.wrong):
-        pose, trust, elsewhere, against = found[k]
+        pose, trust, elsewhere, against, _ = found[k]
         assert elsewhere[leg] < 5
         assert len(against) == len(elsewhere)
         if is_wrong:

@@ -3,3 +3,5 @@
 Imports `geometry` and `body`; knows no session. Callers use `picture_table.PictureTable` and the modules: `openpose`,
 `coco`, `deeplabcut`, `sleap_files`.
 """
+
+__all__ = ["coco", "coco_patching", "coco_reading", "deeplabcut", "hdf5", "openpose", "picture_table"]

@@ -2,3 +2,5 @@
 
 May import the rooms below it, up to `search`. Callers take proposals from `start_generators.GENERATORS`.
 """
+
+__all__ = ["person_scene", "silhouette_overlap", "start_generators", "stature"]

@@ -1,1 +1,3 @@
 """Motion of simulated people: postures, choreography, solo moves, couples, scenes."""
+
+__all__ = ["postures", "scenes"]

@@ -1,1 +1,3 @@
 """The stage of a simulated recording: room, furniture, cameras, rendering, video."""
+
+__all__ = ["camera_rig", "film", "rasterizer", "room"]

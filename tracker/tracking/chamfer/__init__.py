@@ -3,3 +3,5 @@
 It may import compute, search, and what `tracker.tracking.estimation` may. Public: `tracker.ChamferTracker`,
 `settings.TrackSettings`, `settings.pose_cost` and `settings.search_frame`.
 """
+
+__all__ = ["method", "settings", "tracker"]

@@ -3,3 +3,5 @@
 It may import compute, and what `tracker.tracking.estimation` may. Public: `tracker.ContourTracker`,
 `settings.ContourSettings` and `paper.paper_settings`.
 """
+
+__all__ = ["fit_steps", "method", "paper", "paper_fit", "settings"]

@@ -5,3 +5,19 @@ Trackers share it: a method brings settings that extend `settings.EstimationSett
 `forward_pass.track_forward`, `backward_pass.track_backward`, `frame_problem.FrameProblem`, `pose_score`,
 `settings`.
 """
+
+__all__ = [
+    "alternative_poses",
+    "assessment",
+    "backward_pass",
+    "forward_pass",
+    "frame_estimator",
+    "frame_problem",
+    "incremental_fit",
+    "limb_repair",
+    "options",
+    "part_evidence",
+    "pose_score",
+    "settings",
+    "start_pose",
+]

@@ -3,3 +3,16 @@
 It may import compute, geometry, body, evidence, voxels, fitting and `tracker.tracking`. Public:
 `tracker.VoxelTracker`, `settings.VoxelSettings`, `paper.paper_settings`, `labels.label_voxels`.
 """
+
+__all__ = [
+    "body_pose",
+    "figure",
+    "frame_estimator",
+    "frame_voxels",
+    "labels",
+    "levels",
+    "measurement",
+    "method",
+    "settings",
+    "state",
+]

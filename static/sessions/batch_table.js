@@ -1,0 +1,69 @@
+/** The table of a batch: a row for each recording, the one that needs a person most first. */
+
+/**
+ * @typedef {{name: string, session: string, state: string, expected_error_mm: number | null, share_doubted: number,
+ *   poses: number, verified: number, worst_frame: number | null, worst_person: string, seconds: number,
+ *   contradiction: string, error: string}} BatchRow
+ * @typedef {{done: number, failed: number, running: number, waiting: number, hours: number, share_verified: number}} Totals
+ * @typedef {{name: string, totals: Totals, recordings: BatchRow[]}} Batch
+ */
+
+const HEADS = ["Recording", "Error, mm", "Doubted", "Verified", "Seconds"];
+const STATES = /** @type {const} */ (["done", "failed", "running", "waiting"]);
+
+/**
+ * Make the table of a batch.
+ *
+ * @param {Batch} batch
+ * @param {(folder: string, at: {frame: number, person: string}) => void} open opens a session at its worst frame
+ */
+export function batchTable({ name, totals, recordings }, open) {
+  const box = document.createElement("details");
+  box.className = "batch";
+  const summary = document.createElement("summary");
+  const counts = STATES.filter((state) => totals[state]).map((state) => `${totals[state]} ${state}`);
+  const verified = `${Math.round(100 * totals.share_verified)}% verified, ${totals.hours.toFixed(1)} hours of workers`;
+  const title = document.createElement("b");
+  title.textContent = name;
+  summary.append(title, ` ${counts.join(", ")}; ${verified}`);
+  const table = document.createElement("table");
+  const head = table.createTHead().insertRow();
+  for (const text of HEADS) head.append(Object.assign(document.createElement("th"), { textContent: text, scope: "col" }));
+  const body = table.createTBody();
+  for (const row of recordings) addRow(body.insertRow(), row, open);
+  box.append(summary, table);
+  return box;
+}
+
+/**
+ * @param {HTMLTableRowElement} line
+ * @param {BatchRow} row
+ * @param {(folder: string, at: {frame: number, person: string}) => void} open
+ */
+function addRow(line, row, open) {
+  const first = line.insertCell();
+  if (row.state === "done") {
+    const button = document.createElement("button");
+    const at = { frame: row.worst_frame ?? 0, person: row.worst_person };
+    Object.assign(button, { type: "button", textContent: row.name });
+    button.title = `Close this session and open ${row.name} at frame ${at.frame}, where it is worst`;
+    button.addEventListener("click", () => open(row.session, at));
+    first.append(button);
+  } else {
+    first.append(row.name);
+  }
+  const note = row.error || row.contradiction;
+  if (note) {
+    const small = Object.assign(document.createElement("small"), { textContent: note });
+    small.classList.toggle("is-failed", row.error !== "");
+    first.append(small);
+  }
+  const isTracked = row.poses > 0;
+  const cells = [
+    row.expected_error_mm === null ? row.state.replace("done", "") : row.expected_error_mm.toFixed(1),
+    isTracked ? `${Math.round(100 * row.share_doubted)}%` : "",
+    isTracked ? `${row.verified}/${row.poses}` : "",
+    row.seconds ? row.seconds.toFixed(0) : "",
+  ];
+  for (const text of cells) line.insertCell().textContent = text;
+}

@@ -1,0 +1,131 @@
+"""`quadrille batch`: ways to run it that exclude one another, memory, scripts of a job array, the table."""
+
+import json
+import os
+import subprocess
+from dataclasses import replace
+
+import pytest
+from bodies import MODELS
+from command_line import assert_refused
+from stored_motions import store_motion
+
+from app.cli.batches.local import n_workers
+from tracker.batch.manifest import Manifest, Result
+from tracker.store.annotation_store import AnnotationStore
+from tracker.store.records import PoseChange
+
+GB = 1 << 30
+
+
+@pytest.fixture
+def plan(tmp_path):
+    """A plan of two sessions with poses in a folder whose name has a space."""
+    folder = tmp_path / "my lab"
+    folder.mkdir()
+    for name in ("a", "b"):
+        store_motion(folder / name, [MODELS["gavrila38"]], n_frames=4, lost={(0, 2)} if name == "b" else ())
+    path = folder / "plan.toml"
+    path.write_text('sessions = ["a", "b"]')
+    return path
+
+
+@pytest.fixture
+def ended(plan, run):
+    """The same after a batch in which a was tracked, and b was not."""
+    run("batch", plan, "--slurm")
+    manifest = Manifest.load(plan.with_name("plan_batch"))
+    for task, result in zip(
+        manifest.tasks,
+        (
+            Result("done", "host 1", 5.0, 4.0, 0, {"ann": {"good": 4}}, "camera 'C' seems off"),
+            Result("failed", error="expected footage, found none", remedy="relink", remedy_fields={"session": "b"}),
+        ),
+        strict=True,
+    ):
+        claimed, held = manifest.claim_next()
+        assert claimed == task
+        assert manifest.finish(task, held, result)
+    return plan
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--slurm", "--workers", "2"], "expected one of --slurm, --workers, found all of them"),
+        (["--dask", "tcp://x", "--table"], "expected one of --table, --dask"),
+        (["--workers", "0"], "expected --workers as a whole number from 1, found 0"),
+        (["--table"], "expected the folder of a batch, found no tasks"),
+    ],
+)
+def test_wrong_words_are_a_sentence(run, plan, words, expected):
+    assert_refused(run("batch", plan, *words), expected)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "n_tasks", "cores", "free", "n"),
+    [
+        (None, 40, 8, 64 * GB, 8),
+        (16, 40, 8, 64 * GB, 16),
+        (8, 3, 8, 64 * GB, 3),
+        (8, 40, 8, 5 * GB, 2),
+        (4, 9, 4, 1, 1),
+    ],
+)
+def test_memory_bounds_the_workers_and_that_is_said(wanted, n_tasks, cores, free, n):
+    found, note = n_workers(wanted, n_tasks, cores, free)
+    assert found == n
+    assert bool(note) == (n < min(wanted or cores, n_tasks))
+    if note:
+        assert f"{n} of {min(wanted or cores, n_tasks)} workers are started" in note
+    assert n_workers(wanted, n_tasks, cores, None) == (min(wanted or cores, n_tasks), "")
+
+
+def test_the_scripts_of_a_job_array_are_shell_and_name_what_is_there(run, plan):
+    status, out, _ = run("batch", plan, "--slurm")
+    assert status == 0
+    assert out.count("sbatch") == 3
+    folder = plan.with_name("plan_batch")
+    for name in ("kernels.sh", "array.sh", "merge.sh"):
+        subprocess.run(["sh", "-n", str(folder / name)], check=True)
+        assert os.access(folder / name, os.X_OK)
+    assert "--array=0-1" in (folder / "array.sh").read_text()
+
+
+def test_the_table_puts_failures_first_and_opens_at_the_worst_frame(run, ended):
+    status, out, _ = run("batch", ended, "--table", "--json")
+    assert status == 1
+    found = json.loads(out)
+    failed, done = found["recordings"]
+    assert (failed["name"], done["name"]) == ("b", "a")
+    assert failed["error"].startswith("expected footage, found none; ")
+    assert "relink" in failed["error"]
+    assert (done["poses"], done["contradiction"]) == (4, "camera 'C' seems off")
+    assert found["totals"]["done"] == found["totals"]["failed"] == 1
+    text = run("batch", ended, "--table")[1]
+    assert "1 done, 1 failed" in text
+    assert done["open"] in text
+
+
+def test_what_a_person_verified_counts_and_is_no_longer_doubted(run, ended):
+    folder = ended.with_name("a")
+    store = AnnotationStore(folder / "annotations.sqlite")
+    record = store.pose("ann", 1)
+    store.commit("set", [PoseChange("ann", 1, replace(record, keyframe=True, status="lost"))])
+    store.close()
+    done = json.loads(run("batch", ended, "--table", "--json")[1])["recordings"][1]
+    assert (done["verified"], done["share_doubted"]) == (1, 0.0)
+
+
+def test_the_report_is_one_file_that_escapes_names(run, ended, tmp_path):
+    run("batch", ended, "--table", "--report", tmp_path / "m.html")
+    text = (tmp_path / "m.html").read_text()
+    assert "quadrille open" in text
+    assert "camera &#x27;C&#x27; seems off" in text
+    assert "http" not in text
+
+
+def test_failed_tasks_are_tried_again_on_demand(run, ended):
+    run("batch", ended, "--retry", "--slurm")
+    manifest = Manifest.load(ended.with_name("plan_batch"))
+    assert manifest.counts() == {"done": 1, "waiting": 1}
