@@ -20,7 +20,7 @@ const timeline = timelineRoom.mount(context, panes);
 const search = searchRoom.mount(context, timeline);
 const scene = sceneRoom.mount(context, panes);
 const sessions = sessionsRoom.mount(context);
-const inspector = inspectorRoom.mount(context, { panes, posing, scene, sessions });
+const inspector = inspectorRoom.mount(context, { panes, posing, timeline, scene, sessions });
 const annotation = annotationRoom.mount(context, { panes, inspector });
 const bindings = shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector, annotation, sessions });
 exposeState(context, panes.grid, bindings);

@@ -32,6 +32,7 @@ from app.control.session.comparing import Comparing
 from app.control.session.footage_scan import FootageScan
 from app.control.session.history import History
 from app.control.session.kernel_warmup import KernelWarmup
+from app.control.session.other_copy import OtherCopies
 from app.control.session.proposing import Proposing
 from app.control.session.save_retry import SaveRetry
 from app.control.session.session_state import SessionState
@@ -109,6 +110,8 @@ class Controller:
         self._pose_checks = PoseChecks(session_state)
         self.alternatives = Alternatives(session_state, activities, self._pose_checks.check)
         """Replaces poses by their alternatives."""
+        self.other_copies = OtherCopies(session_state, activities, self._pose_checks.check)
+        """Compares with another copy of the session."""
         self.body_sizes = BodySizeEditing(session_state, runs, activities)
         """Edits the sizes of bodies."""
         self.body_acquisition = BodyAcquisition(session_state)
@@ -189,6 +192,7 @@ class Controller:
         self.annotating.close()
         self.proposing.close()
         self.comparing_runs.close()
+        self.other_copies.close()
         self._footage_scan.close()
         if self._compiling is not None:
             self._compiling.close()

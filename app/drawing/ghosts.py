@@ -1,4 +1,4 @@
-"""Draw the poses that are about as good as the shown one: the limbs that are elsewhere."""
+"""Draw poses beside the shown one: limbs that are elsewhere in poses about as good, and the poses of another copy."""
 
 import numpy as np
 
@@ -33,6 +33,23 @@ def ghost_lines(session: Session, state: State, view: View) -> list[Path]:
             contour = occluding_contours.trace([body.ahead(time)], camera, PIECE_PX * max(1.0, max(camera.size) / 640))
             pieces = contour.pieces_px[np.isin(contour.parts, parts) & ~contour.occluded]
             out.append(Path(index, person, "alternative", KIND_COLORS["alternative"], pieces))
+    return out
+
+
+def copy_lines(session: Session, state: State, view: View) -> list[Path]:
+    """Draw the poses that another copy of the session has on the shown frame."""
+    copy, out = state.other_copy, list[Path]()
+    if copy is None or "contours" not in view.layers or "contours" not in state.compiled:
+        return out
+    for person, poses in enumerate(copy.poses):
+        body = poses.get(state.frame)
+        if body is None or person in state.undrawn:
+            continue
+        for index in picture_times(session, state.frame, view.cameras):
+            camera = session.cameras[index].camera.pinhole
+            contour = occluding_contours.trace([body], camera, PIECE_PX * max(1.0, max(camera.size) / 640))
+            pieces = contour.pieces_px[~contour.occluded]
+            out.append(Path(index, person, "other_copy", KIND_COLORS["other_copy"], pieces))
     return out
 
 

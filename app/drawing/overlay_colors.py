@@ -27,6 +27,7 @@ KIND_COLORS = {
     "preview": PROPOSAL,
     "alternative": PROPOSAL,
     "new_sizes": PROPOSAL,
+    "other_copy": NEUTRAL,
     "former": NEUTRAL,
     "part_edge": PART_EDGE,
     "epipolar": MARK,

@@ -42,7 +42,7 @@ _EDGE_STRIDE_PX = 3
 PathKind = Literal[
     "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
     "former", "result", "residual", "part_edge", "epipolar", "accepted", "rejected", "floor", "floor_sight", "error",
-    "imported", "imported_off",
+    "imported", "imported_off", "other_copy",
 ]  # fmt: skip
 Side = Literal["left", "right", ""]
 SIDES: tuple[Side, ...] = get_args(Side)

@@ -1,6 +1,6 @@
 """Messages from the page to the program: the one declaration of their types, fields and limits.
 
-`message_parsing` checks messages against these declarations, `protocol_docs` writes the page's types and
+`message_parsing` checks messages by these declarations. `tests/recipes/protocol_docs.py` writes the page's types and
 docs/protocol.md from them.
 Messages that change poses or run searches are in `pose_messages` and `search_messages`, those of the inspector in
 `inspector_messages`.
@@ -27,7 +27,7 @@ from app.page.inspector_messages import (
     SetView3d,
 )
 from app.page.message_types import Command, Frame, Index, Name, Number
-from app.page.observation_messages import UseObservations
+from app.page.observation_messages import SetCopyTolerance, UseCopy, UseObservations, WatchProvenance
 from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack
 from app.page.search_messages import (
     AskReason,
@@ -259,7 +259,7 @@ ClientMessage: TypeAlias = Union[  # noqa: UP007
     StartTracking, ControlTracking, EditRange, CompareRange, StopRange, ToggleMark, ConfirmKeyframe,
     FollowTracking,
     SetTrackSettings, SetView3d, SetHeight, SetPartSizes, SetGirdleWidth, CoupleSides, ApplySizes, ChangeBody,
-    DraftSizes, AcquireSizes, FindPeople, CheckCalibration, UseObservations,
+    DraftSizes, AcquireSizes, FindPeople, CheckCalibration, UseObservations, WatchProvenance, UseCopy, SetCopyTolerance,
     PlanTasks, DecideTask, WriteComment, ResolveComment, AskNextClick,
     EditFloor, MarkFloor, Undo, Redo, GoTo, Save,
 ]  # fmt: skip

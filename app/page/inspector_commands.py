@@ -11,7 +11,7 @@ from app.page import annotation_messages as plan_wire
 from app.page import inspector_messages as wire
 from app.page.message_parsing import MessageError
 from app.page.message_types import Command
-from app.page.observation_messages import UseObservations
+from app.page.observation_messages import SetCopyTolerance, UseCopy, UseObservations
 from tracker.annotation.frame_choice import FrameChoice
 from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.formats.model_toml import PRESETS
@@ -136,6 +136,13 @@ def _comment(controller: Controller, _: int, message: plan_wire.WriteComment) ->
     controller.annotating.comment(message.person, message.frame, message.limb, message.text)
 
 
+def _copy(controller: Controller, _: int, message: UseCopy) -> None:
+    if message.action == "leave":
+        controller.other_copies.leave()
+    else:
+        controller.other_copies.decide(message.person, message.frame, message.action)
+
+
 INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] = {
     wire.SetTrackSettings: _track_settings,
     wire.SetView3d: _view_3d,
@@ -155,4 +162,6 @@ INSPECTOR_COMMANDS: dict[type[Command], Callable[[Controller, int, Any], None]] 
     plan_wire.WriteComment: _comment,
     plan_wire.ResolveComment: lambda controller, _, m: controller.annotating.resolve(m.uid, m.action == "resolve"),
     plan_wire.AskNextClick: lambda controller, _, m: controller.proposing.start(),
+    UseCopy: _copy,
+    SetCopyTolerance: lambda controller, _, m: controller.other_copies.set_tolerance(m.tolerance_mm / 1000),
 }

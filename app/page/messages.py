@@ -13,7 +13,7 @@ from app.drawing.epipolar_check import epipolar_check
 from app.drawing.error_ellipses import error_ellipses
 from app.drawing.floor_lines import floor_lines
 from app.drawing.former_limbs import former_limb_lines
-from app.drawing.ghosts import ghost_lines
+from app.drawing.ghosts import copy_lines, ghost_lines
 from app.drawing.seen_bodies import bodies_in
 from app.page import search_messages
 from app.page import server_messages as wire
@@ -142,6 +142,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         *floor_lines(session, state),
         *former_limb_lines(session, state, view),
         *ghost_lines(session, state, view),
+        *copy_lines(session, state, view),
         *error_ellipses(session, state, view),
     ]:
         count = len(path.segments_px)

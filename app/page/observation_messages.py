@@ -1,8 +1,11 @@
-"""Messages about imported observations, as `message_types` explains."""
+"""Messages about work from elsewhere, as `message_types` explains: imported observations, another copy of the session,
+and where each pose comes from."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from app.page.message_types import Command, Message, Name, Part
+from msgspec import Meta
+
+from app.page.message_types import Command, Frame, Index, Message, Name, Part
 
 # --- from the page --------------------------------------------------------------------------------------------------
 
@@ -18,6 +21,33 @@ class UseObservations(Command, frozen=True, tag="observations"):
     contours alone. `find_people` stops both. `discard` forgets files that were read and are not imported."""
     name: Name = ""
     """Name of the set; with `show`, empty for none."""
+
+
+class WatchProvenance(Command, frozen=True, tag="provenance"):
+    """Ask where the pose of a person comes from, as long as the page shows it. The answer is `provenance`."""
+
+    person: Index | None
+    """Null ends it."""
+    annotators: bool = False
+    """Whether the page filters by annotator, and needs `annotators`."""
+
+
+class UseCopy(Command, frozen=True, tag="other_copy"):
+    """Decide between the poses of this session and of another copy that is compared with it, or end the comparison.
+
+    `POST copies/open` opens a copy: its path comes by such a request alone.
+    """
+
+    action: Literal["keep", "take", "mean", "leave"]
+    person: Index = 0
+    frame: Frame = 0
+
+
+class SetCopyTolerance(Command, frozen=True, tag="other_copy"):
+    """Set up to which distance two poses count as one."""
+
+    action: Literal["tolerance"]
+    tolerance_mm: Annotated[float, Meta(ge=0, le=10_000)]
 
 
 # --- to the page ----------------------------------------------------------------------------------------------------
@@ -88,3 +118,86 @@ class ObservationsMessage(Message, frozen=True, tag="imported"):
     """The limbs that are off, the most likely and farthest first; at most 500."""
     off: int
     """Number of all limbs that are off, of all frames."""
+
+
+class PointProvenance(Part, frozen=True):
+    """Where the place of a point comes from."""
+
+    point: str
+    source: str
+    author: str
+    """Author of the edit that gave it this source; empty for nobody named."""
+    time: str
+    """Time of this edit, ISO 8601, UTC."""
+    views: tuple[str, ...]
+    """Cameras in which a person put it."""
+    lost: float | None
+    """Probability that its limb is lost; null where it was not assessed."""
+
+
+class ProvenanceMessage(Message, frozen=True, tag="provenance"):
+    """Where the stored pose of a person on the shown frame comes from; only for a page that asks for it."""
+
+    frame: int
+    person: int
+    source: str | None
+    """Its most manual source; null without a stored pose."""
+    author: str
+    """Author of the edit that made or marked it; empty for nobody named."""
+    time: str
+    program: str
+    """Version of the program that made the edit."""
+    keyframe: bool
+    reviewed: bool
+    method: str
+    """Method of the tracker, or another program's work; empty where none is known."""
+    between: tuple[int, int] | None
+    """The two keyframes that it was tracked or interpolated between."""
+    seam_mm: float | None
+    """How far the passes from both lie apart."""
+    imported_from: str
+    """Set of observations, or empty."""
+    taken_from: str
+    """Copy of the session that it was taken from, in words; or empty."""
+    body: str
+    """Name of the body model."""
+    body_revision: int
+    is_earlier_body: bool
+    """Whether the person has another body now."""
+    calibration_revision: int
+    is_earlier_calibration: bool
+    """Whether the session has another calibration now."""
+    points: tuple[PointProvenance, ...]
+
+
+class AnnotatorsMessage(Message, frozen=True, tag="annotators"):
+    """Keyframes by the annotator who set or marked them last; only for a page that filters by them."""
+
+    people: tuple[dict[str, tuple[int, ...]], ...]
+    """By person: frames of each annotator, ascending; the name is empty for nobody named."""
+
+
+class CopyDifferenceInfo(Part, frozen=True):
+    """How far two copies differ on a frame that both annotated."""
+
+    frame: int
+    joint: str
+    """Its farthest joint."""
+    distance_mm: float
+    decided: bool
+    """Whether the user has decided between the two poses, and the pose is unchanged since."""
+
+
+class OtherCopyMessage(Message, frozen=True, tag="other_copy"):
+    """The copy of the session that is compared with it."""
+
+    name: str
+    """Of the copy; empty while none is compared."""
+    own_name: str
+    tolerance_mm: float
+    notes: tuple[str, ...]
+    """Sentences on what else differs."""
+    posed: tuple[bool, ...]
+    """Whether the other copy has a pose of each person on the shown frame."""
+    people: tuple[tuple[CopyDifferenceInfo, ...], ...]
+    """By person, ascending by frame."""

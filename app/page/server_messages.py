@@ -1,8 +1,8 @@
 """Text messages from the program to the page: the one declaration of their types and fields.
 
 Messages about searches and poses that deserve a look are in `search_messages`, the inspector's in
-`inspector_messages`. `messages` and the feeds make them, `protocol_docs` writes the page's types and docs/protocol.md
-from them.
+`inspector_messages`. `messages` and the feeds make them. `tests/recipes/protocol_docs.py` writes the page's types and
+docs/protocol.md from them.
 """
 
 from typing import Literal, TypeAlias, Union, get_args
@@ -18,7 +18,7 @@ from app.page.inspector_messages import (
     View3dMessage,
 )
 from app.page.message_types import Message, Part, Status
-from app.page.observation_messages import ObservationsMessage
+from app.page.observation_messages import AnnotatorsMessage, ObservationsMessage, OtherCopyMessage, ProvenanceMessage
 from app.page.search_messages import (
     CostMapMessage,
     InconsistentMessage,
@@ -409,6 +409,7 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
     AcquisitionMessage, FindingMessage, CalibrationMessage, ObservationsMessage, ReasonMessage, CostMapMessage,
     AnnotationMessage,
+    ProvenanceMessage, AnnotatorsMessage, OtherCopyMessage,
 ]  # fmt: skip
 
 TEXT_MESSAGES: tuple[type[Message], ...] = get_args(TextMessage)

@@ -18,6 +18,8 @@ from app.page.inspector_feed import InspectorFeed
 from app.page.message_parsing import MISUNDERSTOOD, MessageError, check_allowed, parse
 from app.page.message_types import Message, encode_text
 from app.page.observability_feed import ObservabilityFeed
+from app.page.observation_messages import WatchProvenance
+from app.page.provenance_feed import ProvenanceFeed
 from app.page.search_feed import SearchFeed
 from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
 from app.page.server_messages import HistoryMessage, NoticeMessage, StateMessage
@@ -40,7 +42,15 @@ _MAX_HISTORY = 2000
 """Largest number of history entries, in each direction, that a page may request."""
 _EDGES = ("accepted", "rejected")
 """Layers of lines that are drawn from the evidence."""
-_COALESCED = (wire.Seek, wire.SetView, wire.CheckEpipolar, ReplayStep, PreviewCandidate, SetSearchSpeed)
+_COALESCED = (
+    wire.Seek,
+    wire.SetView,
+    wire.CheckEpipolar,
+    WatchProvenance,
+    ReplayStep,
+    PreviewCandidate,
+    SetSearchSpeed,
+)
 """Messages of which only the newest in the queue is carried out."""
 
 
@@ -95,6 +105,7 @@ class PageConnection:
         self._feed = SearchFeed()
         self._inspector = InspectorFeed()
         self._observability = ObservabilityFeed()
+        self._provenance = ProvenanceFeed()
         self._history_limit = 0  # entries in each direction; 0: not subscribed
         self._sent_history: HistoryMessage | None = None
         self._loop = asyncio.get_running_loop()
@@ -184,6 +195,10 @@ class PageConnection:
                 self._sent_history = None
             case wire.SetView():
                 self._view = view_of(message, len(self._controller.session.cameras))
+            case WatchProvenance(person=person):
+                if person is not None:
+                    commands.check_index(self._controller, "person", person)
+                self._provenance.watch(message)
             case wire.CheckEpipolar(points=points):
                 for camera, _, _ in points:
                     commands.check_index(self._controller, "camera", camera)
@@ -223,7 +238,7 @@ class PageConnection:
                 await self._send_epipolar(state)
                 await self._send_checks(sent, state)
                 await self._send_curves(state)
-                await self._send_observability(state)
+                await self._send_details(state)
                 await self._send_history()
                 for update in await asyncio.to_thread(self._feed.updates, self._controller, with_figures):
                     await self._send(update)
@@ -338,8 +353,11 @@ class PageConnection:
             self._sent_epipolar = made_from
             await self._send(messages.epipolar(self._controller.session_of(state), state, self._epipolar))
 
-    async def _send_observability(self, state: State) -> None:
-        """Send how well the views constrain the shown pose, if the page shows that layer."""
+    async def _send_details(self, state: State) -> None:
+        """Send how well the views constrain the shown pose and where it comes from, if the page shows that."""
+        if self._provenance.is_due(state):
+            for news in await asyncio.to_thread(self._provenance.updates, self._controller, state):
+                await self._send(news)
         if self._observability.is_due(state, self._view):
             await self._send(await asyncio.to_thread(self._observability.update, self._controller, state))
 
@@ -409,6 +427,7 @@ def _drawn(state: State) -> tuple[object, ...]:
         state.calibration.n_changes,
         Identity(state.calibration.preview) if state.calibration.is_previewed else None,
         Identity(None if state.reason is None else state.reason.alternatives),
+        Identity(None if state.other_copy is None else state.other_copy.poses),
         Identity(state.observations.drawn),
         Identity(state.observations.drawn_judgements),
     )

@@ -18,6 +18,7 @@ from app.runtime.kernel_compiler import KernelCompiler
 from app.scene3d.gizmos import Gizmos
 from app.scene3d.scene import SceneView
 from app.server.access import is_loopback
+from app.server.copy_routes import CopyRoutes
 from app.server.doorway import Doorway
 from app.server.export_routes import ExportRoutes
 from app.server.observation_routes import ObservationRoutes
@@ -125,6 +126,7 @@ def open_session(
             others = SessionRoutes(session.folder, tokens, no_paths, lambda: controller.state.save_error)
             others.add_to(app)
             ObservationRoutes(controller, no_paths).add_to(app)
+            CopyRoutes(controller, no_paths).add_to(app)
             ThumbnailRoutes(thumbnails.jpeg, thumbnails.silhouette, lambda: not _can_draw(controller)).add_to(app)
 
             def ready() -> None:

@@ -10,6 +10,7 @@ from app.state.calibration import CalibrationState
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import FloorState
 from app.state.observations import ObservationsState
+from app.state.other_copy import OtherCopy
 from app.state.people import (
     AcquisitionState,
     DepthNote,
@@ -87,6 +88,8 @@ class State:
     """Imported observations."""
     annotation: AnnotationState = field(default_factory=AnnotationState)
     """The plan of annotation, comments, and the next best click."""
+    other_copy: OtherCopy | None = None
+    """The copy of the session that is compared with it."""
     follow: bool = True
     """Whether each frame is shown as it is tracked."""
     locked: tuple[frozenset[int], ...] = ()
@@ -265,6 +268,7 @@ class StateChanges(TypedDict, total=False):
     calibration: CalibrationState
     observations: ObservationsState
     annotation: AnnotationState
+    other_copy: OtherCopy | None
     follow: bool
     locked: tuple[frozenset[int], ...]
     ranges: RangeState

@@ -11,8 +11,10 @@ from app.state.people import ShownPose
 from app.state.state import State
 from app.storage import rescue
 from app.storage.frame_index import FrameIndex
+from app.storage.pose_origins import PoseOrigin, keyframes_by_annotator, read_origin
 from app.storage.retry_queue import RetryQueue
 from app.storage.revisions import ModelRevisions
+from tracker.annotation.plan import is_disputed
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
@@ -142,7 +144,7 @@ class Saver:
             record.remark,
             record.part_costs_px,
             revision=record.model_revision,
-            alternatives=() if record.keyframe else tuple(a.values for a in self.alternatives(person, frame)),
+            alternatives=self._offered(person, frame, record),
             errors=record.errors,
             trace=record.trace,
         )
@@ -159,6 +161,26 @@ class Saver:
         queued = self._queue.pose(name, frame)
         stored = self._store.alternatives(name, frame) if queued is None else queued.alternatives
         return tuple(a for a in stored if self.revisions.fits(person, a.model_revision))
+
+    def _offered(self, person: int, frame: int, record: PoseRecord) -> tuple[Array, ...]:
+        """Return the alternatives that are shown: of a keyframe only while two merged copies disagree about it."""
+        found = tuple(a.values for a in self.alternatives(person, frame))
+        is_decided = (
+            record.keyframe and found and not is_disputed(self._store, self._session.people[person].name, frame)
+        )
+        return () if is_decided else found
+
+    def origin(self, person: int, frame: int) -> PoseOrigin | None:
+        """Return where the stored pose of a person comes from; None if there is none, or it is not on disk."""
+        record = self._store.pose(self._session.people[person].name, frame)
+        if record is None:
+            return None
+        body = self.revisions.body(record.model_revision)
+        return read_origin(self._store, self._session.people[person].name, frame, body)
+
+    def keyframes_by_annotator(self) -> tuple[dict[str, tuple[int, ...]], ...]:
+        """Return for each person the keyframes by the annotator who set or marked them last, ascending."""
+        return keyframes_by_annotator(self._store, [p.name for p in self._session.people])
 
     def pose_now(self, person: int, frame: int) -> Array | None:
         """Return the stored pose of a person, (n_values,), retargeted to the present body."""

@@ -1,17 +1,19 @@
 /**
  * Inspector: a column beside the views with the selected joint, body sizes, settings and what the 3-D view shows.
  *
- * The room imports `widgets`, types of `model`, `panes` and `scene`, and `posing`.
+ * The room imports `widgets`, `model`, types of `panes`, `timeline` and `scene`, and `posing`.
  */
 
 import { button } from "../widgets/elements.js";
 import { alt, inArea } from "../widgets/key_matching.js";
 import { calibrationSection } from "./calibration_section.js";
+import { copySection } from "./copy_section.js";
 import { findSection } from "./find_section.js";
 import { BodySection } from "./body_section.js";
 import { Inspector } from "./inspector.js";
 import { jointSection } from "./joint_section.js";
 import { observationsSection } from "./observations_section.js";
+import { provenanceSection } from "./provenance_section.js";
 import { reasonSection } from "./reason_section.js";
 import { searchSection } from "./search_section.js";
 import { trackSection } from "./track_section.js";
@@ -31,12 +33,14 @@ const THEMES = [
  *
  * @param {import("../model/index.js").Context} context
  * @param {{panes: import("../panes/index.js").Panes, posing: import("../posing/index.js").PosingRoom,
- *   scene: import("../scene/index.js").SceneRoom, sessions: import("./import_form.js").PathFields}} rooms
+ *   timeline: import("../timeline/index.js").TimelineRoom, scene: import("../scene/index.js").SceneRoom, sessions: import("./import_form.js").PathFields}} rooms
  */
-export function mount(context, { panes, posing, scene, sessions }) {
+export function mount(context, { panes, posing, timeline, scene, sessions }) {
   const joint = jointSection(context, posing);
   const calibration = calibrationSection(context);
   const observations = observationsSection(context, panes, sessions);
+  const provenance = provenanceSection(context, timeline);
+  const copy = copySection(context, timeline, sessions);
   const sections = [
     joint,
     reasonSection(context, panes, posing),
@@ -46,6 +50,8 @@ export function mount(context, { panes, posing, scene, sessions }) {
     searchSection(context),
     calibration,
     observations,
+    provenance,
+    copy,
     viewSection(context, scene, panes),
   ];
   const inspector = new Inspector(context.store, sections);
@@ -91,6 +97,8 @@ export function mount(context, { panes, posing, scene, sessions }) {
     },
     ...calibration.bindings(() => inspector.reveal("calibration")),
     ...observations.bindings(() => inspector.reveal("observations")),
+    ...provenance.bindings(() => inspector.reveal("provenance")),
+    ...copy.bindings(() => inspector.reveal("copy")),
     ...sections.filter(({ id }) => !["find", "reason", "observations"].includes(id)).map(({ id, title, hint }) => ({
       keys: [],
       label: id === "view" ? "View settings: theme, 3-D view" : title,

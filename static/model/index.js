@@ -7,15 +7,14 @@
 import { Actions } from "./actions.js";
 import { Connection } from "./connection.js";
 import { ImageTones } from "./image_tone.js";
-import { Latency } from "./latency.js";
+import { Latency } from "../widgets/latency.js";
 import { Layers } from "./layers.js";
 import { Navigation } from "./navigation.js";
 import { Receiver } from "./receiver.js";
 import { RecentImages } from "./recent_images.js";
-import { isAllowed, isAsked } from "./roles.js";
 import { Store } from "./store.js";
 import { Themes } from "./theme.js";
-import { unavailableReasons } from "./unavailable_reasons.js";
+import { isAllowed, isAsked, unavailableReasons } from "./unavailable_reasons.js";
 
 /**
  * @typedef {import("./protocol.js").ClientMessage} ClientMessage

@@ -72,6 +72,15 @@ export class Receiver {
       case "annotation":
         this.#store.set({ annotation: message });
         break;
+      case "provenance":
+        this.#store.set({ provenance: message });
+        break;
+      case "annotators":
+        this.#store.set({ annotators: message });
+        break;
+      case "other_copy":
+        this.#store.set({ otherCopy: message.name ? message : null });
+        break;
       case "acquisition":
         this.#store.set({ acquisition: message });
         break;

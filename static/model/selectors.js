@@ -69,6 +69,32 @@ export function earlierCalibration({ calibration }) {
 }
 
 /**
+ * @typedef {import("./protocol.js").CopyDifferenceInfo & {person: number}} Difference
+ */
+
+/**
+ * Poses on which the other copy differs by more than the tolerance and nobody has decided, by person and frame.
+ *
+ * @param {import("./store.js").Facts} facts
+ * @returns {Difference[]}
+ */
+export function copyDifferences({ otherCopy: copy }) {
+  if (!copy) return [];
+  return copy.people.flatMap((of, person) => of.filter((one) => !one.decided && one.distance_mm > copy.tolerance_mm).map((one) => ({ ...one, person })));
+}
+
+/**
+ * How far the other copy differs about a person on a frame, if both annotated it.
+ *
+ * @param {import("./store.js").Facts} facts
+ * @param {number} person
+ * @param {number} frame
+ */
+export function differenceAt({ otherCopy }, person, frame) {
+  return otherCopy?.people[person]?.find((one) => one.frame === frame);
+}
+
+/**
  * Arrows of the last check of the cameras that the views show: none while its correction is previewed.
  *
  * @param {import("./store.js").Facts} facts

@@ -43,6 +43,10 @@ import { defaultLayers } from "./layers.js";
  * @property {import("./protocol.js").CalibrationMessage | null} calibration the check of the cameras
  * @property {import("./protocol.js").ObservationsMessage | null} observations imported observations and their judgement
  * @property {import("./protocol.js").AnnotationMessage | null} annotation the plan, comments, and the next best click
+ * @property {import("./protocol.js").ProvenanceMessage | null} provenance where a pose of the shown frame comes from, while asked for
+ * @property {import("./protocol.js").AnnotatorsMessage | null} annotators keyframes by annotator, while asked for
+ * @property {import("./provenance.js").Filter | null} provenanceFilter poses that the timeline does not dim; null for all
+ * @property {import("./protocol.js").OtherCopyMessage | null} otherCopy the copy of the session that is compared; null without one
  * @property {boolean} showsMisfits whether the views show where the contours of the last check miss the edges
  * @property {number | null} exporting share of an export that is done, 0 to 1; null without one
  * @property {import("./protocol.js").SearchSetupMessage | null} searchSetup
@@ -113,6 +117,10 @@ export class Store {
     calibration: null,
     observations: null,
     annotation: null,
+    provenance: null,
+    annotators: null,
+    provenanceFilter: null,
+    otherCopy: null,
     showsMisfits: false,
     exporting: null,
     searchSetup: null,

@@ -1,4 +1,7 @@
-/** Reasons why commands are unavailable: sentences for the user, null if a command is available. */
+/**
+ * Reasons why commands are unavailable: sentences for the user, null if a command is available; and the messages that a page
+ * with a shared link sends. The program refuses all others, too (app/page/message_parsing.py).
+ */
 
 import { hasSearch, hasTrack } from "./selectors.js";
 
@@ -25,4 +28,34 @@ export function unavailableReasons(store) {
     compared: here(() => (facts().state?.compared ? null : "No fit or search result is shown. Press G or F for one.")),
     people: here(() => ((facts().session?.people.length ?? 0) > 1 ? null : "This session has only one person.")),
   };
+}
+
+/** @typedef {import("./protocol.js").ClientMessage} ClientMessage */
+
+/** @type {ClientMessage["type"][]} */
+const LOOK = ["view", "epipolar", "curves", "history"];
+/** @type {ClientMessage["type"][]} */
+const REVIEW = [...LOOK, "seek", "select"];
+/** Messages that the page sends by itself, or many in a row: nobody has to be told. @type {ClientMessage["type"][]} */
+const SILENT = ["watch", "pause_3d", "seek", "select", "view_3d"];
+const MARKS = new Set(["reviewed", "unreviewed"]);
+
+/**
+ * @param {ClientMessage} message
+ * @param {import("./protocol.js").SessionMessage["role"]} role
+ * @returns {boolean} whether the role may send it
+ */
+export function isAllowed(message, role) {
+  if (role === "annotate") return true;
+  if ((role === "review" ? REVIEW : LOOK).includes(message.type)) return true;
+  if (role === "look") return false;
+  return message.type === "mark" ? message.toggle === "reviewed" : message.type === "range" && MARKS.has(message.action);
+}
+
+/**
+ * @param {ClientMessage} message that is not allowed
+ * @returns {boolean} whether the user asked for something by it, and is told why nothing happens
+ */
+export function isAsked(message) {
+  return !SILENT.includes(message.type) && (!("phase" in message) || message.phase === "start");
 }

@@ -48,6 +48,7 @@ export const LINE_STYLES = {
   result: { width: 2, dash: [0.5, 4.5], layer: "contours", hasOutline: true, ofPerson: true },
   alternative: { width: 1.5, dash: [9, 4, 2, 4], layer: "contours", switch: "alternatives", hasOutline: true, ofPerson: true },
   new_sizes: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
+  other_copy: { width: 1.5, dash: [9, 4, 2, 4, 2, 4], layer: "contours", switch: "alternatives", hasOutline: true, ofPerson: true },
   former: { width: 1.5, dash: [9, 4, 2, 4], layer: "contours", hasOutline: true, ofPerson: true },
   error: { width: 1.25, dash: [], layer: "errors", hasOutline: true, ofPerson: true },
   residual: { width: 1, dash: [], layer: null, hasOutline: true },

@@ -42,7 +42,7 @@ export class Gestures {
   /**
    * @param {import("../model/store.js").Store} store
    * @param {(message: import("../model/protocol.js").ClientMessage) => void} send
-   * @param {import("../model/latency.js").Latency} latency
+   * @param {import("../widgets/latency.js").Latency} latency
    */
   constructor(store, send, latency) {
     this.#store = store;

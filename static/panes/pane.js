@@ -7,6 +7,7 @@ import { ofJoint } from "../model/observability.js";
 import { jointLabel } from "./joint_label.js";
 import { drawObservability } from "./observability_marks.js";
 import { drawAxes, drawEpipolar, drawMisfits } from "./measured_lines.js";
+import { provenanceOf } from "../model/provenance.js";
 import { isDimmed, isInSight, isStoredDrawn, alternativesOf } from "../model/selectors.js";
 import { PICTURE_LAYERS } from "../model/layers.js";
 import { isPlain } from "../model/image_tone.js";
@@ -302,7 +303,8 @@ export class Pane {
       offered.some(({ person, point }) => person === handle.person && point === handle.point),
     );
     const observed = ofJoint(this.#store.facts, named.handle);
-    return [...jointLabel(named, overlapping, people), ...(observed ? observed.sentence.split(/(?<=:) /) : [])];
+    const origin = dragging ? [] : provenanceOf(this.#store.facts, named.handle);
+    return [...jointLabel(named, overlapping, people), ...origin, ...(observed ? observed.sentence.split(/(?<=:) /) : [])];
   }
 
   /**

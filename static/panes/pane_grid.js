@@ -14,7 +14,7 @@ const MIN_SHARE = 0.4;
 /** Two digits within this time form one number. */
 const SECOND_DIGIT_MS = 700;
 /** Facts that change the marks over the overlay. @type {(keyof import("../model/store.js").Facts)[]} */
-const MARKED = ["hover", "hoverPart", "pinHover", "heldPin", "observability", "finding", "epipolar", "epipolarLines", "showsMisfits", "calibration"];
+const MARKED = ["hover", "hoverPart", "pinHover", "heldPin", "observability", "provenance", "finding", "epipolar", "epipolarLines", "showsMisfits", "calibration"];
 /** Facts after which views follow the people: overlay and state of a frame arrive in any order. @type {(keyof import("../model/store.js").Facts)[]} */
 const FOLLOWED = ["overlay", "state", "dragging"];
 /** Facts that change the pictures. @type {(keyof import("../model/store.js").Facts)[]} */
@@ -52,7 +52,7 @@ export class PaneGrid {
   /**
    * @param {HTMLElement} element
    * @param {import("../model/store.js").Store} store
-   * @param {import("../model/latency.js").Latency} latency
+   * @param {import("../widgets/latency.js").Latency} latency
    * @param {(camera: number, button: HTMLElement) => void} openToneMenu opens the tone popover of a camera
    */
   constructor(element, store, latency, openToneMenu) {

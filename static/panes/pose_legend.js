@@ -12,7 +12,7 @@ import { LINE_STYLES } from "./drawing.js";
 const SAMPLE_PX = 30;
 
 /** @typedef {import("../model/protocol.js").CalibrationMessage} Calibration */
-/** Kinds of outlines in the legend, with their names. @type {Partial<Record<Kind, (state: StateMessage, calibration: Calibration | null) => string>>} */
+/** Kinds of outlines in the legend, with their names. @type {Partial<Record<Kind, (state: StateMessage, calibration: Calibration | null, copy: string) => string>>} */
 const NAMES = {
   candidate: () => "tested pose",
   compared: ({ compared_run, replay }) =>
@@ -23,6 +23,7 @@ const NAMES = {
   result: ({ compared }) => `result of the ${compared?.work}`,
   new_sizes: () => "new body sizes",
   former: () => "limb before the fit",
+  other_copy: (_state, _calibration, copy) => copy || "other copy",
 };
 
 export class PoseLegend {
@@ -39,7 +40,7 @@ export class PoseLegend {
   }
 
   #show() {
-    const { state, overlay, layers, session, calibration } = this.#store.facts;
+    const { state, overlay, layers, session, calibration, otherCopy } = this.#store.facts;
     if (!state || !overlay) return;
     const replay = state.replay && `Replay of run ${state.replay.run}, step ${state.replay.step + 1} of ${state.replay.steps}`;
     /** @type {Map<Kind, string>} colours of the kinds that are visible */
@@ -50,7 +51,7 @@ export class PoseLegend {
     }
     const lines = Object.entries(NAMES).flatMap(([name, label]) => {
       const [kind, color] = [/** @type {Kind} */ (name), colors.get(/** @type {Kind} */ (name))];
-      return color ? [{ kind, color, text: label(state, calibration) }] : [];
+      return color ? [{ kind, color, text: label(state, calibration, otherCopy?.name ?? "") }] : [];
     });
     if (replay && colors.has("model")) {
       lines.unshift({ kind: "model", color: session?.people[state.person].color ?? "#fff", text: "best pose so far" });

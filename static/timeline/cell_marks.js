@@ -27,6 +27,8 @@ export const STATUS_COLORS = { good: "--good", doubtful: "--warning", lost: "--b
 export const STATUS_HEIGHTS = { good: 3, doubtful: 7, lost: 12 };
 /** Dotted line above poses of an earlier calibration. */
 export const EARLIER_DASH = [2, 2];
+/** Opacity of what covers dimmed frames: their marks stay recognizable. */
+const DIMMED = 0.72;
 /** Dark stripes on the colour of a person. */
 export const DARK_INK = "rgb(0 0 0 / 72%)";
 
@@ -180,4 +182,71 @@ export function drawDiamond(context, x, y, radius, fill = "#fff") {
   context.lineWidth = 1;
   context.fill();
   context.stroke();
+}
+
+/**
+ * Draw runs of equal neighbouring frames as rectangles. Their number is bounded by the number of changes, and by that of
+ * pixels.
+ *
+ * @param {import("../widgets/frame_axis.js").FrameAxis} axis
+ * @param {(frame: number) => number} look value of a frame; below 0 for nothing to draw
+ * @param {number} gap between frames, CSS pixels
+ * @param {(look: number, x: number, width: number) => void} draw
+ */
+export function eachRun(axis, look, gap, draw) {
+  for (let frame = axis.first; frame <= axis.last; ) {
+    const found = look(frame);
+    let next = frame + 1;
+    if (gap === 0) while (next <= axis.last && look(next) === found) next += 1;
+    if (found >= 0) draw(found, axis.start(frame), Math.max(1, (next - frame) * axis.pitch - gap));
+    frame = next;
+  }
+}
+
+/** @param {import("../widgets/frame_axis.js").FrameAxis} axis */
+export function gapOf(axis) {
+  return axis.pitch >= 5 ? 1 : 0;
+}
+
+/**
+ * Dim frames that a filter does not let through.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("../widgets/frame_axis.js").FrameAxis} axis
+ * @param {(frame: number) => boolean} isKept
+ * @param {CSSStyleDeclaration} style
+ * @param {{top: number, bottom: number}} lane
+ */
+export function drawDimmed(context, axis, isKept, style, { top, bottom }) {
+  context.fillStyle = style.getPropertyValue("--chrome");
+  context.globalAlpha = DIMMED;
+  eachRun(axis, (frame) => (isKept(frame) ? -1 : 0), 0, (_, x, width) => context.fillRect(x, top - 3, width, bottom - top + 6));
+  context.globalAlpha = 1;
+}
+
+/**
+ * Draw how far another copy differs, as bars that are full at twice the tolerance, with a line at the tolerance. Decided
+ * differences are faint.
+ *
+ * @param {CanvasRenderingContext2D} context
+ * @param {import("../widgets/frame_axis.js").FrameAxis} axis
+ * @param {import("../model/protocol.js").OtherCopyMessage} copy
+ * @param {CSSStyleDeclaration} style
+ * @param {{top: number, bottom: number}} band
+ */
+export function drawCopy(context, axis, { people, tolerance_mm }, style, { top, bottom }) {
+  const of = (/** @type {string} */ name) => style.getPropertyValue(name);
+  context.fillStyle = of("--track");
+  context.fillRect(axis.left, top, axis.right - axis.left, bottom - top);
+  const height = bottom - top;
+  for (const { frame, distance_mm, decided } of people.flat().sort((a, b) => a.distance_mm - b.distance_mm)) {
+    if (!axis.shows(frame)) continue;
+    const share = tolerance_mm > 0 ? Math.min(1, distance_mm / (2 * tolerance_mm)) : Number(distance_mm > 0);
+    const tall = Math.max(2, Math.round(share * height));
+    const width = Math.max(3, axis.pitch - gapOf(axis));
+    context.fillStyle = decided ? of("--faint") : distance_mm > tolerance_mm ? of("--warning") : of("--good");
+    context.fillRect(axis.middle(frame) - width / 2, bottom - tall, width, tall);
+  }
+  context.fillStyle = of("--text");
+  context.fillRect(axis.left, Math.round((top + bottom) / 2), axis.right - axis.left, 1);
 }

@@ -1,8 +1,8 @@
 /** Describe cells of the timeline in words. */
 
 import { contradictions, keyframeDoubt } from "../model/keyframe_doubts.js";
-import { earlierCalibration } from "../model/selectors.js";
-import { percent, px } from "../widgets/text.js";
+import { differenceAt, earlierCalibration } from "../model/selectors.js";
+import { displayName, percent, px } from "../widgets/text.js";
 
 /**
  * @typedef {import("../model/protocol.js").Cell} Cell
@@ -84,15 +84,19 @@ function describePoses(frame, facts, person) {
   };
   const isNamed = session.people.some((_, one) => (keyframeDoubt(facts, frame, one)?.distance_cm ?? null) !== null);
   const earlier = (/** @type {number} */ one) => (earlierCalibration(facts)[one]?.has(frame) ? ["earlier calibration"] : []);
+  const apart = (/** @type {number} */ one) => {
+    const found = differenceAt(facts, one, frame);
+    return found ? [`${facts.otherCopy?.name}: ${displayName(found.joint)} ${Math.round(found.distance_mm)} mm apart${found.decided ? ", decided" : ""}`] : [];
+  };
   const jumps = disagreeing.includes(frame) && !isNamed ? ["inconsistent with its neighbours"] : [];
   if (lanes.length === 0) {
-    return [`Frame ${frame}: ${summary(cell)}`, ...details(cell, session.people[0], session), ...doubts(0), ...earlier(0), ...jumps];
+    return [`Frame ${frame}: ${summary(cell)}`, ...details(cell, session.people[0], session), ...doubts(0), ...earlier(0), ...apart(0), ...jumps];
   }
   const shown = person === null ? [...lanes.keys()] : [person];
   const lines = shown.flatMap((one) => {
     const own = lanes[one]?.get(frame);
     const info = session.people[one];
-    return [`${info.name}: ${own ? summary(own) : "no pose"}`, ...(own ? details(own, info, session) : []), ...doubts(one), ...earlier(one)];
+    return [`${info.name}: ${own ? summary(own) : "no pose"}`, ...(own ? details(own, info, session) : []), ...doubts(one), ...earlier(one), ...apart(one)];
   });
   return [person === null ? `Frame ${frame}: ${summary(cell)}` : `Frame ${frame}`, ...lines, ...jumps];
 }

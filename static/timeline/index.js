@@ -47,5 +47,5 @@ export function mount({ store, actions, navigation, reasons }, { grid }) {
     ...drawerBindings(drawer),
     ...queueBindings(queue, reasons.away),
   ];
-  return { bindings, drawer };
+  return { bindings, drawer, jumps };
 }

@@ -52,7 +52,7 @@ export class JumpMenu {
     };
     document.addEventListener("keydown", closes, true);
     store.subscribe((changed) => {
-      if (["timeline", "disagreeing", "calibration", "connected", "session"].some((f) => changed.has(/** @type {"timeline"} */ (f)))) {
+      if (["timeline", "disagreeing", "calibration", "otherCopy", "provenanceFilter", "annotators", "connected", "session"].some((f) => changed.has(/** @type {"timeline"} */ (f)))) {
         this.#count();
       }
     });

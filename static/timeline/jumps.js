@@ -1,9 +1,10 @@
 /** Frames to go to, by kind: their number, and the next one in either direction. */
 
 import { AMBIGUOUS, KEYFRAME, NO_POSE, REVIEWED, STATUSES, keyframesOf } from "../model/cells.js";
-import { earlierCalibration } from "../model/selectors.js";
+import { filterTest } from "../model/provenance.js";
+import { copyDifferences, earlierCalibration } from "../model/selectors.js";
 
-/** @typedef {"doubt" | "ambiguous" | "unreviewed" | "disagreeing" | "earlier" | "keyframe" | "empty"} Kind */
+/** @typedef {"doubt" | "ambiguous" | "unreviewed" | "disagreeing" | "earlier" | "copy" | "chosen" | "keyframe" | "empty"} Kind */
 
 /** @type {{kind: Kind, label: string, title: string, key: string, more: string}[]} */
 export const KINDS = [
@@ -41,6 +42,20 @@ export const KINDS = [
     title: "Frames with a pose that was made before the cameras were corrected",
     key: "",
     more: "frame of an earlier calibration",
+  },
+  {
+    kind: "copy",
+    label: "Other copy differs",
+    title: "Frames on which the copy that the inspector compares differs by more than the tolerance, and nobody has decided",
+    key: "Alt S",
+    more: "frame where the copies differ",
+  },
+  {
+    kind: "chosen",
+    label: "Filtered by provenance",
+    title: "Frames that the filter of the inspector's section Provenance lets through",
+    key: "Alt Q",
+    more: "frame of the chosen provenance",
   },
   { kind: "keyframe", label: "Keyframes", title: "Frames whose pose a person has set or confirmed", key: "W", more: "keyframe" },
   { kind: "empty", label: "Without a pose", title: "Frames that have no pose", key: "", more: "frame without a pose" },
@@ -137,7 +152,12 @@ function tests(facts) {
   const { sources, statuses, marks } = facts.timeline;
   const disagreeing = new Set(facts.disagreeing);
   const earlier = earlierCalibration(facts);
+  const apart = new Set(copyDifferences(facts).map(({ frame }) => frame));
+  // Of several people, a frame counts on which somebody's pose is of the kind.
+  const chosen = (facts.lanes.length ? [...facts.lanes.keys()] : [null]).map((person) => filterTest(facts, person));
   return {
+    copy: (frame) => apart.has(frame),
+    chosen: (frame) => chosen.some((is) => is?.(frame)),
     disagreeing: (frame) => disagreeing.has(frame),
     earlier: (frame) => earlier.some((own) => own.has(frame)),
     doubt: (frame) => statuses[frame] >= DOUBT && !(marks[frame] & REVIEWED),

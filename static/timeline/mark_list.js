@@ -26,6 +26,7 @@ const LINES = [
   ["preview", "proposal", "candidate: click takes it"],
   ["alternative", "proposal", "alternative pose: Shift+X takes it"],
   ["new_sizes", "proposal", "new body sizes: Apply takes them"],
+  ["other_copy", "neutral", "pose of another copy: the section Other copy takes it"],
   ["former", "neutral", "limb before the fit: Alt+B takes it back"],
   ["epipolar", "mark", "line of sight of a pin or drag"],
 ];

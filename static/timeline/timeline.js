@@ -4,10 +4,12 @@
  */
 
 import { AMBIGUOUS, framesWith, keyframesOf } from "../model/cells.js";
+import { filterTest } from "../model/provenance.js";
 import { earlierCalibration } from "../model/selectors.js";
 import { statesByFrame } from "../model/tasks.js";
 import { prepare } from "../panes/drawing.js";
 import { describeFrame } from "./cell_text.js";
+import { drawCopy, drawDimmed } from "./cell_marks.js";
 import { CellTip } from "./cell_tip.js";
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { zoomByWheel } from "./frame_window.js";
@@ -50,8 +52,9 @@ export class Timeline {
     this.#tip = new CellTip(element);
     store.subscribe((changed) => {
       const has = (/** @type {(keyof import("../model/store.js").Facts)[]} */ ...facts) => facts.some((f) => changed.has(f));
-      if (has("session", "annotation")) element.style.height = `${this.#layout.height}px`;
-      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts", "calibration", "annotation")) this.#drawCells();
+      if (has("session", "annotation", "otherCopy")) element.style.height = `${this.#layout.height}px`;
+      if (has("timeline", "lanes", "session", "visible", "keyframeDoubts", "calibration")) this.#drawCells();
+      else if (has("annotation", "otherCopy", "provenanceFilter", "annotators")) this.#drawCells();
       if (has("target", "session", "range", "visible", "annotation")) this.#drawCursor();
       if (has("target", "timeline", "lanes", "session", "keyframeDoubts", "calibration")) this.#describe();
     });
@@ -61,8 +64,8 @@ export class Timeline {
   }
 
   get #layout() {
-    const { session, annotation } = this.#store.facts;
-    return drawing.layout(session?.people.length ?? 1, !!annotation?.tasks.length);
+    const { session, annotation, otherCopy } = this.#store.facts;
+    return drawing.layout(session?.people.length ?? 1, !!annotation?.tasks.length, otherCopy !== null);
   }
 
   get #axis() {
@@ -183,12 +186,12 @@ export class Timeline {
   #drawCells() {
     const { clientWidth, clientHeight } = this.#element;
     const context = prepare(this.#cells, clientWidth, clientHeight, true);
-    const { timeline, lanes, session, keyframeDoubts, annotation } = this.#store.facts;
+    const { timeline, lanes, session, keyframeDoubts, annotation, otherCopy } = this.#store.facts;
     if (!session) return;
     const style = getComputedStyle(this.#element);
     const axis = this.#axis;
-    const { lanes: bands, review, tasks, overview } = this.#layout;
-    drawing.drawLabels(context, axis, style, bands, session.people);
+    const { lanes: bands, review, tasks, copy, overview } = this.#layout;
+    drawing.drawLabels(context, axis, style, bands, session.people, copy);
     if (annotation?.tasks.length) drawing.drawTasks(context, axis, statesByFrame(annotation.tasks), style, tasks);
     context.save();
     context.beginPath();
@@ -205,8 +208,11 @@ export class Timeline {
       const doubted = keyframeDoubts.filter(({ person }) => bands.length === 1 || person === lane).map(({ frame }) => frame);
       drawing.drawDoubtedKeyframes(context, axis, doubted, style, band);
       drawing.drawAmbiguous(context, axis, framesWith(cells, AMBIGUOUS), band);
+      const isKept = filterTest(this.#store.facts, bands.length > 1 ? lane : null);
+      if (isKept) drawDimmed(context, axis, isKept, style, band);
     }
     drawing.drawReviewed(context, axis, timeline, style, review);
+    if (otherCopy && copy) drawCopy(context, axis, otherCopy, style, copy);
     drawing.drawStatuses(context, axis, timeline, style);
     drawing.drawCosts(context, axis, timeline, style);
     context.restore();

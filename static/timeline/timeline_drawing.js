@@ -7,7 +7,7 @@ import { NO_POSE, REVIEWED, SOURCES, STATUSES as ALL, keyframesOf } from "../mod
 import { TASK_STATES } from "../model/tasks.js";
 import { trace } from "../model/series.js";
 import { shortened } from "../widgets/text.js";
-import { DARK_INK, EARLIER_DASH, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, drawTask, fillBands, hatch } from "./cell_marks.js";
+import { DARK_INK, EARLIER_DASH, SOURCE_MARKS, STATUSES, STATUS_COLORS, STATUS_HEIGHTS, drawDiamond, drawTask, eachRun, fillBands, gapOf, hatch } from "./cell_marks.js";
 
 /**
  * @typedef {import("../widgets/frame_axis.js").FrameAxis} FrameAxis
@@ -20,6 +20,8 @@ const KEYFRAME_GAP = 5;
 const CELLS_TOP = 44;
 /** Height of the cells of a single person, and of each of several people; gap between lanes. */
 const [CELL_HEIGHT, LANE_HEIGHT, LANE_GAP] = [12, 15, 3];
+/** Height of the lane of differences from another copy. */
+const COPY_HEIGHT = 12;
 /** Height of the strip of sources below the colour of a person, and the gap between them. */
 const [SOURCE_STRIP, STRIP_GAP] = [5, 1];
 /** Height of the lane of tasks. */
@@ -34,9 +36,10 @@ const PATTERN_FROM = 4;
  *
  * @param {number} people
  * @param {boolean} hasTasks whether there is a lane of tasks
- * @returns {{cells: Band, lanes: Band[], review: Band, tasks: Band, overview: Band, height: number}}
+ * @param {boolean} hasCopy whether another copy is compared, which has a lane of its own
+ * @returns {{cells: Band, lanes: Band[], review: Band, tasks: Band, copy: Band | null, overview: Band, height: number}}
  */
-export function layout(people, hasTasks = false) {
+export function layout(people, hasTasks = false, hasCopy = false) {
   const several = people > 1;
   const height = several ? LANE_HEIGHT : CELL_HEIGHT;
   const lanes = Array.from({ length: Math.max(1, people) }, (_, lane) => {
@@ -45,10 +48,13 @@ export function layout(people, hasTasks = false) {
   });
   const { bottom } = lanes[lanes.length - 1];
   const tasks = { top: bottom + 7, bottom: bottom + 7 + (hasTasks ? TASK_HEIGHT : 0) };
-  const top = hasTasks ? tasks.bottom + 5 : bottom + 8;
+  const end = hasTasks ? tasks.bottom : bottom;
+  const copy = hasCopy ? { top: end + 8, bottom: end + 8 + COPY_HEIGHT } : null;
+  const top = (copy?.bottom ?? end) + (hasTasks && !copy ? 5 : 8);
   const overview = { top, bottom: top + 6 };
   const cells = { top: CELLS_TOP, bottom };
-  return { cells, lanes, review: { top: bottom + 2, bottom: bottom + 4 }, tasks, overview, height: overview.bottom + 2 };
+  const review = { top: bottom + 2, bottom: bottom + 4 };
+  return { cells, lanes, review, tasks, copy, overview, height: overview.bottom + 2 };
 }
 
 /**
@@ -57,8 +63,9 @@ export function layout(people, hasTasks = false) {
  * @param {CSSStyleDeclaration} style
  * @param {Band[]} lanes one per person
  * @param {import("../model/protocol.js").PersonInfo[]} people
+ * @param {Band | null} copy lane of the differences from another copy
  */
-export function drawLabels(context, axis, style, lanes, people) {
+export function drawLabels(context, axis, style, lanes, people, copy) {
   context.font = "10.5px system-ui, sans-serif";
   context.textAlign = "right";
   context.textBaseline = "middle";
@@ -66,6 +73,7 @@ export function drawLabels(context, axis, style, lanes, people) {
   /** @type {[string, Band][]} */
   const rows = [["cost", COST], ["status", STATUS]]; // prettier-ignore
   if (people.length < 2) rows.push(["pose", lanes[0]]);
+  if (copy) rows.push(["differs", copy]);
   for (const [text, { top, bottom }] of rows) context.fillText(text, axis.left - 8, (top + bottom) / 2);
   if (people.length > 1) people.forEach((person, lane) => drawName(context, axis, style, person, lanes[lane]));
 }
@@ -89,30 +97,6 @@ function drawName(context, axis, style, { name, color }, { top, bottom }) {
   context.fillStyle = color;
   context.fillRect(axis.left - 6, top, 4, bottom - top);
   context.fillStyle = fillStyle;
-}
-
-/**
- * Draw runs of equal neighbouring frames as rectangles. Their number is bounded by the number of changes, and by that of
- * pixels.
- *
- * @param {FrameAxis} axis
- * @param {(frame: number) => number} look value of a frame; below 0 for nothing to draw
- * @param {number} gap between frames, CSS pixels
- * @param {(look: number, x: number, width: number) => void} draw
- */
-function eachRun(axis, look, gap, draw) {
-  for (let frame = axis.first; frame <= axis.last; ) {
-    const found = look(frame);
-    let next = frame + 1;
-    if (gap === 0) while (next <= axis.last && look(next) === found) next += 1;
-    if (found >= 0) draw(found, axis.start(frame), Math.max(1, (next - frame) * axis.pitch - gap));
-    frame = next;
-  }
-}
-
-/** @param {FrameAxis} axis */
-function gapOf(axis) {
-  return axis.pitch >= 5 ? 1 : 0;
 }
 
 /**

@@ -153,6 +153,8 @@ class FakeEndpoint:
     """Held while a frame is sent."""
     greetings: list = field(default_factory=list)
     """What the pages said when they connected."""
+    asked: list = field(default_factory=list)
+    """What the pages asked about where poses come from, as the pointer passes joints."""
     views: list = field(default_factory=list)
     """What the pages said that they show."""
     sizes: tuple = ((WIDTH, HEIGHT),)
@@ -229,8 +231,8 @@ class FakeEndpoint:
                 if message.type is WSMsgType.TEXT:
                     parse(message.data)
                     told = json.loads(message.data)
-                    kept = {"pause_3d": self.greetings, "view": self.views}.get(told["type"], self.received)
-                    kept.append(told)
+                    apart = {"pause_3d": self.greetings, "view": self.views, "provenance": self.asked}
+                    apart.get(told["type"], self.received).append(told)
                     await self.answer(told)
         finally:
             self.sockets.discard(socket)

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from tracker.agreement.consensus import mean_pose, pose_steps
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import PosedBody
 from tracker.errors import SessionError
 from tracker.formats.joint_maps import FOOT_POINTS, JOINTS
 from tracker.formats.model_toml import format_model
@@ -76,10 +76,10 @@ def read_copies(sessions: Sequence[Session], poses: Poses = "keyframes", people:
             f"the same frames in each copy{other}"
         )
     joints = (*JOINTS, *FOOT_POINTS)
-    points = np.array([[_points(body, joints) for body in of] for of in bodies.values()])
+    points = np.array([[joint_centers(body, joints) for body in of] for of in bodies.values()])
     known = np.isfinite(points).all(axis=(1, 3)).any(axis=0)
     joints = tuple(joint for joint, is_known in zip(joints, known, strict=True) if is_known)
-    notes = _notes(sessions, bodies)
+    notes = notes_on(sessions, bodies)
     return Copies(
         names, tuple(bodies), joints, points[:, :, known], *_angles(list(bodies.values())), sessions[0].fps, notes
     )
@@ -126,13 +126,29 @@ def _people(session: Session) -> str:
 def _annotated(session: Session, name: str, poses: Poses) -> dict[int, StoredPose]:
     model = next(p.model for p in session.people if p.name == name)
     stored = read_stored_poses(session.annotations_path, name, model)
-    return {f: p for f, p in stored.items() if poses == "all" or p.record.keyframe or p.source in ("manual", "pinned")}
+    return {f: p for f, p in stored.items() if poses == "all" or is_annotated(p.record.keyframe, p.source)}
 
 
-def _points(body: PosedBody, joints: Sequence[str]) -> Array:
-    """Return the centres of joints, (n_joints, 3), metres; NaN for one that the body lacks."""
+def is_annotated(keyframe: bool, source: str) -> bool:
+    """Return whether a person set or verified a pose, by its mark and the most manual source of its values."""
+    return keyframe or source in ("manual", "pinned")
+
+
+def joint_centers(body: PosedBody, joints: Sequence[str]) -> Array:
+    """Return the centres of joints, (n_joints, 3), world, metres; NaN for one that the body lacks."""
     known = dict(zip(body.model.point_names, body.joint_centers_world, strict=True))
     return np.array([known.get(joint, np.full(3, np.nan)) for joint in joints])
+
+
+def farthest_joint(a: PosedBody, b: PosedBody) -> tuple[str, float]:
+    """Return the joint whose centres are farthest apart in two poses of a person, and their distance, metres.
+
+    The poses are compared in their own bodies, by the joints that both have.
+    """
+    joints = (*JOINTS, *FOOT_POINTS)
+    apart_m = np.linalg.norm(joint_centers(a, joints) - joint_centers(b, joints), axis=1)
+    at = int(np.nanargmax(apart_m))
+    return joints[at], float(apart_m[at])
 
 
 def _angles(subjects: Sequence[tuple[PosedBody, ...]]) -> tuple[tuple[str, ...], Array, Array]:
@@ -157,19 +173,18 @@ def _angles(subjects: Sequence[tuple[PosedBody, ...]]) -> tuple[tuple[str, ...],
     return names, means, steps
 
 
-def _notes(sessions: Sequence[Session], bodies: Mapping[Subject, tuple[PosedBody, ...]]) -> tuple[str, ...]:
+def notes_on(sessions: Sequence[Session], bodies: Mapping[Subject, tuple[PosedBody, ...]]) -> tuple[str, ...]:
     """Return sentences on what differs beside the poses: calibrations and bodies."""
     out = list[str]()
     cameras = [sorted((c.camera for c in s.cameras), key=lambda camera: camera.name) for s in sessions]
     matrices = [np.array([(c.K @ c.T_camera_world[:3]) for c in of]) for of in cameras]
     if not all(np.allclose(m, matrices[0]) for m in matrices):
         out.append("the copies have different calibrations, and distances include that difference")
-    of_person: dict[str, dict[BodyModel, None]] = {}
-    for subject, of in bodies.items():
-        of_person.setdefault(subject.person, {}).update(dict.fromkeys(b.model for b in of))
-    for person, models in of_person.items():
-        if len({m.dof_names for m in models}) > 1:
+    texts = {body.model: format_model(body.model) for of in bodies.values() for body in of}
+    for person in dict.fromkeys(subject.person for subject in bodies):
+        of_person = [[body.model for body in of] for subject, of in bodies.items() if subject.person == person]
+        if any(len({m.dof_names for m in models}) > 1 for models in of_person):
             out.append(f"the bodies of '{person}' have different degrees of freedom, and their angles are not compared")
-        if len({format_model(m) for m in models}) > 1:
+        if any(len({texts[m] for m in models}) > 1 for models in of_person):
             out.append(f"the bodies of '{person}' have different sizes, and distances of joints include them")
     return tuple(out)

@@ -85,6 +85,14 @@ def _task(
     return at if holds.get(decided.state, False) else plain
 
 
+def is_disputed(store: AnnotationStore, person: str, frame: int) -> bool:
+    """Return whether two merged copies disagree about the pose of a person, and nobody has decided it yet."""
+    at = ("disagreement", person, frame)
+    if all((row.kind, row.person, row.frame) != at for row in store.tasks.tasks()):
+        return False
+    return any((t.row.kind, t.row.person, t.row.frame) == at and t.state == "rejected" for t in read_tasks(store))
+
+
 def count_states(tasks: Sequence[Task]) -> dict[str, int]:
     """Return the number of tasks in each of `STATES`, and their `total` without withdrawn ones."""
     found = Counter(task.state for task in tasks)

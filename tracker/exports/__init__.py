@@ -2,7 +2,18 @@
 
 Imports all that it gathers: `session`, `store`, `contours`, `posing`; `formats` writes the files. Callers use `motion`,
 to read what is exported, and one function for each format of `writers`, `array_writers`, `nwb_writer`, `label_writers`,
-`mask_writers` and `dataset`. `provenance` tells who made each pose, and how.
+`mask_writers` and `dataset`. `provenance` tells who made each pose, and how; `point_origins` says so of
+each point.
 """
 
-__all__ = ["export_files", "export_format", "formats", "like", "motion", "options", "pose_arrays", "provenance"]
+__all__ = [
+    "export_files",
+    "export_format",
+    "formats",
+    "like",
+    "motion",
+    "options",
+    "point_origins",
+    "pose_arrays",
+    "provenance",
+]

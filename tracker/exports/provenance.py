@@ -69,14 +69,19 @@ def sources_of_points(model: BodyModel, sources: Sequence[str]) -> tuple[str, ..
         model: the body.
         sources: of the values of its pose, (n_values,).
     """
-    values_of: dict[str, list[str]] = {}
-    for name, source in zip(model.value_names, sources, strict=True):
-        values_of.setdefault(name.rpartition(".")[0], []).append(source)
+    return tuple(min((sources[i] for i in values), key=SOURCES.index) for values in values_of_points(model))
+
+
+def values_of_points(model: BodyModel) -> tuple[tuple[int, ...], ...]:
+    """Return the indices of the values of the nearest joint that moves each point, in the order of `point_names`."""
+    values_of: dict[str, list[int]] = {}
+    for i, name in enumerate(model.value_names):
+        values_of.setdefault(name.rpartition(".")[0], []).append(i)
     out = []
     for part in model.proximal_parts.tolist():
         while part > 0 and model.joints[part].name not in values_of:
             part = model.parents[part]
-        out.append(min(values_of[model.joints[part].name], key=SOURCES.index))
+        out.append(tuple(values_of[model.joints[part].name]))
     return tuple(out)
 
 

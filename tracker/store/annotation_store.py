@@ -115,6 +115,20 @@ class AnnotationStore:
             frames,
         )
 
+    def pose_versions(self, person: str, frame: int) -> list[PoseRecord]:
+        """Return the pose of a person in a frame and the ones before it that undo would show, the present one first.
+
+        Steps within one edit count, too. Nothing is returned if the frame shows no pose.
+        """
+        return self._connection.all(
+            "WITH RECURSIVE f (change) AS (SELECT change FROM poses WHERE person = ? AND frame = ? UNION ALL "
+            "SELECT c.previous FROM f JOIN pose_changes c ON c.id = f.change WHERE c.previous IS NOT NULL) "
+            f"SELECT {rows.RECORD_COLUMNS} FROM f JOIN pose_changes c ON c.id = f.change {rows.ORIGIN} "
+            "WHERE c.numbers IS NOT NULL ORDER BY c.id DESC",
+            (person, frame),
+            lambda row: rows.row_to_record(row, rows.PoseLabel(person, frame)),
+        )
+
     def pose_edits(self, person: str) -> dict[int, int]:
         """Return the entry of the history that made each pose of a person, by frame, ascending."""
         sql = f"SELECT p.frame, coalesce(c.made_in, c.edit) {rows.CURRENT_POSES} WHERE p.person = ? ORDER BY p.frame"

@@ -14,6 +14,8 @@ SEEN = "seen"
 BETWEEN, SEAM = "between", "seam_mm"
 """Keys of a pose's settings: the two keyframes that it was interpolated or tracked between, `[first, last]`, and how
 far the passes from them lie apart, the largest of the limb joints, mm."""
+TAKEN_FROM = "taken_from"
+"""Key of a pose's settings: words for where a person took it from: the name of a copy of the session, or a mean."""
 STATUSES = ("", "good", "doubtful", "lost")
 """Quality of a pose as assessed by its tracker; empty if not assessed."""
 

@@ -6,18 +6,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from app.runtime.json_output import format_json
+from app.state.other_copy import TOLERANCE_MM
 from tracker.errors import TrackerError
 
 if TYPE_CHECKING:
     from tracker.annotation.merge_sessions import MergeReport
 
 _Copy = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(help_behavior_hint="")]
-_TOLERANCE_MM = 20.0
-"""Largest distance of a joint at which two poses count as one, mm. Examiners place landmarks such as the greater
-trochanter 15 to 20 mm apart (Della Croce et al. 1999; Rabuffetti et al. 2002)."""
 
 
-def command(a: _Copy, b: _Copy, /, into: Path, tolerance_mm: float = _TOLERANCE_MM, json: bool = False) -> None:
+def command(a: _Copy, b: _Copy, /, into: Path, tolerance_mm: float = TOLERANCE_MM, json: bool = False) -> None:
     """Join two copies of one session, such as those of two annotators, in a new session.
 
     Both copies stay as they are. Poses that both annotated differently become tasks; docs/annotation.md has the rules.

@@ -1,6 +1,7 @@
 """Read the stored poses of the session for views: timeline, curves, trails."""
 
 from app.control.session.session_state import SessionState
+from app.storage.pose_origins import PoseOrigin
 from tracker.body.model import PosedBody
 from tracker.geometry.arrays import Array
 from tracker.store.records import FramePose
@@ -45,6 +46,16 @@ class StoredPoses:
                     assert pose.revision is not None, "a stored pose has a revision"
                     found[person] = PosedBody(saver.revisions.body(pose.revision), pose.values)
         return found
+
+    def origin(self, person: int, frame: int) -> PoseOrigin | None:
+        """Return where the stored pose of a person comes from; None if there is none."""
+        with self._session_state.lock:
+            return self._session_state.saver.origin(person, frame)
+
+    def keyframes_by_annotator(self) -> tuple[dict[str, tuple[int, ...]], ...]:
+        """Return for each person the keyframes by the annotator who set or marked them last, ascending."""
+        with self._session_state.lock:
+            return self._session_state.saver.keyframes_by_annotator()
 
     def in_present_body(self, person: int, frames: range) -> dict[int, Array]:
         """Return a person's poses, (n_values,), in the present body by frame; frames without a pose are left out."""

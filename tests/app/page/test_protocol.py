@@ -3,16 +3,17 @@
 from typing import get_args
 
 import msgspec
+import protocol_docs
 import pytest
 
-from app.page import client_messages, pose_messages, protocol_docs, socket
+from app.page import client_messages, observation_messages, pose_messages, socket
 from app.page.client_messages import CLIENT_MESSAGES
 from app.page.commands import COMMANDS
 from app.page.message_parsing import MessageError, parse
 
 SUBSCRIPTIONS = {
     client_messages.SetView, client_messages.CheckEpipolar, client_messages.ShowCurves, client_messages.WatchTab,
-    client_messages.ShowHistory,
+    client_messages.ShowHistory, observation_messages.WatchProvenance,
 }  # fmt: skip
 
 DRAG = '{"type":"drag","phase":"move","frame":2,"camera":0,"person":0,"point":"torso","seq":1,"u":%s,"v":2}'
@@ -21,7 +22,7 @@ DRAG = '{"type":"drag","phase":"move","frame":2,"camera":0,"person":0,"point":"t
 @pytest.mark.parametrize("path", [protocol_docs.TYPES, protocol_docs.DOCS])
 def test_types_and_reference_are_those_of_the_declarations(path):
     text = path.read_text(encoding="utf-8")
-    assert protocol_docs.generated(path, text) == text, "run `python -m app.page.protocol_docs`"
+    assert protocol_docs.generated(path, text) == text, "run `python tests/recipes/protocol_docs.py`"
 
 
 def test_every_message_is_carried_out():

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 
 import aiohttp
 import pytest
@@ -10,6 +11,7 @@ from serving import listening
 
 from app.server import server
 from app.server.access import Access
+from app.server.copy_routes import CopyRoutes
 from app.server.observation_routes import ObservationRoutes
 from app.server.static_files import static_folder
 from tracker.body.model import PosedBody
@@ -19,6 +21,7 @@ from tracker.store.records import PoseRecord
 from tracker.store.stored_poses import StoredPose
 
 PLAN, IMPORT, REPORT = "/observations/plan", "/observations/import", "/observations/report"
+COPY = "/copies/open"
 
 
 class Nobody:
@@ -39,6 +42,7 @@ async def serve(controller, tmp_path):
     async def start(refusal=None):
         app = server.create_app(Nobody(), tmp_path / "nobody", Access(token="secret"), static_folder())
         ObservationRoutes(controller, refusal).add_to(app)
+        CopyRoutes(controller, refusal).add_to(app)
         context = listening(app)
         port = await context.__aenter__()
         client = aiohttp.ClientSession(f"http://127.0.0.1:{port}")
@@ -165,3 +169,15 @@ async def test_the_report_of_a_judgement_is_downloaded(controller, serve, form):
         text = await response.text()
     assert "left arm jumps" in text
     assert text.count("data:image/jpeg;base64,") == len(controller.session.cameras)
+
+
+async def test_another_copy_is_opened_by_its_path_only_where_paths_may_be_named(controller, serve, session, tmp_path):
+    copy = shutil.copytree(session, tmp_path / "ben")
+    post, _ = await serve("no paths here")
+    assert await post(COPY, {"folder": str(copy)}) == (403, "no paths here")
+    post, _ = await serve()
+    assert (await post(COPY, {"folder": "ben"}))[0] == 400  # neither from the root nor from the home
+    assert (await post(COPY, {"folder": str(copy)}, Origin="http://elsewhere.example"))[0] == 403
+    assert controller.state.other_copy is None
+    assert (await post(COPY, {"folder": str(copy)}))[0] == 200
+    assert controller.state.other_copy.name == "ben"

@@ -1,5 +1,7 @@
 """Two poses about as good: marked, drawn dashed, taken in place of each other, undone."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,10 @@ from app.drawing import overlays
 from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.edit_tree import now
+from tracker.store.identities import new_uid
 from tracker.store.records import Alternative, PoseChange, PoseRecord
+from tracker.store.task_log import StateRow, TaskRow
 
 ANN, BOB = 0, 1
 VIEW = View(frozenset(("contours", "alternatives")), (1, 1, 1, 1))
@@ -98,3 +103,22 @@ def test_without_another_pose_there_is_nothing_to_take(tracked):
     controller.navigation.seek(2)
     with pytest.raises(TrackerError, match="expected an alternative pose on frame 2, found none"):
         controller.alternatives.take_alternative(ANN)
+
+
+@pytest.mark.parametrize("is_disputed", [True, False])
+def test_a_keyframe_shows_its_alternative_only_while_two_merged_copies_disagree(couple, session, opened, is_disputed):
+    ann, other = couple.state.poses[ANN], couple.state.poses[BOB]
+    with closing(AnnotationStore(session / "annotations.sqlite")) as store:
+        record = PoseRecord(ann, ("manual",) * len(ann), couple.state.revisions[ANN], keyframe=True)
+        back = Alternative(other, couple.state.revisions[ANN], None)
+        store.commit("Merge", [PoseChange("ann", 0, record, (back,))])
+        if is_disputed:
+            task = TaskRow(new_uid(), "disagreement", "ann", 0, "", "", now())
+            store.tasks.add([task], [StateRow(new_uid(), task.uid, "rejected", "two poses", "", now())])
+    controller = opened()
+    assert [len(p.alternatives) for p in controller.state.people] == [int(is_disputed), 0]
+    assert drawn(controller) == ({ANN} if is_disputed else set())
+    if is_disputed:
+        controller.alternatives.take_alternative(ANN)
+        np.testing.assert_array_equal(controller.state.poses[ANN], other)
+        assert controller.state.people[ANN].alternatives == ()  # decided

@@ -1,0 +1,220 @@
+/** Other copy: the poses of another annotator's copy of the session beside the own ones, and the choice between them. */
+
+import { copyDifferences, differenceAt } from "../model/selectors.js";
+import { count, displayName } from "../widgets/text.js";
+import { numberRow, textButton } from "./rows.js";
+
+/**
+ * @typedef {import("../model/protocol.js").UseCopy["action"]} Action
+ * @typedef {import("../model/selectors.js").Difference} Difference
+ */
+
+/** Entries of the list that are built at first, and after "more". */
+const FEW_LISTED = 20;
+const NO_COPY = "No copy is compared. Open one first.";
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {import("../timeline/index.js").TimelineRoom} timeline
+ * @param {import("./import_form.js").PathFields} paths
+ * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Binding[]}}
+ */
+export function copySection({ store, send, notify, navigation, actions }, { jumps }, paths) {
+  const decide = (/** @type {Action} */ action) => {
+    const { state } = store.facts;
+    if (state) send({ type: "other_copy", action, person: state.person, frame: state.frame });
+  };
+  const form = Object.assign(document.createElement("form"), { className: "copy-form" });
+  const label = Object.assign(document.createElement("label"), { className: "import-field", title: "Folder of another annotator's copy of this session, on the machine of the program" });
+  const input = Object.assign(document.createElement("input"), { type: "text", className: "query-field", name: "copy", id: "copy-folder" });
+  const holder = Object.assign(document.createElement("span"), { className: "path-field" });
+  holder.append(input);
+  label.append(Object.assign(document.createElement("span"), { textContent: "Folder" }), holder);
+  const open = Object.assign(document.createElement("button"), { type: "submit", textContent: "Compare", title: "Read the poses of this copy, and show where both differ; nothing is changed" });
+  const answer = note();
+  answer.setAttribute("role", "status");
+  form.append(label, open);
+  input.dataset.takes = "folder";
+  paths.completes(input);
+
+  const summary = note();
+  const here = note();
+  const tolerance = numberRow({
+    label: "Tolerance",
+    title: "Distance of a joint up to which two poses count as one",
+    unit: "mm",
+    low: 0,
+    high: 10000,
+    step: 5,
+    change: (value) => value !== null && send({ type: "other_copy", action: "tolerance", tolerance_mm: value }),
+    refuse: (text) => notify({ type: "notice", level: "info", text }),
+  });
+  const keep = textButton("Keep mine", "Keep this session's pose as a keyframe, and count the difference as decided", () => decide("keep"));
+  const take = textButton("Take theirs", "Take the pose of the other copy as a keyframe; can be undone", () => decide("take"));
+  const mean = textButton("Mean", "Take the mean of both poses as a keyframe: angles the shorter way round; can be undone", () => decide("mean"));
+  const buttons = group(keep, take, mean);
+  const previous = textButton("Previous", "Previous frame where the copies differ (Alt+Shift+C)", () => step(-1));
+  const next = textButton("Next", "Next frame where the copies differ (Alt+S)", () => step(1));
+  const leave = textButton("End", "End the comparison; nothing is changed", () => send({ type: "other_copy", action: "leave", person: 0, frame: 0 }));
+  const ways = group(previous, next, leave);
+  const worst = Object.assign(document.createElement("ol"), { className: "observed-worst" });
+  worst.setAttribute("aria-label", "Differences, largest first");
+  const more = textButton("More", "List smaller differences too", () => {
+    limit = Infinity;
+    listed = "";
+    show();
+  });
+  const compared = document.createElement("div");
+  compared.className = "acquisition";
+  compared.append(summary, tolerance.element, ways, here, buttons, worst, more);
+  const body = document.createElement("div");
+  body.className = "acquisition";
+  body.append(form, answer, compared);
+
+  let isBusy = false;
+  let limit = FEW_LISTED;
+  let listed = "";
+  const refuse = (/** @type {string} */ text) => {
+    answer.textContent = text;
+    answer.classList.toggle("is-failed", text !== "");
+    answer.hidden = !text;
+  };
+  const read = async () => {
+    isBusy = true;
+    refuse("");
+    show();
+    try {
+      const found = await fetch("copies/open", { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ folder: input.value.trim() }) });
+      if (!found.ok) refuse(await found.text());
+    } catch {
+      refuse("The program does not answer.");
+    }
+    isBusy = false;
+    show();
+  };
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    if (input.value.trim()) void read();
+  });
+  form.addEventListener("input", () => show());
+
+  /** @param {Difference} found */
+  const visit = ({ person, frame, joint }) => {
+    const info = store.facts.session?.people[person];
+    navigation.pause();
+    navigation.goTo(frame);
+    actions.selectPerson(person, info?.points.includes(joint) ? joint : null);
+  };
+  const step = (/** @type {1 | -1} */ way) => {
+    jumps.go("copy", way);
+    const at = copyDifferences(store.facts).find(({ frame }) => frame === store.facts.target);
+    if (at) visit(at);
+  };
+
+  const show = () => {
+    const { otherCopy: copy, connected, session, state } = store.facts;
+    open.disabled = isBusy || !connected || !input.value.trim();
+    open.textContent = isBusy ? "Reading …" : "Compare";
+    compared.hidden = !copy;
+    form.hidden = !!copy;
+    if (!copy || !session || !state) return;
+    const apart = copyDifferences(store.facts).sort((a, b) => b.distance_mm - a.distance_mm);
+    const all = copy.people.flat();
+    const decided = all.filter((one) => one.decided).length;
+    summary.textContent =
+      `${copy.own_name} and ${copy.name}: ${count(all.length)} ${all.length === 1 ? "pose was" : "poses were"} annotated by both. ` +
+      `${count(apart.length)} ${apart.length === 1 ? "differs" : "differ"} by more than the tolerance${decided ? `, ${count(decided)} decided` : ""}.` +
+      copy.notes.map((text) => ` Note: ${text}.`).join("");
+    tolerance.show(copy.tolerance_mm);
+    previous.disabled = next.disabled = apart.length === 0;
+    const found = differenceAt(store.facts, state.person, state.frame);
+    const isPosed = copy.posed[state.person] ?? false;
+    const isOwn = state.source !== null;
+    keep.disabled = !isOwn || !isPosed;
+    take.disabled = !isPosed;
+    mean.disabled = !isPosed || !isOwn;
+    here.textContent = found
+      ? `Frame ${state.frame}: the ${displayName(found.joint)} is ${Math.round(found.distance_mm)} mm apart${found.decided ? ", decided" : ""}.`
+      : isPosed
+        ? `Frame ${state.frame}: the other pose is drawn; not annotated by both.`
+        : `Frame ${state.frame}: ${copy.name} has no pose.`;
+    const news = JSON.stringify([apart, state.frame, limit]);
+    if (news === listed) return;
+    listed = news;
+    const several = session.people.length > 1;
+    worst.replaceChildren(...apart.slice(0, limit).map((one) => differenceRow(one, several ? session.people[one.person].name : "", one.frame === state.frame, () => visit(one))));
+    worst.hidden = apart.length === 0;
+    more.hidden = apart.length <= limit;
+    more.textContent = `${count(apart.length - limit)} more`;
+  };
+  refuse("");
+  show();
+  return {
+    id: "copy",
+    title: "Other copy",
+    hint: "Compare with another annotator's copy of this session, and decide where both differ",
+    body,
+    update(changed) {
+      if (["otherCopy", "state", "session", "connected"].some((fact) => changed.has(/** @type {"state"} */ (fact)))) show();
+    },
+    bindings(reveal) {
+      const noCopy = () => (store.facts.otherCopy ? null : NO_COPY);
+      const none = () => noCopy() ?? (copyDifferences(store.facts).length ? null : "The copies differ nowhere by more than the tolerance.");
+      const off = (/** @type {HTMLButtonElement} */ which) => () => noCopy() ?? (which.disabled ? here.textContent : null);
+      const command = (/** @type {string} */ text, /** @type {() => string | null} */ why, /** @type {() => void} */ run) => ({
+        keys: [],
+        label: text,
+        words: "annotator agreement copy compare disagreement difference",
+        matches: () => false,
+        why,
+        run,
+      });
+      return [
+        command("Compare with another copy of the session…", () => null, () => {
+          reveal();
+          input.focus();
+        }),
+        command("Other copy: keep my pose", off(keep), () => decide("keep")),
+        command("Other copy: take their pose", off(take), () => decide("take")),
+        command("Other copy: take the mean of both poses", off(mean), () => decide("mean")),
+        command("Other copy: go to the largest difference", none, () => {
+          reveal();
+          const [largest] = copyDifferences(store.facts).sort((a, b) => b.distance_mm - a.distance_mm);
+          visit(largest);
+        }),
+        command("End the comparison with the other copy", noCopy, () => send({ type: "other_copy", action: "leave", person: 0, frame: 0 })),
+      ];
+    },
+  };
+}
+
+/**
+ * @param {Difference} difference
+ * @param {string} who name of the person, empty for the only one
+ * @param {boolean} isHere
+ * @param {() => void} visit
+ */
+function differenceRow({ frame, joint, distance_mm }, who, isHere, visit) {
+  const row = document.createElement("li");
+  const go = textButton("", `Go to frame ${frame} and select the ${displayName(joint)}`, visit);
+  go.append(
+    Object.assign(document.createElement("span"), { className: "observed-frame", textContent: String(frame) }),
+    Object.assign(document.createElement("span"), { textContent: `${who && `${who}, `}${displayName(joint)}` }),
+    Object.assign(document.createElement("span"), { className: "quiet", textContent: `${Math.round(distance_mm)} mm` }),
+  );
+  go.dataset.noCommand = "";
+  if (isHere) go.setAttribute("aria-current", "true");
+  row.append(go);
+  return row;
+}
+
+function note() {
+  return Object.assign(document.createElement("p"), { className: "section-note" });
+}
+
+/** @param {HTMLElement[]} parts */
+function group(...parts) {
+  const element = Object.assign(document.createElement("div"), { className: "acquisition-work" });
+  element.append(...parts);
+  return element;
+}

@@ -1,0 +1,176 @@
+/** Provenance: where the selected person's pose and each of its joints come from, and the timeline's filter by it. */
+
+import { KINDS, annotatorName, pointPhrases, poseLines } from "../model/provenance.js";
+import { capital, count, displayName } from "../widgets/text.js";
+import { choiceRow, textButton } from "./rows.js";
+
+/** @typedef {import("../model/provenance.js").Filter} Filter */
+
+const ALL = "all";
+const BY_NAME = "annotator:";
+const SHOWN_FACTS = /** @type {const} */ (["provenance", "annotators", "state", "session", "connected", "timeline", "provenanceFilter"]);
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {import("../timeline/index.js").TimelineRoom} timeline
+ * @returns {import("./inspector.js").Section & {bindings: (reveal: () => void) => import("../widgets/key_matching.js").Binding[]}}
+ */
+export function provenanceSection({ store, send, actions }, { jumps }) {
+  const filter = choiceRow({
+    label: "Filter",
+    title: "Poses that the timeline shows as usual; it dims the others",
+    options: /** @type {[string, string][]} */ ([]),
+    change: (value) => choose(chosen(value)),
+  });
+  const step = (/** @type {1 | -1} */ way) => jumps.go("chosen", way);
+  const previous = textButton("Previous", "Go to the previous frame of this kind (Alt+Shift+Q)", () => step(-1));
+  const next = textButton("Next", "Go to the next frame of this kind (Alt+Q)", () => step(1));
+  const number = Object.assign(document.createElement("span"), { className: "section-note" });
+  const steps = Object.assign(document.createElement("div"), { className: "acquisition-work" });
+  steps.append(previous, next, number);
+  const pose = document.createElement("div");
+  const list = Object.assign(document.createElement("ul"), { className: "provenance-joints" });
+  list.setAttribute("aria-label", "Joints");
+  const body = document.createElement("div");
+  body.append(filter.element, steps, pose, list);
+
+  /** @param {Filter | null} wanted */
+  const choose = (wanted) => {
+    store.set({ provenanceFilter: wanted });
+    ask(wanted);
+  };
+  let asked = JSON.stringify({ person: null, annotators: false });
+  /** Ask for what is in sight: the panel, a joint under the pointer, or the filter by annotator. */
+  const ask = (wanted = store.facts.provenanceFilter) => {
+    const { connected, state, hover, dragging } = store.facts;
+    if (!connected || !state || dragging) return;
+    const isSeen = body.getClientRects().length > 0;
+    const person = hover ? hover.person : isSeen ? state.person : null;
+    const annotators = isSeen || wanted?.kind === "annotator";
+    const request = JSON.stringify({ person, annotators });
+    if (request === asked) return;
+    asked = request;
+    send({ type: "provenance", person, annotators });
+  };
+  new ResizeObserver(() => ask()).observe(body);
+
+  let offered = "";
+  const showFilter = () => {
+    const { annotators, provenanceFilter } = store.facts;
+    const names = new Set((annotators?.people ?? []).flatMap((of) => Object.keys(of)));
+    if (provenanceFilter?.kind === "annotator") names.add(provenanceFilter.name);
+    /** @type {[string, string][]} */
+    const choices = [
+      [ALL, "all poses"],
+      ...KINDS.map(({ kind, label }) => /** @type {[string, string]} */ ([kind, label])),
+      ...[...names].sort().map((name) => /** @type {[string, string]} */ ([BY_NAME + name, `keyframes of ${annotatorName(name)}`])),
+    ];
+    if (JSON.stringify(choices) !== offered) {
+      offered = JSON.stringify(choices);
+      filter.fill(choices);
+    }
+    filter.show(valueOf(provenanceFilter), provenanceFilter !== null);
+    const found = provenanceFilter ? jumps.count("chosen") : 0;
+    steps.hidden = provenanceFilter === null;
+    previous.disabled = next.disabled = found === 0;
+    number.textContent = `${count(found)} ${found === 1 ? "frame" : "frames"}`;
+  };
+
+  let listed = "";
+  const showPose = () => {
+    const { provenance, state } = store.facts;
+    const isOfSelected = !!provenance && provenance.person === state?.person;
+    if (!state || (provenance && !isOfSelected)) return; // of a joint under the pointer: the panel stays as it is
+    const isKnown = isOfSelected && provenance.source !== null;
+    const lines = isKnown ? poseLines(provenance) : provenance ? ["No pose is stored on this frame."] : [];
+    const joints = isKnown ? grouped(provenance) : [];
+    const news = JSON.stringify([lines, joints, state.point]);
+    if (news === listed) return;
+    listed = news;
+    pose.replaceChildren(...lines.map((textContent) => Object.assign(document.createElement("p"), { className: "section-note", textContent })));
+    list.replaceChildren(...joints.map(([text, points]) => originRow(text, points, state.point, (point) => actions.selectPerson(state.person, point))));
+    list.hidden = joints.length === 0;
+  };
+  showFilter();
+  return {
+    id: "provenance",
+    title: "Provenance",
+    hint: "Who or what made this pose and each joint; filter the timeline by it",
+    body,
+    update(changed) {
+      if (changed.has("connected") && !store.facts.connected) asked = "";
+      if (changed.has("session")) store.set({ provenanceFilter: null });
+      if (["hover", "dragging", "state", "connected"].some((fact) => changed.has(/** @type {"hover"} */ (fact)))) ask();
+      if (SHOWN_FACTS.some((fact) => changed.has(fact))) {
+        showFilter();
+        showPose();
+      }
+    },
+    bindings(reveal) {
+      const command = (/** @type {string} */ label, /** @type {Filter | null} */ wanted) => ({
+        keys: [],
+        label,
+        words: "provenance timeline dim source made",
+        matches: () => false,
+        run: () => {
+          reveal();
+          choose(wanted);
+        },
+      });
+      return [
+        ...KINDS.map(({ kind, label }) => command(`Filter the timeline: poses ${label}`, { kind })),
+        command("Filter the timeline: all poses", null),
+      ];
+    },
+  };
+}
+
+/**
+ * Joints of the same origin together, in the order of the body: the words for it, and the names of its points.
+ *
+ * @param {import("../model/protocol.js").ProvenanceMessage} pose
+ */
+function grouped(pose) {
+  /** @type {Map<string, string[]>} */
+  const found = new Map();
+  for (const point of pose.points) {
+    const text = pointPhrases(point, pose).join(", ");
+    found.set(text, [...(found.get(text) ?? []), point.point]);
+  }
+  return [...found];
+}
+
+/**
+ * @param {string} text
+ * @param {string[]} points
+ * @param {string | null} selected
+ * @param {(point: string) => void} select
+ */
+function originRow(text, points, selected, select) {
+  const row = document.createElement("li");
+  const names = points.map((point) => {
+    const name = textButton(displayName(point), `Select the ${displayName(point)}`, () => select(point));
+    name.dataset.noCommand = "";
+    if (point === selected) name.setAttribute("aria-current", "true");
+    return name;
+  });
+  const joints = Object.assign(document.createElement("span"), { className: "provenance-points" });
+  joints.append(...names);
+  row.append(Object.assign(document.createElement("span"), { textContent: capital(text) }), joints);
+  return row;
+}
+
+/** @param {Filter | null} filter */
+function valueOf(filter) {
+  return filter === null ? ALL : filter.kind === "annotator" ? BY_NAME + filter.name : filter.kind;
+}
+
+/**
+ * @param {string} value of the choice
+ * @returns {Filter | null}
+ */
+function chosen(value) {
+  if (value.startsWith(BY_NAME)) return { kind: "annotator", name: value.slice(BY_NAME.length) };
+  const found = KINDS.find(({ kind }) => kind === value);
+  return found ? { kind: found.kind } : null;
+}
