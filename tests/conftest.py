@@ -12,6 +12,7 @@ from tracker.formats.model_toml import load_model
 
 # Programs that tests start remember their sessions there, not in the user's list.
 os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / "quadrille-test-state")
+os.environ["QUADRILLE_ANNOTATOR"] = ""  # nobody, whomever an earlier run has remembered
 # No time limit: the first call of a numba kernel compiles. No files in the source tree.
 settings.register_profile("quadrille", deadline=None, database=None, derandomize=True)
 settings.load_profile("quadrille")

@@ -37,7 +37,7 @@ export function lineForm(name, action, send) {
   const form = make("form", "plan-line");
   const input = Object.assign(make("input", "query-field"), { type: "text", placeholder: name, autocomplete: "off", maxLength: 2000 });
   input.setAttribute("aria-label", name);
-  const button = Object.assign(make("button", "", action), { type: "submit" });
+  const button = Object.assign(make("button", "", action), { type: "submit", title: `${action}: ${name}` });
   form.append(input, button);
   const enable = () => {
     button.disabled = !input.value.trim();

@@ -81,6 +81,7 @@ def test_the_page_is_driven_from_a_program(sample, tmp_path):
     assert cv2.imread(str(tmp_path / "a.png")).shape[2] == 3
 
 
+@pytest.mark.slow
 def test_a_strangers_metric_and_exporter_are_in_help_results_and_menu(packages, tmp_path):
     session, _ = store_motion(tmp_path / "s", [MODELS["gavrila38"]], n_frames=5)
     tracker.export(session, tmp_path / "truth.trc")

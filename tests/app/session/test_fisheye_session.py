@@ -84,6 +84,7 @@ def test_pins_are_stored_in_pixels_of_the_footage(opened, session):
     np.testing.assert_allclose(pin.position_px, place, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_no_pin_is_set_or_dragged_where_the_picture_is_black(opened):
     controller = opened()
     width, height = controller.session.cameras[FRONT].camera.pinhole.size
@@ -96,6 +97,7 @@ def test_no_pin_is_set_or_dragged_where_the_picture_is_black(opened):
     assert controller.state.pins[0][0].position_px == shown
 
 
+@pytest.mark.slow
 def test_a_dragged_joint_goes_where_the_pointer_is(opened):
     controller = opened()
     start = pixel_of(controller, "left_wrist")

@@ -102,6 +102,7 @@ def test_names_cannot_end_the_script(couple, tmp_path):
     assert (data["session"], data["people"][1]["name"]) == (evil, evil)
 
 
+@pytest.mark.slow
 def test_what_is_there_is_kept(run, couple, tmp_path):
     words = ("share", couple.folder, "--out")
     empty, full, shared, file = (tmp_path / name for name in ("empty", "full", "shared", "a.html"))

@@ -45,7 +45,7 @@ async def test_differences_are_counted_listed_and_visited(page, endpoint, sectio
     await section.locator(".observed-worst button").first.click()
     await until(lambda: {"type": "select", "person": 0, "point": "r_wrist"} in endpoint.received)
     await shows(page, "quadrille.state.target === 30")
-    await page.keyboard.press("Alt+Shift+c")
+    await page.keyboard.press("Alt+Shift+s")
     await shows(page, "quadrille.state.target === 12")
     await endpoint.broadcast(NONE)
     await shows(page, "quadrille.state.otherCopy === null")
@@ -79,7 +79,8 @@ async def test_a_folder_that_is_refused_is_said_beside_the_field(page, endpoint,
     await page.evaluate("document.querySelector('[data-section=copy]').open = true")
     await page.route("**/sessions/paths*", lambda route: route.fulfill(body="[]", content_type="application/json"))
     await page.route("**/copies/open", lambda route: route.fulfill(status=400, body="expected a copy, found none"))
-    await section.get_by_label("Folder", exact=True).fill("/nowhere")
+    async with page.expect_response("**/sessions/paths*"):  # names are completed a moment after typing
+        await section.get_by_label("Folder", exact=True).fill("/nowhere")
     await section.get_by_role("button", name="Compare", exact=True).click()
     await section.get_by_text("expected a copy, found none").wait_for()
     for address in ("**/copies/open", "**/sessions/paths*"):

@@ -36,6 +36,7 @@ def test_the_session_loads_with_all_its_footage(folder):
         assert len(list(source.masks.glob("*.png"))) == 12
 
 
+@pytest.mark.slow
 def test_true_joints_project_into_the_masks(folder):
     truth = read_trc(folder / "truth.trc")
     assert set(truth.names) == LIMB_JOINTS | {"neck", "head"}

@@ -127,6 +127,7 @@ def test_a_judgement_can_be_stopped_and_is_the_only_work(imported, monkeypatch):
     assert imported.state.observations.judgements == ()
 
 
+@pytest.mark.slow
 def test_joints_are_taken_as_poses_in_one_entry_and_keyframes_stay(imported):
     drag(imported, "left_wrist", (6.0, -9.0))
     kept = imported.state.poses[0]
