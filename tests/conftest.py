@@ -12,7 +12,6 @@ from tracker.formats.model_toml import load_model
 
 # Programs that tests start remember their sessions there, not in the user's list.
 os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / "quadrille-test-state")
-os.environ["QUADRILLE_ANNOTATOR"] = ""  # nobody, whomever an earlier run has remembered
 # No time limit: the first call of a numba kernel compiles. No files in the source tree.
 settings.register_profile("quadrille", deadline=None, database=None, derandomize=True)
 settings.load_profile("quadrille")
@@ -51,6 +50,12 @@ def pytest_collection_modifyitems(items):
         if folder.as_posix() != "." and folder.parts[0] != "browser" and folder.as_posix() not in WITHOUT_KERNELS:
             item.add_marker("kernels")
     items.sort(key=lambda item: item.get_closest_marker("kernels") is not None)
+
+
+@pytest.fixture(autouse=True)
+def nobody_annotates(monkeypatch):
+    """Forget the annotator whom a command in this process, or an earlier run, has remembered."""
+    monkeypatch.setenv("QUADRILLE_ANNOTATOR", "")
 
 
 @pytest.fixture(scope="session")

@@ -2,10 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from tracker.body.model import PosedBody
-from tracker.geometry.arrays import Array
+if TYPE_CHECKING:
+    from tracker.body.model import PosedBody
+    from tracker.geometry.arrays import Array
 
 TOLERANCE_MM = 20.0
 """Largest distance of a joint at which two poses count as one, mm. Examiners place landmarks such as the greater
@@ -29,7 +30,7 @@ class OtherCopy:
     """Short name of its folder, by which it differs from that of the open session."""
     own_name: str
     """Short name of the folder of the open session."""
-    poses: tuple[Mapping[int, PosedBody], ...]
+    poses: "tuple[Mapping[int, PosedBody], ...]"
     """By person: its poses by frame, each in the body that it was made with."""
     annotated: tuple[frozenset[int], ...]
     """By person: frames that its annotator set or verified."""
@@ -39,6 +40,6 @@ class OtherCopy:
     """Distance of a joint up to which two poses count as one."""
     notes: tuple[str, ...] = ()
     """Sentences on what else differs: calibrations, bodies."""
-    decided: Mapping[tuple[int, int], Array] = field(default_factory=dict)
+    decided: "Mapping[tuple[int, int], Array]" = field(default_factory=dict)
     """By index of the person and frame: the own pose, (n_values,), with which the user has decided a difference. A pose
     that changes afterwards is no longer decided."""

@@ -69,6 +69,8 @@ def load(video: Path, folder: Path | None) -> Index | None:
             return Index(cached["pts"], {pts: i for i, pts in enumerate(every)}, cached["key_pts"])
     except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # missing or incomplete: list the packets again
         return None
+    except SystemError:  # Python 3.11 may fail to parse the header of an array while another thread parses one
+        return None
 
 
 def save(video: Path, folder: Path | None, index: Index) -> None:
