@@ -16,7 +16,7 @@ from typing import Any
 from platformdirs import user_cache_path, user_state_path
 
 from app.runtime.json_output import format_json
-from app.runtime.memory import WORKER_BYTES, free_bytes
+from app.runtime.memory import WORKER_BYTES, free_bytes, n_cores
 
 _EXTRAS = {
     "import": ("quadrille import of DeepLabCut HDF5, SLEAP and NWB", ("h5py", "sleap_io")),
@@ -38,7 +38,7 @@ class Finding:
     state: str
     """ok, missing or warning."""
     text: str
-    """What was found, and where it is missing, what to do."""
+    """The finding; for something that is missing, also the remedy."""
 
 
 def command(json: bool = False) -> None:
@@ -86,7 +86,7 @@ def examine() -> list[Finding]:
 
 
 def _cores() -> Finding:
-    n = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    n = n_cores()
     return Finding("cores", "ok" if n > 1 else "warning", f"{n}" + ("" if n > 1 else "; tracking wants two or more"))
 
 

@@ -121,7 +121,7 @@ class ObservationsMessage(Message, frozen=True, tag="imported"):
 
 
 class PointProvenance(Part, frozen=True):
-    """Where the place of a point comes from."""
+    """Origin of the place of a point."""
 
     point: str
     source: str
@@ -136,7 +136,7 @@ class PointProvenance(Part, frozen=True):
 
 
 class ProvenanceMessage(Message, frozen=True, tag="provenance"):
-    """Where the stored pose of a person on the shown frame comes from; only for a page that asks for it."""
+    """Origin of the stored pose of a person on the shown frame; only for a page that asks for it."""
 
     frame: int
     person: int

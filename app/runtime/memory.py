@@ -1,5 +1,6 @@
-"""The memory of the machine, and how much a worker needs."""
+"""Cores and memory of the machine, and how much a worker needs."""
 
+import os
 from contextlib import suppress
 from pathlib import Path
 
@@ -14,3 +15,8 @@ def free_bytes() -> int | None:
             if line.startswith("MemAvailable:"):
                 return int(line.split()[1]) * 1024
     return None
+
+
+def n_cores() -> int:
+    """Return the number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""Where stored poses come from: read for the page, which shows it for one pose."""
+"""Origins of stored poses: read for the page, which shows that of one pose."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

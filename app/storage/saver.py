@@ -14,6 +14,7 @@ from app.storage.frame_index import FrameIndex
 from app.storage.pose_origins import PoseOrigin, keyframes_by_annotator, read_origin
 from app.storage.retry_queue import RetryQueue
 from app.storage.revisions import ModelRevisions
+from app.storage.shown_records import is_same, main_source, sources_of, with_marks_of
 from tracker.annotation.plan import is_disputed
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model
@@ -28,7 +29,6 @@ from tracker.store.annotation_store import AnnotationStore
 from tracker.store.calibration_log import present_revision
 from tracker.store.records import (
     SEEN,
-    SOURCES,
     Alternative,
     Change,
     FramePose,
@@ -139,7 +139,7 @@ class Saver:
             return None
         return ShownPose(
             record.values,
-            _main_source(record.sources),
+            main_source(record.sources),
             record.status,
             record.remark,
             record.part_costs_px,
@@ -257,10 +257,10 @@ class Saver:
         changes: list[Change] = self._pin_changes(state)
         for person, (shown, revision) in enumerate(zip(state.people, state.revisions, strict=True)):
             stored = self._readable(self.record, person, state.frame, None)
-            is_stored = stored is not None and _is_same(stored, shown, revision) and not shown.seen
+            is_stored = stored is not None and is_same(stored, shown, revision) and not shown.seen
             if shown.source is None or is_stored:
                 continue
-            sources = _sources_of(stored, shown, source)
+            sources = sources_of(stored, shown, source)
             record = PoseRecord(
                 shown.values,
                 sources,
@@ -273,7 +273,7 @@ class Saver:
                 view_costs_px=state.view_costs_px,
             )
             if vouched is not None and person not in vouched:
-                record = _with_marks_of(stored, record)
+                record = with_marks_of(stored, record)
             changes.append(PoseChange(self._session.people[person].name, state.frame, record))
         return self.write(f"{label}, frame {state.frame}", changes, amend, by_program=False)
 
@@ -285,8 +285,8 @@ class Saver:
         people = []
         for person, (shown, revision) in enumerate(zip(state.people, state.revisions, strict=True)):
             stored = None if shown.source is None else self._readable(self.record, person, state.frame, None)
-            is_stored = stored is not None and _is_same(stored, shown, revision)
-            source = _main_source(stored.sources) if stored is not None and is_stored else shown.source
+            is_stored = stored is not None and is_same(stored, shown, revision)
+            source = main_source(stored.sources) if stored is not None and is_stored else shown.source
             people.append(shown if source == shown.source else replace(shown, source=source))
         return tuple(people)
 
@@ -447,31 +447,3 @@ class Saver:
         self.retry()
         if self.error is not None:
             raise SessionError(f"the history cannot move while an edit is not saved: {self.error}")
-
-
-def _sources_of(stored: PoseRecord | None, shown: ShownPose, source: str) -> tuple[str, ...]:
-    """Return the source of each value of a shown pose; values that an edit did not concern keep theirs."""
-    given = shown.sources or (source,) * len(shown.values)
-    if stored is None or len(stored.values) != len(shown.values):
-        return tuple(new or source for new in given)
-    is_kept = [not new for new in given] if shown.sources else stored.values == shown.values
-    return tuple(old if kept else new for kept, old, new in zip(is_kept, stored.sources, given, strict=True))
-
-
-def _with_marks_of(stored: PoseRecord | None, record: PoseRecord) -> PoseRecord:
-    """Return a new record with the marks and doubts of the stored one."""
-    if stored is None:
-        return replace(record, keyframe=False)
-    return replace(
-        record, keyframe=stored.keyframe, status=stored.status, remark=stored.remark, reviewed=stored.reviewed,
-        limbs_lost=stored.limbs_lost,
-    )  # fmt: skip
-
-
-def _is_same(stored: PoseRecord, shown: ShownPose, revision: int) -> bool:
-    return stored.model_revision == revision and np.array_equal(stored.values, shown.values)
-
-
-def _main_source(sources: tuple[str, ...]) -> str:
-    """Return the source that summarizes a pose: the one nearest to a person's own work."""
-    return min(sources, key=SOURCES.index)

@@ -36,7 +36,7 @@ export function unavailableReasons(store) {
 const LOOK = ["view", "epipolar", "curves", "history"];
 /** @type {ClientMessage["type"][]} */
 const REVIEW = [...LOOK, "seek", "select"];
-/** Messages that the page sends by itself, or many in a row: nobody has to be told. @type {ClientMessage["type"][]} */
+/** Messages that the page sends by itself, or many in a row, so that a refusal needs no notice. @type {ClientMessage["type"][]} */
 const SILENT = ["watch", "pause_3d", "seek", "select", "view_3d"];
 const MARKS = new Set(["reviewed", "unreviewed"]);
 
@@ -54,7 +54,7 @@ export function isAllowed(message, role) {
 
 /**
  * @param {ClientMessage} message that is not allowed
- * @returns {boolean} whether the user asked for something by it, and is told why nothing happens
+ * @returns {boolean} whether a refusal of it needs a notice: the user asked for something
  */
 export function isAsked(message) {
   return !SILENT.includes(message.type) && (!("phase" in message) || message.phase === "start");

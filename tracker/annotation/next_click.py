@@ -27,7 +27,7 @@ from tracker.store.stored_poses import StoredPose
 
 @dataclass(frozen=True)
 class HandSettings:
-    """What is expected of a person who corrects a limb."""
+    """Expectations of a person who corrects a limb."""
 
     sigma_px: float = 3.0
     """Standard deviation of a placed joint along each axis of a view, px of the footage: that of the scripted user with

@@ -17,7 +17,7 @@ _NUMBERED = (SIZES_EDITS, CALIBRATIONS, CALIBRATION_EDITS, CALIBRATIONS_OF_EDITS
 
 
 class Numbered(NamedTuple):
-    """What these settings hold, by identity of the edit."""
+    """Content of these settings, by identity of the edit."""
 
     sizes: Mapping[str, Sequence[tuple[str, Body, Body]]]
     """Name of each person whose sizes an edit changed, with the bodies before and after it."""

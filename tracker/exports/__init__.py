@@ -2,7 +2,7 @@
 
 Imports all that it gathers: `session`, `store`, `contours`, `posing`; `formats` writes the files. Callers use `motion`,
 to read what is exported, and one function for each format of `writers`, `array_writers`, `nwb_writer`, `label_writers`,
-`mask_writers` and `dataset`. `provenance` tells who made each pose, and how; `point_origins` says so of
+`mask_writers` and `dataset`. `provenance` has author and method of each pose; `point_origins` has them of
 each point.
 """
 

@@ -8,7 +8,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from app.runtime.memory import WORKER_BYTES, free_bytes
+from app.runtime.memory import WORKER_BYTES, free_bytes, n_cores
 from app.runtime.progress import Reporter
 from tracker.batch.manifest import Manifest
 
@@ -26,12 +26,12 @@ def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> b
         progress: shows a line for each task.
     """
     n_open = len(manifest.tasks) - sum(n for s, n in manifest.counts().items() if s in ("done", "failed"))
-    n, note = n_workers(wanted, n_open, _cores(), free_bytes())
+    n, note = n_workers(wanted, n_open, n_cores(), free_bytes())
     if note:
         progress.say(note)
     progress.say(f"{n_open} recordings, {n} {'worker' if n == 1 else 'workers'}")
     compile_kernels(progress)
-    environment = {**os.environ, "QUADRILLE_THREADS": str(max(1, _cores() // n))}
+    environment = {**os.environ, "QUADRILLE_THREADS": str(max(1, n_cores() // n))}
     words = [sys.executable, "-m", "app", "batch", str(manifest.folder), "--out", str(manifest.folder), "--work"]
     logs = manifest.folder / "logs"
     logs.mkdir(exist_ok=True)
@@ -87,10 +87,6 @@ def compile_kernels(progress: Reporter) -> None:
     if not is_compiled():
         progress.say("kernels that are not compiled yet are compiled first: it may take a minute or two")
         subprocess.run([sys.executable, "-m", "app.bench.compile_kernels"], check=False)
-
-
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _watch(manifest: Manifest, workers: list[subprocess.Popen[bytes]], progress: Reporter) -> None:
