@@ -284,6 +284,10 @@ class FindingPeople:
         latest = next((e.edit for e in self._session_state.saver.history(1) if not e.undone), None)
         return self._edit if self._edit == latest else None
 
+    def outdated_sizes(self) -> list[str]:
+        """See `OpenSession.outdated_sizes`: people are found by the present calibration."""
+        return []
+
     def is_interrupted(self, plan: TrackPlan) -> bool:
         """See `OpenSession.is_interrupted`; in the page a run that was stopped is over."""
         return False
