@@ -77,9 +77,9 @@ def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tup
     for frame in frames:
         view = frame.views[camera].camera
         mended = corrected(view, correction)
-        for body, velocity in zip(frame.bodies, frame.velocities, strict=True):
+        for body, path in zip(frame.bodies, frame.paths, strict=True):
             now, then = (
-                body.model.points_world(body.model.retract(body.values, (frame.ahead_s[camera] + delay_s) * velocity))
+                body.model.points_world(body.model.retract(body.values, path.step(frame.ahead_s[camera] + delay_s)))
                 for delay_s in (0.0, later_s(correction, frame.time_s))
             )
             moved = np.sum((mended.project(then) - view.project(now)) ** 2, axis=-1)

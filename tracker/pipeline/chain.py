@@ -284,4 +284,4 @@ def open_stored_session(session: Session) -> Iterator[StoredSession]:
     ):
         session = follow_history(session, store)
         with Recording(session.cameras) as recording:
-            yield StoredSession(session, store, Observer(session.cameras, recording))
+            yield StoredSession(session, store, Observer(session.cameras, recording).in_time())

@@ -73,7 +73,7 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
         def report(stage: str, share: float, text: str = "", /) -> None:
             advance(share)
 
-        posed = PosedRecording.of_session(session, Observer(session.cameras, recording))
+        posed = PosedRecording.of_session(session, Observer(session.cameras, recording).in_time())
         found = check_calibration(posed, frames, n, report)
         scores = held_out_scores(posed, found, n, report) if found.named else []
     out = _as_json(found, scores)

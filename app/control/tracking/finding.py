@@ -132,7 +132,7 @@ class FindingPeople:
     @property
     def observer(self) -> Observer:
         """See `OpenSession.observer`."""
-        return self._session_state.frames.observer
+        return self._session_state.frames.observer.in_time()
 
     def sources(self, person: int) -> Mapping[int, str]:
         """See `OpenSession.sources`."""

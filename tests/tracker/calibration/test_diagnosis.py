@@ -9,6 +9,7 @@ from tracker.calibration.camera_correction import DRIFT, N_CORRECTIONS, ROTATION
 from tracker.calibration.diagnosis import diagnose, glance
 from tracker.calibration.findings import SEEN_PX, findings, misfit, sentence
 from tracker.formats.model_toml import load_model
+from tracker.motion.pose_path import PosePath
 
 
 def check(frames):
@@ -98,6 +99,6 @@ def test_a_camera_that_sees_nobody_is_said_to():
 
 @pytest.mark.slow
 def test_a_body_that_stands_still_tells_no_time():
-    frames = [f._replace(velocities=(np.zeros_like(f.velocities[0]),)) for f in viewed({}, range(3))]
+    frames = [f._replace(paths=(PosePath.steady(np.zeros_like(f.paths[0].step(0)), FPS),)) for f in viewed({}, range(3))]
     _, cameras = check(frames)
     assert all(c.sigma[TIME] == pytest.approx(1 / FPS) for c in cameras)
