@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import N_CORRECTIONS
-from tracker.calibration.diagnosis import EFFORT
+from tracker.calibration.diagnosis import EFFORT, LEAST_GAIN
 from tracker.calibration.rig_problem import RigProblem, RigState
 from tracker.calibration.viewed_frames import ViewedFrame, seen_people
 from tracker.fitting.bundle import solve_bundle
@@ -44,7 +44,7 @@ def score_frame(
     state = RigState(corrections, tuple(sizes), tuple(b.values for b in frame.bodies))
     nothing = np.zeros(corrections.shape, np.bool_)
     problem = RigProblem(seen_people([frame]), parameters, sigmas, corrections).with_free(nothing, sizes=False)
-    found = solve_bundle(problem, state, EFFORT.steps)
+    found = solve_bundle(problem, state, EFFORT.steps, least_gain=LEAST_GAIN)
     n = corrections.size
     cameras = np.arange(len(found.equations.gradient)) < n
     gradient, hessian = found.equations.held(cameras, problem.free(found.state, found.equations)[1]).reduced()

@@ -222,7 +222,7 @@ class Calibrating:
         if state.frame not in recording.credible_frames([state.frame]):
             self._set(message="The preview needs poses on this frame and on two before and after it.")
             return
-        (seen,) = recording.seen([state.frame])
+        (seen,), shown = recording.seen([state.frame]), self._session_state.frames.observer
         parameters = [SizeParameters(b.model) for b in seen.bodies]
         sizes, sigmas = check.diagnosis.state.sizes, prior_sigmas(session.fps)
         before, after = (
@@ -232,10 +232,10 @@ class Calibrating:
         models = [p.body(s) for p, s in zip(parameters, sizes, strict=True)]
         bodies = tuple(
             tuple(
-                PosedBody(model, model.retract(values, path.step(ahead_s + later_s(c, seen.time_s))))
+                PosedBody(model, model.retract(values, path.step(later_s(c, seen.time_s) + ahead / session.fps)))
                 for model, values, path in zip(models, after.poses, seen.paths, strict=True)
             )
-            for ahead_s, c in zip(seen.ahead_s, check.corrections, strict=True)
+            for ahead, c in zip(shown.ahead_frames(state.frame), check.corrections, strict=True)
         )
         cameras = tuple(
             corrected(source.camera, c).pinhole for source, c in zip(session.cameras, check.corrections, strict=True)
