@@ -48,7 +48,14 @@ def viewed(off, frames=range(6), model=None, person=None, cameras=CAMERAS):
             views.append(replace(view, camera=camera))
         start = shaken(model, pose, random, 0.02, 0.01)
         out.append(
-            ViewedFrame(k, tuple(views), (PosedBody(model, start),), (PosePath.steady(velocity, FPS),), k / FPS, (0.0,) * len(cameras))
+            ViewedFrame(
+                k,
+                tuple(views),
+                (PosedBody(model, start),),
+                (PosePath.steady(velocity, FPS),),
+                k / FPS,
+                (0.0,) * len(cameras),
+            )
         )
     return out
 

@@ -305,8 +305,7 @@ class _Search:
         fits = {h: self.refitted(fit, chosen, EFFORT.heat) for h, chosen in faults.items()}
         least = min((f.cost + _needed(h) for h, f in fits.items()), default=0.0) + CLEAR_NATS
         return {
-            h: self.refitted(f, faults[h]) if f.cost + _needed(h) - f.promise < least else f
-            for h, f in fits.items()
+            h: self.refitted(f, faults[h]) if f.cost + _needed(h) - f.promise < least else f for h, f in fits.items()
         }
 
     def without_idle(self, fit: _Fitted, kept: Sequence[FoundFault]) -> _Selection:
