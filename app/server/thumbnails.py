@@ -72,7 +72,8 @@ class Thumbnails:
             _Wanted(
                 frame, list(stored).index(person), limb, tuple(b.model for b in bodies),
                 tuple(b.values.tobytes() for b in bodies),
-                tuple(None if b.velocity is None else b.velocity.tobytes() for b in bodies), colors, Identity(self._controller.session.cameras),
+                tuple(None if b.velocity is None else b.velocity.tobytes() for b in bodies),
+                colors, Identity(self._controller.session.cameras),
             )
         )  # fmt: skip
 

@@ -68,9 +68,10 @@ def findings(diagnosis: Diagnosis, frames: Sequence[ViewedFrame], names: Sequenc
 
 
 def _is_followed(frames: Sequence[ViewedFrame], camera: int, kinds: Sequence[str]) -> bool:
-    """Return whether a fault is one of time alone, of a camera whose clock was corrected: it is followed until it stands.
+    """Return whether a fault is one of time alone, of a camera whose clock was corrected before.
 
-    The time is found a little short where people were tracked with the wrong one, and no shape of a body looks like it.
+    Such a fault is followed until it stands: the time is found a little short where people were tracked with the wrong
+    one, and no shape of a body looks like it.
     """
     return bool(kinds) and set(kinds) <= {"time", "drift"} and any(f.ahead_s[camera] for f in frames)
 

@@ -1,7 +1,8 @@
 """Fit corrections of cameras, sizes of bodies and poses to the contours of several frames at once.
 
-View c of frame k sees the pose q_k + p_k(d_c + r_c T_k), with p_k the way of the tracked pose. Corrections and sizes are shared unknowns, the pose of
-each person on each frame is their own (`bundle`). Residuals are those of the tracker (`contour_residuals`).
+View c of frame k sees the pose q_k + p_k(d_c + r_c T_k), with p_k the way of the tracked pose. Corrections
+and sizes are shared unknowns, the pose of each person on each frame is their own (`bundle`). Residuals are those of the
+tracker (`contour_residuals`).
 """
 
 import itertools

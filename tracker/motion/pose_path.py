@@ -13,8 +13,10 @@ from tracker.motion.prediction import unwrapped
 
 @dataclass(frozen=True, eq=False)
 class PosePath:
-    """Way of a pose around a frame: a spline of Catmull and Rom (1974) through the poses, whose slope on each frame is the
-    central difference. Beyond the known poses it goes on straight."""
+    """Way of a pose around a frame: a spline of Catmull and Rom (1974) through the poses.
+
+    Its slope on each frame is the central difference. Beyond the known poses it goes on straight.
+    """
 
     steps: Mapping[int, Array]
     """Steps from the pose of the frame to those around it, by the number of frames that they are later, without a gap:
