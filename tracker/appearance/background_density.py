@@ -234,5 +234,5 @@ def _box(view: CellView) -> tuple[slice, slice]:
 
 
 def _cut(box: tuple[slice, slice], *cells: FloatArray) -> Iterator[FloatArray]:
-    """Return a region of some arrays of cells, contiguous: kernels are compiled anew for each layout in memory."""
+    """Return a region of some arrays of cells, contiguous: kernels are compiled again for each order in memory."""
     return (of_view[box].copy() for of_view in cells)

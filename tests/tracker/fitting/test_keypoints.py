@@ -33,7 +33,7 @@ def cost(block, pose):
 
 
 def test_arguments_of_kernels_are_contiguous():
-    """Kernels are compiled anew for each layout in memory, which takes twenty seconds."""
+    """Kernels are compiled again for each order in memory, which takes twenty seconds."""
     block = block_of(seen(MODEL.neutral()))
     assert [a.flags.c_contiguous for a in block.arrays] == [True] * 5
 
