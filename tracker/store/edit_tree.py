@@ -6,6 +6,7 @@ stays in the log but is out of reach.
 """
 
 import sqlite3
+from collections.abc import Collection
 from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
@@ -119,6 +120,17 @@ def head(db: sqlite3.Connection) -> int | None:
     """Return the id of the last edit done; None if there is none."""
     (edit,) = db.execute("SELECT edit FROM head").fetchone()
     return None if edit is None else int(edit)
+
+
+def is_overtaken(db: sqlite3.Connection, edit: int, poses: Collection[tuple[str, int]]) -> bool:
+    """Return whether an edit is not done, or a later one has changed a pose or its pins, by person and frame."""
+    line = (
+        "WITH RECURSIVE line (id) AS (SELECT edit FROM head UNION ALL "
+        "SELECT parent FROM line JOIN edits USING (id) WHERE id > ?1) SELECT 1 FROM line WHERE id = ?1"
+    )
+    changed = "SELECT person, frame FROM {}_changes WHERE edit > ?1"
+    later = db.execute(f"{changed.format('pose')} UNION {changed.format('pin')}", (edit,))
+    return db.execute(line, (edit,)).fetchone() is None or not {(p, f) for p, f in later}.isdisjoint(poses)
 
 
 def show_change(db: sqlite3.Connection, kind: str, change: int | None, shown: int | None) -> None:
