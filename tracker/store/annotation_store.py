@@ -236,6 +236,10 @@ class AnnotationStore:
         """List the frames whose poses or pins an edit changes, ascending."""
         return self._edits.frames_of(edit)
 
+    def poses_of(self, edit: int) -> set[tuple[str, int]]:
+        """Return person and frame of the poses and pins that an edit changes."""
+        return self._edits.poses_of(edit)
+
     def add_model_revision(self, person: str, toml: str) -> int:
         """Store a body model for good and return its id. An equal model of the person is not stored twice."""
         with self._connection.transaction() as db:

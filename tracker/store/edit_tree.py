@@ -101,8 +101,16 @@ class EditTree:
 
     def frames_of(self, edit: int) -> list[int]:
         """List the frames whose poses or pins an edit changes, ascending."""
-        sql = "SELECT frame FROM pose_changes WHERE edit = ?1 UNION SELECT frame FROM pin_changes WHERE edit = ?1"
-        return sorted(self._connection.all(sql, (edit,), lambda row: rows.frame_number(row[0], f"edit {edit}")))
+        return sorted({frame for _, frame in self.poses_of(edit)})
+
+    def poses_of(self, edit: int) -> set[tuple[str, int]]:
+        """Return person and frame of the poses and pins that an edit changes."""
+        changed = "SELECT person, frame FROM {}_changes WHERE edit = ?1"
+        sql = f"{changed.format('pose')} UNION {changed.format('pin')}"
+        found = self._connection.all(
+            sql, (edit,), lambda row: (str(row[0]), rows.frame_number(row[1], f"edit {edit}"))
+        )
+        return set(found)
 
     def _entries(self, start: str, onward: str, limit: int) -> list[HistoryEntry]:
         """Follow the tree from edit to edit; `start` and `onward` are SQL for their ids."""

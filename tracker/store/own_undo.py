@@ -32,10 +32,12 @@ class OwnMove(NamedTuple):
 
 
 class OwnLabels(NamedTuple):
-    """Labels of the edits that an annotator's undo and redo would move over; None for no such edit."""
+    """The edits that an annotator's undo and redo would move over: labels and numbers; None for no such edit."""
 
     undo: str | None
     redo: str | None
+    undo_edit: int | None
+    redo_edit: int | None
 
 
 def undo_own(connection: Connection, tree: EditTree, author: str, in_tree: bool = True) -> OwnMove | None:
@@ -83,11 +85,9 @@ def own_labels(connection: Connection, author: str) -> OwnLabels:
         db = connection.db
         undo, undone = _last_own(db, author), _undone_own(db, author)
         redo = None if undone is not None else _last_own_taker(db, author)
-        taken = _takers(db)
-        return OwnLabels(
-            None if undo is None else _label(db, undo, taken),
-            undone[1] if undone is not None else None if redo is None else _label(db, redo, taken),
-        )
+        takers = _takers(db)
+        redone = (redo, None if redo is None else _label(db, redo, takers)) if undone is None else undone
+        return OwnLabels(None if undo is None else _label(db, undo, takers), redone[1], undo, redone[0])
 
 
 def _undone_own(db: sqlite3.Connection, author: str) -> tuple[int, str] | None:

@@ -204,10 +204,10 @@ class BodySizeEditing:
         """
         session_state, saver = self._session_state, self._session_state.saver
         edits = saver.setting(SIZES_EDITS, {})
-        latest = next((e for e in saver.history(1) if not e.undone), None)
-        for edit in saver.moved_edits:
+        latest = next((e for e in saver.moves.entries(1) if not e.undone), None)
+        for edit in saver.moves.moved_edits:
             # A move has one direction: if its last entry is applied now, all of them are.
-            done = latest is not None and latest.edit == saver.moved_edits[-1]
+            done = latest is not None and latest.edit == saver.moves.moved_edits[-1]
             for name, before, after in sizes_changed(edits, edit):
                 person = next((i for i, p in enumerate(session_state.session.people) if p.name == name), None)
                 if person is not None:

@@ -288,7 +288,7 @@ class SessionState:
     def revert(self, gesture: object) -> None:
         """Show the frame as it was before a gesture, and undo what was saved of the gesture."""
         if self.open_edit_owner is gesture:
-            self.saver.undo()
+            self.saver.moves.undo()
         self.show_frame(self.state.frame)
         self.refresh_saving()
 
@@ -338,7 +338,7 @@ class SessionState:
         """Bring what the state says of the history and the disk up to date."""
         undo, redo, error = self.state.undo, self.state.redo, self.saver.error
         try:
-            undo, redo = self.saver.undo_label(), self.saver.redo_label()
+            undo, redo = self.saver.moves.labels()
         except TrackerError as unreadable:  # its drive may be gone: edits wait in the queue
             error = error or page_text(unreadable)
         self.set(undo=undo, redo=redo, save_error=error, timeline_version=self.saver.index.version)

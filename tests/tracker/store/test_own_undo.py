@@ -133,19 +133,19 @@ def test_without_the_tree_a_redo_outlives_edits_of_others(store):
     put(store, "anna", 1, 10)
     assert store.undo_own("anna", in_tree=False).in_tree is False
     put(store, "ben", 2, 20)
-    assert store.own_labels("anna") == (None, "anna sets 10")
+    assert store.own_labels("anna")[:2] == (None, "anna sets 10")
     store.redo_own("anna", in_tree=False)
     assert xs(store) == {1: 10, 2: 20}
 
 
 def test_labels_name_what_a_move_would_take(store):
-    assert store.own_labels() == (None, None)
+    assert store.own_labels()[:2] == (None, None)
     put(store, "anna", 1, 10)
     put(store, "ben", 2, 20)
-    assert (store.own_labels(), store.own_labels("ben")) == (("anna sets 10", None), ("ben sets 20", None))
+    assert (store.own_labels()[:2], store.own_labels("ben")[:2]) == (("anna sets 10", None), ("ben sets 20", None))
     store.undo_own()
     store.undo_own("ben", in_tree=True)
-    assert (store.own_labels(), store.own_labels("ben")) == ((None, "anna sets 10"), (None, "ben sets 20"))
+    assert (store.own_labels()[:2], store.own_labels("ben")[:2]) == ((None, "anna sets 10"), (None, "ben sets 20"))
 
 
 def test_a_gesture_goes_on_beside_edits_of_other_poses(store):
