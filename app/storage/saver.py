@@ -12,8 +12,8 @@ from app.state.people import ShownPose
 from app.state.state import State
 from app.storage import rescue
 from app.storage.frame_index import FrameIndex
-from app.storage.pose_origins import PoseOrigin, keyframes_by_annotator, read_origin
 from app.storage.history_moves import HistoryMoves
+from app.storage.pose_origins import PoseOrigin, keyframes_by_annotator, read_origin
 from app.storage.revisions import ModelRevisions
 from app.storage.shared_storage import SharedStorage
 from app.storage.shown_records import is_same, main_source, sources_of, with_marks_of
@@ -107,6 +107,10 @@ class Saver:
         """Continue with a session whose people have other bodies, which new poses belong to."""
         self._session = session
         self.revisions.set_body_models(session)
+
+    def follow_session(self, session: Session) -> None:
+        """Continue with a session whose bodies or cameras another person has changed."""
+        self._session = session
 
     def setting(self, key: str, default: Any = None) -> Any:
         """Return a setting stored with the session: any JSON value."""

@@ -126,7 +126,7 @@ class BodySizeEditing:
         Raises:
             TrackerError: there is nothing to change, or the change cannot be written.
         """
-        with self._activities.editing():
+        with self._activities.editing(alone=True):
             session_state, name = self._session_state, self._session_state.session.people[person].name
             before, model = session_state.saver.revisions.current(person), self.model(person)
             same = model is session_state.present[person] or dimensions_of(model) == dimensions_of(
@@ -161,7 +161,7 @@ class BodySizeEditing:
         Raises:
             TrackerError: the person has this body, or the change cannot be written.
         """
-        with self._activities.editing():
+        with self._activities.editing(alone=True):
             session_state, name = self._session_state, self._session_state.session.people[person].name
             before, body = session_state.saver.revisions.current(person), moved_body(session_state.session, person, to)
             session_state.set_body_models(save_model(session_state.session, person, body))
