@@ -170,6 +170,24 @@ class Controller:
         self._save_retry = SaveRetry(session_state)
         self._compiling = None if compiler is None else KernelWarmup(session_state, compiler)
 
+    def beside(self, author: str, writes: bool) -> "Controller":
+        """Return a controller for one more person who works on the session; it is closed before this one.
+
+        Args:
+            author: their name, by which they undo their own edits.
+            writes: whether they may change what is stored.
+        """
+        own = self._session_state
+        with own.lock:
+            if writes:
+                own.saver.shared.authors |= {own.saver.author, author}
+            return Controller(own.session, own.saver.beside(author), self.frames, None, self)
+
+    @property
+    def author(self) -> str:
+        """Name of the one who works with this controller."""
+        return self._session_state.saver.author
+
     @property
     def state(self) -> State:
         """The present state."""

@@ -65,6 +65,7 @@ ROOMS = [
     "app.control.posing",
     "app.control.tracking",
     "app.control",
+    "app.participants",
     "app.page",
     "app.scene3d",
     "app.server",

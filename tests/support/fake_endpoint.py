@@ -143,8 +143,10 @@ class FakeEndpoint:
     held: asyncio.Event | None = None
     """Images are kept back until it is set; None: none are."""
     n_frames: int = N_FRAMES
-    role: str = "annotate"
+    role: str = "host"
     """Of the page's link."""
+    name_asked: str = ""
+    """Name by which the last page joined."""
     received: list = field(default_factory=list)
     """Every message of every page, but for what each says when it connects."""
     frame_s: float = 0.05
@@ -222,7 +224,8 @@ class FakeEndpoint:
         """All messages of a type, in order."""
         return [m for m in self.received if m["type"] == kind]
 
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
+        self.name_asked = name
         self.sockets.add(socket)
         self.seq = 0
         try:
@@ -450,6 +453,7 @@ class FakeEndpoint:
         await socket.send_str(encoded({
             "type": "session", "name": self.name, "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
             "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start, "role": self.role,
+            "has_place": self.role != "look" or bool(self.name_asked),
         }))  # fmt: skip
         for message in (self.state, self.settings, self.view_3d, self.body_sizes):
             await socket.send_str(encoded(message))

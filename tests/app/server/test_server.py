@@ -23,7 +23,7 @@ NAMED = Access(frozenset({"lab.example.org"}), "secret", Invitation())
 class EchoPanes:
     """A pane endpoint that answers every message with itself."""
 
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
         async for message in socket:
             if message.type is aiohttp.WSMsgType.TEXT:
                 await socket.send_str(message.data.decode())
@@ -344,7 +344,7 @@ def test_page_address_carries_name_and_token():
 class TellingPanes:
     """A pane endpoint that says who has joined."""
 
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
         await socket.send_str(role)
 
 
