@@ -145,7 +145,7 @@ def test_a_canceled_drag_takes_back_its_checkpoints_only(pair):
     start = pixel_of(anna, "torso")
     anna.dragging.begin(1, FRONT, 0, "torso", tuple(start))
     anna._session_state.last_save = 0.0
-    anna.dragging.move(1, tuple(start + (6.0, 0.0)), 1)
+    anna.dragging.move(1, (start[0] + 6.0, start[1]), 1)
     drag(ben, "torso", (5.0, 0.0))
     anna.dragging.cancel(1)
     assert anna.stored_poses.rows(0)[0] == [1]
@@ -262,8 +262,8 @@ def test_a_run_of_one_leaves_the_others_to_other_frames(people, tracker):
     anna.navigation.seek(2)
     drag(anna, "torso", (4.0, 0.0))
     anna.tracking.start(False, 6)
+    ben.navigation.seek(4)
     with pytest.raises(TurnError, match="tracks frames 3 to 6"):
-        ben.navigation.seek(4)
         drag(ben, "torso", (4.0, 0.0))
     ben.navigation.seek(9)
     drag(ben, "torso", (4.0, 0.0))
