@@ -1,5 +1,6 @@
 /** Put the program's messages into the store. */
 
+import { forgetName } from "./connection.js";
 import { Cells } from "./cells.js";
 import { PICTURE_LAYERS } from "./layers.js";
 import { PictureAssembler, keyOf } from "./pictures.js";
@@ -71,6 +72,10 @@ export class Receiver {
         break;
       case "annotation":
         this.#store.set({ annotation: message });
+        break;
+      case "presence":
+        if (message.refusal) forgetName();
+        this.#store.set({ presence: message });
         break;
       case "provenance":
         this.#store.set({ provenance: message });

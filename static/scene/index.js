@@ -52,7 +52,7 @@ function loadLate(frame, store, isSoftware) {
   store.subscribe(() => {
     const { shown, state, session } = store.facts;
     if (isLoaded || shown === null || state === null) return;
-    if (session && session.role !== "annotate") return showNoScene();
+    if (session && session.role !== "host") return showNoScene();
     const waits = isSoftware && BEFORE_COST.has(state.compiling ?? "") && state.cost_px === null;
     byId("scene-note", HTMLElement).hidden = !waits;
     if (waits) return;

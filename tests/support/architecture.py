@@ -146,6 +146,7 @@ PAGE_ROOMS = [
     "scene",
     "inspector",
     "annotation",
+    "participants",
     "sessions",
     "shell",
     "starting",
