@@ -40,7 +40,7 @@ const MOVES = ["seek", "select"];
 const OF_HOST = ["acquire", "find_people", "calibration_check", "floor", "view_3d", "snap", "observations"];
 const DECISIONS = new Set(["verify", "reject", "comment", "resolve", "reopen"]);
 /** Messages that the page sends by itself, or many in a row, so that a refusal needs no notice. @type {ClientMessage["type"][]} */
-const SILENT = ["watch", "pause_3d", "seek", "select", "view_3d"];
+const SILENT = ["watch", "provenance", "pause_3d", "seek", "select", "view_3d"];
 const MARKS = new Set(["reviewed", "unreviewed"]);
 
 /**

@@ -41,7 +41,7 @@ export class Here {
     if (others.length > SHOWN) chips.push(Object.assign(document.createElement("span"), { textContent: `+${others.length - SHOWN}` }));
     this.#chips.replaceChildren(...chips);
     const names = others.map((person) => `${nameOf(person)} on frame ${person.frame}`);
-    this.#button.title = `${names.length ? `Here: ${names.join(", ")}` : "Nobody else is here"} (Alt+N)`;
+    this.#button.title = `${names.length ? `Here: ${names.join(", ")}` : "Nobody else is here"} (Alt+E)`;
     this.#button.setAttribute("aria-label", names.length ? `Who is here: ${names.length} others` : "Who is here: nobody else");
     this.#list.replaceChildren(...people.map((person, index) => this.#row(person, index)));
   }

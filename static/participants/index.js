@@ -29,7 +29,7 @@ export function mount(context) {
     document.documentElement.dataset.place = String(session?.has_place ?? true);
   });
   const bindings = inArea("People", [
-    { keys: ["Alt N"], label: "Who is here, and your name", words: "join participants", matches: alt("KeyN", false), run: () => here.toggle() },
+    { keys: ["Alt E"], label: "Who is here, and your name", words: "join participants", matches: alt("KeyE", false), run: () => here.toggle() },
   ]);
   return { bindings };
 }

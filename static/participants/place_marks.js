@@ -3,6 +3,11 @@
 import { FrameAxis } from "../widgets/frame_axis.js";
 import { colorOf, initialsOf, nameOf } from "./marks.js";
 
+/** Marks nearer than this stand one below the other. */
+const WIDTH_PX = 22;
+/** Distance of one below the other, and the number of steps at most: the timeline has no more room. */
+const [STEP_PX, MAX_STEPS] = [13, 2];
+
 export class PlaceMarks {
   #timeline;
   #store;
@@ -27,10 +32,13 @@ export class PlaceMarks {
     const { presence, session, visible } = this.#store.facts;
     const axis = new FrameAxis(this.#timeline.clientWidth, session?.n_frames ?? 1, visible);
     const others = (presence?.people ?? []).map((person, index) => ({ person, index })).filter(({ person }) => !person.is_self);
-    const marks = others.filter(({ person }) => axis.shows(person.frame)).map(({ person, index }) => {
+    const shown = others.filter(({ person }) => axis.shows(person.frame));
+    const marks = shown.map(({ person, index }, at) => {
+      const before = shown.slice(0, at).filter((one) => Math.abs(axis.middle(one.person.frame) - axis.middle(person.frame)) < WIDTH_PX);
       const mark = Object.assign(document.createElement("span"), { className: "place-mark", textContent: initialsOf(person) });
       mark.title = `${nameOf(person)} is on frame ${person.frame}`;
       mark.style.left = `${axis.middle(person.frame)}px`;
+      mark.style.top = `${2 + STEP_PX * Math.min(before.length, MAX_STEPS)}px`;
       mark.style.setProperty("--participant", colorOf(index));
       return mark;
     }); // prettier-ignore

@@ -36,7 +36,7 @@ export function mount({ store, send, reasons }, { grid }) {
 /** A gizmo of the 3-D view moves people: shared links have none. */
 function showNoScene() {
   const note = byId("scene-note", HTMLElement);
-  [note.hidden, note.textContent] = [false, "This link shows the cameras. The 3-D view is the annotator's."];
+  [note.hidden, note.textContent] = [false, "This link shows the cameras. The 3-D view is the host's."];
 }
 
 /**
