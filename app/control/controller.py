@@ -180,7 +180,7 @@ class Controller:
         own = self._session_state
         with own.lock:
             if writes:
-                own.saver.shared.authors |= {own.saver.author, author}
+                own.saver.shared.note_several()
             return Controller(own.session, own.saver.beside(author), self.frames, None, self)
 
     @property

@@ -8,6 +8,10 @@ from tracker.session.session import Session
 from tracker.store.records import HistoryEntry
 
 
+_ALL = 1 << 30
+"""More entries than any history has."""
+
+
 class HistoryMoves:
     """Undo and redo of one person. The caller holds the session's lock."""
 
@@ -48,11 +52,27 @@ class HistoryMoves:
         """
         self._write_all()
         if self._shared.has_several:
+            self._require_own(edit)
+        return self._moved(self._store.go_to(edit))
+
+    def _require_own(self, edit: int | None) -> None:
+        """Check that a move to an entry passes entries of one's own only, on whose poses nobody works.
+
+        Raises:
+            SessionError: others made one.
+            TurnError: somebody works on a pose.
+        """
+        entries = self._store.history(_ALL)
+        at = next((i for i, e in enumerate(entries) if e.edit == edit), len(entries))
+        present = sum(e.undone for e in entries)
+        passed = entries[present:at] if at >= present else entries[at:present]
+        if any(e.author != self._author for e in passed):
             raise SessionError(
-                "expected a history of one person, found several at work, whose entries would go along; "
+                "expected entries of your own on the way, found some of others, which would go along; "
                 "undo your own edits one by one"
             )
-        return self._moved(self._store.go_to(edit))
+        for entry in passed:
+            self._require_turns(entry.edit)
 
     def entries(self, limit: int) -> list[HistoryEntry]:
         """Return the entries that redo and undo can reach, latest first, at most `limit` of each."""
@@ -79,11 +99,14 @@ class HistoryMoves:
         edit = own.undo_edit if undo else own.redo_edit
         if edit is None:
             return self._moved([])
+        self._require_turns(edit)
+        move = (self._store.undo_own if undo else self._store.redo_own)(self._author, in_tree=False)
+        return self._moved([] if move is None else [move.edit])
+
+    def _require_turns(self, edit: int) -> None:
         indices = {name: i for i, name in enumerate(self._people)}
         poses = ((indices[name], frame) for name, frame in self._store.poses_of(edit) if name in indices)
         self._shared.turns.require(self, poses)
-        move = (self._store.undo_own if undo else self._store.redo_own)(self._author, in_tree=False)
-        return self._moved([] if move is None else [move.edit])
 
     def _moved(self, edits: Iterable[int]) -> list[int]:
         """Note which entries were moved over; returns their frames, ascending."""

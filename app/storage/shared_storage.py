@@ -1,13 +1,18 @@
 """Hold what all savers of one open session share: queued edits, bodies, the index of frames, turns."""
 
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 
 from app.storage.frame_index import FrameIndex
 from app.storage.retry_queue import RetryQueue
 from app.storage.revisions import ModelRevisions
 from app.storage.turns import Turns
+from tracker.errors import SessionError
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
+
+_TOGETHER = "worked_together"
+"""Setting of the session."""
 
 
 class SharedStorage:
@@ -27,15 +32,18 @@ class SharedStorage:
         """The frames that have poses."""
         self.turns = Turns()
         """Those who work on it."""
-        self.authors: set[str] = set()
-        """Names of those who have joined since the program began."""
+        self.has_several = store.setting(_TOGETHER, False) is True
+        """Whether several people have worked on the session at a time: each undoes only their own edits since."""
         self.listeners: list[Callable[[object, Collection[int]], None]] = []
         """Called after each change with who made it and its frames."""
 
-    @property
-    def has_several(self) -> bool:
-        """Whether more than one person has joined: each undoes only their own edits then."""
-        return len(self.authors) > 1
+    def note_several(self) -> None:
+        """Note that a second person joins who may change poses. A restart knows it, too."""
+        if self.has_several:
+            return
+        self.has_several = True
+        with suppress(SessionError):  # its drive may be gone
+            self.store.set_setting(_TOGETHER, True)
 
     def changed(self, owner: object, frames: Sequence[int]) -> None:
         """Read frames again that somebody has changed, ascending."""

@@ -120,6 +120,35 @@ def test_undo_is_of_ones_own(pair):
         anna.history.go_to(None)
 
 
+def test_a_restart_knows_that_several_have_worked(people, opened):
+    anna, ben = people.host, people.join("annotate", "ben").controller
+    drag(anna, "torso", (4.0, 0.0))
+    drag(ben, "torso", (4.0, 0.0))
+    ben.navigation.seek(1)
+    drag(ben, "torso", (5.0, 0.0))
+    people.close()
+    again = opened()
+    again._session_state.saver.moves._author = "anna"
+    again.history.redo()
+    with pytest.raises(TrackerError, match="ben changed it since"):
+        again.history.undo()
+    assert again.stored_poses.rows(0)[0] == [0, 1]
+
+
+def test_alone_again_ones_own_entries_are_gone_along(people):
+    anna, ben = people.host, people.join("annotate", "ben").controller
+    drag(ben, "torso", (4.0, 0.0))
+    first = anna.history.entries(1)[0].edit
+    for frame in (1, 2):
+        anna.navigation.seek(frame)
+        drag(anna, "torso", (5.0, 0.0))
+    last = anna.history.entries(1)[0].edit
+    anna.history.go_to(first)
+    assert anna.stored_poses.rows(0)[0] == [0]
+    anna.history.go_to(last)
+    assert anna.stored_poses.rows(0)[0] == [0, 1, 2]
+
+
 def test_undo_waits_for_a_drag_of_the_same_pose(pair):
     anna, ben = pair
     drag(ben, "torso", (4.0, 0.0))
