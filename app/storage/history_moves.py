@@ -7,7 +7,6 @@ from tracker.errors import SessionError
 from tracker.session.session import Session
 from tracker.store.records import HistoryEntry
 
-
 _ALL = 1 << 30
 """More entries than any history has."""
 

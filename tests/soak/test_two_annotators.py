@@ -44,6 +44,7 @@ class Annotator:
         self.sent = set()
         """Numbers of all edits that were sent, also of those that a kill cut off."""
         self.refused = 0
+        self._frame = None
         self.last = 0
         self.in_flight = None
 
@@ -61,7 +62,8 @@ class Annotator:
 
     async def _edit(self, socket):
         number = next(self._numbers)
-        frame = self.rng.choice([*FRAMES[self.name], *SHARED])
+        # Another frame than the last: two values of one angle in a row are one entry of the history.
+        frame = self._frame = self.rng.choice([k for k in (*FRAMES[self.name], *SHARED) if k != self._frame])
         self.sent.add(number)
         self.in_flight = number
         await socket.send_json({"type": "seek", "frame": frame})
@@ -173,7 +175,7 @@ async def test_two_annotators_and_a_program_that_is_killed(tmp_path, cases, repo
             f.frame: round(store.pose("person", f.frame).values[0] * 100 / STEP_CM) for f in store.frames("person")
         }
     made = [edit.number for edit in log.values() if edit.takes is None]
-    n_edits, n_undone = (sum(len(each) for each in of) for of in zip(*((o.edits, o.undone) for o in (anna, ben))))
+    n_edits, n_undone = (sum(len(each) for each in of) for of in ((anna.edits, ben.edits), (anna.undone, ben.undone)))
     refused = anna.refused + ben.refused
     report(
         f"{kills} kills, {n_edits} edits, {n_undone} undos of one's own, {refused} refused because the other one had "
