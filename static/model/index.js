@@ -38,7 +38,7 @@ export function mount() {
   const send = (/** @type {ClientMessage} */ message) => {
     const { session } = store.facts;
     if (session && !isAllowed(message, session)) {
-      if (isAsked(message)) notify({ type: "notice", level: "info", text: refusalOf(session) });
+      if (isAsked(message)) notify({ type: "notice", level: "info", text: refusalOf(session, store.facts.presence?.link ?? session.role) });
       return;
     }
     if (MOVING.includes(message.type)) navigation.expectMove();

@@ -61,10 +61,11 @@ export function isAllowed(message, { role, has_place }) {
  * Say why a message is not allowed.
  *
  * @param {import("./protocol.js").SessionMessage} session
+ * @param {import("./protocol.js").PresenceMessage["link"]} link what the page may do once a name is given
  */
-export function refusalOf({ role, has_place }) {
+export function refusalOf({ role, has_place }, link) {
   if (role === "annotate") return "The host's page changes bodies, cameras, the floor and the 3-D view: ask the host.";
-  if (!has_place) return "This page shows what the host shows. Give your name to go to other frames.";
+  if (!has_place && link !== "look") return `Give your name first, to ${link}.`;
   return `This link is to ${role}: ask for another to change anything.`;
 }
 

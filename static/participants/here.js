@@ -40,6 +40,7 @@ export class Here {
     const chips = others.slice(0, SHOWN).map((person) => chipOf(person, people.indexOf(person)));
     if (others.length > SHOWN) chips.push(Object.assign(document.createElement("span"), { textContent: `+${others.length - SHOWN}` }));
     this.#chips.replaceChildren(...chips);
+    this.#button.hidden = people.length < 2 && this.#context.store.facts.presence?.link === "host";
     const names = others.map((person) => `${nameOf(person)} on frame ${person.frame}`);
     this.#button.title = `${names.length ? `Here: ${names.join(", ")}` : "Nobody else is here"} (Alt+E)`;
     this.#button.setAttribute("aria-label", names.length ? `Who is here: ${names.length} others` : "Who is here: nobody else");

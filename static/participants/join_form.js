@@ -9,7 +9,7 @@ const DOES = { host: "annotate", annotate: "annotate", review: "review", look: "
 export function joinForm({ store, joinAs }, place) {
   const form = Object.assign(document.createElement("form"), { className: "join-form" });
   const input = Object.assign(document.createElement("input"), {
-    type: "text", id: `join-${place}`, name: "name", maxLength: 60, required: true, autocomplete: "name", className: "query-field",
+    type: "text", id: `join-name-${place}`, name: "name", maxLength: 60, required: true, autocomplete: "name", className: "query-field",
   }); // prettier-ignore
   const label = Object.assign(document.createElement("label"), { htmlFor: input.id });
   const join = Object.assign(document.createElement("button"), { type: "submit", textContent: "Join" });

@@ -145,6 +145,8 @@ class FakeEndpoint:
     n_frames: int = N_FRAMES
     role: str = "host"
     """Of the page's link."""
+    n_guests: int = 0
+    """Number of others who are on the session."""
     name_asked: str = ""
     """Name by which the last page joined."""
     received: list = field(default_factory=list)
@@ -219,6 +221,16 @@ class FakeEndpoint:
             "running": False, "kind": None, "stage": None, "stages": STAGES, "evaluations": 0, "per_second": 0.0,
             "best_px": None, "message": message,
         }  # fmt: skip
+
+    @property
+    def presence(self):
+        """Who is there: the host on frame 0, and the page if it is not the host's."""
+        host = {"name": "Anna", "role": "host", "frame": 0, "person": 0, "doing": "", "is_self": self.role == "host"}
+        own = {**host, "name": self.name_asked, "role": self.role, "frame": 12, "is_self": True}
+        guests = [{**host, "name": f"Guest {i}", "role": "look", "is_self": False} for i in range(self.n_guests)]
+        people = [host, *guests, *([own] if self.name_asked and self.role != "host" else [])]
+        name = "Anna" if self.role == "host" else self.name_asked
+        return {"type": "presence", "name": name, "refusal": "", "link": self.role, "people": people}
 
     def heard(self, kind):
         """All messages of a type, in order."""
@@ -455,7 +467,7 @@ class FakeEndpoint:
             "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start, "role": self.role,
             "has_place": self.role != "look" or bool(self.name_asked),
         }))  # fmt: skip
-        for message in (self.state, self.settings, self.view_3d, self.body_sizes):
+        for message in (self.state, self.settings, self.view_3d, self.body_sizes, self.presence):
             await socket.send_str(encoded(message))
         cells = {k: self.cell(k) for k in range(self.n_frames * 100 // N_FRAMES)}
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):
