@@ -86,6 +86,7 @@ class SessionState:
         self.note_stored()
         self.refresh_saving()
         self.request_evidence()
+        self.set(**self.costs(self.state.poses))  # others may have needed the evidence before
 
     @property
     def models(self) -> tuple[BodyModel, ...]:

@@ -43,6 +43,11 @@ def test_each_has_a_frame_and_a_selection_of_their_own(pair):
     assert (anna.state.point, ben.state.point) == (None, "head")
 
 
+def test_who_joins_on_a_frame_with_evidence_sees_its_cost(pair):
+    anna, ben = pair
+    assert ben.state.cost_px == anna.state.cost_px is not None
+
+
 def test_others_see_an_edit_on_the_frame_that_they_look_at(pair):
     anna, ben = pair
     ben.navigation.seek(3)
