@@ -41,7 +41,7 @@ async def opened(browser: Browser, address: str, name: str) -> Page:
 
 async def dragged(page: Page) -> list[float]:
     """Latencies of the moves of a drag, ms."""
-    n_before = await page.evaluate("quadrille.latencies.length")
+    await page.evaluate("quadrille.latencies.length = 0")
     x, y = await to_client(page, 0, *await handle_of(page, 0, "left_wrist"))
     await page.mouse.move(x, y)
     await page.mouse.down()
@@ -51,7 +51,7 @@ async def dragged(page: Page) -> list[float]:
     await page.mouse.up()
     await asyncio.sleep(1)
     found: list[float] = await page.evaluate("quadrille.latencies")
-    return found[n_before:] if len(found) > n_before else found
+    return found
 
 
 async def in_browsers(address: str) -> tuple[list[float], list[float]]:
