@@ -150,6 +150,8 @@ async def by_sockets(address: str) -> tuple[list[float], list[float]]:
         await ben.send_json(view)
         hand, plays = Hand(anna), asyncio.Event()
         work = [asyncio.create_task(c) for c in (hand.listen(), play(ben, plays), drain(ben))]
+        while hand.handle is None:
+            await asyncio.sleep(1)
         await asyncio.sleep(3)
         for _ in range(ROUNDS):
             alone += await hand.drag()
