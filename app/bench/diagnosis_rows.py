@@ -15,7 +15,7 @@ from tracker.calibration.viewed_frames import ViewedFrame
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.geometry.arrays import Array
-from tracker.motion.velocity import velocity
+from tracker.motion.pose_path import PosePath
 from tracker.tracking.view_regions import regions
 
 _N_FRAMES, _TURN_DEG = 20, 0.7
@@ -65,8 +65,7 @@ def _seen(frame: BenchFrame, poses: Mapping[int, Array], correction: Array) -> l
             body = PosedBody(frame.model, poses[k])
             first, *others = observer.evidence(k, regions(observer.working_cameras, [body]))
             views = (replace(first, camera=corrected(first.camera, correction)), *others)
-            per_frame = velocity(frame.model, poses, k)
-            assert per_frame is not None
+            path = PosePath.around(frame.model, poses, k, session.fps)
             time_s = (k - session.n_frames / 2) / session.fps
-            out.append(ViewedFrame(k, views, (body,), (session.fps * per_frame,), time_s, (0.0,) * len(views)))
+            out.append(ViewedFrame(k, views, (body,), (path,), time_s, (0.0,) * len(views)))
     return out

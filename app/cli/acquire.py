@@ -146,7 +146,9 @@ def acquire(
             def report(stage: str, share: float, text: str = "", /) -> None:
                 advance(share)
 
-            found = acquire_body(session, Observer(session.cameras, recording), person, frames, settings, report)
+            found = acquire_body(
+                session, Observer(session.cameras, recording).in_time(), person, frames, settings, report
+            )
         changes = size_changes(found)
         if store:
             with closing(AnnotationStore(session.annotations_path)) as annotations:

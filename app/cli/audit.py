@@ -81,7 +81,7 @@ def audit(at: Target, frames: range, takes_consensus: bool, progress: Reporter) 
             def report(stage: str, share: float, text: str = "", /) -> None:
                 advance(share)
 
-            rows = audit_poses(session, store, Observer(session.cameras, recording), plan, report)
+            rows = audit_poses(session, store, Observer(session.cameras, recording).in_time(), plan, report)
         if rows:
             store.commit(f"audit frames {rows[0].frame}:{rows[-1].frame + 1}", rows, by_program=True)
     out: dict[str, Any] = {}

@@ -40,8 +40,8 @@ class TrackWords:
     """both: key points of --of too; contours overrule them where they contradict. keypoints: the body is fitted to them
     alone, frame by frame, and smoothed; pictures are not looked at."""
     acquire: bool = False
-    """acquire sizes from the contours before tracking, of people whose body has the sizes of its preset; then track
-    from the frame where people are placed in both directions."""
+    """acquire sizes from the contours before tracking, of people whose body has the sizes of its preset, or sizes from
+    before the calibration was corrected; then track from the frame where people are placed in both directions."""
     frames: OptionalRange = None
     """A:B, half open; all by default."""
     stride: int = 1

@@ -11,7 +11,7 @@ from app.drawing import thumbnails
 from app.session.footage_crops import FootageCrops
 from app.state.identity import Identity
 from tracker.body.limbs import limbs
-from tracker.body.model import BodyModel, PosedBody
+from tracker.body.model import BodyModel, PosedBody, ahead
 
 _CACHED = 256
 """Number of thumbnails that are kept, some 8 kB each."""
@@ -30,6 +30,8 @@ class _Wanted(NamedTuple):
     """Of all people with a pose on the frame."""
     poses: tuple[bytes, ...]
     """Their values as float64, which can be hashed."""
+    velocities: tuple[bytes | None, ...]
+    """Their velocities likewise, where a camera needs them."""
     colors: tuple[str, ...]
     cameras: Identity
     """Of the session: corrected ones make another thumbnail."""
@@ -69,7 +71,9 @@ class Thumbnails:
         return self._drawn(
             _Wanted(
                 frame, list(stored).index(person), limb, tuple(b.model for b in bodies),
-                tuple(b.values.tobytes() for b in bodies), colors, Identity(self._controller.session.cameras),
+                tuple(b.values.tobytes() for b in bodies),
+                tuple(None if b.velocity is None else b.velocity.tobytes() for b in bodies),
+                colors, Identity(self._controller.session.cameras),
             )
         )  # fmt: skip
 
@@ -98,7 +102,10 @@ class Thumbnails:
         self._footage.close()
 
     def _draw(self, wanted: _Wanted) -> bytes | None:
-        bodies = [PosedBody(m, np.frombuffer(v)) for m, v in zip(wanted.bodies, wanted.poses, strict=True)]
+        bodies = [
+            PosedBody(m, np.frombuffer(v), None if moving is None else np.frombuffer(moving))
+            for m, v, moving in zip(wanted.bodies, wanted.poses, wanted.velocities, strict=True)
+        ]
         self._give_way()
         self._follow_cameras()
         cameras = self._footage.cameras
@@ -108,7 +115,8 @@ class Thumbnails:
         image = self._footage.image(crop.camera, wanted.frame)
         self._give_way()
         limb = thumbnails.limb_parts(bodies, wanted.person, wanted.limb)
-        return thumbnails.thumbnail(image, cameras[crop.camera], crop.region, bodies, wanted.colors, limb)
+        then = ahead(bodies, self._cameras[crop.camera].clock.ahead(wanted.frame))
+        return thumbnails.thumbnail(image, cameras[crop.camera], crop.region, then, wanted.colors, limb)
 
     def _follow_cameras(self) -> None:
         """Draw with the cameras of the session, which a correction or undo may have exchanged."""

@@ -23,7 +23,7 @@ from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.geometry.triangulation import PointObservation
 from tracker.pipeline.calibration_check import CalibrationCheck
-from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames
+from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_frames, outdated_sizes
 from tracker.pipeline.seen_points import with_drag_ends, without_moved
 from tracker.pipeline.tracked_changes import keyframes_of
 from tracker.session.session import Session
@@ -156,6 +156,10 @@ class Saver:
         """Return the frames with poses that were made with an earlier calibration, by index of the person."""
         found = outdated_frames(self._session, self._store)
         return {i: tuple(sorted(found[p.name])) for i, p in enumerate(self._session.people) if p.name in found}
+
+    def outdated_sizes(self) -> list[str]:
+        """Return the names of people who have sizes of an earlier calibration."""
+        return outdated_sizes(self._session, self._store)
 
     def pose(self, person: int, frame: int) -> ShownPose | None:
         """Return the stored pose of a person on a frame; None if there is none or its body has other values."""

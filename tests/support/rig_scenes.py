@@ -10,6 +10,7 @@ from tracker.body.model import PosedBody
 from tracker.calibration.camera_correction import N_CORRECTIONS, corrected, later_s
 from tracker.calibration.viewed_frames import ViewedFrame
 from tracker.formats.model_toml import load_model
+from tracker.motion.pose_path import PosePath
 
 CAMERAS = cameras_around(4)
 NAMES = [c.name for c in CAMERAS]
@@ -47,7 +48,14 @@ def viewed(off, frames=range(6), model=None, person=None, cameras=CAMERAS):
             views.append(replace(view, camera=camera))
         start = shaken(model, pose, random, 0.02, 0.01)
         out.append(
-            ViewedFrame(k, tuple(views), (PosedBody(model, start),), (velocity,), k / FPS, (0.0,) * len(cameras))
+            ViewedFrame(
+                k,
+                tuple(views),
+                (PosedBody(model, start),),
+                (PosePath.steady(velocity, FPS),),
+                k / FPS,
+                (0.0,) * len(cameras),
+            )
         )
     return out
 

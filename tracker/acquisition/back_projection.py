@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.size_fit import SightedPerson
-from tracker.body.model import PosedBody, parts_of
+from tracker.body.model import PosedBody, ahead, parts_of
 from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry import rigid
@@ -60,10 +60,10 @@ class OccludingContour(NamedTuple):
 
 def back_project_contours(person: SightedPerson) -> list[OccludingContour]:
     """Return the occluding contours of all parts in all views that have at least `MIN_POINTS` points."""
-    body, first = person.bodies[person.person], parts_of([b.model for b in person.bodies], person.person).start
-    out = []
+    first, out = parts_of([b.model for b in person.bodies], person.person).start, []
     for i, view in enumerate(person.views):
-        points_px, parts = explained_points(view, person.bodies)
+        people = ahead(person.bodies, view.ahead_frames)
+        body, (points_px, parts) = people[person.person], explained_points(view, people)
         for part in range(len(body.model.parts)):
             own = points_px[parts == first + part]
             if len(own) < MIN_POINTS:

@@ -15,7 +15,7 @@ import numpy as np
 from tracker.acquisition.back_projection import MIN_POINTS, back_project_contours
 from tracker.acquisition.size_fit import SightedPerson
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.body.model import parts_of
+from tracker.body.model import ahead, parts_of
 from tracker.contours import occluding_contours
 from tracker.contours.surfaces import Surfaces, resized_surfaces, surfaces_of
 from tracker.geometry.arrays import Array
@@ -107,7 +107,7 @@ class _Space:
         self._contours = back_project_contours(person)
         self._first = parts_of([b.model for b in person.bodies], person.person).start
         self._surfaces = surfaces_of(tuple(b.model for b in person.bodies))
-        self._Ts = occluding_contours.part_poses(person.bodies)
+        self._Ts = [occluding_contours.part_poses(ahead(person.bodies, v.ahead_frames)) for v in person.views]
         sigmas = parameters.sigmas
         is_girth = parameters.of_kinds("girth")
         self._sigmas = np.where(is_girth, np.hypot(sigmas, parameters.priors.build), sigmas)
@@ -170,7 +170,7 @@ class _Space:
         out = {}
         for view in views:
             camera = self._person.views[view].camera
-            traced = occluding_contours.trace_surfaces(surfaces, self._Ts, camera, _PIECE_PX)
+            traced = occluding_contours.trace_surfaces(surfaces, self._Ts[view], camera, _PIECE_PX)
             middles = (traced.pieces_px[:, :2] + traced.pieces_px[:, 2:]) / 2
             seen = ~traced.occluded & np.all((middles >= 0) & (middles < camera.size), axis=1)
             owners, points = traced.parts[seen] - self._first, traced.points_world[seen]

@@ -117,7 +117,7 @@ def acquire_from_contours(
     """
     if not bodies:
         raise TrackerError("expected at least one frame with a pose, found none; place the body on one first")
-    bodies = _moving(observer, bodies)
+    bodies = moving(observer, bodies)
     present = next(iter(bodies.values()))[person].model
     parameters = SizeParameters(typical_body(present), settings.coupled, settings.priors)
     names = ("choosing frames", "reading contours", "fitting sizes to voxels", "fitting sizes")
@@ -163,7 +163,7 @@ def acquire_from_contours(
     )  # fmt: skip
 
 
-def _moving(observer: Observer, bodies: Mapping[int, tuple[PosedBody, ...]]) -> Mapping[int, tuple[PosedBody, ...]]:
+def moving(observer: Observer, bodies: Mapping[int, tuple[PosedBody, ...]]) -> Mapping[int, tuple[PosedBody, ...]]:
     """Return the people with their velocities, by their poses on the frames around, where pictures need them."""
     if not any(any(observer.ahead_frames(k)) for k in bodies):
         return bodies

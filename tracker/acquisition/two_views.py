@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.chamfer_search import ChamferSearchSettings, search_shapes
-from tracker.acquisition.from_contours import Acquisition, cost_px, learn_static_edges, own_views
+from tracker.acquisition.from_contours import Acquisition, cost_px, learn_static_edges, moving, own_views
 from tracker.acquisition.size_fit import SightedPerson, SizeFit
 from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.body.model import PosedBody
@@ -82,6 +82,7 @@ def acquire_from_two_views(
     choosing(0.0)
     chosen = choose_views(observer.working_cameras, bodies, person, settings.views)
     frame, front, side, _ = chosen
+    bodies = moving(observer, bodies)
     reading(0.0)
     static_edges = learn_static_edges(observer, bodies)
     views = read_views(observer, frame, bodies[frame], static_edges)

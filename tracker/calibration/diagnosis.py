@@ -19,7 +19,7 @@ from tracker.calibration.rig_problem import RigProblem, RigState
 from tracker.calibration.viewed_frames import ViewedFrame, seen_people
 from tracker.compute.progress import Report, unreported
 from tracker.compute.threads import one_blas_thread
-from tracker.fitting.bundle import solve_bundle
+from tracker.fitting.bundle import ArrowEquations, solve_bundle
 from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.geometry.arrays import Array
 
@@ -63,7 +63,7 @@ class _Effort(NamedTuple):
 EFFORT = _Effort(cameras=2, kinds=2, beginnings=3, faults=8, heat=2, steps=8)
 """With one camera fitted, a camera opposite the one that is off was blamed on one of nine recordings."""
 
-_LEAST_GAIN = 0.5
+LEAST_GAIN = 0.5
 """Fall of the cost that a further step must promise, nats: as much as a number gains that fits noise."""
 
 
@@ -171,7 +171,7 @@ def glance(frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], 
     found = search.best(fit, (), ())
     if found is None:
         return _diagnosis(_Selection((), fit))
-    return _diagnosis(_Selection(found[:1], search.refitted(fit.problem, found[1], [found[0].fault])))
+    return _diagnosis(_Selection(found[:1], found[1]))
 
 
 def _diagnosis(selection: "_Selection") -> Diagnosis:
@@ -193,13 +193,19 @@ class _Fitted(NamedTuple):
 
     problem: RigProblem
     state: RigState
-    cost: float
+    equations: ArrowEquations
+    """Normal equations there; they are the same whatever is free."""
     hessian: Array
     """Of the shared unknowns, whatever the poses are, (n, n)."""
     gradient: Array
     """By them, (n,)."""
     free: NDArray[np.bool_]
     """Which of them were fitted, (n,)."""
+
+    @property
+    def cost(self) -> float:
+        """Cost of the state."""
+        return self.equations.cost
 
     @property
     def promise(self) -> float:
@@ -237,12 +243,12 @@ class _Search:
             if found is None:
                 return self.without_idle(fit, kept)
             kept.append(found[0])
-            state = found[1]
+            state = found[1].state
 
     def total(self, problem: RigProblem, selection: _Selection) -> float:
         """Return the cost of a selection on the evidence of a problem, with the worth that its faults need."""
         faults = [k.fault for k in selection.kept]
-        return self.refitted(problem, selection.fit.state, faults).cost + sum(map(_needed, faults))
+        return self._solved(problem, selection.fit.state, faults).cost + sum(map(_needed, faults))
 
     def fitted(
         self, state: RigState, chosen: Collection[Fault], accepts: bool = True, steps: int = EFFORT.steps
@@ -250,27 +256,31 @@ class _Search:
         """Fit poses, sizes and chosen corrections, on the evidence that the state accepts or on all."""
         seen = seen_people(self._frames, state if accepts else None)
         problem = RigProblem(seen, self._parameters, self._sigmas, state.corrections)
-        return self.refitted(problem, state, chosen, steps)
+        return self._solved(problem, state, chosen, steps)
 
-    def refitted(
-        self, problem: RigProblem, state: RigState, chosen: Collection[Fault], steps: int = EFFORT.steps
-    ) -> _Fitted:
-        """Fit poses, sizes and chosen corrections on the evidence of a problem, in some Gauss-Newton steps at most."""
+    def refitted(self, fit: _Fitted, chosen: Collection[Fault], steps: int = EFFORT.steps) -> _Fitted:
+        """Fit poses, sizes and chosen corrections on the same evidence further, in some Gauss-Newton steps at most."""
+        return self._solved(fit.problem, fit.state, chosen, steps, fit.equations)
+
+    def _solved(
+        self, problem: RigProblem, state: RigState, chosen: Collection[Fault], steps: int = EFFORT.steps,
+        known: ArrowEquations | None = None,
+    ) -> _Fitted:  # fmt: skip
         free = np.zeros(state.corrections.size, np.bool_)
         for h in chosen:
             free[h.columns] = True
         problem = problem.with_free(free.reshape(state.corrections.shape))
-        found = solve_bundle(problem, state, steps, least_gain=_LEAST_GAIN)
+        found = solve_bundle(problem, state, steps, least_gain=LEAST_GAIN, known=known)
         shared, own = problem.free(found.state, found.equations)
         every = np.concatenate([np.ones(free.size, np.bool_), shared[free.size :]])
         with one_blas_thread():
             gradient, hessian = found.equations.held(every, own).reduced()
-        return _Fitted(problem, found.state, found.cost, hessian, gradient, shared)
+        return _Fitted(problem, found.state, found.equations, hessian, gradient, shared)
 
     def best(
         self, fit: _Fitted, chosen: Collection[Fault], without: Collection[int]
-    ) -> tuple[FoundFault, RigState] | None:
-        """Fit the most promising faults; return the best with its state, or None if none is worth it.
+    ) -> tuple[FoundFault, _Fitted] | None:
+        """Fit the most promising faults; return the best with its fit, or None if none is worth it.
 
         Args:
             fit: the rig so far.
@@ -288,15 +298,14 @@ class _Search:
         if best is None or worth[best] <= 0:
             return None
         rivals = [h for h in worth if h != best and worth[h] > worth[best] - CLEAR_NATS]
-        return FoundFault(best, fit.cost - fits[best].cost, tuple(rivals)), fits[best].state
+        return FoundFault(best, fit.cost - fits[best].cost, tuple(rivals)), fits[best]
 
     def _raced(self, fit: _Fitted, faults: Mapping[Fault, Collection[Fault]]) -> dict[Fault, _Fitted]:
         """Fit each fault with those that go with it; not to the end where it cannot become the best or a rival."""
-        fits = {h: self.refitted(fit.problem, fit.state, chosen, EFFORT.heat) for h, chosen in faults.items()}
+        fits = {h: self.refitted(fit, chosen, EFFORT.heat) for h, chosen in faults.items()}
         least = min((f.cost + _needed(h) for h, f in fits.items()), default=0.0) + CLEAR_NATS
         return {
-            h: self.refitted(fit.problem, f.state, faults[h]) if f.cost + _needed(h) - f.promise < least else f
-            for h, f in fits.items()
+            h: self.refitted(f, faults[h]) if f.cost + _needed(h) - f.promise < least else f for h, f in fits.items()
         }
 
     def without_idle(self, fit: _Fitted, kept: Sequence[FoundFault]) -> _Selection:
@@ -307,7 +316,7 @@ class _Search:
                 continue
             state = fit.state._replace(corrections=fit.state.corrections.copy())
             state.corrections.ravel()[candidate.fault.columns] = 0.0
-            found = self.refitted(fit.problem, state, [k.fault for k in others])
+            found = self._solved(fit.problem, state, [k.fault for k in others])
             if found.cost - fit.cost < _needed(candidate.fault):
                 kept, fit = others, found
         return _Selection(tuple(kept), fit)

@@ -56,7 +56,7 @@ def findings(diagnosis: Diagnosis, frames: Sequence[ViewedFrame], names: Sequenc
         misfit_px, misfit_mm = misfit(frames, i, shown)
         gain = sum(k.gain_nats for k in kept) if kinds else diagnosis.steps[likely].gain_nats
         rivals = {r.kind for k in kept for r in k.rivals if r.camera == i} - set(kinds)
-        named = kinds if misfit_px >= SEEN_PX else ()
+        named = kinds if misfit_px >= SEEN_PX or _is_followed(frames, i, kinds) else ()
         is_seen = any(len(f.views[i].points_px) for f in frames)
         out.append(
             CameraFinding(
@@ -65,6 +65,15 @@ def findings(diagnosis: Diagnosis, frames: Sequence[ViewedFrame], names: Sequenc
             )
         )  # fmt: skip
     return out
+
+
+def _is_followed(frames: Sequence[ViewedFrame], camera: int, kinds: Sequence[str]) -> bool:
+    """Return whether a fault is one of time alone, of a camera whose clock was corrected before.
+
+    Such a fault is followed until it stands: the time is found a little short where people were tracked with the wrong
+    one, and no shape of a body looks like it.
+    """
+    return bool(kinds) and set(kinds) <= {"time", "drift"} and any(f.ahead_s[camera] for f in frames)
 
 
 def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tuple[float, float]:
@@ -77,9 +86,9 @@ def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tup
     for frame in frames:
         view = frame.views[camera].camera
         mended = corrected(view, correction)
-        for body, velocity in zip(frame.bodies, frame.velocities, strict=True):
+        for body, path in zip(frame.bodies, frame.paths, strict=True):
             now, then = (
-                body.model.points_world(body.model.retract(body.values, (frame.ahead_s[camera] + delay_s) * velocity))
+                body.model.points_world(body.model.retract(body.values, path.step(frame.ahead_s[camera] + delay_s)))
                 for delay_s in (0.0, later_s(correction, frame.time_s))
             )
             moved = np.sum((mended.project(then) - view.project(now)) ** 2, axis=-1)

@@ -39,7 +39,7 @@ def residual_pieces(
     for seen, pose in zip(seen_people(frames, state), state.poses, strict=True):
         body = parameters[seen.person].body(state.sizes[seen.person])
         for camera, evidence, residuals in views_of(seen, nothing):
-            then = body.retract(pose, seen.ahead_s[camera] * seen.velocity)
+            then = body.retract(pose, seen.path.step(seen.ahead_s[camera]))
             pieces = residuals.with_surfaces(body, residuals.resized(body)).piece_sums(then)[1].pulled
             # Resizing keeps the borders of pixels, not their centres.
             points_px = (pieces.points_px + evidence.corner_px + 0.5) / evidence.scale - 0.5

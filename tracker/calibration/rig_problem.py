@@ -1,7 +1,8 @@
 """Fit corrections of cameras, sizes of bodies and poses to the contours of several frames at once.
 
-View c of frame k sees the pose q_k + (d_c + r_c T_k) dq_k/dt. Corrections and sizes are shared unknowns, the pose of
-each person on each frame is their own (`bundle`). Residuals are those of the tracker (`contour_residuals`).
+View c of frame k sees the pose q_k + p_k(d_c + r_c T_k), with p_k the way of the tracked pose. Corrections
+and sizes are shared unknowns, the pose of each person on each frame is their own (`bundle`). Residuals are those of the
+tracker (`contour_residuals`).
 """
 
 import itertools
@@ -29,6 +30,7 @@ from tracker.fitting.gauss_newton import NormalEquations, PosePrior, pressed_aga
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import so3_exp
+from tracker.motion.pose_path import PosePath
 
 SIZE_KINDS = ("height", "build", "length", "girth", "end", "free_end", "side", "joint")
 """Kinds of sizes that are found together with the cameras, see `SizePriors`: a body of other sizes looks like a
@@ -45,8 +47,8 @@ class SeenPerson(NamedTuple):
     """Evidence of each view that is the person's, in the order of the cameras."""
     bodies: tuple[PosedBody, ...]
     """All people; the others occlude."""
-    velocity: Array
-    """Change of the person's pose, (n_dofs,), rad or metres per second."""
+    path: PosePath
+    """Way of the person's pose around the frame."""
     time_s: float
     """Time of the frame, seconds, since that to which drifts are related."""
     ahead_s: Sequence[float]
@@ -201,10 +203,10 @@ class RigProblem:
             lambda v: float(seen.ahead_s[v.camera] + later_s(state.corrections[v.camera], seen.time_s)),
         ):
             assert surfaces is not None
-            then = body.retract(pose, delay * seen.velocity) if delay else pose
+            then = body.retract(pose, seen.path.step(delay)) if delay else pose
             kinematics, of_body = body.kinematics(then), np.zeros((len(body.parts), N_PART, N_PART))
             J = motions_by_unknowns(body, kinematics, by_sizes)[:, :N_PART]
-            moving, pulls = J[:, :, n_sizes:] @ seen.velocity, np.zeros(J.shape[:2])
+            moving, pulls = J[:, :, n_sizes:] @ seen.path.velocity(delay), np.zeros(J.shape[:2])
             for view in views:
                 correction = state.corrections[view.camera]
                 camera = corrected(view.evidence.camera, correction)
@@ -333,7 +335,7 @@ def views_of(seen: SeenPerson, corrections: Array) -> list[SeenView]:
         if not len(view.points_px):
             continue
         delay_s = seen.ahead_s[i] + later_s(correction, seen.time_s)
-        then = seen.moved(seen.body.model.retract(seen.body.values, delay_s * seen.velocity))
+        then = seen.moved(seen.body.model.retract(seen.body.values, seen.path.step(delay_s)))
         evidence = replace(view, camera=corrected(view.camera, correction))
         out.append(SeenView(i, view, ContourResiduals([evidence], then.bodies, seen.person)))
     return out

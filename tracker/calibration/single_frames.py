@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import N_CORRECTIONS
-from tracker.calibration.diagnosis import EFFORT
+from tracker.calibration.diagnosis import EFFORT, LEAST_GAIN
 from tracker.calibration.rig_problem import RigProblem, RigState
 from tracker.calibration.viewed_frames import ViewedFrame, seen_people
 from tracker.fitting.bundle import solve_bundle
@@ -44,7 +44,7 @@ def score_frame(
     state = RigState(corrections, tuple(sizes), tuple(b.values for b in frame.bodies))
     nothing = np.zeros(corrections.shape, np.bool_)
     problem = RigProblem(seen_people([frame]), parameters, sigmas, corrections).with_free(nothing, sizes=False)
-    found = solve_bundle(problem, state, EFFORT.steps)
+    found = solve_bundle(problem, state, EFFORT.steps, least_gain=LEAST_GAIN)
     n = corrections.size
     cameras = np.arange(len(found.equations.gradient)) < n
     gradient, hessian = found.equations.held(cameras, problem.free(found.state, found.equations)[1]).reduced()
@@ -65,20 +65,33 @@ class Change(NamedTuple):
     """Fall of the cost against a camera that is off on all frames, or that never changes."""
 
 
-def find_change(scores: Sequence[FrameScore], camera: int, columns: Array, sigmas: Array) -> Change:
+def find_change(
+    scores: Sequence[tuple[FrameScore, FrameScore]], camera: int, columns: Array, correction: Array, sigmas: Array
+) -> Change:
     """Find since when a camera is off, by the likelihood of each frame (a change point; Page 1954).
 
+    The best correction of some frames is near that of all: there the cost is a parabola, but at the present camera it
+    is none if a body moves by more than contours reach.
+
     Args:
-        scores: of frames in order, with the present cameras.
+        scores: of frames in order, with the present camera, and with the correction of all frames.
         camera: index of the camera.
         columns: indices of the numbers that are corrected, (n,), within those of a camera.
+        correction: of all frames, (N_CORRECTIONS,).
         sigmas: standard deviations of corrections in their prior, (N_CORRECTIONS,).
     """
-    at = camera * N_CORRECTIONS + columns
+    at, c = camera * N_CORRECTIONS + columns, correction[columns]
     prior = np.diag(1 / sigmas[columns] ** 2)
-    b = np.cumsum([s.gradient[at] for s in scores][::-1], axis=0)[::-1]
-    S = np.cumsum([s.hessian[np.ix_(at, at)] for s in scores][::-1], axis=0)[::-1]
-    gains = [0.5 * float(g @ np.linalg.solve(H + prior, g)) for g, H in zip(b, S, strict=True)]
+
+    def from_each_on(values: Sequence[Array] | Sequence[float]) -> Array:
+        return np.asarray(np.cumsum(np.asarray(values)[::-1], axis=0)[::-1])
+
+    falls = from_each_on([before.cost - after.cost for before, after in scores]) - 0.5 * c @ prior @ c
+    b = from_each_on([after.gradient[at] for _, after in scores]) + prior @ c
+    S = from_each_on([after.hessian[np.ix_(at, at)] for _, after in scores]) + prior
+    gains = [
+        float(fall + 0.5 * g @ np.linalg.solve(H, g)) for fall, g, H in zip(falls, b, S, strict=True)
+    ]  # fmt: skip
     first = int(np.argmax(gains))
     gain = gains[first] - gains[0]
     # The best of n frames gains ln n more by chance than a frame that was named before.

@@ -13,6 +13,7 @@ from tracker.contours import occluding_contours
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence, with_all_segments, with_segments
 from tracker.geometry.arrays import Array
 from tracker.images.edge_segments import accept_segments
+from tracker.motion.pose_path import PosePath
 
 
 class ViewedFrame(NamedTuple):
@@ -23,8 +24,8 @@ class ViewedFrame(NamedTuple):
     """With their segments."""
     bodies: tuple[PosedBody, ...]
     """All people, as they were tracked."""
-    velocities: tuple[Array, ...]
-    """Change of each person's pose, (n_dofs,), rad or metres per second."""
+    paths: tuple[PosePath, ...]
+    """Way of each person's pose around the frame."""
     time_s: float
     """Time of the frame, seconds, since that to which drifts are related."""
     ahead_s: tuple[float, ...]
@@ -46,18 +47,18 @@ def seen_people(frames: Sequence[ViewedFrame], state: RigState | None = None) ->
         else:
             bodies = tuple(PosedBody(b.model, next(poses)) for b in seen.bodies)
             views = [
-                _accepted(view, _then(bodies, seen.velocities, ahead_s + later_s(c, seen.time_s)), c)
+                _accepted(view, _then(bodies, seen.paths, ahead_s + later_s(c, seen.time_s)), c)
                 for view, ahead_s, c in zip(seen.views, seen.ahead_s, state.corrections, strict=True)
             ]
-        for person, velocity in enumerate(seen.velocities):
+        for person, path in enumerate(seen.paths):
             own = own_views(views, bodies, person) if len(bodies) > 1 else views
-            out.append(SeenPerson(seen.frame, person, own, bodies, velocity, seen.time_s, seen.ahead_s))
+            out.append(SeenPerson(seen.frame, person, own, bodies, path, seen.time_s, seen.ahead_s))
     return out
 
 
-def _then(bodies: Sequence[PosedBody], velocities: Sequence[Array], delay_s: float) -> list[PosedBody]:
+def _then(bodies: Sequence[PosedBody], paths: Sequence[PosePath], delay_s: float) -> list[PosedBody]:
     """Return people as they are some time later."""
-    return [PosedBody(b.model, b.model.retract(b.values, delay_s * v)) for b, v in zip(bodies, velocities, strict=True)]
+    return [PosedBody(b.model, b.model.retract(b.values, p.step(delay_s))) for b, p in zip(bodies, paths, strict=True)]
 
 
 def _accepted(view: ViewEvidence, bodies: Sequence[PosedBody], correction: Array) -> ViewEvidence:

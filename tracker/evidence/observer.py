@@ -59,7 +59,7 @@ class Observer:
 
     def __init__(
         self, cameras: Sequence[CameraSource], recording: Recording, in_recording: Sequence[int] | None = None,
-        views: Sequence[Foreground] | None = None, keypoints: KeypointEvidence | None = None,
+        views: Sequence[Foreground] | None = None, keypoints: KeypointEvidence | None = None, in_time: bool = False,
     ) -> None:  # fmt: skip
         """Read the backgrounds.
 
@@ -69,6 +69,7 @@ class Observer:
             in_recording: index of each view in the recording, if it has others too.
             views: the foreground of each view, if another observer has read the backgrounds.
             keypoints: of all people in these views, if they are evidence, too.
+            in_time: see `in_time`.
 
         Raises:
             RecordingError: a background is missing, unreadable or of the wrong size.
@@ -76,7 +77,7 @@ class Observer:
         self.cameras = tuple(cameras)
         self.recording = recording
         """Footage of the views."""
-        self._in_recording, self.keypoints = in_recording, keypoints
+        self._in_recording, self.keypoints, self._is_in_time = in_recording, keypoints, in_time
         # OpenCV's own threads would compete with the threads of other views.
         self._pool, self._pool_ahead = (
             ThreadPoolExecutor(FRAMES_AHEAD, name, initializer=cv2.setNumThreads, initargs=(1,))
@@ -93,17 +94,29 @@ class Observer:
 
     def with_keypoints(self, keypoints: KeypointEvidence | None) -> "Observer":
         """Return an observer of the same views to which key points are evidence, too; None: to which they are not."""
-        cameras, recording, in_recording, views, _ = self._of(range(len(self.cameras)))
-        return Observer(cameras, recording, in_recording, views, keypoints)
+        cameras, recording, in_recording, views, _, in_time = self._of(range(len(self.cameras)))
+        return Observer(cameras, recording, in_recording, views, keypoints, in_time)
+
+    def in_time(self) -> "Observer":
+        """Return an observer of the same views that takes the picture of each that is nearest in time to the frame.
+
+        Poses that follow one another are found by it: a motion is straight over half a frame, but not over several.
+        """
+        n = self.recording.n_frames
+        if self._is_in_time or all(c.clock.nearest(k, n) == k for c in self.cameras for k in (0, n // 2, n - 1)):
+            return self
+        cameras, recording, in_recording, views, keypoints, _ = self._of(range(len(self.cameras)))
+        return Observer(cameras, recording, in_recording, views, keypoints, in_time=True)
 
     def _of(
         self, chosen: Sequence[int]
-    ) -> tuple[list[CameraSource], Recording, list[int], list[Foreground], KeypointEvidence | None]:
+    ) -> tuple[list[CameraSource], Recording, list[int], list[Foreground], KeypointEvidence | None, bool]:
         """Return the arguments of an observer of some of the views."""
         known = range(len(self.cameras)) if self._in_recording is None else self._in_recording
         cameras = [self.cameras[i] for i in chosen]
         keypoints = None if self.keypoints is None else self.keypoints.of_views(chosen)
-        return cameras, self.recording, [known[i] for i in chosen], [self._views[i] for i in chosen], keypoints
+        in_recording, views = [known[i] for i in chosen], [self._views[i] for i in chosen]
+        return cameras, self.recording, in_recording, views, keypoints, self._is_in_time
 
     @property
     def working_cameras(self) -> tuple[Camera, ...]:
@@ -112,7 +125,13 @@ class Observer:
 
     def ahead_frames(self, k: int) -> tuple[float, ...]:
         """Return by how many frames the picture of each view was taken later than frame k; see `Clock.ahead`."""
-        return tuple(c.clock.ahead(k) for c in self.cameras)
+        return tuple(c.clock.ahead(shown) + shown - k for c, shown in zip(self.cameras, self._shown(k), strict=True))
+
+    def _shown(self, k: int) -> list[int]:
+        """Return the frame whose picture each view has on frame k: k, or that of the nearest time; see `in_time`."""
+        if not self._is_in_time:
+            return [k] * len(self.cameras)
+        return [c.clock.nearest(k, self.recording.n_frames) for c in self.cameras]
 
     def empty_scenes(self) -> tuple[Image | None, ...]:
         """Return the smoothed empty scene of each view in working pixels, (H, W, 3); None without a background."""
@@ -185,6 +204,8 @@ class Observer:
         if ahead is not None and ahead.features is not None and (ahead.with_static_edges, ahead.edges) == asked:
             features = ahead.features.result()
 
+        shown = self._shown(k)
+
         def observe(
             i: int, region: Region | None, predicted_px: FloatArray | None, model: StaticEdgeModel | None
         ) -> ViewEvidence:
@@ -196,7 +217,7 @@ class Observer:
             found = select_evidence(seen, predicted_px, model, edges.max_angle_rad)
             if self.keypoints is None or prepared[i] is None:
                 return found
-            return replace(found, keypoints=self.keypoints.in_view(k, i, found.camera))
+            return replace(found, keypoints=self.keypoints.in_view(shown[i], i, found.camera))
 
         return tuple(
             self._pool.map(
@@ -206,11 +227,16 @@ class Observer:
         )  # fmt: skip
 
     def _prepare(self, k: int) -> list[Prepared | None]:
-        chosen = self._in_recording
-        frames = self.recording.read(k) if chosen is None else self.recording.read(k, chosen)
+        shown, chosen = self._shown(k), self._in_recording
+        frames: Sequence[Image | None]
+        if set(shown) != {k}:
+            frames = self.recording.read_each(shown, chosen)
+        else:
+            frames = self.recording.read(k) if chosen is None else self.recording.read(k, chosen)
         for view in self._views:  # those of all views at the same time
             view.measure_empty_scene()
-        return [None if f is None else view.prepare(f, k) for view, f in zip(self._views, frames, strict=True)]
+        seen = zip(self._views, frames, shown, strict=True)
+        return [None if f is None else view.prepare(f, at) for view, f, at in seen]
 
     def _find_ahead(
         self,
@@ -245,7 +271,7 @@ class Observer:
         view, box = self._views[i], self._box(i, region)
         working = view.view.camera
         camera, scale, filmed = working.cropped(box), view.view.scale, view.view.filmed
-        ahead = self.cameras[i].clock.ahead(k)
+        ahead = self.ahead_frames(k)[i]
         if prepared is None:
             nothing = np.zeros((camera.height, camera.width), np.uint8)
             return RegionFeatures(camera, scale, box[:2], filmed.size, nothing, ahead_frames=ahead)

@@ -93,7 +93,7 @@ class SilhouetteFinder:
         self._models = list(self._pool.map(self._model, range(len(self.cameras))))
 
     def silhouettes(self, k: int, person: int | None = None) -> tuple[ViewSilhouette, ...]:
-        """Find the silhouettes of frame k in all views.
+        """Find the silhouettes of frame k in all views, each in the picture that is nearest in time to the frame.
 
         Args:
             k: frame number.
@@ -102,8 +102,9 @@ class SilhouetteFinder:
         Raises:
             RecordingError: the frame or a mask cannot be read.
         """
-        frames = self.recording.read(k)
-        return tuple(self._pool.map(lambda i: self._silhouette(i, frames[i], k, person), range(len(frames))))
+        shown = [c.clock.nearest(k, self.recording.n_frames) for c in self.cameras]
+        frames = self.recording.read(k) if set(shown) == {k} else self.recording.read_each(shown)
+        return tuple(self._pool.map(lambda i: self._silhouette(i, frames[i], shown[i], person), range(len(frames))))
 
     def close(self) -> None:
         """End the threads."""

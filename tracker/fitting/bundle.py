@@ -143,6 +143,7 @@ def solve_bundle(
     tolerance: float = 1e-4,
     report: Callable[[int], None] = lambda iteration: None,
     least_gain: float = 0.0,
+    known: ArrowEquations | None = None,
 ) -> BundleFit[S]:
     """Minimize the cost of a problem (Levenberg-Marquardt).
 
@@ -153,16 +154,18 @@ def solve_bundle(
         tolerance: smallest relative decrease of the cost that a step must promise.
         report: is given the number of each iteration before it begins. An exception that it raises ends the fit.
         least_gain: smallest decrease that a step must promise, in units of the cost.
+        known: normal equations at the initial state, if they were calculated before.
     """
     with one_blas_thread():
-        return _solve(problem, state, max_iterations, lambda cost: max(tolerance * cost, least_gain), report)
+        here = BundleFit(state, problem.linearize(state) if known is None else known, int(known is None))
+        return _solve(problem, here, max_iterations, lambda cost: max(tolerance * cost, least_gain), report)
 
 
 def _solve(
-    problem: BundleProblem[S], state: S, max_iterations: int, enough: Callable[[float], float],
+    problem: BundleProblem[S], start: BundleFit[S], max_iterations: int, enough: Callable[[float], float],
     report: Callable[[int], None],
 ) -> BundleFit[S]:  # fmt: skip
-    here, damping, evaluations = problem.linearize(state), DAMPING.first, 1
+    state, here, evaluations, damping = start.state, start.equations, start.evaluations, DAMPING.first
     for iteration in range(max_iterations):
         report(iteration)
         equations = here.held(*problem.free(state, here))

@@ -1,6 +1,7 @@
 """One camera of a session: its calibration and the paths of its images."""
 
 from dataclasses import dataclass, replace
+from math import floor
 from pathlib import Path
 
 from tracker.geometry.cameras import Camera
@@ -21,6 +22,10 @@ class Clock:
     def ahead(self, frame: float) -> float:
         """Return by how many frames the picture of a frame was taken later than the frame."""
         return self.ahead_frames + self.rate * frame
+
+    def nearest(self, frame: int, n_frames: int) -> int:
+        """Return the frame, of so many, whose picture was taken nearest to the time of a frame."""
+        return min(max(0, floor((frame - self.ahead_frames) / (1 + self.rate) + 0.5)), n_frames - 1)
 
 
 @dataclass(frozen=True, eq=False)

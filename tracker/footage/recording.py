@@ -114,6 +114,12 @@ class Recording:
         wanted = range(len(self._cameras)) if cameras is None else cameras
         return tuple(self._pool.map(lambda i: self._read_one(i, k), wanted))
 
+    def read_each(self, frames: Sequence[int], cameras: Sequence[int] | None = None) -> tuple[Image | None, ...]:
+        """Read a frame of each camera of its own; otherwise as `read`."""
+        for k in frames:
+            self._check(k)
+        return tuple(self._pool.map(self._read_one, range(len(frames)) if cameras is None else cameras, frames))
+
     def read_view(self, camera: int, k: int) -> Image | None:
         """Read frame k of one camera, by its index; otherwise as `read`."""
         self._check(k)

@@ -198,22 +198,25 @@ class _Changes:
         """Return the frame since when a camera is off; None if on all frames."""
         index = [c.name for c in self._check.cameras].index(name)
         columns = np.concatenate([np.arange(N_CORRECTIONS)[KINDS[k]] for k in self._check.cameras[index].kinds])
-        others = self._check.corrections
-        others[index] = 0.0
-        scores = dict[int, FrameScore]()
+        corrections, without = self._check.corrections, self._check.corrections
+        without[index] = 0.0
+        scores = dict[int, tuple[FrameScore, FrameScore]]()
         while True:
             for k, seen in self._seen.items():
                 if k not in scores:
                     parameters = [SizeParameters(b.model) for b in seen.bodies]
                     state = self._check.diagnosis.state
-                    scores[k] = score_frame(seen, parameters, state.sizes, others, self._sigmas)
+                    before, after = (
+                        score_frame(seen, parameters, state.sizes, c, self._sigmas) for c in (without, corrections)
+                    )
+                    scores[k] = before, after
             ordered = [scores[k] for k in sorted(scores)]
-            change = find_change(ordered, index, columns, self._sigmas)
+            change = find_change(ordered, index, columns, corrections[index], self._sigmas)
             if change.first == 0:
                 return None
-            before, after = ordered[change.first - 1].frame, ordered[change.first].frame
-            between = [k for k in self._usable if before < k < after]
+            last, first = ordered[change.first - 1][0].frame, ordered[change.first][0].frame
+            between = [k for k in self._usable if last < k < first]
             if not between:
-                return after
+                return first
             more = sorted({between[i] for i in np.linspace(0, len(between) - 1, 5).round().astype(int)})
             self._seen.update({f.frame: f for f in self._recording.seen(more)})

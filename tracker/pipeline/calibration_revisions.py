@@ -11,12 +11,20 @@ from tracker.errors import SessionError
 from tracker.files import refuse_links, write_text_atomic
 from tracker.footage.camera_source import Clock
 from tracker.formats.anipose import format_calibration
+from tracker.formats.model_toml import has_preset_proportions
 from tracker.geometry.arrays import Array
+from tracker.pipeline.body_acquisition import SIZES_EDITS, sizes_changed
 from tracker.pipeline.calibration_check import CalibrationCheck
 from tracker.pipeline.stored_run import forget_unfinished
 from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_cameras
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, present_revision, revisions_of_poses
+from tracker.store.calibration_log import (
+    CALIBRATION_EDITS,
+    CALIBRATIONS,
+    calibration_edits,
+    present_revision,
+    revisions_of_poses,
+)
 from tracker.store.edit_tree import now
 
 
@@ -93,6 +101,20 @@ def outdated_frames(session: Session, store: AnnotationStore) -> dict[str, list[
         if found:
             out[person.name] = found
     return out
+
+
+def outdated_sizes(session: Session, store: AnnotationStore) -> list[str]:
+    """Return the names of people who have sizes of their own from before the last change of the calibration.
+
+    They were fitted to contours as the former cameras saw them.
+    """
+    done = set(store.done_edits())
+    corrected_by = max((edit for edit in calibration_edits(store) if edit in done), default=0)
+    sizes_edits, last = store.setting(SIZES_EDITS, {}), dict[str, int]()
+    for edit in sorted(done.intersection(map(int, sizes_edits))):
+        last.update({name: edit for name, _, _ in sizes_changed(sizes_edits, edit)})
+    own = [p.name for p in session.people if not has_preset_proportions(p.model)]
+    return [name for name in own if last.get(name, corrected_by) < corrected_by]
 
 
 def same_calibration(one: Session, other: Session) -> bool:

@@ -20,7 +20,7 @@ from tracker.formats.model_toml import has_preset_proportions
 from tracker.initialization.first_pose import FirstPoses
 from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.body_acquisition import acquire_body, acquisition_sentence, posed_frames, store_body
-from tracker.pipeline.calibration_revisions import follow_history
+from tracker.pipeline.calibration_revisions import follow_history, outdated_sizes
 from tracker.pipeline.find_people import FindSettings, find_people, sentences, store_found
 from tracker.pipeline.keyframe_stretches import KeyframeStretch, stretches_to_track
 from tracker.pipeline.keypoint_evidence import (
@@ -54,7 +54,7 @@ class ChainPlan:
     find: FindSettings | None = field(default_factory=FindSettings)
     """How people who have no pose are found; None if nobody is looked for."""
     acquire: tuple[int, ...] = ()
-    """People whose sizes are acquired from the contours, unless they have sizes of their own by then."""
+    """People whose sizes are acquired from the contours, unless they have sizes of their own under this calibration."""
 
 
 class Sink(Protocol):
@@ -95,6 +95,9 @@ class OpenSession(Protocol):
 
     def setting(self, name: str, default: Any) -> Any:
         """Return a setting of the session."""
+
+    def outdated_sizes(self) -> list[str]:
+        """Return the names of people who have sizes of an earlier calibration."""
 
     def is_interrupted(self, plan: TrackPlan) -> bool:
         """Return whether this run was interrupted, so that it goes on there."""
@@ -150,11 +153,11 @@ def run_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
 def _acquire(
     people: Sequence[int], track: TrackPlan, points: Mapping[int, BodyPoints], opened: OpenSession, report: Report
 ) -> dict[int, dict[int, PosedBody]]:
-    """Acquire the sizes of those people who have none of their own, one after the other, and store each; return their
-    bodies by frame."""
+    """Acquire the sizes of those people who have none of their own, or those of an earlier calibration, one after the
+    other, and store each; return their bodies by frame."""
     assert track.start is not None
-    out = dict[int, dict[int, PosedBody]]()
-    people = [i for i in people if has_preset_proportions(opened.session.people[i].model)]
+    out, outdated, known_people = dict[int, dict[int, PosedBody]](), opened.outdated_sizes(), opened.session.people
+    people = [i for i in people if has_preset_proportions(known_people[i].model) or known_people[i].name in outdated]
     settings = AcquisitionSettings(rounds=2)  # again with acquired sizes where few frames were good with the preset's
     whole = range(track.frames[0], track.frames[-1] + 1)
     for number, person in enumerate(people):
@@ -237,6 +240,10 @@ class StoredSession:
         """See `OpenSession.setting`."""
         return self._store.setting(name, default)
 
+    def outdated_sizes(self) -> list[str]:
+        """See `OpenSession.outdated_sizes`."""
+        return outdated_sizes(self.session, self._store)
+
     def is_interrupted(self, plan: TrackPlan) -> bool:
         """See `OpenSession.is_interrupted`."""
         return is_interrupted(self._store, plan)
@@ -277,4 +284,4 @@ def open_stored_session(session: Session) -> Iterator[StoredSession]:
     ):
         session = follow_history(session, store)
         with Recording(session.cameras) as recording:
-            yield StoredSession(session, store, Observer(session.cameras, recording))
+            yield StoredSession(session, store, Observer(session.cameras, recording).in_time())

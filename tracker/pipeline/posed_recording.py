@@ -13,9 +13,8 @@ from tracker.compute.progress import Report, unreported
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.hypothesis import SAME_POSE_M
-from tracker.geometry.arrays import Array
 from tracker.images.static_edges import StaticEdgeModel
-from tracker.motion.velocity import velocity
+from tracker.motion.pose_path import PosePath
 from tracker.session.session import Session
 from tracker.store.stored_poses import read_stored_poses
 from tracker.tracking.estimate import TrackedFrame
@@ -102,17 +101,15 @@ class PosedRecording:
             bodies = tuple(own[k] for own in self.poses)
             regions_px = regions(self.observer.working_cameras, bodies)
             views = self.observer.evidence(k, regions_px, None, self._static_edges)
-            velocities = tuple(self._velocity(own, k) for own in self.poses)
+            paths = tuple(self._path(own, k) for own in self.poses)
             ahead_s = tuple(ahead / self.fps for ahead in self.observer.ahead_frames(k))
-            out.append(ViewedFrame(k, views, bodies, velocities, k / self.fps - self.middle_s, ahead_s))
+            out.append(ViewedFrame(k, views, bodies, paths, k / self.fps - self.middle_s, ahead_s))
         return out
 
-    def _velocity(self, own: Mapping[int, PosedBody], frame: int) -> Array:
-        """Return the change of a person's pose on a credible frame, (n_dofs,), per second."""
-        around = {k: own[k].values for k in range(frame - 2, frame + 3)}
-        per_frame = velocity(own[frame].model, around, frame)
-        assert per_frame is not None
-        return self.fps * per_frame
+    def _path(self, own: Mapping[int, PosedBody], frame: int) -> PosePath:
+        """Return the way of a person's pose around a frame, as far as poses in the same body lead."""
+        model = own[frame].model
+        return PosePath.around(model, {k: b.values for k, b in own.items() if b.model is model}, frame, self.fps)
 
     @cached_property
     def _static_edges(self) -> list[StaticEdgeModel] | None:

@@ -73,23 +73,22 @@ def check(session: "Session", frames: range, n: int, applies: bool, progress: Re
         def report(stage: str, share: float, text: str = "", /) -> None:
             advance(share)
 
-        posed = PosedRecording.of_session(session, Observer(session.cameras, recording))
+        posed = PosedRecording.of_session(session, Observer(session.cameras, recording).in_time())
         found = check_calibration(posed, frames, n, report)
         scores = held_out_scores(posed, found, n, report) if found.named else []
     out = _as_json(found, scores)
     if applies:
-        out["applied"] = _apply(session, found, scores)
+        out["applied"] = list(found.named)
+        out["outdated_sizes"] = _apply(session, found, scores) if found.named else []
     return out
 
 
 def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameScore"]]) -> list[str]:
-    """Correct the named cameras; return their names."""
-    from tracker.pipeline.calibration_revisions import apply_check, follow_history
+    """Correct the named cameras; return the names of people whose sizes are then of an earlier calibration."""
+    from tracker.pipeline.calibration_revisions import apply_check, follow_history, outdated_sizes
     from tracker.session.lock import SessionLock
     from tracker.store.annotation_store import AnnotationStore
 
-    if not found.named:
-        return []
     found.require_applicable(scores)
     with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
         if follow_history(session, store) is not session:
@@ -97,8 +96,7 @@ def _apply(session: "Session", found: "CalibrationCheck", scores: list[tuple["Fr
                 "expected the calibration that was checked, found one that an interrupted correction had left; it is "
                 "restored, so check it again"
             )
-        apply_check(session, store, found)
-    return list(found.named)
+        return outdated_sizes(apply_check(session, store, found), store)
 
 
 def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameScore"]]) -> dict[str, Any]:
@@ -144,8 +142,10 @@ def _format(found: dict[str, Any]) -> str:
     if n:
         lines = [*lines, f"of {n} other frames, {found['explained']['held_out_better']} fit better with it"]
     if found.get("applied"):
-        before = "poses and acquired sizes are still those of the calibration before"
-        lines = [*lines, f"corrected; acquire the sizes again, if they were acquired, and track again: {before}"]
+        names, again = " and ".join(found["outdated_sizes"]), "track again"
+        if names:
+            again = f"track with --acquire, which also acquires the sizes of {names} again"
+        lines = [*lines, f"corrected; poses are still those of the calibration before: {again}"]
     elif found["named"]:
         lines = [*lines, "say --apply to correct it"]
     return "\n".join(lines)

@@ -70,7 +70,7 @@ def judge_session(session: "Session", name: str, progress: Reporter) -> list["Ju
 
     require_files(session)
     with Recording(session.cameras) as recording, ChainProgress(progress) as sink:
-        return judge(session, Observer(session.cameras, recording), name, TrackSettings(), sink)
+        return judge(session, Observer(session.cameras, recording).in_time(), name, TrackSettings(), sink)
 
 
 def record(found: list["Judgement"]) -> dict[str, Any]:

@@ -76,7 +76,12 @@ class BodyAcquisition:
         try:
             session = session_state.session
             found = acquire_body(
-                session, session_state.frames.observer, person, range(session.n_frames), settings, self._report
+                session,
+                session_state.frames.observer.in_time(),
+                person,
+                range(session.n_frames),
+                settings,
+                self._report,
             )
             self._finish(person, model, found)
         except _StoppedError:

@@ -210,7 +210,7 @@ class SessionState:
             if frame != self.state.frame and "pins" not in changes:
                 changes["pins"] = self._load_pins(frame)
             if frame != self.state.frame and "velocities" not in changes:
-                changes["velocities"] = self._load_velocities(frame)
+                changes["velocities"] = self.stored_velocities(frame)
             if frame != self.state.frame and "search_view" not in changes:
                 changes["search_view"] = SearchView(speed=self.state.search_view.speed)
             state = replace(self.state, **changes)
@@ -221,7 +221,7 @@ class SessionState:
     def show_frame(self, frame: int, /, **changes: Unpack[StateChanges]) -> None:
         """Show the stored poses of a frame, with other changes; the next save makes a new entry of the history."""
         self.open_edit_owner = None
-        shown, velocities = self._load(frame), self._load_velocities(frame)
+        shown, velocities = self._load(frame), self.stored_velocities(frame)
         costs = self.costs(tuple(p.values for p in shown["people"]), frame, shown["models"], velocities)
         loaded: StateChanges = {
             "frame": frame, "pins": self._load_pins(frame), "velocities": velocities, **shown, **costs
@@ -441,7 +441,7 @@ class SessionState:
         revisions = tuple(saver.revisions.current(i) if p.revision is None else p.revision for i, p in enumerate(shown))
         return tuple(saver.revisions.body(r) for r in revisions), revisions
 
-    def _load_velocities(self, frame: int) -> tuple[Array | None, ...]:
+    def stored_velocities(self, frame: int) -> tuple[Array | None, ...]:
         """Return the velocity of each person by the stored poses around a frame; empty where no camera needs them."""
         if not any(c.clock.ahead(frame) for c in self.session.cameras):
             return ()

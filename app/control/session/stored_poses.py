@@ -37,14 +37,16 @@ class StoredPoses:
         return frames, saver.pose_rows(person, frames)
 
     def on_frame(self, frame: int) -> dict[int, PosedBody]:
-        """Return the stored poses of a frame by index of the person, each in the body that it was made with."""
+        """Return the stored poses of a frame by index of the person, each in the body that it was made with, and with
+        their velocities where a camera needs them."""
         saver, found = self._session_state.saver, dict[int, PosedBody]()
         with self._session_state.lock:
+            velocities = dict(enumerate(self._session_state.stored_velocities(frame)))
             for person in range(len(self._session_state.session.people)):
                 pose = saver.pose(person, frame)
                 if pose is not None:
                     assert pose.revision is not None, "a stored pose has a revision"
-                    found[person] = PosedBody(saver.revisions.body(pose.revision), pose.values)
+                    found[person] = PosedBody(saver.revisions.body(pose.revision), pose.values, velocities.get(person))
         return found
 
     def origin(self, person: int, frame: int) -> PoseOrigin | None:

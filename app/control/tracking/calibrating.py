@@ -108,7 +108,10 @@ class Calibrating:
             if found.refused:
                 raise TrackerError(found.refused)
             session_state.set_cameras(session_state.saver.correct_cameras(check))
-            self._set(check=None, is_previewed=False, preview=None, message=f"Corrected: {', '.join(check.named)}.")
+            message, sizes = f"Corrected: {', '.join(check.named)}.", session_state.saver.outdated_sizes()
+            if sizes:
+                message += f" Acquire the sizes of {', '.join(sizes)} again, which fit the former cameras, then track."
+            self._set(check=None, is_previewed=False, preview=None, message=message)
             self._show_cameras()
 
     def track_again(self) -> None:
@@ -185,7 +188,7 @@ class Calibrating:
             self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
 
     def _recording(self) -> PosedRecording:
-        return PosedRecording.of_session(self._session_state.session, self._session_state.frames.observer)
+        return PosedRecording.of_session(self._session_state.session, self._session_state.frames.observer.in_time())
 
     def _report(self, stage: str, share: float, text: str = "", /) -> None:
         if self._stopping.is_set():
@@ -219,7 +222,7 @@ class Calibrating:
         if state.frame not in recording.credible_frames([state.frame]):
             self._set(message="The preview needs poses on this frame and on two before and after it.")
             return
-        (seen,) = recording.seen([state.frame])
+        (seen,), shown = recording.seen([state.frame]), self._session_state.frames.observer
         parameters = [SizeParameters(b.model) for b in seen.bodies]
         sizes, sigmas = check.diagnosis.state.sizes, prior_sigmas(session.fps)
         before, after = (
@@ -229,10 +232,10 @@ class Calibrating:
         models = [p.body(s) for p, s in zip(parameters, sizes, strict=True)]
         bodies = tuple(
             tuple(
-                PosedBody(model, model.retract(values, (ahead_s + later_s(c, seen.time_s)) * speed))
-                for model, values, speed in zip(models, after.poses, seen.velocities, strict=True)
+                PosedBody(model, model.retract(values, path.step(later_s(c, seen.time_s) + ahead / session.fps)))
+                for model, values, path in zip(models, after.poses, seen.paths, strict=True)
             )
-            for ahead_s, c in zip(seen.ahead_s, check.corrections, strict=True)
+            for ahead, c in zip(shown.ahead_frames(state.frame), check.corrections, strict=True)
         )
         cameras = tuple(
             corrected(source.camera, c).pinhole for source, c in zip(session.cameras, check.corrections, strict=True)

@@ -132,7 +132,7 @@ class FindingPeople:
     @property
     def observer(self) -> Observer:
         """See `OpenSession.observer`."""
-        return self._session_state.frames.observer
+        return self._session_state.frames.observer.in_time()
 
     def sources(self, person: int) -> Mapping[int, str]:
         """See `OpenSession.sources`."""
@@ -283,6 +283,10 @@ class FindingPeople:
         """Return the entry of the history of this search if further changes can be added to it: if it is the latest."""
         latest = next((e.edit for e in self._session_state.saver.moves.entries(1) if not e.undone), None)
         return self._edit if self._edit == latest else None
+
+    def outdated_sizes(self) -> list[str]:
+        """See `OpenSession.outdated_sizes`: people are found by the present calibration."""
+        return []
 
     def is_interrupted(self, plan: TrackPlan) -> bool:
         """See `OpenSession.is_interrupted`; in the page a run that was stopped is over."""

@@ -163,7 +163,7 @@ class Observing:
             self._set(running=False, message=f"{text[:1].upper()}{text[1:]}.", failed=True)
 
     def _judge(self, name: str) -> str:
-        session, observer = self._session_state.session, self._session_state.frames.observer
+        session, observer = self._session_state.session, self._session_state.frames.observer.in_time()
         found = judge(session, observer, name, TrackSettings(), _ShownProgress(self._report), self._report)
         self._set(judged=name, judgements=tuple(found))
         return ""

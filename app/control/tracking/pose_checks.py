@@ -71,7 +71,8 @@ class PoseChecks:
             settings = track_settings.of_run(state.settings, state.run_choices)
             pose = self._in_run(person, change)
             if pose is not None:
-                found = checked_pose(session_state.session, session_state.frames.observer, settings, pose, self._report)
+                observer = session_state.frames.observer.in_time()
+                found = checked_pose(session_state.session, observer, settings, pose, self._report)
                 self._store(person, stored, found)
         except _StoppedError:
             return

@@ -268,7 +268,7 @@ class Tracking:
 
     def observer(self) -> Observer:
         """Return the observer of the chosen cameras."""
-        observer, cameras = self._session_state.frames.observer, self._session_state.state.run_choices.cameras
+        observer, cameras = self._session_state.frames.observer.in_time(), self._session_state.state.run_choices.cameras
         chosen = [i for i, c in enumerate(observer.cameras) if c.camera.name in cameras]
         return observer.with_cameras(chosen) if chosen else observer
 

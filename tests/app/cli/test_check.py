@@ -41,7 +41,7 @@ def test_a_turned_camera_is_named_corrected_and_undone(run, posed):
     wrong = (posed / "calibration.toml").read_text()
     status, out, _ = run("check", posed, "--json", "--apply", "--max-frames", "8")
     found = json.loads(out)
-    assert (status, found["named"], found["applied"]) == (0, ["LEFT"], ["LEFT"])
+    assert (status, found["named"], found["applied"], found["outdated_sizes"]) == (0, ["LEFT"], ["LEFT"], [])
     left = next(c for c in found["cameras"] if c["name"] == "LEFT")
     # Somebody who stays in one place looks the same from a camera that was turned and from one that was moved.
     assert left["kind"] in ("rotation", "position")

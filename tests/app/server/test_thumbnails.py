@@ -13,6 +13,7 @@ from app.drawing import overlay_colors
 from app.server import thumbnails
 from app.session.footage_crops import FootageCrops
 from tracker.calibration.camera_correction import N_CORRECTIONS, ROTATION, corrected
+from tracker.footage.camera_source import Clock
 
 
 @pytest.fixture
@@ -64,6 +65,24 @@ def test_a_silhouette_is_shown_over_its_view(made):
     assert np.abs(image - (footage + color) / 2)[core].mean() < 8
     assert found.silhouette(99, 0) is None
     assert found.silhouette(0, 10**6) is None
+
+
+def test_a_person_is_drawn_at_the_time_of_the_picture(made):
+    controller, found, drawn = made
+    found.jpeg(0, 0, None)
+    cameras, (body,) = controller.session.cameras, controller.stored_poses.on_frame(0).values()
+    assert body.velocity is None
+    late = replace(controller.session, cameras=tuple(replace(c, clock=Clock(0.5)) for c in cameras))
+    controller.frames.set_cameras = lambda _: None  # the observer is shared by other tests
+    controller._session_state.show_frame(1)
+    drag(controller, "torso", (30.0, 0.0))  # another pose beside it gives a velocity
+    controller._session_state.set_cameras(late)
+    assert found.jpeg(0, 0, None)
+    (now,), (then,) = drawn[0][3], drawn[-1][3]
+    velocity = controller.stored_poses.on_frame(0)[0].velocity
+    assert np.abs(velocity).max() > 0
+    np.testing.assert_allclose(then.values, now.model.retract(now.values, 0.5 * velocity))
+    controller._session_state.set_cameras(replace(controller.session, cameras=cameras))
 
 
 def test_corrected_cameras_are_followed(made):

@@ -98,6 +98,21 @@ def test_contours_are_back_projected_to_where_they_arise():
         np.testing.assert_allclose(ROUND[0].project(points), ROUND[0].project(contour.points_world[own]), atol=1e-3)
 
 
+def test_contours_are_back_projected_at_the_time_of_their_picture():
+    model = load_model("gavrila22", 1.7)
+    step = np.zeros(model.n_dofs)
+    step[:3] = 0.3, -0.2, 0.1
+    body = PosedBody(model, in_posture(model), step)
+    late = PosedBody(model, model.retract(body.values, 0.5 * step))
+    views = own_evidence([late], ROUND[:2])
+    after = [replace(v, ahead_frames=0.5) for v in views]
+    found = back_project_contours(SightedPerson(0, after, (body,), 0))
+    expected = back_project_contours(SightedPerson(0, views, (late,), 0))
+    assert len(found) == len(expected) > 5
+    for a, b in zip(found, expected, strict=True):
+        np.testing.assert_allclose(a.points_world, b.points_world)
+
+
 def test_points_belong_to_the_part_that_explains_them():
     model = load_model("gavrila22", 1.7)
     body = PosedBody(model, in_posture(model))

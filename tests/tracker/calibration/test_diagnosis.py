@@ -5,10 +5,11 @@ import pytest
 from rig_scenes import FPS, NAMES, nothing_seen, person_of, turned, viewed
 
 from tracker.acquisition.size_parameters import SizeParameters
-from tracker.calibration.camera_correction import DRIFT, N_CORRECTIONS, ROTATION, TIME, with_step
-from tracker.calibration.diagnosis import diagnose, glance
+from tracker.calibration.camera_correction import DRIFT, KINDS, N_CORRECTIONS, ROTATION, TIME, with_step
+from tracker.calibration.diagnosis import Diagnosis, Fault, FoundFault, Step, diagnose, glance
 from tracker.calibration.findings import SEEN_PX, findings, misfit, sentence
 from tracker.formats.model_toml import load_model
+from tracker.motion.pose_path import PosePath
 
 
 def check(frames):
@@ -66,6 +67,18 @@ def test_other_faults_are_named_by_their_kind(kind):
     assert cameras[1].misfit_px == pytest.approx(misfit(viewed({}), 1, off)[0], rel=0.3)
 
 
+def test_a_small_rest_of_time_is_named_of_a_corrected_clock_alone():
+    frames, corrections = viewed({}, range(1)), np.zeros((4, N_CORRECTIONS))
+    corrections[1, TIME] = 0.0005
+    nothing = Step(np.zeros(N_CORRECTIONS), np.zeros(N_CORRECTIONS), 0.0)
+    kept = (FoundFault(Fault(1, "time"), 30.0, ()),)
+    steps = {h: nothing for i in range(4) for k in KINDS if (h := Fault(i, k)) != kept[0].fault}
+    found = Diagnosis(corrections, np.zeros((corrections.size,) * 2), kept, steps, None)
+    assert named(findings(found, frames, NAMES)) == []
+    late = [f._replace(ahead_s=(0.0, 0.02, 0.0, 0.0)) for f in frames]
+    assert named(findings(found, late, NAMES)) == ["cam1"]
+
+
 @pytest.mark.slow
 def test_two_cameras_are_named():
     _, cameras = check(viewed({0: turned(yaw_deg=0.8), 1: turned(pitch_deg=-0.8)}, range(4)))
@@ -98,6 +111,8 @@ def test_a_camera_that_sees_nobody_is_said_to():
 
 @pytest.mark.slow
 def test_a_body_that_stands_still_tells_no_time():
-    frames = [f._replace(velocities=(np.zeros_like(f.velocities[0]),)) for f in viewed({}, range(3))]
+    frames = [
+        f._replace(paths=(PosePath.steady(np.zeros_like(f.paths[0].step(0)), FPS),)) for f in viewed({}, range(3))
+    ]
     _, cameras = check(frames)
     assert all(c.sigma[TIME] == pytest.approx(1 / FPS) for c in cameras)

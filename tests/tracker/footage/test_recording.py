@@ -7,7 +7,7 @@ import pytest
 from clips import SIZE, encode, number, picture, write_images
 
 from tracker.errors import RecordingError
-from tracker.footage.camera_source import CameraSource
+from tracker.footage.camera_source import CameraSource, Clock
 from tracker.footage.recording import Recording, read_background, read_mask
 from tracker.formats.anipose import read_calibration
 from tracker.geometry.cameras import Camera
@@ -181,3 +181,13 @@ def test_real_footage(data_folder):
         assert image.shape == background.shape == (camera.camera.height, camera.camera.width, 3)
         # Mostly the same room.
         assert np.median(np.abs(background.astype(int) - image)) < 20
+
+
+def test_the_nearest_picture_is_at_most_half_a_frame_away():
+    for clock in (Clock(), Clock(0.5), Clock(-0.4), Clock(2.3), Clock(-1.7, 0.02)):
+        for k in range(3, 30):
+            shown = clock.nearest(k, 40)
+            assert abs(shown + clock.ahead(shown) - k) <= 0.52
+    assert [Clock(0.5).nearest(k, 9) for k in range(9)] == [*range(9)]
+    assert Clock(2.0).nearest(1, 9) == 0
+    assert Clock(-2.0).nearest(8, 9) == 8

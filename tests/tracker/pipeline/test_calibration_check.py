@@ -5,6 +5,7 @@ import pytest
 from rig_scenes import CAMERAS, FPS, NAMES, nothing_seen, turned, viewed
 
 from tracker.errors import TrackerError
+from tracker.motion.pose_path import PosePath
 from tracker.pipeline.calibration_check import check_calibration, contradiction
 
 
@@ -27,7 +28,7 @@ class Seen:
 
 
 def still(frames):
-    return [f._replace(velocities=tuple(np.zeros_like(v) for v in f.velocities)) for f in frames]
+    return [f._replace(paths=tuple(PosePath.steady(np.zeros_like(p.step(0)), FPS) for p in f.paths)) for f in frames]
 
 
 def test_people_who_move_before_healthy_cameras_need_no_sentence():

@@ -13,12 +13,14 @@ from fake_tracker import Walker
 from tracker.acquisition.from_contours import Acquisition
 from tracker.body.dimensions import dimensions_of, with_dimensions
 from tracker.body.model import PosedBody
+from tracker.calibration.camera_correction import N_CORRECTIONS
 from tracker.errors import TrackerError
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import format_model, load_model
 from tracker.initialization.first_pose import FirstPose, FirstPoses
 from tracker.pipeline import chain
+from tracker.pipeline.calibration_revisions import change_calibration, with_corrections
 from tracker.pipeline.chain import ChainPlan, StoredSession, run_chain, start_frame
 from tracker.pipeline.find_people import FindSettings
 from tracker.pipeline.methods import METHODS
@@ -267,6 +269,25 @@ def test_sizes_are_acquired_of_placed_people_unless_they_have_their_own(opened, 
     assert sorted(poses) == list(range(6))
     run(opened, acquire=(0,), is_finding=False)
     assert len(acquiring.calls) == 1
+
+
+def test_sizes_of_an_earlier_calibration_are_acquired_again(opened, found, walkers, acquiring):
+    put(opened, 4, keyframe=True)
+    run(opened, acquire=(0,), is_finding=False)
+    corrections = np.zeros((len(opened.session.cameras), N_CORRECTIONS))
+    corrections[0, 1] = 0.01
+    changed = with_corrections(opened.session, corrections)
+    with closing(AnnotationStore(opened.session.annotations_path)) as store:
+        opened.session = change_calibration(opened.session, store, changed, "corrected")
+        assert opened.outdated_sizes() == ["person"]
+        store.undo()
+        assert opened.outdated_sizes() == []
+        store.redo()
+    run(opened, acquire=(0,), is_finding=False)
+    assert len(acquiring.calls) == 2
+    assert opened.outdated_sizes() == []
+    run(opened, acquire=(0,), is_finding=False)
+    assert len(acquiring.calls) == 2
 
 
 def test_people_without_a_pose_are_named_where_nobody_is_looked_for(opened, found, acquiring):
