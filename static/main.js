@@ -3,6 +3,7 @@
 import * as annotationRoom from "./annotation/index.js";
 import * as inspectorRoom from "./inspector/index.js";
 import * as model from "./model/index.js";
+import * as participantsRoom from "./participants/index.js";
 import * as panesRoom from "./panes/index.js";
 import * as posingRoom from "./posing/index.js";
 import * as sceneRoom from "./scene/index.js";
@@ -22,7 +23,8 @@ const scene = sceneRoom.mount(context, panes);
 const sessions = sessionsRoom.mount(context);
 const inspector = inspectorRoom.mount(context, { panes, posing, timeline, scene, sessions });
 const annotation = annotationRoom.mount(context, { panes, inspector });
-const bindings = shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector, annotation, sessions });
+const participants = participantsRoom.mount(context);
+const bindings = shellRoom.mount(context, { panes, posing, timeline, search, scene, inspector, annotation, participants, sessions });
 exposeState(context, panes.grid, bindings);
 
 await started;

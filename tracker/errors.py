@@ -69,5 +69,9 @@ class DamagedStoreError(SessionError):
     """A store of annotations is not as it was written."""
 
 
+class OvertakenEditError(SessionError):
+    """An entry of the history cannot be added to any more: others have changed its poses since, or it is undone."""
+
+
 class FormatError(TrackerError):
     """A foreign file (TRC, CSV, ...) is malformed."""

@@ -37,7 +37,7 @@ def command(
         allow_host: names by which browsers may call this machine.
         browser: open the page in the default browser.
         token: require the token in the printed address. Without it every account of this machine can use the page.
-        share: print links for other people too: one to review, one to look. They end with this start.
+        share: print links for other people too: to annotate, to review and to look. They end with this start.
         sample: name of the sample: tango, two people to be placed by hand (the default), or elbow_rotation, one person.
         start_again: discard the working copy of the sample and make a new one.
         frame: frame to show first.

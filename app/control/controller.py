@@ -37,6 +37,7 @@ from app.control.session.proposing import Proposing
 from app.control.session.save_retry import SaveRetry
 from app.control.session.session_state import SessionState
 from app.control.session.stored_poses import StoredPoses
+from app.control.session.taking_over import FollowingHost, TakingOver
 from app.control.tracking.calibrating import Calibrating
 from app.control.tracking.comparing_runs import ComparingRuns
 from app.control.tracking.finding import FindingPeople
@@ -61,7 +62,12 @@ class Controller:
     """The parts that change the state of one open session, and read access to that state."""
 
     def __init__(
-        self, session: Session, saver: Saver, frames: FrameCache, compiler: KernelCompiler | None = None
+        self,
+        session: Session,
+        saver: Saver,
+        frames: FrameCache,
+        compiler: KernelCompiler | None = None,
+        host: "Controller | None" = None,
     ) -> None:
         """Show the first frame.
 
@@ -70,19 +76,27 @@ class Controller:
             saver: stores its poses.
             frames: gives images and evidence.
             compiler: compiles missing kernels, which are not called before; None to compile each at its first call.
+            host: of the session, for one more person who works on it: with a state of their own, while the parts that
+                belong to the session are the host's.
         """
-        self.frames = frames
+        self.frames, self._is_host = frames, host is None
         """Images and evidence of the footage."""
         compiled = frozenset(STAGES) if compiler is None else compiler.stages
-        self._session_state = session_state = SessionState(session, saver, frames, compiled)
-        runs = SearchRuns()
-        self.activities = activities = Activities(session_state.lock)
+        if host is not None:
+            compiled = host.state.compiled
+        lock = None if host is None else host.lock
+        self._session_state = session_state = SessionState(session, saver, frames, compiled, lock)
+        runs, turns = SearchRuns(), saver.shared.turns
+        turns.add(saver.moves, lambda: saver.author or "the host", lambda: session_state.state)
+        self.activities = activities = Activities(session_state.lock, session_state.show_again, turns, saver.moves)
         """Stops what is at work."""
         self.search = SearchRunner(session_state, runs, activities)
         """Searches the shown frame."""
         self.tracking = Tracking(session_state, activities)
         """Tracks from the shown frame."""
-        self.finding = FindingPeople(session_state, activities, self.tracking, runs)
+        self.finding: FindingPeople = (
+            host.finding if host else FindingPeople(session_state, activities, self.tracking, runs)
+        )
         """Finds people whom nobody has placed, and tracks them."""
         self.ranges = Ranges(session_state, self.tracking, activities)
         """Interpolates, clears, marks and tracks ranges of frames."""
@@ -114,17 +128,21 @@ class Controller:
         """Compares with another copy of the session."""
         self.body_sizes = BodySizeEditing(session_state, runs, activities)
         """Edits the sizes of bodies."""
-        self.body_acquisition = BodyAcquisition(session_state)
+        self.body_acquisition: BodyAcquisition = host.body_acquisition if host else BodyAcquisition(session_state)
         """Acquires the sizes of bodies from the footage."""
-        self.calibrating = Calibrating(session_state, activities, self.tracking)
+        self.calibrating: Calibrating = (
+            host.calibrating if host else Calibrating(session_state, activities, self.tracking)
+        )
         """Checks and corrects the cameras."""
-        self.observing = Observing(session_state, activities, self.finding)
+        self.observing: Observing = host.observing if host else Observing(session_state, activities, self.finding)
         """Shows, judges and imports observations of other programs."""
-        self.annotating = Annotating(session_state, activities)
+        reader = None if host is None else host.annotating
+        self.annotating: Annotating = Annotating(session_state, activities, reader)
         """Plans tasks, decides on them, and comments."""
         self.proposing = Proposing(session_state)
         """Proposes the next best click."""
-        self.history = History(session_state, activities, (self.body_sizes.follow, self.calibrating.follow))
+        follow = () if host else (self.body_sizes.follow, self.calibrating.follow)
+        self.history = History(session_state, activities, follow)
         """Moves along the history."""
         self.cost_landscape = CostLandscapes(session_state, activities)
         """Samples the cost along one degree of freedom."""
@@ -132,18 +150,43 @@ class Controller:
         """Samples the cost over two degrees of freedom."""
         self.reasons = Reasons(session_state)
         """Explains the shown pose by what each view shows of each part."""
-        self.floor = FloorEditing(session_state, activities)
+        self.floor: FloorEditing = host.floor if host else FloorEditing(session_state, activities)
         """Sets the floor."""
         self.visibility = PeopleVisibility(session_state)
         """Shows, hides and dims people."""
         self.view_3d = View3dSettings(session_state)
         """Chooses what the 3-D view shows."""
-        self.inconsistent_frames = InconsistentFrames(session_state)
+        self.inconsistent_frames: InconsistentFrames = (
+            host.inconsistent_frames if host else InconsistentFrames(session_state)
+        )
         """Finds frames and keyframes that disagree with those around them."""
         self.tracking.after_run = self.comparing_runs.compare_run
+        self._taking_over = TakingOver(session_state, self.search.forget_paused)
+        self._following: FollowingHost | None = None
+        if host is not None:
+            self._following = FollowingHost(session_state, host._session_state, activities.finish_gestures)
+            return
         self._footage_scan = FootageScan(session_state)
         self._save_retry = SaveRetry(session_state)
         self._compiling = None if compiler is None else KernelWarmup(session_state, compiler)
+
+    def beside(self, author: str, writes: bool) -> "Controller":
+        """Return a controller for one more person who works on the session; it is closed before this one.
+
+        Args:
+            author: their name, by which they undo their own edits.
+            writes: whether they may change what is stored.
+        """
+        own = self._session_state
+        with own.lock:
+            if writes:
+                own.saver.shared.note_several()
+            return Controller(own.session, own.saver.beside(author), self.frames, None, self)
+
+    @property
+    def author(self) -> str:
+        """Name of the one who works with this controller."""
+        return self._session_state.saver.author
 
     @property
     def state(self) -> State:
@@ -179,25 +222,32 @@ class Controller:
         return self._session_state.subscribe(view)
 
     def close(self) -> None:
-        """Stop all work and save; the controller must not be used afterwards."""
-        self.body_acquisition.stop()
-        self.finding.stop()
-        self.calibrating.close()
-        self.observing.stop()
-        self._save_retry.close()
+        """Stop all work and save; the controller must not be used afterwards. The host's is closed last."""
+        if self._is_host:
+            self.body_acquisition.stop()
+            self.finding.stop()
+            self.calibrating.close()
+            self.observing.stop()
+            self._save_retry.close()
         with self.activities.editing():
             self.history.save()
-        self.dragging.close()
+        self._taking_over.close()
+        if self._following is not None:
+            self._following.close()
+        self._session_state.saver.shared.turns.remove(self._session_state.saver.moves)
+        for part in (
+            self.dragging, self.annotating, self.proposing, self.comparing_runs, self.other_copies,
+            self.cost_landscape, self.cost_map, self.reasons, self._pose_checks,
+        ):  # fmt: skip
+            part.close()
+        self.frames.forget(self._session_state)
+        if self._is_host:
+            self._close_session()
+
+    def _close_session(self) -> None:
+        """Close what belongs to the session."""
         self.inconsistent_frames.close()
-        self.annotating.close()
-        self.proposing.close()
-        self.comparing_runs.close()
-        self.other_copies.close()
         self._footage_scan.close()
         if self._compiling is not None:
             self._compiling.close()
-        self.cost_landscape.close()
-        self.cost_map.close()
-        self.reasons.close()
-        self._pose_checks.close()
         self.frames.close()

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, TypeAlias
 from msgspec import Meta
 
 from app.page.message_types import Command, Frame, Index, Message, Name, Part
+from app.state.role import Role
 
 Text: TypeAlias = Annotated[str, Meta(max_length=2000)]
 TaskState: TypeAlias = Literal["draft", "annotated", "verified", "rejected"]
@@ -138,6 +139,32 @@ class ClickProposal(Part, frozen=True):
     """90% interval of this mean."""
     after_mm: float | None
     """Expected error since poses have changed; null before."""
+
+
+class PresentPerson(Part, frozen=True):
+    """A person who has a page open on the session."""
+
+    name: str
+    role: Role
+    frame: int
+    person: int
+    """Index of the selected person."""
+    doing: str
+    """Work on poses, for display: `drags on frame 12`; empty for none."""
+    is_self: bool
+
+
+class PresenceMessage(Message, frozen=True, tag="presence"):
+    """Who is where. Sent when that changes, at most five times a second."""
+
+    name: str
+    """Name by which the page has joined; empty while it shows what the host shows."""
+    refusal: str
+    """Why the name that the page asked for could not be had, or empty."""
+    link: Role
+    """What the page's link allows once a name is given."""
+    people: tuple[PresentPerson, ...]
+    """The host first, then in the order of joining."""
 
 
 class AnnotationMessage(Message, frozen=True, tag="annotation"):

@@ -5,9 +5,11 @@ from typing import Any, get_args
 
 import msgspec
 
+from app.page import annotation_messages as plan_wire
 from app.page import client_messages as wire
 from app.page.client_messages import CLIENT_MESSAGES, ClientMessage
 from app.page.message_types import Command
+from app.page.observation_messages import UseObservations
 from app.state.role import Role
 from tracker.errors import TrackerError
 from tracker.validation import explain, quoted
@@ -17,9 +19,17 @@ MISUNDERSTOOD = "expected a message that this program knows, found one of anothe
 _SEEN: tuple[type[Command], ...] = (
     wire.SetView, wire.CheckEpipolar, wire.ShowCurves, wire.ShowHistory,
 )  # fmt: skip
-"""Subscriptions of one page alone. A page that may only look sees the frame that the annotator works on."""
+"""Subscriptions of one page alone."""
 _MOVED: tuple[type[Command], ...] = (wire.Seek, wire.Select)
-"""All pages show one frame and person, which a review moves too."""
+"""Change the frame and person that one participant sees, and nothing that is stored."""
+_OF_HOST: tuple[type[Command], ...] = (
+    wire.SetHeight, wire.SetPartSizes, wire.SetGirdleWidth, wire.ApplySizes, wire.ChangeBody, wire.DraftSizes,
+    wire.AcquireSizes, wire.FindPeople, wire.CheckCalibration, wire.EditFloor, wire.MarkFloor, wire.SetView3d,
+    wire.LookThrough, UseObservations,
+)  # fmt: skip
+"""Change what belongs to the session, not to a pose, or the 3-D view, which shows what the host shows."""
+_DECIDED = ("verify", "reject")
+"""Decisions of a review."""
 _REVIEWED = ("reviewed", "unreviewed")
 """Marks that a review may set on a range."""
 
@@ -94,19 +104,37 @@ def _value(data: str | bytes) -> Any:
         return None
 
 
-def check_allowed(role: Role, message: Command) -> None:
+def check_allowed(role: Role, message: Command, has_place: bool = True) -> None:
     """Check that a page may send a message.
+
+    Args:
+        role: of the page.
+        message: as parsed.
+        has_place: whether the page has a frame of its own, which it may leave.
 
     Raises:
         TrackerError: its role does not allow it.
     """
-    if role == "annotate" or isinstance(message, _SEEN) or (role == "review" and _is_review(message)):
+    if role == "host" or isinstance(message, _SEEN) or (has_place and isinstance(message, _MOVED)):
         return
-    only = "look" if role == "look" else "look and mark poses as reviewed"
+    if role == "annotate":
+        if isinstance(message, _OF_HOST):
+            raise TrackerError(
+                "expected the host's page to change bodies, cameras, the floor or the 3-D view, and to find people or "
+                "use imported observations, found another; ask the host"
+            )
+        return
+    if role == "review" and _is_review(message):
+        return
+    only = "look" if role == "look" else "look, mark poses as reviewed, decide on tasks and comment"
     raise TrackerError(f"expected a page that may annotate, found one that may only {only}; ask for another link")
 
 
 def _is_review(message: Command) -> bool:
     if isinstance(message, wire.EditRange):
         return message.action in _REVIEWED
-    return isinstance(message, _MOVED) or (isinstance(message, wire.ToggleMark) and message.toggle == "reviewed")
+    if isinstance(message, plan_wire.DecideTask):
+        return message.action in _DECIDED
+    return isinstance(message, plan_wire.WriteComment | plan_wire.ResolveComment) or (
+        isinstance(message, wire.ToggleMark) and message.toggle == "reviewed"
+    )

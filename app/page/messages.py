@@ -14,10 +14,12 @@ from app.drawing.error_ellipses import error_ellipses
 from app.drawing.floor_lines import floor_lines
 from app.drawing.ghosts import copy_lines, former_limb_lines, ghost_lines
 from app.drawing.seen_bodies import bodies_in
+from app.page import annotation_messages as plan_wire
 from app.page import search_messages
 from app.page import server_messages as wire
 from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
 from app.page.message_types import encode_binary
+from app.participants.participants import Presence, Visit
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import Picking
 from app.state.page_view import View
@@ -50,13 +52,23 @@ _NO_CELL: dict[str, Any] = {
 }
 
 
-def session(session: Session, role: Role = "annotate") -> wire.SessionMessage:
-    """Describe the session to a page of a role."""
+def session(session: Session, role: Role = "host", has_place: bool = True) -> wire.SessionMessage:
+    """Describe the session to a page of a role, with a frame of its own or not."""
     cameras = tuple(wire.CameraInfo(c.camera.name, *c.camera.pinhole.size) for c in session.cameras)
     people = tuple(_person(p) for p in session.people)
     return wire.SessionMessage(
-        session.name, session.fps, session.n_frames, cameras, people, DOUBTFUL_FROM, LOST_FROM, _START, role
+        session.name, session.fps, session.n_frames, cameras, people, DOUBTFUL_FROM, LOST_FROM, _START, role,
+        has_place,
+    )  # fmt: skip
+
+
+def presence(visit: Visit, people: Sequence[Presence]) -> plan_wire.PresenceMessage:
+    """Tell a page who is where."""
+    own = visit.participant and (visit.role, visit.name)
+    here = tuple(
+        plan_wire.PresentPerson(p.name, p.role, p.frame, p.person, p.doing, (p.role, p.name) == own) for p in people
     )
+    return plan_wire.PresenceMessage(visit.name, visit.refusal, visit.link, here)
 
 
 def _person(person: Person) -> wire.PersonInfo:

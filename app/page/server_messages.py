@@ -8,7 +8,7 @@ docs/protocol.md from them.
 from typing import Literal, TypeAlias, Union, get_args
 
 from app.drawing.epipolar_check import EpipolarDistance, EpipolarLine
-from app.page.annotation_messages import AnnotationMessage
+from app.page.annotation_messages import AnnotationMessage, PresenceMessage
 from app.page.inspector_messages import (
     AcquisitionMessage,
     BodySizesMessage,
@@ -110,7 +110,9 @@ class SessionMessage(Message, frozen=True, tag="session"):
     start: str
     """Identifies the start of the program. After another start a page goes back to the frame and person it showed."""
     role: Role
-    """Messages that the page's link allows; others are refused."""
+    """Messages that the page may send; others are refused."""
+    has_place: bool
+    """Whether the page has a frame of its own; else it shows that of the host."""
 
 
 # --- state ---------------------------------------------------------------------------------------------------------
@@ -408,7 +410,7 @@ TextMessage: TypeAlias = Union[  # noqa: UP007
     RangeComparisonMessage, ObservabilityMessage, EpipolarMessage,
     SearchSetupMessage, SearchRunsMessage, SettingsMessage, View3dMessage, BodySizesMessage,
     AcquisitionMessage, FindingMessage, CalibrationMessage, ObservationsMessage, ReasonMessage, CostMapMessage,
-    AnnotationMessage,
+    AnnotationMessage, PresenceMessage,
     ProvenanceMessage, AnnotatorsMessage, OtherCopyMessage,
 ]  # fmt: skip
 

@@ -10,7 +10,6 @@ from typing import Any
 import aiohttp
 from aiohttp import web
 
-from app.control.controller import Controller
 from app.drawing.curves import CurveGroup
 from app.page import client_messages as wire
 from app.page import commands, messages, picture_sets
@@ -23,6 +22,8 @@ from app.page.provenance_feed import ProvenanceFeed
 from app.page.search_feed import SearchFeed
 from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
 from app.page.server_messages import HistoryMessage, NoticeMessage, StateMessage
+from app.participants.participants import Participants, Visit
+from app.participants.presence_feed import PresenceFeed
 from app.remedies import page_text
 from app.state import page_view
 from app.state.identity import Identity
@@ -57,37 +58,48 @@ _COALESCED = (
 class PaneSocket:
     """Serves every page that is open on the session."""
 
-    def __init__(self, controller: Controller, notices: Sequence[str] = ()) -> None:
-        """Serve this controller's session.
+    def __init__(self, participants: Participants, notices: Sequence[str] = ()) -> None:
+        """Serve a session.
 
         Args:
-            controller: of the session.
+            participants: the people on the session.
             notices: shown by every page when it connects.
         """
-        self._controller, self._notices = controller, notices
+        self._participants, self._notices = participants, notices
         self._pages = itertools.count(1)
 
-    async def serve(self, socket: web.WebSocketResponse, role: Role = "annotate") -> None:
-        """Serve one page until its socket closes."""
-        page = PageConnection(next(self._pages), self._controller, socket, role)
-        await page.serve(self._notices)
+    async def serve(self, socket: web.WebSocketResponse, role: Role = "host", name: str = "") -> None:
+        """Serve one page until its socket closes.
+
+        Args:
+            socket: to the page.
+            role: that its link gives.
+            name: by which it joins; empty for none.
+        """
+        visit = await asyncio.to_thread(self._participants.join, role, name)
+        presence = PresenceFeed(self._participants)
+        try:
+            page = PageConnection(next(self._pages), visit, socket, presence)
+            await page.serve(self._notices)
+        finally:
+            presence.close()
+            await asyncio.to_thread(self._participants.leave, visit)
 
 
 class PageConnection:
     """The connection to one page."""
 
-    def __init__(
-        self, number: int, controller: Controller, socket: web.WebSocketResponse, role: Role = "annotate"
-    ) -> None:
+    def __init__(self, number: int, visit: Visit, socket: web.WebSocketResponse, presence: PresenceFeed) -> None:
         """Prepare to serve a page.
 
         Args:
             number: of the page, unique while the program runs.
-            controller: of the session.
+            visit: the controller that it shows, and its role; messages that this does not allow are refused.
             socket: to the page.
-            role: of the page; messages that it does not allow are refused.
+            presence: tells it who is where.
         """
-        self._number, self._controller, self._socket, self._role = number, controller, socket, role
+        self._number, self._visit, self._socket, self._presence = number, visit, socket, presence
+        self._controller = visit.controller
         self._changed = asyncio.Event()
         self._arrived = asyncio.Event()
         self._waiting: deque[wire.ClientMessage] = deque()
@@ -97,7 +109,7 @@ class PageConnection:
         self._reminder: asyncio.TimerHandle | None = None  # for figures that were held back
         self._sent_overlay: tuple[object, ...] = ()  # what it was drawn from
         self._view: View | None = None  # nothing is drawn before the page's first view
-        self._pictures = picture_sets.PictureSets(controller)
+        self._pictures = picture_sets.PictureSets(visit.controller)
         self._epipolar: tuple[tuple[int, float, float], ...] = ()
         self._sent_epipolar: tuple[object, ...] = ((),)  # what the lines were drawn from
         self._curves: CurveGroup | None = None
@@ -118,7 +130,8 @@ class PageConnection:
         """
         unsubscribe = self._controller.subscribe(self._wake)
         self._changed.set()
-        tasks = [asyncio.create_task(self._guarded(t)) for t in (self._send_all(notices), self._act())]
+        work = (self._send_all(notices), self._act(), self._send_presence())
+        tasks = [asyncio.create_task(self._guarded(t)) for t in work]
         try:
             async for message in self._socket:
                 if message.type in (aiohttp.WSMsgType.TEXT, aiohttp.WSMsgType.BINARY):
@@ -134,6 +147,7 @@ class PageConnection:
             self._controller.cost_landscape.watch(self._number, False)
             self._controller.reasons.watch(self._number, False)
             self._controller.cost_map.leave(self._number)
+            self._controller.frames.forget(self)
 
     def _wake(self, _: State) -> None:
         """Wake the sender; called from any thread."""
@@ -157,9 +171,9 @@ class PageConnection:
             if received.type is aiohttp.WSMsgType.BINARY:
                 raise MessageError("a text message", f"a binary one of {len(received.data)} bytes")
             message = parse(received.data)
-            if self._role != "annotate" and isinstance(message, wire.Pause3d):
+            if self._visit.role != "host" and isinstance(message, wire.Pause3d):
                 return  # sent on connecting, before the page knows that it has no 3-D view
-            check_allowed(self._role, message)
+            check_allowed(self._visit.role, message, self._visit.has_place)
         except TrackerError as error:
             await self._refuse(error)
             return
@@ -212,7 +226,7 @@ class PageConnection:
 
     async def _send_all(self, notices: Sequence[str]) -> None:
         names = _value_names(self._controller.session)
-        await self._send(messages.session(self._controller.session, self._role))
+        await self._send(messages.session(self._controller.session, self._visit.role, self._visit.has_place))
         for notice in notices:
             await self._send(NoticeMessage("info", notice))
         while True:
@@ -308,7 +322,7 @@ class PageConnection:
             return None
         frames, views = self._controller.frames, self._controller.frames.cached_evidence(state.frame)
         if views is None and "evidence" in state.compiled:
-            frames.request(state.frame, lambda _: self._wake(state))
+            frames.request(state.frame, lambda _: self._wake(state), self)
         return views
 
     async def _send_timeline(self, since: int) -> None:
@@ -370,6 +384,11 @@ class PageConnection:
         if message != self._sent_history:
             self._sent_history = message
             await self._send(message)
+
+    async def _send_presence(self) -> None:
+        """Send who is where whenever that changes."""
+        async for people in self._presence.changes():
+            await self._send(messages.presence(self._visit, people))
 
     async def _refuse(self, error: TrackerError) -> None:
         """Tell the page why a message was not carried out, in the words of the page."""

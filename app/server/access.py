@@ -53,7 +53,7 @@ class Access:
 
     def token_of(self, role: Role) -> str | None:
         """Return the token that gives a role."""
-        return self.token if role == "annotate" else next(link.token for link in self.links if link.role == role)
+        return self.token if role == "host" else next(link.token for link in self.links if link.role == role)
 
     @property
     def root(self) -> str:
@@ -96,11 +96,11 @@ class Access:
             tokens: those in the request's address and cookie.
         """
         if self.token is None:
-            return "annotate"
+            return "host"
         for token in tokens:
             shared = [link.role for link in self.links if _equal(link.token, token)]
             if shared or self._admits(token):
-                return shared[0] if shared else "annotate"
+                return shared[0] if shared else "host"
         return None
 
     def _admits(self, token: str) -> bool:
@@ -184,7 +184,7 @@ def access_for(
     if not token:
         return Access(names)
     kept = None if tokens is None or not is_loopback(host) or names else kept_token(tokens)
-    roles: tuple[Role, ...] = ("review", "look") if share else ()
+    roles: tuple[Role, ...] = ("annotate", "review", "look") if share else ()
     links = tuple(SharedLink(role, secrets.token_urlsafe(32)) for role in roles)
     return Access(names, kept or secrets.token_urlsafe(32), Invitation(), links)
 

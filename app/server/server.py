@@ -43,8 +43,8 @@ _CLOSE_TIMEOUT_S = 1.0
 class PaneEndpoint(Protocol):
     """Answers the pane socket (docs/protocol.md)."""
 
-    async def serve(self, socket: web.WebSocketResponse, role: Role) -> None:
-        """Serve one page until its socket closes."""
+    async def serve(self, socket: web.WebSocketResponse, role: Role, name: str) -> None:
+        """Serve one page until its socket closes; it joins by a name, which may be empty."""
 
 
 def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: Path) -> web.Application:
@@ -93,7 +93,7 @@ def create_app(panes: PaneEndpoint, viser_socket: Path, access: Access, static: 
         await socket.prepare(request)
         request.app[_SOCKETS].add(socket)
         try:
-            await panes.serve(socket, request[ROLE])
+            await panes.serve(socket, request[ROLE], request.query.get("name", ""))
         except ConnectionError:
             _LOG.debug("a page closed its socket during a message")
         except Exception:
@@ -152,7 +152,7 @@ def _guard(access: Access) -> Middleware:
         if role is None:
             why = why or NO_TOKEN
         elif not _may_ask(role, request):
-            why = f"expected a page that may annotate, found one with a link to {role}; ask for another link"
+            why = f"expected a page of the host, found one with a link to {role}; ask the host"
         if why is not None:
             return _refused(403, f"Quadrille refused this request: {why}.\n")
         assert role is not None
@@ -168,7 +168,7 @@ def _guard(access: Access) -> Middleware:
 
 def _may_ask(role: Role, request: web.Request) -> bool:
     """Return whether a role may send a request: with a shared link, only those that show the session."""
-    if role == "annotate":
+    if role == "host":
         return True
     path = request.path
     return request.method in ("GET", "HEAD") and (path in _SHOWN or path.startswith(_SHOWN_BELOW))

@@ -13,6 +13,7 @@ from platformdirs import user_state_path
 
 from app.control.controller import Controller
 from app.page.socket import PaneSocket
+from app.participants.participants import Participants
 from app.remedies import command_line_text, page_text
 from app.runtime.kernel_compiler import KernelCompiler
 from app.scene3d.gizmos import Gizmos
@@ -115,11 +116,12 @@ def open_session(
         controller.navigation.seek(first.frame)
         controller.navigation.select(first.person, None)
         viser = PrivateViser()
+        participants = Participants(controller)
         thumbnails = Thumbnails(controller, FootageCrops(session.cameras, indices))
         try:
             SceneView(viser.server, controller)
             Gizmos(viser.server, controller)
-            app = create_app(PaneSocket(controller, offers), viser.socket_path, doorway.access, static_folder())
+            app = create_app(PaneSocket(participants, offers), viser.socket_path, doorway.access, static_folder())
             ExportRoutes(session.folder).add_to(app)
             is_private = is_loopback(serving.host) and not serving.allow_hosts
             no_paths = refusal(is_private, serving.token)
@@ -143,6 +145,7 @@ def open_session(
             asyncio.run(_until_interrupted(served, others.is_chosen))
         finally:
             try:
+                participants.close()
                 controller.close()
             finally:  # also where a second Ctrl+C ends the work
                 unsaved = _keep_unsaved(saver, session.folder)

@@ -50,7 +50,7 @@ class FrameCache:
         self.observer, self._proxies, self._rest_s = observer, list(proxies), rest_s
         self._empty_caches()
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
-        self._wanted: int | None = None
+        self._wanted: dict[object, int] = {}  # by who asks
         self._n_pictures = 0  # number of pictures in the making
         self._idle = threading.Condition()
         self._failed: dict[Hashable, Callable[[], object]] = {}  # what could not be read, and how to try it again
@@ -143,24 +143,25 @@ class FrameCache:
         """Return the evidence of a frame if it is cached."""
         return self._evidence.peek(self._versions(frame))
 
-    def request(self, frame: int, done: Callable[[int], None]) -> None:
-        """Compute the evidence of a frame in the background, unless another is requested first.
+    def request(self, frame: int, done: Callable[[int], None], asker: object = None) -> None:
+        """Compute the evidence of a frame in the background, unless the same one asks for another first.
 
         Work starts when the request is a moment old and no picture is in the making.
 
         Args:
             frame: whose evidence is computed.
             done: called with the frame afterwards.
+            asker: who asks. Each person at work shows a frame of their own.
         """
-        self._wanted, asked = frame, time.monotonic()
+        self._wanted[asker], asked = frame, time.monotonic()
 
         def work() -> None:
-            while self._wanted == frame and time.monotonic() < asked + self._rest_s:
+            while self._wanted.get(asker) == frame and time.monotonic() < asked + self._rest_s:
                 time.sleep(self._rest_s / 8)
             with self._idle:
                 self._idle.wait_for(lambda: not self._n_pictures, _WAIT_S)
             try:
-                if self._wanted == frame and self._is_indexed(frame):
+                if self._wanted.get(asker) == frame and self._is_indexed(frame):
                     self.evidence(frame)
                     done(frame)
             except RecordingError as error:  # the pages show `problem`
@@ -170,9 +171,13 @@ class FrameCache:
 
         self._pool.submit(work)
 
+    def forget(self, asker: object) -> None:
+        """Cancel the requests of one who asks no more."""
+        self._wanted.pop(asker, None)
+
     def close(self) -> None:
         """Cancel the requests."""
-        self._wanted = None
+        self._wanted = {}
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def image(self, frame: int, camera: int, reduction: float = 1) -> bytes:

@@ -48,6 +48,15 @@ class ShownPose:
         return np.zeros(0) if self.errors is None else np.sqrt(np.trace(self.errors, axis1=1, axis2=2))
 
 
+def is_same_pose(before: ShownPose, now: ShownPose) -> bool:
+    """Return whether a stored pose is still as it was shown; one that was just saved has no revision yet."""
+    return (
+        (before.source, before.status, before.remark) == (now.source, now.status, now.remark)
+        and before.revision in (None, now.revision)
+        and np.array_equal(before.values, now.values)
+    )
+
+
 @dataclass(frozen=True)
 class DragState:
     """A drag of a point or of a part."""

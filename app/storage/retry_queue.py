@@ -5,11 +5,12 @@ and are written with the next edit or on request.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from app.remedies import page_text
 from app.storage.rescue_file import UnsavedEdit
-from tracker.errors import TrackerError
+from tracker.errors import OvertakenEditError, TrackerError
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import Change, PinChange, PoseChange
 
@@ -25,19 +26,15 @@ class _QueuedEdit:
     amend: int | None
     """The edit on disk to add to; None makes a new one."""
     by_program: bool
+    author: str
 
 
 class RetryQueue:
     """Writes edits to the store of one session. The caller holds the session's lock."""
 
-    def __init__(self, store: AnnotationStore, author: str) -> None:
-        """Write to a store.
-
-        Args:
-            store: of the session.
-            author: of the edits.
-        """
-        self._store, self._author = store, author
+    def __init__(self, store: AnnotationStore) -> None:
+        """Write to the store of a session."""
+        self._store = store
         self._queue: list[_QueuedEdit] = []
         self._edits: dict[int, int] = {}  # tickets -> ids of the edits that were made of them
         self._last_ticket = 0
@@ -45,7 +42,7 @@ class RetryQueue:
         """Why the last edit is not on disk; None if all are."""
 
     def write(
-        self, label: str, changes: Sequence[Change], amend: int | None, by_program: bool
+        self, label: str, changes: Sequence[Change], amend: int | None, by_program: bool, author: str
     ) -> tuple[int, list[int]]:
         """Write changes after all queued edits.
 
@@ -54,6 +51,7 @@ class RetryQueue:
             changes: of poses, their marks, or pins.
             amend: the result of an earlier call for the edit to add to; None makes a new edit.
             by_program: leave keyframes unchanged.
+            author: of a new edit.
 
         Returns:
             The edit that later calls can amend, and the frames written now, ascending.
@@ -65,7 +63,7 @@ class RetryQueue:
         else:
             self._last_ticket -= 1
             on_disk = amend if amend is not None and amend > 0 else None
-            last = _QueuedEdit(self._last_ticket, label, list(changes), on_disk, by_program)
+            last = _QueuedEdit(self._last_ticket, label, list(changes), on_disk, by_program, author)
             self._queue.append(last)
         written = self.retry()
         return self._edits.get(last.ticket, last.ticket), written
@@ -76,7 +74,7 @@ class RetryQueue:
         return [UnsavedEdit(e.label, e.changes, e.amend, e.by_program) for e in self._queue]
 
     def retry(self, patient: bool = True) -> list[int]:
-        """Write queued edits until one fails.
+        """Write queued edits until one fails. An edit that others have overtaken goes on as a new one.
 
         Args:
             patient: wait for another program that has locked the file.
@@ -95,11 +93,7 @@ class RetryQueue:
         while self._queue:
             first = self._queue[0]
             try:
-                if first.amend is None:
-                    edit = self._store.commit(first.label, first.changes, self._author, first.by_program).edit
-                else:
-                    self._store.amend(first.amend, first.changes, first.by_program)
-                    edit = first.amend
+                edit = self._written(first)
             except TrackerError as error:
                 self.error = page_text(error)
                 break
@@ -107,6 +101,14 @@ class RetryQueue:
             frames.update(change.frame for change in first.changes)
             self._queue.pop(0)
         return sorted(frames)
+
+    def _written(self, queued: _QueuedEdit) -> int:
+        """Write an edit, and return its number."""
+        if queued.amend is not None:
+            with suppress(OvertakenEditError):
+                self._store.amend(queued.amend, queued.changes, queued.by_program)
+                return queued.amend
+        return self._store.commit(queued.label, queued.changes, queued.author, queued.by_program).edit
 
     def pose(self, person: str, frame: int) -> PoseChange | None:
         """Return the queued pose of a person on a frame, if there is one."""

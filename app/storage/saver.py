@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import asdict, replace
+from itertools import product
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -11,9 +12,10 @@ from app.state.people import ShownPose
 from app.state.state import State
 from app.storage import rescue
 from app.storage.frame_index import FrameIndex
+from app.storage.history_moves import HistoryMoves
 from app.storage.pose_origins import PoseOrigin, keyframes_by_annotator, read_origin
-from app.storage.retry_queue import RetryQueue
 from app.storage.revisions import ModelRevisions
+from app.storage.shared_storage import SharedStorage
 from app.storage.shown_records import is_same, main_source, sources_of, with_marks_of
 from tracker.annotation.plan import is_disputed
 from tracker.errors import SessionError
@@ -33,7 +35,6 @@ from tracker.store.records import (
     Change,
     FramePose,
     FrameRow,
-    HistoryEntry,
     Pin,
     PinChange,
     PoseChange,
@@ -55,22 +56,37 @@ _READ_FRAMES = 2000
 class Saver:
     """The annotations of one open session. The caller holds the session's lock."""
 
-    def __init__(self, session: Session, store: AnnotationStore, author: str = "") -> None:
+    def __init__(
+        self, session: Session, store: AnnotationStore, author: str = "", shared: SharedStorage | None = None
+    ) -> None:
         """List the frames that have poses, and store the present bodies as revisions.
 
         Args:
             session: the open session.
             store: its annotations.
             author: of the edits, for the history.
+            shared: of the savers of other people on the session; None for the first one.
         """
-        self._session, self._store, self._queue = session, store, RetryQueue(store, author)
+        self.shared = shared or SharedStorage(session, store)
+        """What all savers of the session share."""
+        self._session, self._store, self._queue = session, store, self.shared.queue
         self._author = author
-        self.revisions = ModelRevisions(session, store)
+        self.moves = HistoryMoves(session, self.shared, author)
+        """Undo and redo."""
+
+    def beside(self, author: str) -> "Saver":
+        """Return the saver of another person who works on the session."""
+        return Saver(self._session, self._store, author, self.shared)
+
+    @property
+    def revisions(self) -> ModelRevisions:
         """The bodies that poses were made with."""
-        self.index = FrameIndex(store, [p.name for p in session.people])
+        return self.shared.revisions
+
+    @property
+    def index(self) -> FrameIndex:
         """The frames that have poses."""
-        self.moved_edits: tuple[int, ...] = ()
-        """Entries of the history that the last undo, redo or `go_to` reverted or reapplied, in that order."""
+        return self.shared.index
 
     @property
     def error(self) -> str | None:
@@ -92,6 +108,10 @@ class Saver:
         self._session = session
         self.revisions.set_body_models(session)
 
+    def follow_session(self, session: Session) -> None:
+        """Continue with a session whose bodies or cameras another person has changed."""
+        self._session = session
+
     def setting(self, key: str, default: Any = None) -> Any:
         """Return a setting stored with the session: any JSON value."""
         return self._store.setting(key, default)
@@ -106,7 +126,7 @@ class Saver:
         Raises:
             SessionError: a queued edit still cannot be written, or the calibration cannot be.
         """
-        self._write_all()
+        self._require_written()
         return self._with_cameras(apply_check(self._session, self._store, check))
 
     def follow_calibration(self) -> Session:
@@ -121,6 +141,11 @@ class Saver:
     def _with_cameras(self, found: Session) -> Session:
         self._session = replace(self._session, cameras=found.cameras)
         return self._session
+
+    def _require_written(self) -> None:
+        self.retry()
+        if self.error is not None:
+            raise SessionError(f"the cameras cannot change while an edit is not saved: {self.error}")
 
     @property
     def calibration_revision(self) -> int:
@@ -309,11 +334,15 @@ class Saver:
         Returns:
             The entry that later calls can amend; None if there was nothing to write. Changes that cannot be written
             are queued, and `error` says why.
+
+        Raises:
+            TurnError: somebody else works on one of the poses.
         """
         if not (changes or even_empty):
             return amend
-        edit, written = self._queue.write(label, changes, amend, by_program)
-        self.index.update(written)
+        self._require_turns(changes)
+        edit, written = self._queue.write(label, changes, amend, by_program, self._author)
+        self.shared.changed(self.moves, written)
         return edit
 
     def retry(self, patient: bool = True) -> None:
@@ -322,7 +351,19 @@ class Saver:
         Args:
             patient: wait for another program that has locked the file.
         """
-        self.index.update(self._queue.retry(patient))
+        self.shared.changed(self.moves, self._queue.retry(patient))
+
+    def require_turn(self, people: Iterable[int], frames: Iterable[int]) -> None:
+        """Check that nobody else works on poses of people, given by index, on frames.
+
+        Raises:
+            TurnError: somebody does.
+        """
+        self.shared.turns.require(self.moves, product(people, frames))
+
+    def _require_turns(self, changes: Sequence[Change]) -> None:
+        indices = {p.name: i for i, p in enumerate(self._session.people)}
+        self.shared.turns.require(self.moves, ((indices[c.person], c.frame) for c in changes if c.person in indices))
 
     def rescue(self) -> Path | None:
         """Keep the queued edits in a rescue file outside of the session.
@@ -338,54 +379,6 @@ class Saver:
             return None
         models = {r: format_model(self.revisions.body(r)) for r in rescue.revisions_of(edits)}
         return rescue.write(self._session.folder, self._store, edits, models, self._author, self.error or "")
-
-    def undo(self) -> list[int]:
-        """Revert the last entry of the history; returns its frames, ascending.
-
-        Raises:
-            SessionError: a queued edit still cannot be written.
-        """
-        self._write_all()
-        entry = self._next_undo()
-        if entry is None:
-            return self._moved([])
-        self._store.undo()
-        return self._moved([entry.edit])
-
-    def redo(self) -> list[int]:
-        """Reapply the entry that was reverted last; returns its frames, ascending. Raises as `undo` does."""
-        self._write_all()
-        entry = self._next_redo()
-        if entry is None:
-            return self._moved([])
-        self._store.redo()
-        return self._moved([entry.edit])
-
-    def go_to(self, edit: int | None) -> list[int]:
-        """Undo or redo until an entry is the last applied one; returns the changed frames, ascending.
-
-        Args:
-            edit: the entry; None reverts all.
-
-        Raises:
-            SessionError: a queued edit still cannot be written.
-        """
-        self._write_all()
-        return self._moved(self._store.go_to(edit))
-
-    def history(self, limit: int) -> list[HistoryEntry]:
-        """Return the entries that redo and undo can reach, latest first, at most `limit` of each."""
-        return self._store.history(limit)
-
-    def undo_label(self) -> str | None:
-        """Return the label of the entry that undo would revert."""
-        entry = self._next_undo()
-        return None if entry is None else entry.label
-
-    def redo_label(self) -> str | None:
-        """Return the label of the entry that redo would reapply."""
-        entry = self._next_redo()
-        return None if entry is None else entry.label
 
     def _readable(self, read: Callable[[int, int], T], person: int, frame: int, otherwise: T) -> T:
         """Read what is stored of a frame, to write what differs; `otherwise` if the store cannot be read.
@@ -428,26 +421,3 @@ class Saver:
                     position_px = (float(u), float(v))
                 changes.append(PinChange(name, state.frame, point, camera.name, position_px))
         return changes
-
-    def _next_undo(self) -> HistoryEntry | None:
-        return next((e for e in self._store.history(1) if not e.undone), None)
-
-    def _next_redo(self) -> HistoryEntry | None:
-        return next((e for e in self._store.history(1) if e.undone), None)
-
-    def _moved(self, edits: Iterable[int]) -> list[int]:
-        """Note which entries were moved over; returns their frames, ascending."""
-        self.moved_edits = tuple(edits)
-        frames = sorted({frame for edit in self.moved_edits for frame in self._store.frames_of(edit)})
-        self.index.update(frames)
-        return frames
-
-    def _write_all(self) -> None:
-        """Write the queued edits before the history moves.
-
-        Raises:
-            SessionError: one still cannot be written.
-        """
-        self.retry()
-        if self.error is not None:
-            raise SessionError(f"the history cannot move while an edit is not saved: {self.error}")

@@ -23,9 +23,9 @@ export function clickCard({ store, send }, visits) {
   };
   const button = textButton("Next best click", "Go to the frame and limb where a correction lowers the expected error most (Alt+C)", ask);
   const again = textButton("Show it", "Go to the proposed limb again", () => visit());
-  const buttons = make("div", "plan-buttons");
+  const buttons = make("div", "plan-buttons click-card");
   buttons.append(button, again);
-  const text = make("p", "section-note");
+  const text = make("p", "section-note click-card");
   text.setAttribute("role", "status");
 
   const visit = () => {

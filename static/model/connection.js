@@ -4,6 +4,13 @@ import { decodeBinary } from "./protocol.js";
 
 const FIRST_DELAY_MS = 250;
 const MAX_DELAY_MS = 5000;
+/** Where the name is kept by which this tab joins: each tab may have another. */
+const NAME_KEY = "quadrille-name";
+
+/** The name by which this tab joins; empty for none. */
+export function joinedName() {
+  return sessionStorage.getItem(NAME_KEY) ?? "";
+}
 
 /**
  * @typedef {object} Listener
@@ -11,6 +18,11 @@ const MAX_DELAY_MS = 5000;
  * @property {(message: import("./protocol.js").TextMessage) => void} onText
  * @property {(header: import("./protocol.js").BinaryHeader, payload: ArrayBuffer) => void} onBinary
  */
+
+/** Join without a name from now on: the one that was asked for could not be had. */
+export function forgetName() {
+  sessionStorage.removeItem(NAME_KEY);
+}
 
 export class Connection {
   /** @type {WebSocket | null} */
@@ -46,11 +58,22 @@ export class Connection {
     if (this.#socket?.readyState === WebSocket.OPEN) this.#socket.send(JSON.stringify(message));
   }
 
+  /**
+   * Join by another name, with a new connection.
+   *
+   * @param {string} name empty for none
+   */
+  joinAs(name) {
+    sessionStorage.setItem(NAME_KEY, name);
+    this.#delayMs = 0;
+    this.#socket?.close();
+  }
+
   #connect() {
     if (this.#socket && this.#socket.readyState !== WebSocket.CLOSED) return;
     const url = new URL("ws", document.baseURI);
     url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
-    url.search = "";
+    url.search = new URLSearchParams(joinedName() ? { name: joinedName() } : {}).toString();
     const socket = new WebSocket(url);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {

@@ -14,7 +14,7 @@ import { Receiver } from "./receiver.js";
 import { RecentImages } from "./recent_images.js";
 import { Store } from "./store.js";
 import { Themes } from "./theme.js";
-import { isAllowed, isAsked, unavailableReasons } from "./unavailable_reasons.js";
+import { isAllowed, isAsked, refusalOf, unavailableReasons } from "./unavailable_reasons.js";
 
 /**
  * @typedef {import("./protocol.js").ClientMessage} ClientMessage
@@ -36,9 +36,9 @@ export function mount() {
   /** @type {Connection | null} */
   let connection = null;
   const send = (/** @type {ClientMessage} */ message) => {
-    const role = store.facts.session?.role ?? "annotate";
-    if (!isAllowed(message, role)) {
-      if (isAsked(message)) notify({ type: "notice", level: "info", text: `This link is to ${role}: ask for another to change anything.` });
+    const { session } = store.facts;
+    if (session && !isAllowed(message, session)) {
+      if (isAsked(message)) notify({ type: "notice", level: "info", text: refusalOf(session, store.facts.presence?.link ?? session.role) });
       return;
     }
     if (MOVING.includes(message.type)) navigation.expectMove();
@@ -58,6 +58,11 @@ export function mount() {
     imageTones: new ImageTones(store),
     themes: new Themes(store),
     reasons: unavailableReasons(store),
+
+    /** @param {string} name by which this page joins from now on; empty for none */
+    joinAs(name) {
+      connection?.joinAs(name);
+    },
 
     /** @param {(notice: NoticeMessage) => void} listener shows notices of the program and of the page */
     onNotice(listener) {

@@ -45,7 +45,7 @@ export class Navigation {
    */
   goTo(frame) {
     const { session, connected } = this.#store.facts;
-    if (!session || !connected || session.role === "look") return;
+    if (!session || !connected || !session.has_place) return;
     this.request(Math.max(0, Math.min(this.#last, Math.round(frame))));
   }
 

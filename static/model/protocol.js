@@ -121,7 +121,8 @@
  *   string[], bones: [string, string][], parts: string[], limbs: string[], dofs: DofInfo[], point_dofs: Record<string,
  *   number[]>, point_limbs: Record<string, Limb>}} PersonInfo
  * @typedef {{type: "session", name: string, fps: number, n_frames: number, cameras: CameraInfo[], people: PersonInfo[],
- *   doubtful_from: number, lost_from: number, start: string, role: "annotate" | "review" | "look"}} SessionMessage
+ *   doubtful_from: number, lost_from: number, start: string, role: "host" | "annotate" | "review" | "look", has_place:
+ *   boolean}} SessionMessage
  * @typedef {{source: string | null, status: Status, shown: boolean, alternatives: number}} PersonState
  * @typedef {{running: boolean, kind: string | null, stage: string | null, stages: string[], evaluations: number,
  *   per_second: number, best_px: number | null, message: string}} Job
@@ -248,6 +249,10 @@
  *   interval_mm: [number, number] | null, after_mm: number | null}} ClickProposal
  * @typedef {{type: "annotation", annotator: string, tasks: TaskInfo[], comments: CommentInfo[], speeds: SpeedInfo[],
  *   proposal: ClickProposal}} AnnotationMessage
+ * @typedef {{name: string, role: "host" | "annotate" | "review" | "look", frame: number, person: number, doing: string,
+ *   is_self: boolean}} PresentPerson
+ * @typedef {{type: "presence", name: string, refusal: string, link: "host" | "annotate" | "review" | "look", people:
+ *   PresentPerson[]}} PresenceMessage
  * @typedef {{point: string, source: string, author: string, time: string, views: string[], lost: number | null}}
  *   PointProvenance
  * @typedef {{type: "provenance", frame: number, person: number, source: string | null, author: string, time: string,
@@ -300,8 +305,8 @@
  * @typedef {SessionMessage | StateMessage | HistoryMessage | NoticeMessage | TimelineMessage | InconsistentMessage |
  *   RangeComparisonMessage | ObservabilityMessage | EpipolarMessage | SearchSetupMessage | SearchRunsMessage |
  *   SettingsMessage | View3dMessage | BodySizesMessage | AcquisitionMessage | FindingMessage | CalibrationMessage |
- *   ObservationsMessage | ReasonMessage | CostMapMessage | AnnotationMessage | ProvenanceMessage | AnnotatorsMessage |
- *   OtherCopyMessage} TextMessage
+ *   ObservationsMessage | ReasonMessage | CostMapMessage | AnnotationMessage | PresenceMessage | ProvenanceMessage |
+ *   AnnotatorsMessage | OtherCopyMessage} TextMessage
  * @typedef {ImageHeader | OverlayHeader | CellsHeader | CurvesHeader | SearchStepsHeader | SearchCandidatesHeader |
  *   LandscapeHeader} BinaryHeader
  * generated: end

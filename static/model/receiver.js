@@ -1,5 +1,6 @@
 /** Put the program's messages into the store. */
 
+import { forgetName } from "./connection.js";
 import { Cells } from "./cells.js";
 import { PICTURE_LAYERS } from "./layers.js";
 import { PictureAssembler, keyOf } from "./pictures.js";
@@ -71,6 +72,10 @@ export class Receiver {
         break;
       case "annotation":
         this.#store.set({ annotation: message });
+        break;
+      case "presence":
+        if (message.refusal) this.#refuse(message.refusal);
+        this.#store.set({ presence: message });
         break;
       case "provenance":
         this.#store.set({ provenance: message });
@@ -171,6 +176,12 @@ export class Receiver {
     this.#early.set(overlay.frame, overlay);
     // A tracker can be some frames ahead of decoding. Older overlays belong to skipped frames.
     for (const frame of this.#early.keys()) if (this.#early.size > MAX_EARLY) this.#early.delete(frame);
+  }
+
+  /** @param {string} refusal why the name of this tab could not be had */
+  #refuse(refusal) {
+    forgetName();
+    this.#notify({ type: "notice", level: "error", text: refusal });
   }
 
   /** @param {import("./protocol.js").SessionMessage} session */

@@ -43,6 +43,7 @@ import { defaultLayers } from "./layers.js";
  * @property {import("./protocol.js").CalibrationMessage | null} calibration the check of the cameras
  * @property {import("./protocol.js").ObservationsMessage | null} observations imported observations and their judgement
  * @property {import("./protocol.js").AnnotationMessage | null} annotation the plan, comments, and the next best click
+ * @property {import("./protocol.js").PresenceMessage | null} presence who is on the session, and where
  * @property {import("./protocol.js").ProvenanceMessage | null} provenance where a pose of the shown frame comes from, while asked for
  * @property {import("./protocol.js").AnnotatorsMessage | null} annotators keyframes by annotator, while asked for
  * @property {import("./provenance.js").Filter | null} provenanceFilter poses that the timeline does not dim; null for all
@@ -117,6 +118,7 @@ export class Store {
     calibration: null,
     observations: null,
     annotation: null,
+    presence: null,
     provenance: null,
     annotators: null,
     provenanceFilter: null,

@@ -34,22 +34,39 @@ export function unavailableReasons(store) {
 
 /** @type {ClientMessage["type"][]} */
 const LOOK = ["view", "epipolar", "curves", "history"];
-/** @type {ClientMessage["type"][]} */
-const REVIEW = [...LOOK, "seek", "select"];
+/** Messages that move in a place of one's own. @type {ClientMessage["type"][]} */
+const MOVES = ["seek", "select"];
+/** Messages that change what belongs to the session, which only its host does. @type {ClientMessage["type"][]} */
+const OF_HOST = ["acquire", "find_people", "calibration_check", "floor", "view_3d", "snap", "observations"];
+const DECISIONS = new Set(["verify", "reject", "comment", "resolve", "reopen"]);
 /** Messages that the page sends by itself, or many in a row, so that a refusal needs no notice. @type {ClientMessage["type"][]} */
-const SILENT = ["watch", "pause_3d", "seek", "select", "view_3d"];
+const SILENT = ["watch", "provenance", "pause_3d", "seek", "select", "view_3d"];
 const MARKS = new Set(["reviewed", "unreviewed"]);
 
 /**
  * @param {ClientMessage} message
- * @param {import("./protocol.js").SessionMessage["role"]} role
- * @returns {boolean} whether the role may send it
+ * @param {import("./protocol.js").SessionMessage} session
+ * @returns {boolean} whether the page may send it
  */
-export function isAllowed(message, role) {
-  if (role === "annotate") return true;
-  if ((role === "review" ? REVIEW : LOOK).includes(message.type)) return true;
+export function isAllowed(message, { role, has_place }) {
+  if (role === "host" || LOOK.includes(message.type)) return true;
+  if (MOVES.includes(message.type)) return has_place;
+  if (role === "annotate") return !OF_HOST.includes(message.type) && (message.type !== "body_sizes" || message.action === "couple");
   if (role === "look") return false;
+  if (message.type === "annotation") return DECISIONS.has(message.action);
   return message.type === "mark" ? message.toggle === "reviewed" : message.type === "range" && MARKS.has(message.action);
+}
+
+/**
+ * Say why a message is not allowed.
+ *
+ * @param {import("./protocol.js").SessionMessage} session
+ * @param {import("./protocol.js").PresenceMessage["link"]} link what the page may do once a name is given
+ */
+export function refusalOf({ role, has_place }, link) {
+  if (role === "annotate") return "The host's page changes bodies, cameras, the floor and the 3-D view: ask the host.";
+  if (!has_place && link !== "look") return `Give your name first, to ${link}.`;
+  return `This link is to ${role}: ask for another to change anything.`;
 }
 
 /**

@@ -36,7 +36,7 @@ export function mount({ store, send, reasons }, { grid }) {
 /** A gizmo of the 3-D view moves people: shared links have none. */
 function showNoScene() {
   const note = byId("scene-note", HTMLElement);
-  [note.hidden, note.textContent] = [false, "This link shows the cameras. The 3-D view is the annotator's."];
+  [note.hidden, note.textContent] = [false, "This link shows the cameras. The 3-D view is the host's."];
 }
 
 /**
@@ -52,7 +52,7 @@ function loadLate(frame, store, isSoftware) {
   store.subscribe(() => {
     const { shown, state, session } = store.facts;
     if (isLoaded || shown === null || state === null) return;
-    if (session && session.role !== "annotate") return showNoScene();
+    if (session && session.role !== "host") return showNoScene();
     const waits = isSoftware && BEFORE_COST.has(state.compiling ?? "") && state.cost_px === null;
     byId("scene-note", HTMLElement).hidden = !waits;
     if (waits) return;

@@ -33,6 +33,7 @@ import { Workspace } from "./workspace.js";
  * @property {import("../scene/index.js").SceneRoom} scene
  * @property {import("../inspector/index.js").InspectorRoom} inspector
  * @property {import("../annotation/index.js").AnnotationRoom} annotation
+ * @property {import("../participants/index.js").ParticipantsRoom} participants
  * @property {import("../sessions/index.js").SessionsRoom} sessions
  */
 
@@ -72,10 +73,10 @@ export function mount(context, rooms) {
     ...peopleBindings({ actions, posing, people, reasons }),
     ...workspace.bindings,
   ];
-  const { panes, timeline, search, scene, inspector, annotation } = rooms;
+  const { panes, timeline, search, scene, inspector, annotation, participants } = rooms;
   const table = orderedByArea([
     own,
-    ...[scene, search, timeline, rooms.posing, panes, inspector, annotation].map(({ bindings }) => bindings),
+    ...[scene, search, timeline, rooms.posing, panes, inspector, annotation, participants].map(({ bindings }) => bindings),
   ]);
   palette.setBindings(table);
   keyList.setBindings(table);

@@ -3,8 +3,9 @@
 import { byId } from "../widgets/elements.js";
 
 const TEXTS = {
-  look: ["Look only", "This link shows the session and the frame that the annotator works on. It changes nothing"],
-  review: ["Review", "This link shows the session and marks poses as reviewed (E). It changes no pose"],
+  annotate: ["Annotate", "Your own frame and undo. The host's page changes bodies, cameras, the floor and the 3-D view"],
+  look: ["Look only", "This page shows the session. It changes nothing"],
+  review: ["Review", "This page marks poses as reviewed (E), verifies (Alt+K) and rejects (Alt+R) tasks. It changes no pose"],
 };
 
 /** @param {import("../model/store.js").Store} store */
@@ -14,7 +15,7 @@ export function showRole(store) {
     const role = store.facts.session?.role;
     if (!changed.has("session") || !role) return;
     document.documentElement.dataset.role = role;
-    badge.hidden = role === "annotate";
-    if (role !== "annotate") [badge.textContent, badge.title] = TEXTS[role];
+    badge.hidden = role === "host";
+    if (role !== "host") [badge.textContent, badge.title] = TEXTS[role];
   });
 }

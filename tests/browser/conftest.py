@@ -92,8 +92,8 @@ class _Server:
         self.endpoint = None
         self.address = ""
 
-    async def serve(self, socket, role):
-        await self.endpoint.serve(socket, role)
+    async def serve(self, socket, role, name):
+        await self.endpoint.serve(socket, role, name)
 
     async def thumbnail(self, request):
         return await self.endpoint.thumbnail(request)

@@ -143,8 +143,12 @@ class FakeEndpoint:
     held: asyncio.Event | None = None
     """Images are kept back until it is set; None: none are."""
     n_frames: int = N_FRAMES
-    role: str = "annotate"
+    role: str = "host"
     """Of the page's link."""
+    n_guests: int = 0
+    """Number of others who are on the session."""
+    name_asked: str = ""
+    """Name by which the last page joined."""
     received: list = field(default_factory=list)
     """Every message of every page, but for what each says when it connects."""
     frame_s: float = 0.05
@@ -218,11 +222,22 @@ class FakeEndpoint:
             "best_px": None, "message": message,
         }  # fmt: skip
 
+    @property
+    def presence(self):
+        """Who is there: the host on frame 0, and the page if it is not the host's."""
+        host = {"name": "Anna", "role": "host", "frame": 0, "person": 0, "doing": "", "is_self": self.role == "host"}
+        own = {**host, "name": self.name_asked, "role": self.role, "frame": 12, "is_self": True}
+        guests = [{**host, "name": f"Guest {i}", "role": "look", "is_self": False} for i in range(self.n_guests)]
+        people = [host, *guests, *([own] if self.name_asked and self.role != "host" else [])]
+        name = "Anna" if self.role == "host" else self.name_asked
+        return {"type": "presence", "name": name, "refusal": "", "link": self.role, "people": people}
+
     def heard(self, kind):
         """All messages of a type, in order."""
         return [m for m in self.received if m["type"] == kind]
 
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
+        self.name_asked = name
         self.sockets.add(socket)
         self.seq = 0
         try:
@@ -450,8 +465,9 @@ class FakeEndpoint:
         await socket.send_str(encoded({
             "type": "session", "name": self.name, "fps": 30.0, "n_frames": self.n_frames, "cameras": cameras,
             "people": people, "doubtful_from": 0.02, "lost_from": 0.5, "start": self.start, "role": self.role,
+            "has_place": self.role != "look" or bool(self.name_asked),
         }))  # fmt: skip
-        for message in (self.state, self.settings, self.view_3d, self.body_sizes):
+        for message in (self.state, self.settings, self.view_3d, self.body_sizes, self.presence):
             await socket.send_str(encoded(message))
         cells = {k: self.cell(k) for k in range(self.n_frames * 100 // N_FRAMES)}
         for person in (None, *(range(self.n_people) if self.n_people > 1 else ())):

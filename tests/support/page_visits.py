@@ -4,12 +4,14 @@ import asyncio
 import json
 import struct
 from contextlib import asynccontextmanager
+from urllib.parse import quote
 
 import aiohttp
 from aiohttp import web
 from declared_messages import checked
 
 from app.page.socket import PaneSocket
+from app.participants.participants import Participants
 
 
 class Page:
@@ -48,11 +50,13 @@ class Page:
 
 
 @asynccontextmanager
-async def visiting(controller, notices=(), role="annotate"):
+async def visiting(controller, notices=(), role="host", name="", participants=None):
+    people = participants or Participants(controller)
+
     async def serve(request):
         socket = web.WebSocketResponse(decode_text=False)
         await socket.prepare(request)
-        await PaneSocket(controller, notices).serve(socket, role)
+        await PaneSocket(people, notices).serve(socket, role, name)
         return socket
 
     app = web.Application()
@@ -70,12 +74,17 @@ async def visiting(controller, notices=(), role="annotate"):
             yield page
     finally:
         await runner.cleanup()
+        if participants is None:
+            people.close()
 
 
 @asynccontextmanager
-async def joined(address):
+async def joined(address, name=""):
     """A page of a running program, by its address."""
-    async with aiohttp.ClientSession() as session, session.ws_connect(address + "ws", max_msg_size=0) as socket:
+    async with (
+        aiohttp.ClientSession() as session,
+        session.ws_connect(f"{address}ws?name={quote(name)}", max_msg_size=0) as socket,
+    ):
         page = Page(socket)
         await page.shows("image", "contours", "joints")
         yield page

@@ -12,13 +12,13 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from tracker.errors import SessionError
+from tracker.errors import OvertakenEditError
 from tracker.store import edit_tree, own_undo, rows
 from tracker.store.annotator import annotator
 from tracker.store.changes import write_changes
 from tracker.store.connection import Connection
 from tracker.store.edit_log import EditLog, Written, read_log, write_log
-from tracker.store.own_undo import OwnMove
+from tracker.store.own_undo import OwnLabels, OwnMove
 from tracker.store.records import (
     Alternative,
     Change,
@@ -181,18 +181,18 @@ class AnnotationStore:
             return Committed(edit, write_changes(db, edit, changes, by_program))
 
     def amend(self, edit: int, changes: Sequence[Change], by_program: bool = False) -> tuple[tuple[str, int], ...]:
-        """Add changes to the last edit, while its gesture continues.
+        """Add changes to an edit, while its gesture continues. Edits of other poses may have come in between.
 
         Returns:
             Person and frame of the keyframes left unchanged because a program made the edit.
 
         Raises:
-            SessionError: another edit, or an undo, has come in between.
+            OvertakenEditError: the edit is undone, or a later one has changed the same poses.
         """
         with self._connection.transaction() as db:
             head = edit_tree.head(db)
-            if head != edit:
-                raise SessionError(f"edit {edit} cannot go on: the history stands at {head}; begin a new edit")
+            if head != edit and edit_tree.is_overtaken(db, edit, {(c.person, c.frame) for c in changes}):
+                raise OvertakenEditError(f"edit {edit} cannot go on: the history stands at {head}; begin a new edit")
             return write_changes(db, edit, changes, by_program)
 
     def undo(self) -> str | None:
@@ -203,17 +203,22 @@ class AnnotationStore:
         """Redo the edit that was undone last; returns its label, or None if there is none."""
         return self._edits.redo()
 
-    def undo_own(self, author: str | None = None) -> OwnMove | None:
-        """Undo the last edit of an annotator, also among later edits of others; see `own_undo`.
+    def undo_own(self, author: str | None = None, in_tree: bool = True) -> OwnMove | None:
+        """Undo the last edit of an annotator, also among later edits of others; see `own_undo.undo_own`.
 
         Args:
             author: the annotator; by default the one of the store.
+            in_tree: whether the last edit of all is undone in the tree.
         """
-        return own_undo.undo_own(self._connection, self._edits, self._author if author is None else author)
+        return own_undo.undo_own(self._connection, self._edits, self._author if author is None else author, in_tree)
 
-    def redo_own(self, author: str | None = None) -> OwnMove | None:
+    def redo_own(self, author: str | None = None, in_tree: bool = True) -> OwnMove | None:
         """Redo the last edit of an annotator that was undone; arguments as for `undo_own`."""
-        return own_undo.redo_own(self._connection, self._edits, self._author if author is None else author)
+        return own_undo.redo_own(self._connection, self._edits, self._author if author is None else author, in_tree)
+
+    def own_labels(self, author: str | None = None) -> OwnLabels:
+        """Return labels of what an annotator, by default the one of the store, can undo and redo."""
+        return own_undo.own_labels(self._connection, self._author if author is None else author)
 
     def go_to(self, edit: int | None) -> list[int]:
         """Undo or redo until an edit is the last one done; see `EditTree.go_to`."""
@@ -230,6 +235,10 @@ class AnnotationStore:
     def frames_of(self, edit: int) -> list[int]:
         """List the frames whose poses or pins an edit changes, ascending."""
         return self._edits.frames_of(edit)
+
+    def poses_of(self, edit: int) -> set[tuple[str, int]]:
+        """Return person and frame of the poses and pins that an edit changes."""
+        return self._edits.poses_of(edit)
 
     def add_model_revision(self, person: str, toml: str) -> int:
         """Store a body model for good and return its id. An equal model of the person is not stored twice."""

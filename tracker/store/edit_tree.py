@@ -6,6 +6,7 @@ stays in the log but is out of reach.
 """
 
 import sqlite3
+from collections.abc import Collection
 from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
@@ -100,8 +101,14 @@ class EditTree:
 
     def frames_of(self, edit: int) -> list[int]:
         """List the frames whose poses or pins an edit changes, ascending."""
-        sql = "SELECT frame FROM pose_changes WHERE edit = ?1 UNION SELECT frame FROM pin_changes WHERE edit = ?1"
-        return sorted(self._connection.all(sql, (edit,), lambda row: rows.frame_number(row[0], f"edit {edit}")))
+        return sorted({frame for _, frame in self.poses_of(edit)})
+
+    def poses_of(self, edit: int) -> set[tuple[str, int]]:
+        """Return person and frame of the poses and pins that an edit changes."""
+        changed = "SELECT person, frame FROM {}_changes WHERE edit = ?1"
+        sql = f"{changed.format('pose')} UNION {changed.format('pin')}"
+        found = self._connection.all(sql, (edit,), lambda row: (str(row[0]), rows.frame_number(row[1], f"edit {edit}")))
+        return set(found)
 
     def _entries(self, start: str, onward: str, limit: int) -> list[HistoryEntry]:
         """Follow the tree from edit to edit; `start` and `onward` are SQL for their ids."""
@@ -119,6 +126,17 @@ def head(db: sqlite3.Connection) -> int | None:
     """Return the id of the last edit done; None if there is none."""
     (edit,) = db.execute("SELECT edit FROM head").fetchone()
     return None if edit is None else int(edit)
+
+
+def is_overtaken(db: sqlite3.Connection, edit: int, poses: Collection[tuple[str, int]]) -> bool:
+    """Return whether an edit is not done, or a later one has changed a pose or its pins, by person and frame."""
+    line = (
+        "WITH RECURSIVE line (id) AS (SELECT edit FROM head UNION ALL "
+        "SELECT parent FROM line JOIN edits USING (id) WHERE id > ?1) SELECT 1 FROM line WHERE id = ?1"
+    )
+    changed = "SELECT person, frame FROM {}_changes WHERE edit > ?1"
+    later = db.execute(f"{changed.format('pose')} UNION {changed.format('pin')}", (edit,))
+    return db.execute(line, (edit,)).fetchone() is None or not {(p, f) for p, f in later}.isdisjoint(poses)
 
 
 def show_change(db: sqlite3.Connection, kind: str, change: int | None, shown: int | None) -> None:

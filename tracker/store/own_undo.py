@@ -6,7 +6,7 @@ earlier one replaced. Poses and pins that are no longer as the earlier edit left
 
 import json
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from tracker.errors import SessionError
@@ -31,59 +31,120 @@ class OwnMove(NamedTuple):
     """Number of poses and pins that stay as somebody else changed them since."""
 
 
-def undo_own(connection: Connection, tree: EditTree, author: str) -> OwnMove | None:
+class OwnLabels(NamedTuple):
+    """The edits that an annotator's undo and redo would move over: labels and numbers; None for no such edit."""
+
+    undo: str | None
+    redo: str | None
+    undo_edit: int | None
+    redo_edit: int | None
+
+
+def undo_own(connection: Connection, tree: EditTree, author: str, in_tree: bool = True) -> OwnMove | None:
     """Undo the last edit of an annotator that still holds; returns None if there is none.
+
+    Args:
+        connection: to the store.
+        tree: its edits.
+        author: the annotator.
+        in_tree: whether the last edit of all is undone in the tree, where a later edit of anybody ends what can be
+            redone. An edit of bodies or cameras always is.
 
     Raises:
         SessionError: others have changed all that it changed, or it changed bodies or cameras and is not the last.
     """
     with connection.transaction() as db:
-        edit = _last_own(db, author, is_taker=False)
-        return None if edit is None else _take_back(db, tree, edit, author)
+        edit = _last_own(db, author)
+        return None if edit is None else _take_back(db, tree, edit, author, in_tree)
 
 
-def redo_own(connection: Connection, tree: EditTree, author: str) -> OwnMove | None:
+def redo_own(connection: Connection, tree: EditTree, author: str, in_tree: bool = True) -> OwnMove | None:
     """Redo the last edit of an annotator that was undone; returns None if there is none.
+
+    Args:
+        connection: to the store.
+        tree: its edits.
+        author: the annotator.
+        in_tree: as for `undo_own`.
 
     Raises:
         SessionError: as for `undo_own`.
     """
     with connection.transaction() as db:
-        undone = db.execute(
-            "SELECT id, label, author FROM edits WHERE parent IS (SELECT edit FROM head) ORDER BY id DESC LIMIT 1"
-        ).fetchone()
-        if undone is not None and undone[2] == author and str(undone[0]) not in _setting(db, TAKEN_BACK):
+        undone = _undone_own(db, author)
+        if undone is not None:
             redo_edit(db, undone[0])
-            return OwnMove(str(undone[1]), int(undone[0]), True, 0)
-        edit = _last_own(db, author, is_taker=True)
-        return None if edit is None else _take_back(db, tree, edit, author)
+            return OwnMove(undone[1], undone[0], True, 0)
+        edit = _last_own_taker(db, author)
+        return None if edit is None else _take_back(db, tree, edit, author, in_tree)
 
 
-def _last_own(db: sqlite3.Connection, author: str, is_taker: bool) -> int | None:
-    """Return the last edit of an annotator that is done and holds.
+def own_labels(connection: Connection, author: str) -> OwnLabels:
+    """Return what an annotator can undo and redo; only the latest edits are read."""
+    with connection.snapshot():
+        db = connection.db
+        undo, undone = _last_own(db, author), _undone_own(db, author)
+        redo = None if undone is not None else _last_own_taker(db, author)
+        takers = _takers(db)
+        redone = (redo, None if redo is None else _label(db, redo, takers)) if undone is None else undone
+        return OwnLabels(None if undo is None else _label(db, undo, takers), redone[1], undo, redone[0])
+
+
+def _undone_own(db: sqlite3.Connection, author: str) -> tuple[int, str] | None:
+    """Return the edit that redo in the tree would reach, and its label; None if it is not the annotator's."""
+    found = db.execute(
+        "SELECT id, label, author FROM edits WHERE parent IS (SELECT edit FROM head) ORDER BY id DESC LIMIT 1"
+    ).fetchone()
+    is_own = found is not None and found[2] == author and found[0] not in _takers(db)
+    return (int(found[0]), str(found[1])) if is_own else None
+
+
+def _last_own(db: sqlite3.Connection, author: str) -> int | None:
+    """Return the last edit of an annotator that holds and changed poses by itself."""
+    takers = _takers(db)
+    return next((e for e, by in _held(db, takers) if by == author and e not in takers), None)
+
+
+def _last_own_taker(db: sqlite3.Connection, author: str) -> int | None:
+    """Return the last edit of an annotator that holds and takes back an edit, as undo does.
 
     A redo must follow its undo: an edit made after a taker ends what could be redone.
-
-    Args:
-        db: connection within a transaction.
-        author: the annotator.
-        is_taker: whether an edit is sought that takes back an undone one, or one that changed poses by itself.
     """
-    done = _done(db)
-    takers = {int(taker): taken for taker, taken in _setting(db, TAKEN_BACK).items()}
-    held: set[int] = set()
+    takers = _takers(db)
+    for edit, by in _held(db, takers) if takers else ():
+        if by != author:
+            continue
+        if edit not in takers:
+            return None
+        if _depth(edit, takers)[0] % 2:
+            made = (int(e) for (e,) in db.execute("SELECT id FROM edits WHERE id > ? AND author = ?", (edit, author)))
+            return None if any(e not in takers for e in made) else edit
+    return None
+
+
+def _held(db: sqlite3.Connection, takers: Mapping[int, int]) -> Iterator[tuple[int, str]]:
+    """Yield the edits that are done and not taken back, the latest first, with their authors."""
+    sql = (
+        "WITH RECURSIVE line (id) AS (SELECT edit FROM head UNION ALL SELECT parent FROM line JOIN edits USING (id)) "
+        "SELECT id, author FROM line JOIN edits USING (id)"
+    )
     taken: set[int] = set()
-    for edit in sorted(done, reverse=True):
+    for edit, author in db.execute(sql):  # a parent is older than its child
         if edit not in taken:
-            held.add(edit)
             if edit in takers:
                 taken.add(takers[edit])
-    own = [e for e in sorted(held, reverse=True) if done[e] == author]
-    if not is_taker:
-        return next((e for e in own if e not in takers), None)
-    last = next((e for e in own if _depth(e, takers)[0] % 2), None)
-    made = (int(e) for (e,) in db.execute("SELECT id FROM edits WHERE author = ?", (author,)))
-    return None if last is None or any(e > last and e not in takers for e in made) else last
+            yield int(edit), str(author)
+
+
+def _takers(db: sqlite3.Connection) -> dict[int, int]:
+    """Return the edits that take back others, each with the one that it takes back."""
+    return {int(taker): taken for taker, taken in _setting(db, TAKEN_BACK).items()}
+
+
+def _label(db: sqlite3.Connection, edit: int, takers: Mapping[int, int]) -> str:
+    """Return the label of the edit that changed poses by itself, from which a chain of undo and redo goes out."""
+    (label,) = db.execute("SELECT label FROM edits WHERE id = ?", (_depth(edit, takers)[1],)).fetchone()
+    return str(label)
 
 
 def _depth(edit: int, takers: Mapping[int, int]) -> tuple[int, int]:
@@ -94,14 +155,14 @@ def _depth(edit: int, takers: Mapping[int, int]) -> tuple[int, int]:
     return depth, edit
 
 
-def _take_back(db: sqlite3.Connection, tree: EditTree, edit: int, author: str) -> OwnMove:
-    taken = _setting(db, TAKEN_BACK)
-    depth, first = _depth(edit, {int(taker): of for taker, of in taken.items()})
-    (label,) = db.execute("SELECT label FROM edits WHERE id = ?", (first,)).fetchone()
-    if head(db) == edit:
+def _take_back(db: sqlite3.Connection, tree: EditTree, edit: int, author: str, in_tree: bool) -> OwnMove:
+    taken, takers = _setting(db, TAKEN_BACK), _takers(db)
+    depth, label = _depth(edit, takers)[0], _label(db, edit, takers)
+    is_numbered = any(str(edit) in _setting(db, name) for name in _BY_NUMBER)
+    if head(db) == edit and (in_tree or is_numbered):
         undo_edit(db, edit)
-        return OwnMove(str(label), edit, True, 0)
-    if any(str(edit) in _setting(db, name) for name in _BY_NUMBER):
+        return OwnMove(label, edit, True, 0)
+    if is_numbered:
         raise SessionError(
             f"expected an edit of poses, found '{label}', which others have worked on since; "
             "go back in the history before it, or change sizes or cameras again"
@@ -116,9 +177,9 @@ def _take_back(db: sqlite3.Connection, tree: EditTree, edit: int, author: str) -
     added = tree.add(db, f"{'redo' if depth % 2 else 'undo'}: {label}", author)
     for kind, change, before in free:
         _show_again(db, kind, added, change, before)
-    takers = {**taken, str(added): edit}
-    db.execute("INSERT OR REPLACE INTO settings (key, value) VALUES (?, ?)", (TAKEN_BACK, json.dumps(takers)))
-    return OwnMove(str(label), added, False, len(changes) - len(free))
+    taken = {**taken, str(added): edit}
+    db.execute("INSERT OR REPLACE INTO settings (key, value) VALUES (?, ?)", (TAKEN_BACK, json.dumps(taken)))
+    return OwnMove(label, added, False, len(changes) - len(free))
 
 
 def _last_changes(db: sqlite3.Connection, kind: str, edit: int) -> list[tuple[int, int | None, bool]]:
@@ -187,15 +248,6 @@ def _changed_by(db: sqlite3.Connection, edit: int) -> str:
         )
     }
     return " and ".join(sorted(authors)) or "somebody"
-
-
-def _done(db: sqlite3.Connection) -> dict[int, str]:
-    """Return the author of each edit that is done."""
-    sql = (
-        "WITH RECURSIVE line (id) AS (SELECT edit FROM head UNION ALL SELECT parent FROM line JOIN edits USING (id)) "
-        "SELECT id, author FROM line JOIN edits USING (id)"
-    )
-    return {int(edit): str(author) for edit, author in db.execute(sql)}
 
 
 def _setting(db: sqlite3.Connection, name: str) -> dict[str, int]:

@@ -76,6 +76,7 @@ _DECLARATIONS: Mapping[str, Any] = {
     "calibrations": list[_Calibration],
     "calibration_edits": dict[_IdText, tuple[_Id, _Id]],
     "calibrations_of_edits": dict[_IdText, _Id],
+    "worked_together": bool,
     "taken_back": dict[_IdText, _Id],
     "confirmed_keyframes": dict[Name, dict[_FrameText, Annotated[int, Meta(ge=0, lt=2**32)]]],
     "silhouette_axes": _Axes | None,

@@ -126,7 +126,7 @@ class BodySizeEditing:
         Raises:
             TrackerError: there is nothing to change, or the change cannot be written.
         """
-        with self._activities.editing():
+        with self._activities.editing(alone=True):
             session_state, name = self._session_state, self._session_state.session.people[person].name
             before, model = session_state.saver.revisions.current(person), self.model(person)
             same = model is session_state.present[person] or dimensions_of(model) == dimensions_of(
@@ -161,7 +161,7 @@ class BodySizeEditing:
         Raises:
             TrackerError: the person has this body, or the change cannot be written.
         """
-        with self._activities.editing():
+        with self._activities.editing(alone=True):
             session_state, name = self._session_state, self._session_state.session.people[person].name
             before, body = session_state.saver.revisions.current(person), moved_body(session_state.session, person, to)
             session_state.set_body_models(save_model(session_state.session, person, body))
@@ -204,10 +204,10 @@ class BodySizeEditing:
         """
         session_state, saver = self._session_state, self._session_state.saver
         edits = saver.setting(SIZES_EDITS, {})
-        latest = next((e for e in saver.history(1) if not e.undone), None)
-        for edit in saver.moved_edits:
+        latest = next((e for e in saver.moves.entries(1) if not e.undone), None)
+        for edit in saver.moves.moved_edits:
             # A move has one direction: if its last entry is applied now, all of them are.
-            done = latest is not None and latest.edit == saver.moved_edits[-1]
+            done = latest is not None and latest.edit == saver.moves.moved_edits[-1]
             for name, before, after in sizes_changed(edits, edit):
                 person = next((i for i, p in enumerate(session_state.session.people) if p.name == name), None)
                 if person is not None:

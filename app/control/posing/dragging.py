@@ -70,6 +70,7 @@ class Dragging:
 
         Raises:
             TrackerError: all degrees of freedom that move it are locked.
+            TurnError: somebody else works on the pose.
         """
         session_state = self._session_state
         cameras, models = session_state.session.cameras, session_state.models
@@ -82,6 +83,7 @@ class Dragging:
             return
         with self._activities.editing():
             session_state.go_to(frame)
+            session_state.require_turn([person])
             values = session_state.state.poses[person]
             view, pointer = cameras[camera].camera, np.array(pointer_px)
             constraints = session_state.drag_constraints(person)

@@ -69,6 +69,7 @@ class SearchRunner:
         """
         with self._activities.starting(self):
             if not self.running:
+                self._session_state.require_turn()
                 self._paused_job(person).step()
 
     def run_stage(self, person: int | None = None) -> None:
@@ -146,6 +147,11 @@ class SearchRunner:
             self._run.over = True
         self._session_state.set(search=SearchState())
 
+    def forget_paused(self) -> None:
+        """Discard a paused search, whose poses others have replaced; called under the lock."""
+        if self._job is not None and not self.running:
+            self.forget()
+
     def stop(self) -> None:
         """Pause a running search with its best poses on disk; end a paused one. The caller must not hold the lock."""
         was_running = self.running
@@ -163,6 +169,7 @@ class SearchRunner:
     ) -> None:
         with self._activities.starting(self):
             if not self.running:
+                self._session_state.require_turn()
                 job = self._paused_job(person, start, contours)
                 self._session_state.set(search=replace(self._session_state.state.search, running=True))
                 job.run(until)

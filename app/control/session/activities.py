@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
+from app.storage.turns import TurnError, Turns
+
 
 class BackgroundJob(Protocol):
     """Work in another thread that changes poses: a search, a tracking run, work on a range of frames."""
@@ -26,13 +28,19 @@ class BackgroundJob(Protocol):
 class Activities:
     """The jobs and gestures of one session. At most one of them changes poses at a time."""
 
-    def __init__(self, lock: threading.RLock) -> None:
+    def __init__(
+        self, lock: threading.RLock, restore: Callable[[], None] = lambda: None, turns: Turns | None = None,
+        owner: object = None,
+    ) -> None:  # fmt: skip
         """Register nothing yet.
 
         Args:
             lock: of the session's state.
+            restore: shows the stored poses again, after an edit that another person's work refuses.
+            turns: those who work on the session.
+            owner: stands for the one whose activities these are.
         """
-        self._lock = lock
+        self._lock, self._restore, self._turns, self._owner = lock, restore, turns or Turns(), owner
         self._jobs: list[BackgroundJob] = []
         self._on_shown_frame: list[BackgroundJob] = []
         self._finish_gestures: list[Callable[[], None]] = []
@@ -53,8 +61,15 @@ class Activities:
         self._finish_gestures.append(finish)
 
     @contextmanager
-    def editing(self) -> Iterator[None]:
-        """Hold the lock for an edit, with all jobs discarded and all gestures finished."""
+    def editing(self, alone: bool = False) -> Iterator[None]:
+        """Hold the lock for an edit, with all jobs discarded and all gestures finished.
+
+        Args:
+            alone: whether nobody else may be at work, because bodies or cameras change.
+
+        Raises:
+            TurnError: another person works on what the edit changes; the stored poses are shown again.
+        """
         while True:
             for job in self._jobs:  # without the lock: the last step of a job takes it
                 job.halt()
@@ -64,7 +79,13 @@ class Activities:
                 self.finish_gestures()
                 for job in self._jobs:
                     job.forget()
-                yield
+                if alone:
+                    self._turns.require_alone(self._owner)
+                try:
+                    yield
+                except TurnError:
+                    self._restore()
+                    raise
                 return
 
     @contextmanager

@@ -31,14 +31,20 @@ _REST_S = 0.3
 class Annotating:
     """Tasks and comments of one session. The state follows what is stored, in the background."""
 
-    def __init__(self, session_state: SessionState, activities: Activities) -> None:
+    def __init__(self, session_state: SessionState, activities: Activities, reader: "Annotating | None" = None) -> None:
         """Read the plan.
 
         Args:
             session_state: holds the state.
             activities: ends jobs and gestures before a pose is marked.
+            reader: reads the plan for everybody who works on the session; None for the host's own part.
         """
         self._session_state, self._activities = session_state, activities
+        self._reader = reader or self
+        author = session_state.saver.author
+        session_state.set(annotation=replace(session_state.state.annotation, author=author))
+        if reader is not None:
+            return
         self._seen = -1
         self._reading = threading.Lock()  # the last reading that begins is the last one shown
         self._latest: LatestWinsWorker[int] = LatestWinsWorker(self._read, "plan of annotation", _REST_S)
@@ -47,7 +53,8 @@ class Annotating:
 
     def close(self) -> None:
         """End the thread."""
-        self._latest.close()
+        if self._reader is self:
+            self._latest.close()
 
     def plan(self, choice: FrameChoice, person: int | None, names: Sequence[str], each: bool) -> int:
         """Plan tasks; those that are planned already stay. Returns the number of new ones.
@@ -144,8 +151,12 @@ class Annotating:
         saver = self._session_state.saver
         with self._session_state.lock:
             found = write(saver.store, saver.author)
-        self._read(0)
+        self._reader.read()
         return found
+
+    def read(self) -> None:
+        """Read the plan into the state; those who follow the host take it over."""
+        self._read(0)
 
     def _changed(self, state: State) -> None:
         if state.timeline_version != self._seen:

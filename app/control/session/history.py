@@ -26,7 +26,7 @@ class History:
     def entries(self, limit: int) -> list[HistoryEntry]:
         """Return the entries that redo and undo can reach, latest first, at most `limit` of each."""
         with self._session_state.lock:
-            return self._session_state.saver.history(limit)
+            return self._session_state.saver.moves.entries(limit)
 
     def undo(self) -> None:
         """Revert the last entry, after ending the job or gesture that made it.
@@ -34,7 +34,7 @@ class History:
         Raises:
             TrackerError: a queued edit still cannot be written.
         """
-        self._move(self._session_state.saver.undo)
+        self._move(self._session_state.saver.moves.undo)
 
     def redo(self) -> None:
         """Reapply the entry that was reverted last.
@@ -42,7 +42,7 @@ class History:
         Raises:
             TrackerError: a queued edit still cannot be written.
         """
-        self._move(self._session_state.saver.redo)
+        self._move(self._session_state.saver.moves.redo)
 
     def go_to(self, edit: int | None) -> None:
         """Undo or redo until an entry is the last applied one; None reverts all.
@@ -50,7 +50,7 @@ class History:
         Raises:
             TrackerError: the history no longer contains the entry, or a queued edit still cannot be written.
         """
-        self._move(lambda: self._session_state.saver.go_to(edit))
+        self._move(lambda: self._session_state.saver.moves.go_to(edit))
 
     def save(self) -> None:
         """Try again to write queued edits; the state has the result."""

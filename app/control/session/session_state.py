@@ -2,17 +2,17 @@
 
 import threading
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Unpack
+from typing import TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.remedies import page_text
 from app.session.frame_cache import FrameCache
-from app.state.people import ShownPose
+from app.state.people import ShownPose, is_same_pose
 from app.state.search import SearchView
 from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_none
 from app.storage.saver import Saver
@@ -30,7 +30,7 @@ from tracker.motion.velocity import velocity
 from tracker.pipeline.seen_points import seen_points
 from tracker.posing.default_pose import default_pose
 from tracker.posing.grab import Constraints
-from tracker.session.locked_dofs import active_dofs
+from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
 from tracker.tracking.estimation.settings import chamfer_cost
 
@@ -40,11 +40,24 @@ _APART_M = 0.9
 """Distance between people who are not placed yet, metres: each can be seen and dragged by itself."""
 
 
+T = TypeVar("T")
+
+
+def chosen(is_new: Sequence[bool], new: Sequence[T], old: Sequence[T]) -> tuple[T, ...]:
+    """Return the new values where they are new, else the old ones."""
+    return tuple(a if first else b for first, a, b in zip(is_new, new, old, strict=True))
+
+
 class SessionState:
     """The state of one open session. A change takes `lock`; the views are called under it."""
 
     def __init__(
-        self, session: Session, saver: Saver, frames: FrameCache, compiled: frozenset[str] = frozenset(STAGES)
+        self,
+        session: Session,
+        saver: Saver,
+        frames: FrameCache,
+        compiled: frozenset[str] = frozenset(STAGES),
+        lock: "threading.RLock | None" = None,
     ) -> None:
         """Show the first frame.
 
@@ -53,9 +66,10 @@ class SessionState:
             saver: stores its poses.
             frames: gives images and evidence.
             compiled: groups of kernels that can be called without delay.
+            lock: of the states of everybody who works on the session; None for the first one.
         """
         self.session, self.saver, self.frames = session, saver, frames
-        self.lock = threading.RLock()
+        self.lock = lock or threading.RLock()
         self.set_default_poses(up_rotation(session.up, session.floor))
         self._subscribers: list[Callable[[State], None]] = []
         self._stored: tuple[tuple[ShownPose, ...], Pins] | None = None  # the shown poses and pins that are on disk
@@ -72,6 +86,7 @@ class SessionState:
         self.note_stored()
         self.refresh_saving()
         self.request_evidence()
+        self.set(**self.costs(self.state.poses))  # others may have needed the evidence before
 
     @property
     def models(self) -> tuple[BodyModel, ...]:
@@ -160,6 +175,18 @@ class SessionState:
         self.frames.set_cameras(session.cameras)
         self.session = replace(self.session, cameras=session.cameras)
 
+    def follow_session(self, session: Session) -> None:
+        """Continue with bodies, cameras and floor that the host of the session has changed, and show them."""
+        self.session = session
+        self.saver.follow_session(session)
+        self.set_default_poses(up_rotation(session.up, session.floor))
+        names = [p.model.point_names for p in session.people]
+        point = self.state.point if self.state.point in names[self.state.person] else None
+        held = frozenset(h for h in self.state.held if h.point in names[h.person])
+        floor = replace(self.state.floor, up=session.up, plane=session.floor, picking=None)
+        locked = load_locks(session.people, self.saver.setting)
+        self.show_frame(self.state.frame, point=point, held=held, floor=floor, locked=locked, draft=None)
+
     def subscribe(self, view: Callable[[State], None]) -> Callable[[], None]:
         """Call a view with every new state; returns the function that ends this."""
         with self.lock:
@@ -205,13 +232,50 @@ class SessionState:
         self.set(**after)
         self.request_evidence()
 
+    def show_again(self) -> None:
+        """Show the stored poses of the shown frame in place of others."""
+        self.show_frame(self.state.frame)
+
+    def take_over(self) -> bool:
+        """Show what others have stored of the shown frame, and return whether anything is new.
+
+        The others leave poses alone that change here, so that these stay as they are shown.
+        """
+        state, (stored, stored_pins) = self.state, self._stored or (self.state.people, self.state.pins)
+        loaded, pins = self._load(state.frame), self._load_pins(state.frame)
+        new = [not is_same_pose(*pair) for pair in zip(stored, loaded["people"], strict=True)]
+        new_pins = [now != before for now, before in zip(pins, stored_pins, strict=True)]
+        if not any(new + new_pins):
+            return False
+        people = chosen(new, loaded["people"], state.people)
+        models = chosen(new, loaded["models"], state.models)
+        self._stored = chosen(new, loaded["people"], stored), pins
+        self.set(
+            people=people,
+            models=models,
+            revisions=chosen(new, loaded["revisions"], state.revisions),
+            present=loaded["present"],
+            pins=chosen(new_pins, pins, state.pins),
+            **self.costs(tuple(p.values for p in people), state.frame, models),
+        )
+        return True
+
+    def require_turn(self, people: Iterable[int] | None = None, frames: Iterable[int] | None = None) -> None:
+        """Check that nobody else works on poses: by default those of everybody on the shown frame.
+
+        Raises:
+            TurnError: somebody does.
+        """
+        everybody = range(len(self.session.people))
+        self.saver.require_turn(everybody if people is None else people, frames or [self.state.frame])
+
     def request_evidence(self) -> None:
         """Request the frame's evidence in the background, unless it is cached; the costs follow.
 
         Kernels that are compiled beside the page come first: here they would hold it up.
         """
         if "evidence" in self.state.compiled and self.frames.cached_evidence(self.state.frame) is None:
-            self.frames.request(self.state.frame, self._evidence_ready)
+            self.frames.request(self.state.frame, self._evidence_ready, self)
 
     def note_compiled(self, stages: frozenset[str]) -> None:
         """Note the groups of kernels that can be called without delay, and do what has waited for them."""
@@ -288,7 +352,7 @@ class SessionState:
     def revert(self, gesture: object) -> None:
         """Show the frame as it was before a gesture, and undo what was saved of the gesture."""
         if self.open_edit_owner is gesture:
-            self.saver.undo()
+            self.saver.moves.undo()
         self.show_frame(self.state.frame)
         self.refresh_saving()
 
@@ -338,7 +402,7 @@ class SessionState:
         """Bring what the state says of the history and the disk up to date."""
         undo, redo, error = self.state.undo, self.state.redo, self.saver.error
         try:
-            undo, redo = self.saver.undo_label(), self.saver.redo_label()
+            undo, redo = self.saver.moves.labels()
         except TrackerError as unreadable:  # its drive may be gone: edits wait in the queue
             error = error or page_text(unreadable)
         self.set(undo=undo, redo=redo, save_error=error, timeline_version=self.saver.index.version)

@@ -103,7 +103,7 @@ class Calibrating:
             TrackerError: nothing is to be corrected, other frames do not confirm it, or it cannot be written.
         """
         check = self._found()
-        with self._activities.editing():
+        with self._activities.editing(alone=True):
             session_state, found = self._session_state, self._session_state.state.calibration
             if found.refused:
                 raise TrackerError(found.refused)

@@ -281,7 +281,7 @@ class FindingPeople:
 
     def _entry(self) -> int | None:
         """Return the entry of the history of this search if further changes can be added to it: if it is the latest."""
-        latest = next((e.edit for e in self._session_state.saver.history(1) if not e.undone), None)
+        latest = next((e.edit for e in self._session_state.saver.moves.entries(1) if not e.undone), None)
         return self._edit if self._edit == latest else None
 
     def outdated_sizes(self) -> list[str]:

@@ -116,7 +116,7 @@ class PoseChecks:
             now = saver.record(person, change.frame)
             if change.pose is None or now is None or now.values.tolist() != change.pose.values.tolist():
                 return
-            last = next((e.edit for e in saver.history(1) if not e.undone), None)
+            last = next((e.edit for e in saver.moves.entries(1) if not e.undone), None)
             amend = stored.edit if stored.edit is not None and stored.edit == last else None
             row = AssessmentChange.of(change.person, change.frame, found)
             saver.write(f"assess the pose, frame {change.frame}", [row], amend, by_program=False)

@@ -198,6 +198,7 @@ class Tracking:
         """Begin a run in a worker thread; the caller is editing."""
         session_state = self._session_state
         state, saver = session_state.state, session_state.saver
+        session_state.require_turn(None, [k for leg in legs for k in leg.run.frames])
         session = TrackSession(
             make_tracker(track_settings.of_run(state.settings, state.run_choices)),
             legs,

@@ -3,17 +3,21 @@
 from typing import get_args
 
 import pytest
+from gestures import FRONT, drag, pixel_of, wait_for
 from page_visits import visiting
 
+from app.page import annotation_messages as plan_wire
 from app.page import client_messages as wire
 from app.page.message_parsing import check_allowed
 from app.page.message_types import Command
+from app.participants.participants import Participants
+from tracker.annotation.frame_choice import FrameChoice
 from tracker.errors import TrackerError
 
 
-def allowed(role, message):
+def allowed(role, message, has_place=True):
     try:
-        check_allowed(role, message)
+        check_allowed(role, message, has_place)
     except TrackerError:
         return False
     return True
@@ -23,6 +27,7 @@ def test_what_is_not_named_is_refused():
     class Fresh(Command, frozen=True, tag="fresh"):
         """A message of a later version."""
 
+    assert allowed("host", Fresh())
     assert allowed("annotate", Fresh())
     assert not allowed("review", Fresh())
     assert not allowed("look", Fresh())
@@ -42,16 +47,33 @@ def test_a_review_moves_and_marks_poses_as_reviewed():
     assert {action for action, is_allowed in marks.items() if is_allowed} == {"reviewed", "unreviewed"}
 
 
-def test_a_page_that_looks_sees_what_the_annotator_sees():
+def test_a_review_decides_and_comments():
+    assert allowed("review", plan_wire.DecideTask("verify", 0, 1))
+    assert allowed("review", plan_wire.WriteComment("comment", 0, 1, None, "why"))
+    assert not allowed("review", plan_wire.DecideTask("withdraw", 0, 1))
+    assert not allowed("review", plan_wire.PlanTasks("plan", "every"))
+    assert not allowed("look", plan_wire.DecideTask("verify", 0, 1))
+
+
+def test_a_page_that_looks_moves_in_a_place_of_its_own_only():
     assert allowed("look", wire.ShowHistory(10))
-    assert not allowed("look", wire.Seek(3))
+    assert allowed("look", wire.Seek(3))
+    assert not allowed("look", wire.Seek(3), has_place=False)
     assert not allowed("look", wire.ToggleMark("reviewed"))
 
 
-async def test_the_program_refuses_and_goes_on(opened):
+@pytest.mark.parametrize("message", [wire.FindPeople("start"), wire.EditFloor("begin")])
+def test_bodies_cameras_and_floor_are_the_hosts(message):
+    assert allowed("host", message)
+    assert not allowed("annotate", message)
+
+
+async def test_a_link_without_a_name_watches_the_host(opened):
     controller = opened()
-    async with visiting(controller, role="look") as page:
-        assert (await page.hear("session"))["role"] == "look"
+    async with visiting(controller, role="review") as page:
+        session = await page.hear("session")
+        assert (session["role"], session["has_place"]) == ("look", False)
+        assert (await page.hear("presence"))["link"] == "review"
         await page.send("seek", frame=3)
         assert "only look" in (await page.hear("notice"))["text"]
         await page.send("pause_3d", pause=True)
@@ -59,3 +81,47 @@ async def test_the_program_refuses_and_goes_on(opened):
         await page.hear("history")
     assert controller.state.frame == 0
     assert not controller.state.pages_pausing_3d
+
+
+async def test_a_reviewer_verifies_under_the_name_of_joining(opened):
+    host = opened()
+    drag(host, "torso", (4.0, 0.0))
+    host.annotating.plan(FrameChoice(frames="0,1"), None, [], each=False)
+    async with visiting(host, role="review", name=" Rita ") as page:
+        assert (await page.hear("session"))["role"] == "review"
+        await page.send("seek", frame=1)
+        await page.hear("state", lambda m: m["frame"] == 1)
+        await page.send("annotation", action="verify", person=0, frame=0)
+        found = await page.hear("annotation", lambda m: m["tasks"] and m["tasks"][0]["state"] == "verified")
+        assert (found["annotator"], found["tasks"][0]["by"]) == ("Rita", "Rita")
+        await page.send("annotation", action="withdraw", person=0, frame=0)
+        assert "may only look, mark" in (await page.hear("notice"))["text"]
+    assert host.state.frame == 0
+    wait_for(lambda: host.state.annotation.tasks[0].by == "Rita")
+
+
+async def test_a_named_look_moves_without_moving_the_host_and_writes_nothing(opened):
+    host = opened()
+    drag(host, "torso", (4.0, 0.0))
+    entries = host.history.entries(9)
+    async with visiting(host, role="look", name="Lou") as page:
+        await page.send("seek", frame=2)
+        await page.hear("state", lambda m: m["frame"] == 2)
+        for refused in ({"kind": "mark", "toggle": "reviewed"}, {"kind": "undo"}):
+            await page.send(refused.pop("kind"), **refused)
+            assert "only look" in (await page.hear("notice"))["text"]
+    assert host.state.frame == 0
+    assert host.history.entries(9) == entries
+
+
+async def test_a_second_page_of_another_name_is_refused_by_turn(opened):
+    host = opened()
+    people = Participants(host)
+    host.dragging.begin(1, FRONT, 0, "torso", tuple(pixel_of(host, "torso")))
+    async with visiting(host, name="ben", participants=people) as page:
+        (seen,) = (await page.hear("presence"))["people"]
+        assert seen["is_self"], "no page of the host is open"
+        u, v = pixel_of(host, "torso")
+        await page.send("drag", phase="start", camera=0, person=0, point="torso", u=u, v=v, seq=1, mode="move", frame=0)
+        assert "drags on frame 0" in (await page.hear("notice"))["text"]
+    people.close()

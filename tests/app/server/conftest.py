@@ -15,7 +15,7 @@ from app.server.static_files import static_folder
 
 
 class Nobody:
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name):
         pass
 
 

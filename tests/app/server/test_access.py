@@ -51,16 +51,16 @@ def test_other_origins_are_refused(origin):
 
 def test_beyond_loopback_wants_name_and_token():
     assert REMOTE.refusal("lab.example.org:8080", None) is None
-    assert REMOTE.role(["secret"]) == REMOTE.role(["guess", "secret"]) == "annotate"
+    assert REMOTE.role(["secret"]) == REMOTE.role(["guess", "secret"]) == "host"
     assert REMOTE.role(["guess"]) is REMOTE.role() is None
     assert "Host" in REMOTE.refusal("other.example.org:8080", None)
 
 
 def test_shared_links_have_roles_tokens_and_paths_of_their_own():
     shared = access_for("127.0.0.1", share=True)
-    tokens = [shared.token_of(role) for role in ("annotate", "review", "look")]
-    assert [shared.role([token]) for token in tokens] == ["annotate", "review", "look"]
-    assert len(set(shared.roots)) == len(set(tokens)) == 3
+    tokens = [shared.token_of(role) for role in ("host", "annotate", "review", "look")]
+    assert [shared.role([token]) for token in tokens] == ["host", "annotate", "review", "look"]
+    assert len(set(shared.roots)) == len(set(tokens)) == 4
     assert shared.role([tokens[2] + "x"]) is None
     assert access_for("127.0.0.1", share=True).role([tokens[2]]) is None, "links end with their start"
     assert access_for("127.0.0.1").links == ()

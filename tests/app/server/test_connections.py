@@ -13,7 +13,7 @@ from app.server.static_files import static_folder
 
 
 class EchoPanes:
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
         async for message in socket:
             await socket.send_bytes(message.data)
 

@@ -27,7 +27,7 @@ from tracker.session.session import load_session
 
 
 class Nobody:
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
         pass
 
 

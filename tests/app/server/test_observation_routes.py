@@ -25,7 +25,7 @@ COPY = "/copies/open"
 
 
 class Nobody:
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
         pass
 
 

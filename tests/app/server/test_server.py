@@ -23,7 +23,7 @@ NAMED = Access(frozenset({"lab.example.org"}), "secret", Invitation())
 class EchoPanes:
     """A pane endpoint that answers every message with itself."""
 
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
         async for message in socket:
             if message.type is aiohttp.WSMsgType.TEXT:
                 await socket.send_str(message.data.decode())
@@ -344,7 +344,7 @@ def test_page_address_carries_name_and_token():
 class TellingPanes:
     """A pane endpoint that says who has joined."""
 
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
         await socket.send_str(role)
 
 
@@ -352,7 +352,7 @@ async def _answer(_):
     return web.Response()
 
 
-@pytest.mark.parametrize("role", ["review", "look"])
+@pytest.mark.parametrize("role", ["annotate", "review", "look"])
 async def test_a_shared_link_shows_the_session_and_no_more(fake_viser, role):
     access = access_for("127.0.0.1", share=True)
     app = server.create_app(TellingPanes(), fake_viser.socket_path, access, static_folder())
@@ -372,6 +372,6 @@ async def test_a_shared_link_shows_the_session_and_no_more(fake_viser, role):
         for path in ("viser/", "sessions", "export"):
             async with client.get(start + root + path) as refused:
                 assert refused.status == 403
-                assert "may annotate" in await refused.text()
+                assert "page of the host" in await refused.text()
         async with client.post(start + root) as refused:
             assert refused.status == 403

@@ -17,7 +17,7 @@ JPEG = b"\xff\xd8 a picture"
 
 
 class Nobody:
-    async def serve(self, socket, role):
+    async def serve(self, socket, role, name=""):
         pass
 
 

@@ -203,7 +203,7 @@ async def test_nothing_is_cut_off_in_small_windows(page):
 
 
 @pytest.mark.slow
-@pytest.mark.endpoint(n_people=2)
+@pytest.mark.parametrize("endpoint", [{"n_people": 2}, {"n_people": 2, "n_guests": 6}], indirect=True)
 async def test_the_bar_of_two_people_fits_every_window(page):
     for width in (1600, 1500, 1410, 1280, 1110, 1024):
         await page.set_viewport_size({"width": width, "height": 700})

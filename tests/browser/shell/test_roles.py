@@ -1,7 +1,7 @@
 """Pages with a shared link, against `fake_endpoint`: what they show, and what they send."""
 
 import pytest
-from page_driver import shows
+from page_driver import shows, until
 from playwright.async_api import expect
 
 ANNOTATING = (
@@ -11,7 +11,6 @@ ANNOTATING = (
     "#track-forward",
     "#search-frame",
     "#show-export",
-    "#inspector",
 )
 
 
@@ -27,7 +26,7 @@ async def join(page, endpoint, role):
 async def test_a_link_to_look_changes_nothing(page, endpoint):
     await join(page, endpoint, "look")
     await expect(page.locator("#role-badge")).to_have_text("Look only")
-    for control in (*ANNOTATING, "#play", "#toggle-reviewed"):
+    for control in (*ANNOTATING, "#inspector", "#play", "#toggle-reviewed"):
         await expect(page.locator(control)).to_be_hidden()
     for key in ("f", "k", "Period", "e", "Control+z", "t"):
         await page.keyboard.press(key)
@@ -50,3 +49,38 @@ async def test_a_link_to_review_moves_and_marks(page, endpoint):
         await page.keyboard.press(key)
     assert {m["type"] for m in endpoint.received} <= {"seek", "select", "view", "mark"}
     assert {"type": "mark", "toggle": "keyframe"} not in endpoint.received
+
+
+@pytest.mark.slow
+async def test_a_review_sees_the_plan_alone(page, endpoint):
+    await join(page, endpoint, "review")
+    await page.keyboard.press("Alt+u")
+    await expect(page.locator("[data-section=annotation]")).to_be_visible()
+    await expect(page.locator("[data-section=body]")).to_be_hidden()
+    await expect(page.locator("#plan-frames")).to_be_hidden()
+
+
+@pytest.mark.slow
+async def test_a_link_asks_for_a_name_and_then_moves_by_itself(page, endpoint):
+    await join(page, endpoint, "look")
+    await page.keyboard.press("End")
+    assert endpoint.received == [], "without a name the page shows what the host shows"
+    await page.locator("#join-bar").get_by_label("Your name, to look around").fill("Lou Q")
+    await page.keyboard.press("Enter")
+    await until(lambda: endpoint.name_asked == "Lou Q")
+    await expect(page.locator("#join-bar")).to_be_hidden()
+    await expect(page.locator("#play")).to_be_visible()
+    await page.keyboard.press("End")
+    await until(lambda: endpoint.received[-1]["type"] == "seek")
+    await page.keyboard.press("Alt+e")
+    await expect(page.locator("#participants-list")).to_contain_text("Lou Q (you)")
+    await page.keyboard.press("Escape")
+    await page.reload()
+    await shows(page, "window.quadrille?.state.presence?.name === 'Lou Q'")
+
+
+@pytest.mark.slow
+async def test_others_have_marks_at_their_frames(page, endpoint):
+    await join(page, endpoint, "review")
+    await expect(page.locator("#participant-chips .participant-chip")).to_have_text(["A"])
+    await expect(page.locator(".place-mark")).to_have_attribute("title", "Anna is on frame 0")

@@ -5,7 +5,7 @@ import random
 import numpy as np
 import pytest
 
-from tracker.errors import SessionError
+from tracker.errors import OvertakenEditError, SessionError
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PinChange, PoseChange, PoseRecord
 
@@ -127,3 +127,41 @@ def test_any_order_of_two_annotators_leaves_each_their_own(store):
             at[name].append(x_again)
         expected = {frame: at[who][-1] for who, frame in (("anna", 1), ("ben", 2)) if at[who]}
         assert xs(store) == expected, (x, name, move)
+
+
+def test_without_the_tree_a_redo_outlives_edits_of_others(store):
+    put(store, "anna", 1, 10)
+    assert store.undo_own("anna", in_tree=False).in_tree is False
+    put(store, "ben", 2, 20)
+    assert store.own_labels("anna")[:2] == (None, "anna sets 10")
+    store.redo_own("anna", in_tree=False)
+    assert xs(store) == {1: 10, 2: 20}
+
+
+def test_labels_name_what_a_move_would_take(store):
+    assert store.own_labels()[:2] == (None, None)
+    put(store, "anna", 1, 10)
+    put(store, "ben", 2, 20)
+    assert (store.own_labels()[:2], store.own_labels("ben")[:2]) == (("anna sets 10", None), ("ben sets 20", None))
+    store.undo_own()
+    store.undo_own("ben", in_tree=True)
+    assert (store.own_labels()[:2], store.own_labels("ben")[:2]) == ((None, "anna sets 10"), (None, "ben sets 20"))
+
+
+def test_a_gesture_goes_on_beside_edits_of_other_poses(store):
+    drag = put(store, "anna", 1, 10)
+    put(store, "ben", 2, 20)
+    store.amend(drag, [PoseChange("man", 1, PoseRecord(np.array([11.0]), ("manual",), 1))])
+    assert xs(store) == {1: 11, 2: 20}
+    store.undo_own("anna")
+    assert xs(store) == {2: 20}
+    with pytest.raises(OvertakenEditError):
+        store.amend(drag, [PoseChange("man", 2, PoseRecord(np.array([12.0]), ("manual",), 1))])
+
+
+def test_a_gesture_that_was_undone_goes_on_no_more(store):
+    drag = put(store, "anna", 1, 10)
+    store.undo_own()
+    put(store, "ben", 2, 20)
+    with pytest.raises(OvertakenEditError):
+        store.amend(drag, [PoseChange("man", 1, PoseRecord(np.array([11.0]), ("manual",), 1))])

@@ -1,0 +1,227 @@
+"""The people on one session: they join by name, have a controller each, and find their place again."""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from app.control.controller import Controller
+from app.participants.names import is_same, joined_name
+from app.state.role import Role
+from app.state.state import State
+from app.storage.turns import work_of
+from tracker.errors import TrackerError
+
+_MAX_PEOPLE = 12
+"""People besides the host who can be on a session at a time: each has a dozen threads and some megabytes."""
+_MAX_PLACES = 100
+"""Number of people whose frame is remembered after they have left."""
+_ABSENT_S = 300.0
+"""Time after which the controller of a person without a page is closed; it can be opened again at the same frame."""
+
+
+class Presence(NamedTuple):
+    """A person on the session, as the others see them."""
+
+    name: str
+    role: Role
+    frame: int
+    person: int
+    """Index of the selected person."""
+    doing: str
+    """Work on poses, as text: `drags on frame 12`; empty for none."""
+
+
+@dataclass(eq=False)
+class _Participant:
+    name: str
+    role: Role
+    controller: Controller
+    n_pages: int = 0
+    left_at: float = field(default_factory=time.monotonic)
+    seen: Presence | None = None
+    """As the others were last told; None while no page is open."""
+    unsubscribe: Callable[[], None] = lambda: None
+
+
+class Visit(NamedTuple):
+    """What a page shows, and what it may do."""
+
+    controller: Controller
+    role: Role
+    """What it may do now: a link without a name only looks."""
+    name: str
+    """Name of the one who has joined; empty for a page that watches the host."""
+    link: Role
+    """What its link allows once a name is given."""
+    refusal: str = ""
+    """Why the wanted name could not be had, or empty."""
+    participant: _Participant | None = None
+    """Whose page it is; None for one that watches the host."""
+
+    @property
+    def has_place(self) -> bool:
+        """Whether it has a frame of its own, shared with other pages of the same person only."""
+        return self.participant is not None
+
+
+class Participants:
+    """Those who have joined one session. The host is there from the beginning."""
+
+    def __init__(self, host: Controller, absent_s: float = _ABSENT_S) -> None:
+        """Begin with the host.
+
+        Args:
+            host: controller of the session.
+            absent_s: time after which the controller of an absent person is closed.
+        """
+        self._absent_s = absent_s
+        self._lock = threading.RLock()  # taken before that of the session, never within
+        self._host = _Participant(host.author, "host", host)
+        self._others: list[_Participant] = []
+        self._places: dict[tuple[Role, str], tuple[int, int, str | None]] = {}
+        self._listeners: list[Callable[[], None]] = []
+        self._timer: threading.Timer | None = None
+        self._closed = False
+        self._follow(self._host)
+
+    @property
+    def host(self) -> Controller:
+        """Controller of the host."""
+        return self._host.controller
+
+    def join(self, role: Role, text: str = "") -> Visit:
+        """Join with a page, until `leave`.
+
+        Args:
+            role: that the page's link gives.
+            text: name as typed; empty for none. Without one, a page of the host is the host's, and a link watches the
+                host.
+        """
+        refusal = ""
+        try:
+            found = self._join(role, joined_name(text))
+        except TrackerError as error:
+            refusal, found = str(error), self._join(role, "")
+        if found is None:
+            return Visit(self.host, "look", "", role, refusal)
+        return Visit(found.controller, found.role, found.name, role, refusal, found)
+
+    def leave(self, visit: Visit) -> None:
+        """Leave with a page. The controller stays for a while, so that a page that loads again finds its place."""
+        participant = visit.participant
+        if participant is None:
+            return
+        with self._lock:
+            participant.n_pages -= 1
+            participant.left_at = time.monotonic()
+            self._note(participant)
+            self._plan_drop()
+
+    def present(self) -> tuple[Presence, ...]:
+        """Return who has a page open: the host first, the others in the order in which they joined."""
+        with self._lock:
+            return tuple(p.seen for p in (self._host, *self._others) if p.n_pages and p.seen is not None)
+
+    def subscribe(self, listener: Callable[[], None]) -> Callable[[], None]:
+        """Call a function whenever `present` changes, from any thread; returns the function that ends this."""
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener)
+
+    def close(self) -> None:
+        """Close the controllers of all but the host."""
+        with self._lock:
+            self._closed = True
+            if self._timer is not None:
+                self._timer.cancel()
+            for participant in list(self._others):
+                self._drop(participant)
+        self._host.unsubscribe()
+
+    def _join(self, role: Role, name: str) -> _Participant | None:
+        """Return the participant of a page; None for one that only watches the host.
+
+        Raises:
+            TrackerError: somebody with another role has the name, or there are too many.
+        """
+        with self._lock:
+            if role == "host" and (not name or is_same(name, self._host.name)):
+                found = self._host
+            elif not name:
+                return None
+            else:
+                found = self._named("annotate" if role == "host" else role, name)
+            found.n_pages += 1
+            self._note(found)
+            return found
+
+    def _named(self, role: Role, name: str) -> _Participant:
+        known = next((p for p in (self._host, *self._others) if is_same(p.name, name)), None)
+        if known is not None and known.role == role:
+            return known
+        if known is not None and (known is self._host or not _is_idle(known)):
+            raise TrackerError(
+                f"expected a name that nobody else has, found {known.name}, who has joined with another role; "
+                "choose another"
+            )
+        if known is not None:
+            self._drop(known)
+        if len(self._others) >= _MAX_PEOPLE:
+            idle = [p for p in self._others if _is_idle(p)]
+            if not idle:
+                raise TrackerError(
+                    f"expected at most {_MAX_PEOPLE} people besides the host, found as many; join when somebody leaves"
+                )
+            self._drop(min(idle, key=lambda p: p.left_at))
+        made = _Participant(name, role, self.host.beside(name, writes=role != "look"))
+        frame, person, point = self._places.get((role, name), (self.host.state.frame, self.host.state.person, None))
+        made.controller.navigation.seek(frame)
+        made.controller.navigation.select(person, point)
+        self._others.append(made)
+        self._follow(made)
+        return made
+
+    def _plan_drop(self) -> None:
+        if self._timer is None and not self._closed and any(not p.n_pages for p in self._others):
+            self._timer = threading.Timer(self._absent_s, self._drop_absent)
+            self._timer.daemon = True
+            self._timer.start()
+
+    def _drop_absent(self) -> None:
+        with self._lock:
+            self._timer = None
+            late = time.monotonic() - self._absent_s
+            for participant in [p for p in self._others if _is_idle(p) and p.left_at <= late]:
+                self._drop(participant)
+            self._plan_drop()
+
+    def _drop(self, participant: _Participant) -> None:
+        self._others.remove(participant)
+        participant.unsubscribe()
+        state = participant.controller.state
+        self._places.pop((participant.role, participant.name), None)
+        self._places[participant.role, participant.name] = state.frame, state.person, state.point
+        if len(self._places) > _MAX_PLACES:
+            del self._places[next(iter(self._places))]
+        participant.controller.close()
+
+    def _follow(self, participant: _Participant) -> None:
+        participant.unsubscribe = participant.controller.subscribe(lambda _: self._note(participant))
+
+    def _note(self, participant: _Participant) -> None:
+        """Tell the pages where a participant is, if that has changed; called under the session's lock or not."""
+        seen = _presence(participant, participant.controller.state) if participant.n_pages else None
+        if seen != participant.seen:
+            participant.seen = seen
+            for listener in list(self._listeners):
+                listener()
+
+
+def _is_idle(participant: _Participant) -> bool:
+    return not participant.n_pages and work_of(participant.controller.state) is None
+
+
+def _presence(participant: _Participant, state: State) -> Presence:
+    work = work_of(state)
+    return Presence(participant.name, participant.role, state.frame, state.person, "" if work is None else work.what)

@@ -1,0 +1,80 @@
+/** The people on the session: initials in the top bar, and a list with frames in a popover. */
+
+import { byId } from "../widgets/elements.js";
+import { opensPopover, togglePopover } from "../widgets/popovers.js";
+import { capital } from "../widgets/text.js";
+import { colorOf, initialsOf, nameOf } from "./marks.js";
+
+const ROLES = { host: "host", annotate: "annotates", review: "reviews", look: "looks" };
+/** Number of people whose initials are shown; the others are counted. */
+const SHOWN = 4;
+
+export class Here {
+  #context;
+  #form;
+  #button = byId("show-participants", HTMLButtonElement);
+  #panel = byId("participants-panel", HTMLElement);
+  #chips = byId("participant-chips", HTMLElement);
+  #list = byId("participants-list", HTMLElement);
+
+  /**
+   * @param {import("../model/index.js").Context} context
+   * @param {ReturnType<typeof import("./join_form.js").joinForm>} join
+   */
+  constructor(context, join) {
+    this.#context = context;
+    this.#form = join;
+    this.#panel.append(join.form);
+    opensPopover(this.#panel, this.#button, () => this.toggle());
+    context.store.subscribe((changed) => changed.has("presence") && this.#show());
+  }
+
+  toggle() {
+    togglePopover(this.#panel, this.#button);
+    if (this.#panel.matches(":popover-open")) this.#form.input.focus();
+  }
+
+  #show() {
+    const people = this.#context.store.facts.presence?.people ?? [];
+    const others = people.filter(({ is_self }) => !is_self);
+    const chips = others.slice(0, SHOWN).map((person) => chipOf(person, people.indexOf(person)));
+    if (others.length > SHOWN) chips.push(Object.assign(document.createElement("span"), { textContent: `+${others.length - SHOWN}` }));
+    this.#chips.replaceChildren(...chips);
+    this.#button.hidden = people.length < 2 && this.#context.store.facts.presence?.link === "host";
+    const names = others.map((person) => `${nameOf(person)} on frame ${person.frame}`);
+    this.#button.title = `${names.length ? `Here: ${names.join(", ")}` : "Nobody else is here"} (Alt+E)`;
+    this.#button.setAttribute("aria-label", names.length ? `Who is here: ${names.length} others` : "Who is here: nobody else");
+    this.#list.replaceChildren(...people.map((person, index) => this.#row(person, index)));
+  }
+
+  /**
+   * @param {import("../model/protocol.js").PresentPerson} person
+   * @param {number} index
+   */
+  #row(person, index) {
+    const row = document.createElement("li");
+    const name = Object.assign(document.createElement("span"), { className: "participant-name" });
+    name.textContent = nameOf(person) + (person.is_self ? " (you)" : "");
+    const role = Object.assign(document.createElement("span"), { className: "quiet", textContent: ROLES[person.role] });
+    const work = capital(person.doing);
+    const at = Object.assign(document.createElement("button"), {
+      type: "button", textContent: `Frame ${person.frame}`, title: `Go to frame ${person.frame}`, disabled: person.is_self,
+    }); // prettier-ignore
+    at.addEventListener("click", () => this.#context.navigation.goTo(person.frame));
+    const doing = Object.assign(document.createElement("span"), { className: "participant-work", textContent: work });
+    row.append(chipOf(person, index), name, role, at, doing);
+    return row;
+  }
+}
+
+/**
+ * @param {import("../model/protocol.js").PresentPerson} person
+ * @param {number} index
+ */
+function chipOf(person, index) {
+  const chip = Object.assign(document.createElement("span"), { className: "participant-chip", textContent: initialsOf(person) });
+  chip.style.setProperty("--participant", colorOf(index));
+  chip.classList.toggle("is-at-work", person.doing !== "");
+  chip.setAttribute("aria-hidden", "true");
+  return chip;
+}

@@ -1,0 +1,35 @@
+/**
+ * Participants: who else is on the session, where, and the name by which this page joins.
+ *
+ * The room imports `widgets` and types of `model`.
+ */
+
+import { byId } from "../widgets/elements.js";
+import { alt, inArea } from "../widgets/key_matching.js";
+import { Here } from "./here.js";
+import { joinForm } from "./join_form.js";
+import { PlaceMarks } from "./place_marks.js";
+
+/** @typedef {ReturnType<typeof mount>} ParticipantsRoom */
+
+/**
+ * Show who is where in the top bar and along the timeline.
+ *
+ * @param {import("../model/index.js").Context} context
+ */
+export function mount(context) {
+  const here = new Here(context, joinForm(context, "panel"));
+  new PlaceMarks(byId("timeline", HTMLElement), context.store);
+  const bar = byId("join-bar", HTMLElement);
+  bar.append(joinForm(context, "bar").form);
+  context.store.subscribe((changed) => {
+    if (!changed.has("presence") && !changed.has("session")) return;
+    const { presence, session } = context.store.facts;
+    bar.hidden = !presence || !session || session.has_place;
+    document.documentElement.dataset.place = String(session?.has_place ?? true);
+  });
+  const bindings = inArea("People", [
+    { keys: ["Alt E"], label: "Who is here, and your name", words: "join participants", matches: alt("KeyE", false), run: () => here.toggle() },
+  ]);
+  return { bindings };
+}

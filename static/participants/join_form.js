@@ -1,0 +1,38 @@
+/** The field for the name by which a page joins. */
+
+const DOES = { host: "annotate", annotate: "annotate", review: "review", look: "look around" };
+
+/**
+ * @param {import("../model/index.js").Context} context
+ * @param {string} place of the form in the page, which makes its field's id unique
+ */
+export function joinForm({ store, joinAs }, place) {
+  const form = Object.assign(document.createElement("form"), { className: "join-form" });
+  const input = Object.assign(document.createElement("input"), {
+    type: "text", id: `join-name-${place}`, name: "name", maxLength: 60, required: true, autocomplete: "name", className: "query-field",
+  }); // prettier-ignore
+  const label = Object.assign(document.createElement("label"), { htmlFor: input.id });
+  const join = Object.assign(document.createElement("button"), { type: "submit", textContent: "Join" });
+  const refusal = Object.assign(document.createElement("output"), { className: "join-refusal" });
+  join.title = "Work under this name, on a frame of your own (Enter)";
+  form.append(label, input, join, refusal);
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    joinAs(input.value.trim());
+    input.blur();
+  });
+  input.addEventListener("keydown", (event) => {
+    event.stopPropagation();
+    if (event.key === "Escape") input.blur();
+  });
+  store.subscribe((changed) => {
+    const { presence } = store.facts;
+    if (!changed.has("presence") || !presence) return;
+    const isHost = presence.link === "host";
+    label.textContent = isHost ? "Join under another name" : presence.name ? "Change your name" : `Your name, to ${DOES[presence.link]}`;
+    refusal.textContent = presence.refusal;
+    refusal.hidden = !presence.refusal;
+    if (document.activeElement !== input) input.value = presence.refusal || isHost ? "" : presence.name;
+  });
+  return { form, input };
+}

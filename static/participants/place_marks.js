@@ -1,0 +1,47 @@
+/** Marks along the timeline at the frames of the others. */
+
+import { FrameAxis } from "../widgets/frame_axis.js";
+import { colorOf, initialsOf, nameOf } from "./marks.js";
+
+/** Marks nearer than this stand one below the other. */
+const WIDTH_PX = 22;
+/** Distance of one below the other, and the number of steps at most: the timeline has no more room. */
+const [STEP_PX, MAX_STEPS] = [13, 2];
+
+export class PlaceMarks {
+  #timeline;
+  #store;
+  #layer = Object.assign(document.createElement("div"), { className: "place-marks" });
+
+  /**
+   * @param {HTMLElement} timeline
+   * @param {import("../model/store.js").Store} store
+   */
+  constructor(timeline, store) {
+    this.#timeline = timeline;
+    this.#store = store;
+    this.#layer.setAttribute("aria-hidden", "true"); // the list of people says the same
+    timeline.append(this.#layer);
+    new ResizeObserver(() => this.#show()).observe(timeline);
+    store.subscribe((changed) => {
+      if (["presence", "session", "visible"].some((fact) => changed.has(/** @type {"presence"} */ (fact)))) this.#show();
+    });
+  }
+
+  #show() {
+    const { presence, session, visible } = this.#store.facts;
+    const axis = new FrameAxis(this.#timeline.clientWidth, session?.n_frames ?? 1, visible);
+    const others = (presence?.people ?? []).map((person, index) => ({ person, index })).filter(({ person }) => !person.is_self);
+    const shown = others.filter(({ person }) => axis.shows(person.frame));
+    const marks = shown.map(({ person, index }, at) => {
+      const before = shown.slice(0, at).filter((one) => Math.abs(axis.middle(one.person.frame) - axis.middle(person.frame)) < WIDTH_PX);
+      const mark = Object.assign(document.createElement("span"), { className: "place-mark", textContent: initialsOf(person) });
+      mark.title = `${nameOf(person)} is on frame ${person.frame}`;
+      mark.style.left = `${axis.middle(person.frame)}px`;
+      mark.style.top = `${2 + STEP_PX * Math.min(before.length, MAX_STEPS)}px`;
+      mark.style.setProperty("--participant", colorOf(index));
+      return mark;
+    }); // prettier-ignore
+    this.#layer.replaceChildren(...marks);
+  }
+}

@@ -1,0 +1,189 @@
+"""How much a second person who plays slows the drags of the first, as a ratio within one run.
+
+Run by hand, on a quiet machine: `python tests/benchmarks/two_people.py`. Two people have joined the sample session with
+a page each. One drags a wrist, some 30 moves a second, while the other rests and while they play, in turns: with plain
+sockets, which leaves the share of the program, then in two Chromium without the 3-D view. A word measures one of them.
+"""
+
+import asyncio
+import json
+import shutil
+import struct
+import sys
+import tempfile
+import time
+from contextlib import AsyncExitStack, suppress
+from pathlib import Path
+
+import aiohttp
+import numpy as np
+from playwright.async_api import Browser, Page, async_playwright
+from sample_page import ROOT
+
+from chromium import FLAGS, chromium_path  # isort: skip  (found by sample_page)
+from page_driver import handle_of, shows, to_client  # isort: skip
+from program import READY, WITHOUT_3D, Program  # isort: skip
+
+ROUNDS, MOVES, INTERVAL_S = 4, 150, 1 / 30
+FPS = 25
+SIZE = {"width": 1280, "height": 720}
+
+
+async def opened(browser: Browser, address: str, name: str) -> Page:
+    """A page of a person, in a context of its own."""
+    context = await browser.new_context(viewport=SIZE)
+    await context.add_init_script(f"{WITHOUT_3D}; sessionStorage.setItem('quadrille-name', '{name}')")
+    page = await context.new_page()
+    await page.goto(address)
+    await shows(page, READY, 120)
+    return page
+
+
+async def dragged(page: Page) -> list[float]:
+    """Latencies of the moves of a drag, ms."""
+    await page.evaluate("quadrille.latencies.length = 0")
+    x, y = await to_client(page, 0, *await handle_of(page, 0, "left_wrist"))
+    await page.mouse.move(x, y)
+    await page.mouse.down()
+    for k in range(MOVES):
+        await page.mouse.move(x + 30 * np.sin(k / 12), y - 20 + 20 * np.cos(k / 9))
+        await asyncio.sleep(INTERVAL_S)
+    await page.mouse.up()
+    await asyncio.sleep(1)
+    found: list[float] = await page.evaluate("quadrille.latencies")
+    return found
+
+
+async def in_browsers(address: str) -> tuple[list[float], list[float]]:
+    """Latencies while the other page rests, and while it plays, ms."""
+    alone, beside = [], []
+    async with async_playwright() as playwright, AsyncExitStack() as stack:
+        # A process for each, as two people have.
+        browsers = [
+            await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS) for _ in ("anna", "ben")
+        ]
+        for browser in browsers:
+            stack.push_async_callback(browser.close)
+        anna, ben = await opened(browsers[0], address, ""), await opened(browsers[1], address, "ben")
+        await ben.keyboard.press("Shift+Space")  # loops
+        for _ in range(ROUNDS):
+            alone += await dragged(anna)
+            await ben.keyboard.press("Space")
+            await asyncio.sleep(1)
+            beside += await dragged(anna)
+            await ben.keyboard.press("Space")
+            await asyncio.sleep(1)
+    return alone, beside
+
+
+class Hand:
+    """Drags through a plain socket, and times each move until its contours arrive."""
+
+    def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
+        """Use an open socket."""
+        self._socket, self._sent, self._seq = socket, dict[int, float](), 0
+        self.latencies: list[float] = []
+        self.handle: tuple[float, float] | None = None
+
+    async def listen(self) -> None:
+        """Note when the contours of a move arrive."""
+        with suppress(asyncio.CancelledError):
+            async for message in self._socket:
+                if message.type is not aiohttp.WSMsgType.BINARY:
+                    continue
+                (length,) = struct.unpack_from("<I", message.data)
+                header = json.loads(message.data[4 : 4 + length])
+                if header["type"] != "overlay":
+                    continue
+                at = time.perf_counter()
+                for one in header["handles"]:
+                    if one["camera"] == 0 and one["point"] == "left_wrist":
+                        self.handle = (one["u"], one["v"])
+                seq = header["seq"]
+                if seq in self._sent:
+                    self.latencies.append(1000 * (at - self._sent.pop(seq)))
+
+    async def drag(self) -> list[float]:
+        """Latencies of the moves of a drag, ms."""
+        self.latencies = []
+        assert self.handle is not None
+        u, v = self.handle
+        for k in range(MOVES):
+            self._seq += 1
+            self._sent[self._seq] = time.perf_counter()
+            place = {"u": u + 20 * np.sin(k / 12), "v": v - 10 + 10 * np.cos(k / 9)}
+            phase = "start" if k == 0 else "end" if k == MOVES - 1 else "move"
+            fields = {"camera": 0, "person": 0, "point": "left_wrist", "mode": "move", "frame": 0}
+            await self._socket.send_json({"type": "drag", "phase": phase, "seq": self._seq, **fields, **place})
+            await asyncio.sleep(INTERVAL_S)
+        await asyncio.sleep(1)
+        return self.latencies
+
+
+async def play(socket: aiohttp.ClientWebSocketResponse, plays: asyncio.Event) -> None:
+    """Ask for one frame after the other while that is wanted."""
+    frame = 0
+    while True:
+        await plays.wait()
+        frame = (frame + 1) % 50
+        await socket.send_json({"type": "seek", "frame": frame})
+        await asyncio.sleep(1 / FPS)
+
+
+async def drain(socket: aiohttp.ClientWebSocketResponse) -> None:
+    """Read all that comes."""
+    async for _ in socket:
+        pass
+
+
+async def by_sockets(address: str) -> tuple[list[float], list[float]]:
+    """As `in_browsers`, without browsers."""
+    alone, beside = [], []
+    url = address.replace("http", "ws") + "ws"
+    async with (
+        aiohttp.ClientSession() as client,
+        client.ws_connect(url, max_msg_size=0) as anna,
+        client.ws_connect(f"{url}?name=cleo", max_msg_size=0) as ben,
+    ):
+        view = {"type": "view", "layers": ["image", "contours", "joints"], "reductions": [1] * 4, "by_part": False}
+        await anna.send_json(view)
+        await ben.send_json(view)
+        hand, plays = Hand(anna), asyncio.Event()
+        work = [asyncio.create_task(c) for c in (hand.listen(), play(ben, plays), drain(ben))]
+        while hand.handle is None:
+            await asyncio.sleep(1)
+        await asyncio.sleep(3)
+        for _ in range(ROUNDS):
+            alone += await hand.drag()
+            plays.set()
+            await asyncio.sleep(1)
+            beside += await hand.drag()
+            plays.clear()
+            await asyncio.sleep(1)
+        for task in work:
+            task.cancel()
+        await asyncio.gather(*work, return_exceptions=True)
+    return alone, beside
+
+
+async def main() -> None:
+    """Print medians, 95th percentiles and their ratio."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary) / "session"
+        shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", folder)
+        for name, measure in (("sockets", by_sockets), ("browsers", in_browsers)):
+            if sys.argv[1:] and name not in sys.argv[1:]:
+                continue
+            program = Program(folder, "--annotator", "anna")
+            await program.start()
+            alone, beside = await measure(program.address)
+            await program.stop()
+            (a50, a95), (b50, b95) = np.percentile(alone, [50, 95]), np.percentile(beside, [50, 95])
+            print(
+                f"{name}: {len(alone)} and {len(beside)} moves; alone median {a50:.0f} ms, p95 {a95:.0f} ms; while the "
+                f"other plays {b50:.0f} and {b95:.0f} ms; ratio of p95 {b95 / a95:.2f}"
+            )
+
+
+if __name__ == "__main__":
+    asyncio.run(main())
