@@ -6,15 +6,21 @@ import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeAlias
 
 import msgspec
 
 from tracker.batch.claims import BEAT_S, Claim
 from tracker.batch.manifest import Manifest, RecordingTask, Result
+from tracker.batch.stretches import Division
 from tracker.batch.tasks import Done, do_task
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
+
+
+Work: TypeAlias = Callable[[RecordingTask, Path, Callable[[str, float], None]], Done | Division]
+"""Does a task in the folder of a batch, and reports its progress."""
 
 
 class LostClaimError(Exception):
@@ -24,14 +30,14 @@ class LostClaimError(Exception):
 def work(
     folder: Path,
     max_tasks: int | None = None,
-    do: Callable[[RecordingTask, Path, Callable[[str, float], None]], Done] = do_task,
+    do: Work = do_task,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> int:
     """Do tasks of a batch until all have ended.
 
     Args:
         folder: of the batch.
-        max_tasks: number of tasks after which it ends; None for no limit.
+        max_tasks: number of tasks after which it ends, each stretch being one; None for no limit.
         do: does a task.
         is_stopped: asked at each step; its task is then given back, and goes on where it was later.
 
@@ -55,12 +61,12 @@ def _do(
     manifest: Manifest,
     task: RecordingTask,
     held: Claim,
-    do: Callable[[RecordingTask, Path, Callable[[str, float], None]], Done],
+    do: Work,
     is_stopped: Callable[[], bool],
 ) -> bool:
     """Do one task; return whether its result was written."""
     if held.dead is not None:
-        held.free_session(Path(task.recording.session))
+        held.free_session(task.session(manifest.folder))
     began, cpu = time.monotonic(), time.process_time()
 
     def go_on(stage: str, share: float) -> None:
@@ -69,10 +75,16 @@ def _do(
         if not held.is_held():
             raise LostClaimError
 
+    def used() -> dict[str, float]:
+        seconds, cpu_seconds = manifest.spent(task)
+        return {
+            "seconds": seconds + time.monotonic() - began,
+            "cpu_seconds": cpu_seconds + time.process_time() - cpu,
+        }
+
     def end(result: Result) -> bool:
-        used = {"seconds": time.monotonic() - began, "cpu_seconds": time.process_time() - cpu}
         who = f"{socket.gethostname()} {os.getpid()}"
-        return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, **used))
+        return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, **used()))
 
     try:
         allowed = task.recording.settings.attempts or 3
@@ -87,17 +99,27 @@ def _do(
         code = "" if remedy is None else remedy.code
         return end(Result("failed", error=str(error), remedy=code, remedy_fields=fields))
     except LostClaimError:
-        _LOG.warning("%s was taken by another worker; this one goes on with the next task", task.recording.name)
+        _LOG.warning("%s was taken by another worker; this one goes on with the next task", task.name)
         return False
     except (InterruptedError, KeyboardInterrupt):
         manifest.forget_attempt(task)
         held.release()
         raise
     except Exception as error:  # one recording must not end the others
-        _LOG.exception("%s failed", task.recording.name)
+        _LOG.exception("%s failed", task.name)
         text = f"internal error: {type(error).__name__}: {error}; please report it with the log"
         return end(Result("failed", error=text))
-    files = [str(path.relative_to(manifest.folder)) for path in done.files]
-    statuses = {name: dict(counts) for name, counts in done.tracked.statuses.items()}
-    tracked = done.tracked
-    return end(Result("done", "", 0.0, 0.0, tracked.first_frame, statuses, tracked.contradiction, files))
+    if isinstance(done, Division):
+        manifest.forget_attempt(task)
+        return manifest.divide(task, held, msgspec.structs.replace(done, **used()))
+    return end(
+        Result(
+            "done",
+            first_pose=done.tracked.first_frame,
+            statuses={name: dict(counts) for name, counts in done.tracked.statuses.items()},
+            contradiction=done.tracked.contradiction,
+            files=[str(path.relative_to(manifest.folder)) for path in done.files],
+            n_stretches=max(1, len(task.stretches())),
+            seams=list(done.seams),
+        )
+    )
