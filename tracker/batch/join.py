@@ -1,8 +1,8 @@
 """Join the stretches of a long recording, in the store of its session, by one worker.
 
-Neighbouring stretches share some frames. They are joined at the frame on which their tracks agree best. How far they lie
-apart there is the seam. On all shared frames the expected errors count what the tracks disagree about, by the rule of
-poses between keyframes (`tracker.pipeline.keyframe_stretches`), so that a seam over the tolerance is doubted.
+Neighbouring stretches share some frames. They are joined at the frame on which their tracks agree best. The distance of
+the tracks there is the seam. On all shared frames the expected errors count what the tracks disagree about, by the rule
+of poses between keyframes (`tracker.pipeline.keyframe_stretches`), so that a seam over the tolerance is doubted.
 """
 
 from collections import Counter
@@ -29,8 +29,8 @@ from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 
 _JOINING = "joining"
 """Setting of the session: the task that joins stretches, and the entry of the history to which it adds poses."""
-_NOWHERE = np.full(3, np.nan)
-"""Place of a person who has no pose."""
+_NOWHERE = np.full((1, 3), np.nan)
+"""Points of a person who has no pose."""
 
 
 class TrackedStretch(NamedTuple):
@@ -165,10 +165,8 @@ class _Joiner:
 
         def places(part: TrackedStretch, person: Person) -> Array:
             poses = self._poses(part, person, shared)
-            middles = [
-                person.model.points_world(poses[k].values).mean(axis=0) if k in poses else _NOWHERE for k in shared
-            ]
-            return np.array(middles)
+            points = [person.model.points_world(poses[k].values) if k in poses else _NOWHERE for k in shared]
+            return np.array([of_frame.mean(axis=0) for of_frame in points])
 
         of_a, of_b = ([places(part, person) for person in self._people] for part in (a, b))
         apart_m = np.array([[np.nanmean(np.linalg.norm(p - q, axis=1)) for q in of_a] for p in of_b])

@@ -226,15 +226,27 @@ class Manifest:
         held.release()
         return True
 
-    def spent(self, task: RecordingTask) -> tuple[float, float]:
-        """Return the time that earlier visits and the stretches of a recording took, by the clock and of processors, s."""
-        if task.division is None or task.stretch is not None:
-            return 0.0, 0.0
-        ended = [r for part in task.stretches() if (r := self.result(part)) is not None]
-        return (
-            task.division.seconds + sum(r.seconds for r in ended),
-            task.division.cpu_seconds + sum(r.cpu_seconds for r in ended),
-        )
+    def spent_on_stretches(self, task: RecordingTask) -> tuple[float, float]:
+        """Return the time that the stretches of a recording took, by the clock and of processors, s."""
+        found = [
+            msgspec.json.decode(path.read_bytes(), type=Result)
+            for path in sorted((self.folder / "results").glob(f"{task.key}_*.json"))
+        ]
+        return sum(r.seconds for r in found), sum(r.cpu_seconds for r in found)
+
+    def n_parts(self) -> int:
+        """Return how many tasks are left that workers can do side by side: recordings, and stretches of long ones."""
+        n = 0
+        for task in self.tasks:
+            if self.result(task) is None:
+                parts = self.divided(task).stretches()
+                n += max(1, sum(self.result(part) is None for part in parts)) if parts else task.n_expected
+        return n
+
+    def ended_parts(self) -> dict[str, tuple[RecordingTask, Result]]:
+        """Return the tasks that have ended, and the stretches of long recordings, by their keys."""
+        parts = (part for task in self.tasks for part in (*self.divided(task).stretches(), task))
+        return {part.key: (part, result) for part in parts if (result := self.result(part)) is not None}
 
     def is_finished(self) -> bool:
         """Return whether every task has ended."""

@@ -48,9 +48,8 @@ class Settings(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     export: list[Name] | None = None
     """Formats to write the poses in."""
     stretch: Annotated[int, Meta(ge=0, description="a whole number from 0")] | None = None
-    """Frames of a stretch at least, of those that are tracked: a recording of twice as many is cut. 0 for never, 1000 by
-    default: memory of a worker stays at that of such a recording, and finding people in each stretch takes as long as
-    tracking some fifty frames of it with the audit."""
+    """Frames of a stretch at least, of those that are tracked: a recording of twice as many is cut. 0 for never. 1000
+    by default (`tests/benchmarks/long_recording.py`): finding people in each stretch takes a tenth of the time."""
     attempts: Annotated[int, Meta(ge=1, description="a whole number from 1")] | None = None
     """Workers that may die over the recording before it counts as failed, so that it does not kill them all; 3 by
     default."""

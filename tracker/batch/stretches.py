@@ -1,7 +1,7 @@
 """Stretches of a long recording: where it is cut, and under which names its people were found.
 
-A recording is cut where everybody has a keyframe; the stretches on both sides share that frame. Where there is none, the
-stretches share a second of frames, on which their tracks are compared and joined (`tracker.batch.join`).
+A recording is cut where everybody has a keyframe; the stretches on both sides share that frame. Where there is none,
+they share a second of frames, on which their tracks are compared and joined (`tracker.batch.join`).
 """
 
 from collections.abc import Collection

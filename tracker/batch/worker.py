@@ -75,16 +75,15 @@ def _do(
         if not held.is_held():
             raise LostClaimError
 
-    def used() -> dict[str, float]:
-        seconds, cpu_seconds = manifest.spent(task)
-        return {
-            "seconds": seconds + time.monotonic() - began,
-            "cpu_seconds": cpu_seconds + time.process_time() - cpu,
-        }
+    def used(*before: tuple[float, float]) -> dict[str, float]:
+        taken = [(time.monotonic() - began, time.process_time() - cpu), *before]
+        if task.division is not None and task.stretch is None:
+            taken.append((task.division.seconds, task.division.cpu_seconds))
+        return {"seconds": sum(s for s, _ in taken), "cpu_seconds": sum(s for _, s in taken)}
 
     def end(result: Result) -> bool:
-        who = f"{socket.gethostname()} {os.getpid()}"
-        return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, **used()))
+        who, times = f"{socket.gethostname()} {os.getpid()}", used(manifest.spent_on_stretches(task))
+        return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, **times))
 
     try:
         allowed = task.recording.settings.attempts or 3
