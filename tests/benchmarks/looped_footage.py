@@ -1,4 +1,7 @@
-"""Make footage as long as is asked for of short footage: played forth and back, encoded once, and its packets repeated."""
+"""Make long footage of short footage, which is played forth and back.
+
+One round is encoded, and its packets are repeated, so that 20,000 frames take seconds.
+"""
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
