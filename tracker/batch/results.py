@@ -10,6 +10,7 @@ import numpy as np
 from tracker.api.pose_series import PoseSeries
 from tracker.api.results import read_poses
 from tracker.batch.manifest import Manifest, RecordingTask, Result, State
+from tracker.batch.stretches import SeamRow
 from tracker.errors import SessionError, TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.session import load_session
@@ -39,6 +40,10 @@ class RecordingRow:
     cpu_seconds: float = 0.0
     contradiction: str = ""
     """A sentence on a camera that seems off; empty without one."""
+    n_stretches: int = 1
+    """Number of stretches in which it was tracked."""
+    seams: tuple[SeamRow, ...] = ()
+    """Where these were joined, the largest seam first."""
     result: Result | None = None
     """How the task ended; None while it has not."""
 
@@ -106,6 +111,8 @@ def _row(manifest: Manifest, task: RecordingTask) -> RecordingRow:
         result.seconds,
         result.cpu_seconds,
         result.contradiction,
+        result.n_stretches,
+        tuple(sorted(result.seams, key=lambda seam: -seam.apart_mm)),
         result,
     )
 

@@ -118,7 +118,7 @@ def _do(
             statuses={name: dict(counts) for name, counts in done.tracked.statuses.items()},
             contradiction=done.tracked.contradiction,
             files=[str(path.relative_to(manifest.folder)) for path in done.files],
-            n_stretches=max(1, len(task.stretches())),
+            n_stretches=1 if task.stretch is not None else max(1, len(task.stretches())),
             seams=list(done.seams),
         )
     )
