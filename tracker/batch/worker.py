@@ -14,6 +14,7 @@ from tracker.batch.claims import BEAT_S, Claim
 from tracker.batch.manifest import Manifest, RecordingTask, Result
 from tracker.batch.stretches import Division
 from tracker.batch.tasks import Done, do_task
+from tracker.compute.threads import one_blas_thread
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
@@ -44,16 +45,19 @@ def work(
     Returns:
         Number of tasks that this worker has ended.
     """
+    import scipy.linalg  # noqa: F401  before its threads are limited, which every task would load
+
     manifest, n_done = Manifest.load(folder), 0
-    while not is_stopped() and (max_tasks is None or n_done < max_tasks) and not manifest.is_finished():
-        found = manifest.claim_next()
-        if found is None:
-            time.sleep(BEAT_S)
-            continue
-        try:
-            n_done += _do(manifest, *found, do, is_stopped)
-        except InterruptedError:
-            break
+    with one_blas_thread():  # a worker has its share of the cores already
+        while not is_stopped() and (max_tasks is None or n_done < max_tasks) and not manifest.is_finished():
+            found = manifest.claim_next()
+            if found is None:
+                time.sleep(BEAT_S)
+                continue
+            try:
+                n_done += _do(manifest, *found, do, is_stopped)
+            except InterruptedError:
+                break
     return n_done
 
 
