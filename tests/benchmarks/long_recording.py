@@ -51,16 +51,18 @@ def watch(claims: Path, running: subprocess.Popen[bytes]) -> dict[str, tuple[flo
     return found
 
 
-def peak_mb(words: list[str]) -> tuple[float, float]:
-    """Run a command; return the most memory that it had, MB, and its processor time, s."""
+def peak_mb(words: list[str]) -> float:
+    """Run a command; return the most memory that it had, MB."""
+    most = 0.0
     with tempfile.TemporaryFile() as out:
         child = subprocess.Popen(words, stdout=out, stderr=subprocess.STDOUT)
-        _, status, used = os.wait4(child.pid, 0)
-        child.returncode = os.waitstatus_to_exitcode(status)
+        while child.poll() is None:
+            most = max(most, memory_mb(child.pid))
+            time.sleep(0.05)
         if child.returncode:
             out.seek(0)
             print(out.read().decode()[-2000:])
-    return used.ru_maxrss / 1e3, used.ru_utime + used.ru_stime
+    return most
 
 
 def opened_mb(session: Path) -> float:
@@ -186,8 +188,7 @@ def main() -> None:
             ["export", str(session), "--out", str(folder / "out.csv"), "--overwrite"],
             ["batch", str(plan), "--table"],
         ):
-            most, cpu = peak_mb([*PROGRAM, *command])
-            print(f"quadrille {command[0]}: {most:.0f} MB at most, {cpu:.1f} s of processor time")
+            print(f"quadrille {command[0]}: {peak_mb([*PROGRAM, *command]):.0f} MB at most")
         print(f"quadrille open: {opened_mb(session):.0f} MB")
 
 

@@ -55,5 +55,5 @@ def test_two_hundred_short_tasks_compile_each_kernel_once(lab, tmp_path):
     assert not late, "a worker compiled what the batch had compiled before its first task"
     cpu_s = sorted(r["cpu_seconds"] for r in found["recordings"])
     print(
-        f"{len(kernels)} kernels; processor time of a task: median {cpu_s[N_TASKS // 2]:.2f} s, most {cpu_s[-1]:.2f} s"
+        f"{len(kernels)} kernels; processor time of tasks: median {cpu_s[N_TASKS // 2]:.2f} s, most {cpu_s[-1]:.2f} s"
     )

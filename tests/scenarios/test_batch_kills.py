@@ -63,40 +63,56 @@ def poses_of(lab):
     return {folder.name: tracker.read_poses(folder).joints for folder in [*sorted(lab.glob("r*")), lab / "long"]}
 
 
-def test_random_kills_of_workers_that_track(recordings, tmp_path):
-    alone, _ = lab_of(recordings, tmp_path / "alone")
-    assert start(alone).wait() == 0
-    random.seed(44)
-    lab, manifest = lab_of(recordings, tmp_path / "killed")
-    workers, n_kills, changed = [], 0, {}
+def finish(lab, manifest, n_kills, life_s):
+    """Finish a batch by two workers, one of which is killed so many times; return how often that was done, and the
+    results as they were when they were seen first."""
+    workers, done, seen = [], 0, {}
     while not manifest.is_finished():
         workers = [w for w in workers if w.poll() is None]
         while len(workers) < 2:
             workers.append(start(lab))
-        for task in manifest.tasks:
-            if manifest.result(task) is not None and task.number not in changed:
-                changed[task.number] = (manifest.folder / "results" / f"{task.key}.json").read_bytes()
-        if n_kills < N_KILLS:
-            time.sleep(random.uniform(0.3, 4.0))
+        for path in (manifest.folder / "results").glob("*.json"):
+            seen.setdefault(path.name, path.read_bytes())
+        time.sleep(random.uniform(0.1, 0.9) * life_s)
+        if done < n_kills:
             random.choice(workers).send_signal(signal.SIGKILL)
-            n_kills += 1
-        else:
-            time.sleep(0.2)
+            done += 1
     for worker in workers:
         worker.wait()
-    assert n_kills >= N_KILLS or len(changed) >= len(manifest.tasks) - 1
+    return done, seen
+
+
+def check(lab, manifest, seen, expected):
+    """All is done, nothing was done again once it had ended, and the poses are the same to the bit."""
     assert manifest.counts() == {"done": 12}
-    for task in manifest.tasks:  # none was done again once it had ended
+    for task in manifest.tasks:
         result = manifest.folder / "results" / f"{task.key}.json"
-        assert result.read_bytes() == changed.get(task.number, result.read_bytes())
+        assert result.read_bytes() == seen.get(result.name, result.read_bytes())
         stored = max(p.stat().st_mtime for p in (lab / task.recording.name).glob("annotations.sqlite*"))
         assert stored <= result.stat().st_mtime
     assert not [*(manifest.folder / "claims").glob("[0-9]*")]
     assert not [p for p in (manifest.folder / "stretches").iterdir() if p.is_dir()]
     joined = json.loads((manifest.folder / "results" / "000000.json").read_text())
     assert (joined["n_stretches"], joined["seams"]) == (3, [])
-    expected, found = poses_of(alone), poses_of(lab)
+    found = poses_of(lab)
     assert expected.keys() == found.keys()
     for name, joints in found.items():
         assert np.array_equal(joints, expected[name], equal_nan=True), name
-    print(f"{n_kills} kills")
+
+
+def test_random_kills_of_workers_that_track(recordings, tmp_path):
+    alone, manifest = lab_of(recordings, tmp_path / "alone")
+    began = time.monotonic()
+    worker = start(alone)
+    while manifest.counts()["done"] == 0:
+        time.sleep(0.1)
+        assert worker.poll() is None
+    life_s = time.monotonic() - began  # until the first task is done: kills come before and after
+    assert worker.wait() == 0
+    expected, n_left = poses_of(alone), N_KILLS
+    random.seed(44)
+    while n_left:
+        lab, manifest = lab_of(recordings, tmp_path / f"killed{n_left}")
+        n_kills, seen = finish(lab, manifest, n_left, life_s)
+        check(lab, manifest, seen, expected)
+        n_left -= n_kills

@@ -230,7 +230,8 @@ class BodyModel:
 
         n_parts, n_dofs, kernels = len(self.parts), self.n_dofs, tracker.body.kinematics
         out = kernels.Kinematics(np.empty((n_parts, 4, 4)), np.empty((n_dofs, 3)), np.empty((n_dofs, 3)))
-        kernels.forward_kinematics(np.asarray(values, dtype=np.float64), self.tree, *out)
+        own = np.array(values, dtype=np.float64)  # a read-only or strided array would have a kernel of its own compiled
+        kernels.forward_kinematics(own, self.tree, *out)
         return out
 
     def points_world(self, values: Array) -> Array:
