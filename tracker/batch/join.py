@@ -173,10 +173,8 @@ class _Joiner:
         return [int(j) for j in linear_sum_assignment(apart_m)[1]]
 
     def cut(self, a: TrackedStretch, b: TrackedStretch) -> _Cut:
-        """Return the frame at which two neighbours agree best, of all people together, and their seams."""
+        """Return the frame at which two neighbours agree best, of all people together, and their seams; keyframes have none."""
         shared = self._shared(a, b)
-        if len(shared) == 1:  # a keyframe of everybody
-            return _Cut(shared[0], {}, ())
         seams = {i: self._seams(a, b, person, shared) for i, person in enumerate(self._people)}
         apart_mm = {
             k: [seams[i][k].seam_mm(person.model) for i, person in enumerate(self._people) if k in seams[i]]
