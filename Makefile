@@ -41,8 +41,8 @@ test-quick: $(VENV)/.tested
 test-library: $(VENV)/.tested
 	nice -n 19 $(PYTEST) --no-loadscope-reorder -m "not slow" --ignore=tests/browser tests
 
-# Starts at once: only the files of tests/browser/live, which come last, wait for the kernels. Three processes, because
-# these tests wait more than they compute.
+# Starts at once: only the files of tests/browser/live and share, which come last, wait for the kernels. Three processes,
+# because these tests wait more than they compute.
 test-page: $(VENV)/.tested
 	nice -n 5 $(PYTEST) --numprocesses 3 --no-loadscope-reorder -m "not slow" tests/browser
 

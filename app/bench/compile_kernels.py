@@ -139,11 +139,14 @@ def _call_tracking(session: Session) -> None:
 def _call_others(session: Session) -> None:
     """Call the kernels that the chamfer tracker does not need.
 
-    They label parts in an image, carve and label voxels, compare bodies with silhouettes, film simulated people, and
-    learn what is usual in a run.
+    They label parts in an image, carve and label voxels, compare bodies with silhouettes, film simulated people, learn
+    what is usual in a run, and check its cameras.
     """
+    from tracker.calibration.camera_correction import N_CORRECTIONS
+    from tracker.calibration.rig_problem import sums_of_pieces
     from tracker.contours.label_image import part_labels
     from tracker.evidence.silhouettes import SilhouetteFinder
+    from tracker.fitting.contour_residuals import ContourResiduals
     from tracker.geometry.cameras import viewed_point
     from tracker.initialization.generators.silhouette_overlap import SilhouetteOverlap
     from tracker.simulate.people.model_figure import ModelFigure
@@ -170,8 +173,11 @@ def _call_others(session: Session) -> None:
     overlap = SilhouetteOverlap(model, [s.mask for s in silhouettes], [s.camera for s in silhouettes], middle)
     overlap.added(body.kinematics.Ts_world_part[None], np.arange(len(model.parts)), overlap.nothing())
     with Recording(sources) as recording:
-        frames = [(k, (body,)) for k in range(_FRAME, _FRAME + _FRAMES)]
-        learn_run(Observer(sources, recording), frames)
+        observer, frames = Observer(sources, recording), [(k, (body,)) for k in range(_FRAME, _FRAME + _FRAMES)]
+        learn_run(observer, frames)
+        (view, *_) = observer.evidence(_FRAME)
+    _, pieces = ContourResiduals([view], [body]).piece_sums(body.values)
+    sums_of_pieces(pieces, model, body.kinematics, view.camera, np.zeros(N_CORRECTIONS))
 
 
 def _track(

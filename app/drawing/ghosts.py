@@ -1,17 +1,16 @@
-"""Draw poses beside the shown one: limbs that are elsewhere in poses about as good, and the poses of another copy."""
+"""Draw poses beside the shown one: alternatives, those of another copy, and former places of limbs that a fit moved."""
 
 import numpy as np
 
 from app.drawing.overlay_colors import KIND_COLORS
-from app.drawing.overlays import Path
+from app.drawing.overlays import Path, PathKind, traced
 from app.drawing.seen_bodies import picture_times
 from app.state.page_view import View
 from app.state.state import State
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.model import BodyModel, PosedBody
-from tracker.contours import occluding_contours
-from tracker.contours.pieces import PIECE_PX
 from tracker.geometry.arrays import IntArray
+from tracker.posing.edits import copy_dofs
 from tracker.session.session import Session
 
 
@@ -26,13 +25,10 @@ def ghost_lines(session: Session, state: State, view: View) -> list[Path]:
     person, model = reason.person, state.models[reason.person]
     if person in state.undrawn:
         return out
+    times = picture_times(session, state.frame, view.cameras)
     for other in reason.alternatives or ():
         body, parts = PosedBody(model, other.values, state.velocity(person)), _parts_of(model, other.limbs)
-        for index, time in picture_times(session, state.frame, view.cameras).items():
-            camera = session.cameras[index].camera.pinhole
-            contour = occluding_contours.trace([body.ahead(time)], camera, PIECE_PX * max(1.0, max(camera.size) / 640))
-            pieces = contour.pieces_px[np.isin(contour.parts, parts) & ~contour.occluded]
-            out.append(Path(index, person, "alternative", KIND_COLORS["alternative"], pieces))
+        out += _outlined(session, times, body, person, "alternative", parts)
     return out
 
 
@@ -41,15 +37,38 @@ def copy_lines(session: Session, state: State, view: View) -> list[Path]:
     copy, out = state.other_copy, list[Path]()
     if copy is None or "contours" not in view.layers or "contours" not in state.compiled:
         return out
+    times = picture_times(session, state.frame, view.cameras)
     for person, poses in enumerate(copy.poses):
         body = poses.get(state.frame)
-        if body is None or person in state.undrawn:
-            continue
-        for index in picture_times(session, state.frame, view.cameras):
-            camera = session.cameras[index].camera.pinhole
-            contour = occluding_contours.trace([body], camera, PIECE_PX * max(1.0, max(camera.size) / 640))
-            pieces = contour.pieces_px[~contour.occluded]
-            out.append(Path(index, person, "other_copy", KIND_COLORS["other_copy"], pieces))
+        if body is not None and person not in state.undrawn:
+            out += _outlined(session, times, body, person, "other_copy", np.arange(len(body.model.parts)))
+    return out
+
+
+def former_limb_lines(session: Session, state: State, view: View) -> list[Path]:
+    """Draw each limb that a fit moved untouched, in the views that a page shows, as when it is taken back."""
+    last = state.compared
+    if last is None or last.is_before_shown or "contours" not in state.compiled:
+        return []
+    out, times = list[Path](), picture_times(session, state.frame, view.cameras)
+    for person, move in last.moved:
+        if person not in state.visibility.hidden:
+            model = state.models[person]
+            values = copy_dofs(model, state.poses[person], last.before[person].values, move.limb.dofs)
+            body = PosedBody(model, values, state.velocity(person))
+            out += _outlined(session, times, body, person, "former", np.array(move.limb.parts))
+    return out
+
+
+def _outlined(
+    session: Session, times: dict[int, float], body: PosedBody, person: int, kind: PathKind, parts: IntArray
+) -> list[Path]:
+    """Draw the visible contours of some parts of one body alone, in views given with the times of their pictures."""
+    out = []
+    for index, time in times.items():
+        contour = traced([body.ahead(time)], session.cameras[index].camera.pinhole)
+        pieces = contour.pieces_px[np.isin(contour.parts, parts) & ~contour.occluded]
+        out.append(Path(index, person, kind, KIND_COLORS[kind], pieces))
     return out
 
 

@@ -1,19 +1,19 @@
-"""Draw over the views: contours, candidates, part edges, joints, epipolar lines, edge segments."""
+"""Draw lines over the views: contours, candidates, part edges, epipolar lines, edge segments."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from app.drawing.facing import facing_arrow
+from app.drawing.joint_handles import SIDES, Side, dragged_place, side_of
 from app.drawing.observed_points import limbs_off, observed_segments
 from app.drawing.overlay_colors import KIND_COLORS
 from app.drawing.seen_bodies import at_one_time, bodies_in, picture_times
 from app.state.calibration import CorrectedFrame
 from app.state.page_view import View
-from app.state.people import DragState
 from app.state.state import State
 from tracker.body.model import BodyModel, PosedBody, ahead
 from tracker.contours import occluding_contours, part_edges
@@ -22,7 +22,6 @@ from tracker.contours.pieces import PIECE_PX
 from tracker.contours.surfaces import surfaces_of
 from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.fitting.retarget import retarget_pose
-from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, FloatArray, IntArray, Mask
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.images.edge_segments import accept_segments
@@ -33,8 +32,6 @@ _PERSON_KINDS = (
     "model", "hidden", "facing", "facing_away", "candidate", "compared", "preview", "alternative", "new_sizes",
 )  # fmt: skip
 """Kinds of lines that belong to a person, and are left out when the person is hidden."""
-_SHORT_M = 0.01
-"""Smallest distance from the pointer's line of sight that counts as out of reach, metres."""
 _EDGE_STRIDE_PX = 3
 """Spacing of the edge pixels drawn. More would show only at high zoom, and cost the browser much."""
 
@@ -44,8 +41,6 @@ PathKind = Literal[
     "former", "result", "residual", "part_edge", "epipolar", "accepted", "rejected", "floor", "floor_sight", "error",
     "imported", "imported_off", "other_copy",
 ]  # fmt: skip
-Side = Literal["left", "right", ""]
-SIDES: tuple[Side, ...] = get_args(Side)
 
 
 class Path(NamedTuple):
@@ -59,42 +54,6 @@ class Path(NamedTuple):
     """x0, y0, x1, y1, (N, 4), undistorted px."""
     side: Side = ""
     """Side of the body that they belong to."""
-
-
-@dataclass(frozen=True)
-class OutOfReach:
-    """A dragged point that stays behind the pointer."""
-
-    camera: int
-    person: int
-    point: str
-    u: float
-    """Position of the pointer, undistorted px."""
-    v: float
-    point_u: float
-    """Position of the point, undistorted px."""
-    point_v: float
-    distance_m: float
-    """Distance of the point from the line of sight."""
-
-
-@dataclass(frozen=True)
-class Handle:
-    """A joint in one view; a joint behind the camera has none."""
-
-    camera: int
-    person: int
-    point: str
-    u: float
-    v: float
-    visible: bool
-    """False for an occluded joint."""
-    hidden_by: int | None
-    """Index of another person who occludes it, where the own body does not; null otherwise."""
-    held: bool
-    """Whether it stays in place while others are dragged."""
-    side: Side
-    """Side of the body."""
 
 
 def paths(session: Session, state: State, view: View, views: Sequence[ViewEvidence] | None) -> list[Path]:
@@ -169,86 +128,19 @@ def paths(session: Session, state: State, view: View, views: Sequence[ViewEviden
     ]  # fmt: skip
 
 
-def handles(session: Session, state: State, cameras: Collection[int]) -> list[Handle]:
-    """Project the joints of all visible people into some views, given by index; joints behind a camera are left out.
-
-    There are none while corrected cameras are previewed: the people are drawn elsewhere, and cannot be dragged.
-    """
-    if state.calibration.shown_on(state.frame) is not None:
-        return []
-    found: dict[int, list[Handle]] = {}
-    for time, group in at_one_time(picture_times(session, state.frame, cameras)):
-        found |= _handles(session, state, ahead(bodies_in(session, state), time), group)
-    return [handle for index in sorted(found) for handle in found[index]]
-
-
-def _handles(
-    session: Session, state: State, bodies: Sequence[PosedBody], cameras: Sequence[int]
-) -> dict[int, list[Handle]]:
-    """Return the handles of all visible people in views of one time, by index of the view."""
-    points, views = [b.points_world for b in bodies], [session.cameras[index].camera.pinhole for index in cameras]
-    undrawn = state.undrawn
-    if "contours" in state.compiled:
-        occluded = part_edges.points_occluded_by_body(bodies, views, np.concatenate(points))
-    else:  # the kernels are being compiled: every joint can be grabbed
-        occluded = np.zeros((len(views), len(bodies), sum(map(len, points))), bool)
-    people = np.repeat(np.arange(len(bodies)), list(map(len, points)))
-    out: dict[int, list[Handle]] = {index: [] for index in cameras}
-    for index, camera, by_body in zip(cameras, views, occluded, strict=True):
-        first = 0
-        hidden, occluders = by_body.any(axis=0), _other_occluders(by_body, people)
-        for person, body in enumerate(bodies):
-            px, held = camera.project(points[person]), state.held_points(person)
-            is_in_front = np.all(np.isfinite(px), axis=1)
-            for i, (name, (u, v)) in enumerate(zip(body.model.point_names, px.tolist(), strict=True)):
-                if person not in undrawn and is_in_front[i]:
-                    is_visible, by, is_held = not hidden[first + i], occluders[first + i], name in held
-                    out[index].append(Handle(index, person, name, u, v, is_visible, by, is_held, side_of(name)))
-            first += len(px)
-    return out
-
-
-def _other_occluders(by_body: Mask, people: IntArray) -> list[int | None]:
-    """Return for each point of all bodies the index of another body that occludes it, if its own does not.
-
-    Args:
-        by_body: whether each body occludes each point in a view, (n_bodies, n).
-        people: index of the body of each point, (n,).
-    """
-    is_by_other = by_body.any(axis=0) & ~by_body[people, np.arange(len(people))]
-    return [int(i) if is_other else None for i, is_other in zip(by_body.argmax(axis=0), is_by_other, strict=True)]
-
-
-def out_of_reach(session: Session, state: State) -> OutOfReach | None:
-    """Describe a dragged point that does not reach the pointer; None if it does."""
-    drag = state.drag
-    if drag is None or drag.wanted_px is None or drag.short_m < _SHORT_M:
-        return None
-    camera = session.cameras[drag.camera].camera.pinhole
-    u, v = (float(c) for c in camera.project(_dragged_place(session, state, drag)))
-    if not np.isfinite([u, v]).all():
-        return None
-    return OutOfReach(drag.camera, drag.person, drag.point, *drag.wanted_px, u, v, drag.short_m)
-
-
-def side_of(name: str) -> Side:
-    """Return the side of the body that a part or a point belongs to, by its name."""
-    side = name.partition("_")[0]
-    return "left" if side == "left" else "right" if side == "right" else ""
-
-
 def part_colors(people: Sequence[Person]) -> list[str]:
     """Return the colours of the parts of some people, in order."""
     return [part.color for person in people for part in person.model.parts]
 
 
-def _traced(bodies: Sequence[PosedBody], camera: Camera) -> Contour:
+def traced(bodies: Sequence[PosedBody], camera: Camera) -> Contour:
+    """Trace contours for drawing: in pieces that look alike in pictures of any size."""
     return occluding_contours.trace(bodies, camera, PIECE_PX * max(1.0, max(camera.size) / 640))
 
 
 def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index: int, view: View) -> list[Path]:
     """Draw the visible and the occluded contours of the shown poses."""
-    contour = _traced(bodies, camera)
+    contour = traced(bodies, camera)
     out = []
     kinds: tuple[tuple[str, PathKind, Mask], ...] = (
         ("hidden", "hidden", contour.occluded),
@@ -265,7 +157,7 @@ def _model(session: Session, bodies: Sequence[PosedBody], camera: Camera, index:
 def _corrected(found: CorrectedFrame, index: int) -> list[Path]:
     """Draw the visible contours of the people refitted under the corrected cameras."""
     bodies = found.bodies[index]
-    contour = _traced(bodies, found.cameras[index])
+    contour = traced(bodies, found.cameras[index])
     colors = [KIND_COLORS["preview"]] * len(bodies)
     return _by_person(bodies, contour, ~contour.occluded, index, "preview", colors)
 
@@ -305,7 +197,7 @@ def _part_edges(
 
 def _outlined(bodies: Sequence[PosedBody], camera: Camera, index: int, kind: PathKind) -> list[Path]:
     """Draw the visible contours of other poses of all people."""
-    contour = _traced(bodies, camera)
+    contour = traced(bodies, camera)
     return _by_person(bodies, contour, ~contour.occluded, index, kind, [KIND_COLORS[kind]] * len(bodies))
 
 
@@ -344,7 +236,7 @@ def _some(
     chosen: Collection[int], people: Sequence[PosedBody], camera: Camera, index: int, kind: PathKind
 ) -> list[Path]:
     """Draw the visible contours of some people, given by index, among all people."""
-    contour = _traced(people, camera)
+    contour = traced(people, camera)
     found = _by_person(people, contour, ~contour.occluded, index, kind, [KIND_COLORS[kind]] * len(people))
     return [path for path in found if path.person in chosen]
 
@@ -436,18 +328,12 @@ def _imported(session: Session, state: State, view: View, index: int) -> list[Pa
     return [Path(index, 0, kind, KIND_COLORS[kind], own) for kind, own in lines]
 
 
-def _dragged_place(session: Session, state: State, drag: DragState) -> Array:
-    """Return the dragged place, (3,), metres."""
-    T_world_part = session.people[drag.person].model.kinematics(state.poses[drag.person]).Ts_world_part[drag.part]
-    return rigid.apply(T_world_part, np.array(drag.place_part))
-
-
 def _epipolar_lines(session: Session, state: State) -> list[Path]:
     """Draw the line of sight of the dragged point in the other views."""
     drag = state.drag
     assert drag is not None
     source = session.cameras[drag.camera].camera.pinhole
-    point_world = _dragged_place(session, state, drag)
+    point_world = dragged_place(session, state, drag)
     out = []
     for index, target in enumerate(session.cameras):
         if index != drag.camera:

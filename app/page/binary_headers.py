@@ -7,7 +7,8 @@ docstring of each header describes its payload.
 from typing import Literal, TypeAlias, Union, get_args
 
 from app.drawing.curves import CurveGroup
-from app.drawing.overlays import Handle, OutOfReach, PathKind, Side
+from app.drawing.joint_handles import Handle, OutOfReach, Side
+from app.drawing.overlays import PathKind
 from app.drawing.pin_marks import PinMark, PinTriangulation
 from app.page.message_types import Message, Part, Status
 from app.state.page_view import PictureLayer

@@ -7,13 +7,12 @@ from typing import Any, cast
 import msgspec
 import numpy as np
 
-from app.drawing import dof_labels, overlays, part_outlines, pin_marks
+from app.drawing import dof_labels, joint_handles, overlays, part_outlines, pin_marks
 from app.drawing.curves import CurveGroup, plots_of, samples
 from app.drawing.epipolar_check import epipolar_check
 from app.drawing.error_ellipses import error_ellipses
 from app.drawing.floor_lines import floor_lines
-from app.drawing.former_limbs import former_limb_lines
-from app.drawing.ghosts import copy_lines, ghost_lines
+from app.drawing.ghosts import copy_lines, former_limb_lines, ghost_lines
 from app.drawing.seen_bodies import bodies_in
 from app.page import search_messages
 from app.page import server_messages as wire
@@ -154,7 +153,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         hulls.append(Outline(hull.camera, hull.person, hull.part, hull.depth, first, count))
         segments.append(hull.segments_px)
         first += count
-    handles = overlays.handles(session, state.drawn, view.cameras)
+    handles = joint_handles.handles(session, state.drawn, view.cameras)
     header = OverlayHeader(
         frame=state.frame,
         seq=dict(state.drag_seqs).get(page, 0),
@@ -162,7 +161,7 @@ def overlay(session: Session, state: State, page: int, view: View, views: Sequen
         paths=tuple(rows),
         outlines=tuple(hulls),
         handles=tuple(handles),
-        out_of_reach=overlays.out_of_reach(session, state),
+        out_of_reach=joint_handles.out_of_reach(session, state),
         pins=tuple(pin_marks.pin_marks(session, state)),
         triangulation=pin_marks.pin_triangulation(session, state),
     )

@@ -6,8 +6,8 @@ import numpy as np
 import viser
 
 from app.drawing.facing import nose
+from app.drawing.joint_handles import Side, side_of
 from app.drawing.overlay_colors import rgb
-from app.drawing.overlays import Side, side_of
 from app.state.view_3d import View3d
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours.occluding_contours import part_poses

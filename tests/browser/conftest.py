@@ -1,4 +1,6 @@
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,8 @@ from app.server.server import create_app
 from app.server.static_files import static_folder
 
 BLANK = "<!doctype html><title>3-D</title><link rel=icon href='data:,'><body tabindex=0>"
-LIVE = Path(__file__).parent / "live"
+WITH_KERNELS = [Path(__file__).parent / room for room in ("live", "share")]
+"""Folders of tests that need compiled kernels."""
 VIEWPORT = {"width": 1440, "height": 900}
 WHOLE_IMAGES = "localStorage.setItem('quadrille.views.elbow_rotation', '{}')"
 """JavaScript: the user has seen the session before, and left all views at the whole image."""
@@ -27,7 +30,14 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.browser)
             # One event loop for all: the browser is started once, and the server under test runs beside the test.
             item.add_marker(pytest.mark.asyncio(loop_scope="session"), append=False)
-    items.sort(key=lambda item: LIVE in item.path.parents)  # kernels may be compiled meanwhile
+    # Last, because kernels may be compiled meanwhile.
+    items.sort(key=lambda item: any(room in item.path.parents for room in WITH_KERNELS))
+
+
+@pytest.fixture(scope="session")
+def kernels():
+    """Compile the kernels, or wait for another program that compiles them."""
+    subprocess.run([sys.executable, "-m", "app.bench.compile_kernels"], check=True)
 
 
 @pytest_asyncio.fixture(loop_scope="session", scope="session")

@@ -32,7 +32,7 @@ def crowd(model, n):
     return np.array(out)
 
 
-@pytest.mark.parametrize("n", [3, 4])
+@pytest.mark.parametrize("n", [3, pytest.param(4, marks=pytest.mark.slow)])
 def test_people_a_metre_apart_stay_who_they_are(gavrila, n):
     truth = crowd(gavrila, n)
     observer = filmed([[PosedBody(gavrila, poses[k]) for poses in truth] for k in range(N_FRAMES)])

@@ -4,7 +4,7 @@ The background of a cell is a Gaussian around its usual colour, the same colour 
 that moves there, as often as it was seen around that place.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -56,12 +56,9 @@ class BackgroundDensity(NamedTuple):
 
     def log_density(self, view: CellView, gain: FloatArray) -> FloatArray:
         """Return the log density of the colour of each cell as background, (h, w), per cubic gray level."""
-        rows, columns = _box(view)
+        mean, noise, outlier, shadow = _cut(_box(view), self.mean, self.noise, self.outlier, self.shadow)
         out = np.empty(view.colors.shape[:2], np.float32)
-        _log_density(
-            view.colors, self.mean[rows, columns], self.noise[rows, columns], self.outlier[rows, columns],
-            self.shadow[rows, columns], self.outlier_density, gain, out,
-        )  # fmt: skip
+        _log_density(view.colors, mean, noise, outlier, shadow, self.outlier_density, gain, out)
         return out
 
 
@@ -103,7 +100,10 @@ def _with_medians(
         _append(
             view.colors, hidden, (1 / gain).astype(np.float32), view.corner[1] - top, view.corner[0] - left, values, n
         )
-    _medians(values, n, mean[top:bottom, left:right], noise[top:bottom, left:right])
+    box = slice(top, bottom), slice(left, right)
+    own_mean, own_noise = _cut(box, mean, noise)
+    _medians(values, n, own_mean, own_noise)
+    mean[box], noise[box] = own_mean, own_noise
     return before._replace(mean=mean, noise=noise)
 
 
@@ -146,10 +146,8 @@ def _with_rates(
     counts = np.zeros(BINS**3)
     for view, hidden, gain in zip(views, occupied, gains, strict=True):
         rows, columns = _box(view)
-        _count(
-            view.colors, hidden, before.mean[rows, columns], before.noise[rows, columns], gain, rows.start,
-            columns.start, blocks, counts,
-        )  # fmt: skip
+        mean, noise = _cut((rows, columns), before.mean, before.noise)
+        _count(view.colors, hidden, mean, noise, gain, rows.start, columns.start, blocks, counts)
     total = blocks.sum(axis=(1, 2)) + 1.0
     shares = total / total.sum()
     rates = (blocks + _BLOCK**2 * shares[:, None, None]) / (blocks.sum(axis=0) + _BLOCK**2)
@@ -233,3 +231,8 @@ def _box(view: CellView) -> tuple[slice, slice]:
     """Return rows and columns of a region among the cells of the whole view."""
     (u, v), (height, width) = view.corner, view.colors.shape[:2]
     return slice(v, v + height), slice(u, u + width)
+
+
+def _cut(box: tuple[slice, slice], *cells: FloatArray) -> Iterator[FloatArray]:
+    """Return a region of some arrays of cells, contiguous: kernels are compiled again for each order in memory."""
+    return (of_view[box].copy() for of_view in cells)

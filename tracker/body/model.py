@@ -230,8 +230,7 @@ class BodyModel:
 
         n_parts, n_dofs, kernels = len(self.parts), self.n_dofs, tracker.body.kinematics
         out = kernels.Kinematics(np.empty((n_parts, 4, 4)), np.empty((n_dofs, 3)), np.empty((n_dofs, 3)))
-        own = np.array(values, dtype=np.float64)  # a read-only or strided array would have a kernel of its own compiled
-        kernels.forward_kinematics(own, self.tree, *out)
+        kernels.forward_kinematics(np.array(values, dtype=np.float64), self.tree, *out)
         return out
 
     def points_world(self, values: Array) -> Array:
@@ -276,7 +275,8 @@ class BodyModel:
         from tracker.body.kinematics import point_jacobian
 
         J = np.empty((len(parts), 3, self.n_dofs))
-        point_jacobian(kinematics, self.dof_is_length, self.moves, parts, points_world, J)
+        points = np.array(points_world, dtype=np.float64, order="C")  # one form of the argument: compiled once
+        point_jacobian(kinematics, self.dof_is_length, self.moves, parts, points, J)
         return J
 
     def retract(self, values: Array, step: Array) -> Array:

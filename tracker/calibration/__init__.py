@@ -14,6 +14,7 @@ __all__ = [
     "point_adjustment",
     "reprojection",
     "residual_pieces",
+    "rig_problem",
     "single_frames",
     "viewed_frames",
 ]

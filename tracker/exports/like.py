@@ -75,7 +75,7 @@ def export_like(
         session, observations, observed_joints(observations, cameras).joints_world, poses, learn_offsets
     )
     frames = sorted({f for person in mended for f in person.bodies})
-    if frames and observations.format not in (*_PATCHED, "hdf5"):  # of HDF5, DeepLabCut's tables are replaced
+    if frames and observations.format not in _PATCHED:
         listed = ", ".join(FORMATS[name].title for name in _PATCHED)
         raise FormatError(
             f"expected observations of a format whose points can be replaced in place ({listed}), found "
@@ -91,7 +91,8 @@ def export_like(
     return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames))
 
 
-_PATCHED = ("openpose", "coco", "deeplabcut", "trc", "csv", "c3d")
+_PATCHED = ("openpose", "coco", "deeplabcut", "hdf5", "trc", "csv", "c3d")
+"""Formats whose points can be replaced; of HDF5 all but NWB."""
 
 
 def _stored_contents(session: Session, observations: ObservationSet) -> Files:
@@ -142,28 +143,14 @@ def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Chan
         for pictures, changes in found:
             of_row = {pictures.files[row]: c for row, c in changes.items()}
             out |= {path: patch_openpose(path.read_bytes(), c) for path, c in of_row.items()}
-    elif format_name == "coco":  # a file may hold several cameras
-        for path in {pictures.files[0] for pictures, _ in found}:
-            out[path] = patch_coco(path, {p.part: changes for p, changes in found if p.files[0] == path})
-    else:
-        for pictures, changes in found:
-            (path,) = pictures.files
-            # A table has columns for each individual: one who was not found has the first that is free.
-            n = pictures.table.points.shape[1]
-            patch = patch_deeplabcut_csv if format_name == "deeplabcut" else patch_hdf5_apart
-            out[path] = patch(path, {row: _with_free_individuals(c, n) for row, c in changes.items()})
+        return out
+    for path in {pictures.files[0] for pictures, _ in found}:  # a file may hold several cameras
+        of_file = {p.part: changes for p, changes in found if p.files[0] == path}
+        if format_name == "deeplabcut":
+            out[path] = patch_deeplabcut_csv(path, of_file[0])
+        else:
+            out[path] = (patch_coco if format_name == "coco" else patch_hdf5_apart)(path, of_file)
     return out
-
-
-def _with_free_individuals(some: list[tuple[int, Array]], n: int) -> list[tuple[int, Array]]:
-    taken = {k for k, _ in some}
-    left = [k for k in range(n) if k not in taken]
-    if sum(k < 0 for k, _ in some) > len(left):
-        raise FormatError(
-            f"expected columns for a person who was not found, found those of {n} others alone",
-            Remedy("export_other_format"),
-        )
-    return [(k if k >= 0 else left.pop(0), values) for k, values in some]
 
 
 def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Array:

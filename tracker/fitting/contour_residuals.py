@@ -296,7 +296,7 @@ class ContourResiduals:
     def costs(self, candidates: Array) -> Array:
         """Return the costs alone of many poses, (C, n_values) to (C,)."""
         out, model = np.empty(len(candidates)), self._model
-        _score(np.ascontiguousarray(candidates, np.float64), model.tree, model.n_dofs, self._term, out)
+        _score(np.array(candidates, np.float64, order="C"), model.tree, model.n_dofs, self._term, out)
         return out
 
     def part_costs(self, pose: Array) -> PartCosts:

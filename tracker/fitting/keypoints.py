@@ -58,7 +58,7 @@ class KeypointBlock:
             KeypointTerm(
                 np.concatenate([k.parts for _, k in own]),
                 np.concatenate([k.points_part for _, k in own]),
-                np.concatenate([np.broadcast_to(P, (len(k.parts), 3, 4)) for P, k in own]),
+                np.repeat([P for P, _ in own], [len(k.parts) for _, k in own], axis=0),  # contiguous: compiled once
                 np.concatenate([k.positions_px for _, k in own]),
                 np.concatenate([1 / k.sigmas_px**2 for _, k in own]),
             )

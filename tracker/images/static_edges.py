@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.compute.jit import njit
-from tracker.geometry.arrays import FloatArray
+from tracker.geometry.arrays import FloatArray, IntArray
 from tracker.images.edge_segments import EdgeSegments
 
 _MEMORY = 4
@@ -40,8 +40,7 @@ class StaticEdgeModel:
             corner_px: first pixel of the region in the whole image, working px.
         """
         known = np.zeros(len(segments.firsts) - 1, np.bool_)
-        left, top = corner_px
-        _mark_known(segments, self._gradients[top:, left:], known)
+        _mark_known(segments, self._gradients, *corner_px, known)
         return known
 
     def update(
@@ -61,19 +60,18 @@ class StaticEdgeModel:
             pieces_px: visible pieces of the contours of all bodies, x0, y0, x1, y1, (M, 4), px of the region.
             reach_px: edges nearer to these pieces may belong to bodies and are left out, px.
         """
-        (left, top), (width, height) = corner_px, size
-        region = slice(top, top + height), slice(left, left + width)
-        _update_means(segments, pieces_px, int(np.ceil(reach_px)), self._gradients[region], self._frames[region])
+        box = np.array([*corner_px, *size])
+        _update_means(segments, pieces_px, int(np.ceil(reach_px)), self._gradients, self._frames, box)
 
 
 @njit(nogil=True, cache=True)
-def _mark_known(segments: EdgeSegments, gradients: FloatArray, known: NDArray[np.bool_]) -> None:
-    """Mark the known segments, (S,); the mean gradients, (h, w, 2), begin at the region's corner."""
+def _mark_known(segments: EdgeSegments, gradients: FloatArray, left: int, top: int, known: NDArray[np.bool_]) -> None:
+    """Mark the known segments of a region, (S,), by the mean gradients of the whole image, (H, W, 2)."""
     points, normals, firsts = segments.points_px, segments.normals, segments.firsts
     for s in range(known.shape[0]):
         there = 0
         for i in range(firsts[s], firsts[s + 1]):
-            u, v = int(points[i, 0]), int(points[i, 1])
+            u, v = left + int(points[i, 0]), top + int(points[i, 1])
             if gradients[v, u, 0] * normals[i, 0] + gradients[v, u, 1] * normals[i, 1] > _KNOWN:
                 there += 1
         known[s] = there > _KNOWN * (firsts[s + 1] - firsts[s])
@@ -81,13 +79,16 @@ def _mark_known(segments: EdgeSegments, gradients: FloatArray, known: NDArray[np
 
 @njit(nogil=True, cache=True)
 def _update_means(
-    segments: EdgeSegments, pieces: FloatArray, reach: int, gradients: FloatArray, frames: NDArray[np.uint8]
-) -> None:
+    segments: EdgeSegments, pieces: FloatArray, reach: int, gradients: FloatArray, frames: NDArray[np.uint8],
+    box: IntArray,
+) -> None:  # fmt: skip
     """Update the mean gradients, (H, W, 2), of pixels away from all pieces, and their frame counts, (H, W).
 
-    Edges are drawn one pixel wider on all sides, because noise moves them by that much.
+    Segments and pieces lie in the region `box`: left, top, width and height. Edges are drawn one pixel wider on all
+    sides, because noise moves them by that much.
     """
-    height, width = frames.shape
+    left, top = box[0], box[1]
+    width, height = min(box[2], frames.shape[1] - left), min(box[3], frames.shape[0] - top)
     now, free = np.zeros((height, width, 2), np.float32), np.ones((height, width), np.bool_)
     points, normals = segments.points_px, segments.normals
     for i in range(points.shape[0]):
@@ -101,7 +102,8 @@ def _update_means(
     for y in range(height):
         for x in range(width):
             if free[y, x]:
-                frames[y, x] = min(frames[y, x] + 1, _MEMORY)
-                share = np.float32(1.0) / np.float32(frames[y, x])
-                gradients[y, x, 0] += share * (now[y, x, 0] - gradients[y, x, 0])
-                gradients[y, x, 1] += share * (now[y, x, 1] - gradients[y, x, 1])
+                v, u = top + y, left + x
+                frames[v, u] = min(frames[v, u] + 1, _MEMORY)
+                share = np.float32(1.0) / np.float32(frames[v, u])
+                gradients[v, u, 0] += share * (now[y, x, 0] - gradients[v, u, 0])
+                gradients[v, u, 1] += share * (now[y, x, 1] - gradients[v, u, 1])

@@ -314,6 +314,7 @@ def test_backward_and_paper(run, session):
     assert tuple(found[3].settings["search"]["passes"]) == (1.0,)
 
 
+@pytest.mark.slow
 def test_several_people(run, tmp_path):
     s = tmp_path / "s"
     words = ("--calibration", SAMPLE / "calibration.toml", "--videos", *sorted(SAMPLE.glob("*.mp4")))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.drawing import overlays
+from app.drawing import joint_handles, overlays
 from app.drawing.overlays import Path
 from app.state.page_view import View
 from app.state.people import ShownPose
@@ -125,7 +125,7 @@ def test_each_contour_names_its_side(controller, by_part):
         expected = traced.pieces_px[~traced.occluded][[name.startswith(side) for name in names]]
         found = [p.segments_px for p in paths if p.side == side]
         np.testing.assert_array_equal(rows_sorted(found), rows_sorted([expected]))
-    handles = overlays.handles(session, state, [1])
+    handles = joint_handles.handles(session, state, [1])
     assert {h.point: h.side for h in handles if h.point.endswith("knee")} == {
         "left_knee": "left",
         "right_knee": "right",
@@ -154,7 +154,7 @@ def test_the_head_shows_where_it_faces(controller):
 def test_only_the_views_that_a_page_sees_are_drawn(controller):
     seen = view_of("contours", "accepted", reductions=(0, 0, 2, 0))
     assert {p.camera for p in drawn(controller, controller.state, view=seen)} == {2}
-    assert {h.camera for h in overlays.handles(controller.session, controller.state, seen.cameras)} == {2}
+    assert {h.camera for h in joint_handles.handles(controller.session, controller.state, seen.cameras)} == {2}
 
 
 def test_a_joint_behind_another_person_says_by_whom_it_is_hidden(couple):
@@ -164,9 +164,9 @@ def test_a_joint_behind_another_person_says_by_whom_it_is_hidden(couple):
     to_camera = camera.center_world - ann[:3]
     bob[:3] += 0.7 * to_camera / np.linalg.norm(to_camera)
     state = replace(state, people=(ShownPose(ann, "manual"), ShownPose(bob, "manual")))
-    alone = overlays.handles(couple.session, replace(state, people=(state.people[0], couple.state.people[1])), [0])
+    alone = joint_handles.handles(couple.session, replace(state, people=(state.people[0], couple.state.people[1])), [0])
     visible = {h.point for h in alone if h.person == 0 and h.visible}
-    found = overlays.handles(couple.session, state, [0])
+    found = joint_handles.handles(couple.session, state, [0])
     assert {h.hidden_by for h in found if h.person == 0 and h.point in visible and not h.visible} == {1}
     assert [h for h in found if h.person == 0 and h.point in visible and not h.visible]
     assert {h.hidden_by for h in found if h.person == 1} == {None}
@@ -182,7 +182,7 @@ def test_joints_are_tested_once_against_each_body_in_the_visible_views(couple, m
     behind = values.copy()
     behind[:3] += 0.6 * cameras[0].T_world_camera[:3, 2]  # of the first in this view
     state = replace(couple.state, people=(ShownPose(values, "manual"), ShownPose(behind, "manual")))
-    found = overlays.handles(couple.session, state, {0, 2})
+    found = joint_handles.handles(couple.session, state, {0, 2})
     assert sorted(tested) == sorted(2 * [names[0], names[2]])
     assert {h.camera for h in found} == {0, 2}
     assert {(h.person, h.hidden_by) for h in found if h.camera == 0 and not h.visible} >= {(0, None), (1, None), (1, 0)}

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.drawing import overlays
+from app.drawing import joint_handles, overlays
 from app.drawing.pin_marks import pin_marks
 from app.state.page_view import View
 from app.state.people import ShownPose
@@ -31,7 +31,7 @@ def late(session):
 
 
 def places(session, state):
-    found = overlays.handles(session, state, range(len(session.cameras)))
+    found = joint_handles.handles(session, state, range(len(session.cameras)))
     return {i: np.array([(h.u, h.v) for h in found if h.camera == i]) for i in range(len(session.cameras))}
 
 

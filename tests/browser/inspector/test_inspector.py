@@ -190,8 +190,8 @@ async def test_it_leaves_the_views_room_and_stays_open_after_a_reload(page):
 
 
 FOUND = {
-    "body": ("Body sizes", "Height, cm"),
-    "sizes": ("Body sizes", "Height, cm"),
+    "body": ("Body sizes", "Joints and parts of the person"),
+    "sizes": ("Body sizes", "Joints and parts of the person"),
     "settings": ("Track settings", "Chamfer matching"),
     "track settings": ("Track settings", "Chamfer matching"),
     "search settings": ("Search settings", "Angle bound, °"),

@@ -30,7 +30,7 @@ COMMENTS = [
 
 
 @pytest.fixture(scope="module")
-def shared(tmp_path_factory):
+def shared(tmp_path_factory, kernels):
     """A folder and a file of a few frames, whose session and person have names with markup."""
     folder = tmp_path_factory.mktemp("shared")
     motion = read_motion(sample_with_poses(folder / "session", N), (0,))

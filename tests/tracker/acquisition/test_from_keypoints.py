@@ -57,6 +57,7 @@ def test_a_frame_with_gross_errors_costs_more(recording):
     assert min(costs[k] for k in range(0, N, 10)) > max(costs[k] for k in range(N) if k % 10)
 
 
+@pytest.mark.slow
 def test_a_body_of_another_shape_follows_the_key_points(recording):
     bodies, points = recording
     fitted = fit_to_keypoints(OTHER, first_frames(points))

@@ -212,6 +212,7 @@ def test_segments_are_those_of_the_poses_with_their_uncertainty(acquisition):
     assert segments["shoulder width"].length_m == pytest.approx(np.median(widths))
 
 
+@pytest.mark.slow
 def test_joints_that_hardly_turn_are_said_to_be_unobservable(acquisition):
     model = acquisition.body
     poses = [model.neutral() for _ in range(3)]

@@ -25,7 +25,9 @@ def test_a_grown_body_has_the_proportions_of_its_preset(name):
     assert dimensions_of(found) == dimensions_of(preset)
 
 
-@each_model
+@pytest.mark.parametrize(
+    "name", ["gavrila38", *(pytest.param(n, marks=pytest.mark.slow) for n in PRESETS if n != "gavrila38")]
+)
 def test_a_child_has_shorter_legs_and_a_larger_head(name):
     legs, heads = [], []
     for height_m in (1.0, 1.2, 1.35, 1.4):

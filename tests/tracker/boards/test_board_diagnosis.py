@@ -23,7 +23,7 @@ def pictures(board):
         pytest.param(CHARUCO, {"columns": 5, "rows": 4}, marks=pytest.mark.slow),
         pytest.param(CHARUCO, {"columns": 6, "rows": 8}, marks=pytest.mark.slow),
         (CHARUCO, {"inverted": True}),
-        (CHECKERS, {"columns": 8, "rows": 7}),
+        pytest.param(CHECKERS, {"columns": 8, "rows": 7}, marks=pytest.mark.slow),
     ],
 )
 def test_the_right_board_is_named(board, change):

@@ -76,8 +76,8 @@ def test_errors_of_wrong_cameras_are_seen_on_held_out_frames(rig, found):
 @pytest.mark.parametrize(
     ("focal", "distortion", "fisheye"),
     [
-        (0.7, (-0.34, 0.1, 0.001, 0.002, -0.004), False),
-        (1.5, (0.1, -0.05, 0.0, 0.0, 0.0), False),
+        pytest.param(0.7, (-0.34, 0.1, 0.001, 0.002, -0.004), False, marks=pytest.mark.slow),
+        pytest.param(1.5, (0.1, -0.05, 0.0, 0.0, 0.0), False, marks=pytest.mark.slow),
         (0.4, (0.02, -0.01, 0.002, 0.0), True),
     ],
 )
@@ -160,6 +160,7 @@ def test_a_board_at_one_distance_tells_no_focal_length():
     assert "film the board nearer, farther and tilted" in found.notes[0]
 
 
+@pytest.mark.slow
 def test_the_expected_error_is_that_of_drawn_cameras(rig):
     """Cameras drawn from a covariance have errors with the quantiles that were expected."""
     random = np.random.default_rng(0)

@@ -77,6 +77,7 @@ def test_gross_errors_have_no_influence():
     assert np.mean(spoilt.fit.weights < 0.1) == pytest.approx(0.1, abs=0.03)
 
 
+@pytest.mark.slow
 def test_the_covariance_is_that_of_the_errors():
     """Squared errors of cameras that moved as the prior says, in their covariance, have a mean of 1 each."""
     points, cameras, means = cloud(80), ring_of(4), []

@@ -104,5 +104,6 @@ def test_chosen_modules_are_interpreted_in_all_threads(kernel):
     assert kernel.signatures
 
 
+@pytest.mark.slow
 def test_a_body_is_dragged_and_scored_as_by_compiled_kernels():
     subprocess.run([sys.executable, "-c", _SCORE], check=True, timeout=240)

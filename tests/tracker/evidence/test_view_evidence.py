@@ -245,6 +245,7 @@ def test_the_matched_camera_is_the_pinhole_scaled():
     assert view.camera.size == expected.size
 
 
+@pytest.mark.slow
 def test_a_region_shows_what_the_whole_image_shows_there(sample, real_frame):
     session, recording = sample
     observer = Observer(session.cameras, recording)

@@ -260,19 +260,20 @@ def numbers_of(path):
 
 
 @pytest.mark.slow
-def test_mended_points_of_a_table_of_pandas_alone_differ(session, tmp_path):
-    pytest.importorskip("h5py")
+@pytest.mark.parametrize("kind", ["dlc h5", "sleap"])
+def test_mended_points_of_hdf5_alone_differ(session, tmp_path, kind):
+    pytest.importorskip(NEEDS[kind])
     bodies = poses(session)
     truth = observed(session, bodies, np.zeros(3))
-    path, _ = write_kind("dlc h5", session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
+    path, _ = write_kind(kind, session, tmp_path, truth + (np.arange(N) == EDITED)[:, None, None] * 0.2)
     store(session, bodies, joints=("left_hip",))
     done = export_like(session, imported(session, path), tmp_path / "back")
     assert done.frames == (EDITED,)
     assert len(done.changed) == len(session.cameras)
-    names, knee = BODY_25.points, BODY_25.points.index("LKnee")
+    names, knee, suffix = BODY_25.points, BODY_25.points.index("LKnee"), ".slp" if kind == "sleap" else ".h5"
     for source in session.cameras:
         ((_, before),), ((_, after),) = (
-            read_hdf5_apart(folder / f"{source.camera.name}.h5") for folder in (path, tmp_path / "back")
+            read_hdf5_apart(folder / f"{source.camera.name}{suffix}") for folder in (path, tmp_path / "back")
         )
         assert (before.names, before.numbers.tolist()) == (after.names, after.numbers.tolist())
         differ = np.argwhere((before.points != after.points).any(axis=-1)).tolist()
@@ -281,13 +282,78 @@ def test_mended_points_of_a_table_of_pandas_alone_differ(session, tmp_path):
         assert np.abs(after.points[EDITED, 0, knee, :2] - expected).max() < 0.1
 
 
+SOME = ("hip", "knee", "ankle")
+
+
+def sleap_people(n_people):
+    """Points of some people on four pictures, (4, n_people, 3, 3); the first person has no knee on picture 1."""
+    points = np.random.default_rng(1).uniform(50, 400, (4, n_people, len(SOME), 3))
+    points[..., 2] = 0.75
+    points[1, 0, 1] = np.nan
+    return points
+
+
+MENDED = np.array([[10.0, 20.0, 1.0], [np.nan] * 3, [0.0, 0.0, 0.0]])
+"""A point elsewhere, one that stays, one that is absent."""
+
+
+def changed_points(path, changes):
+    """Points of the first video before and after a change, and of the file without its changed points."""
+    ((_, before),) = read_hdf5_apart(path)
+    path.with_name(f"new{path.suffix}").write_bytes(patch_hdf5_apart(path, {0: changes}))
+    ((_, after),) = read_hdf5_apart(path.with_name(f"new{path.suffix}"))
+    assert (before.names, before.numbers.tolist()) == (after.names, after.numbers.tolist())
+    return before.points, after.points
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("suffix", "version"), [(".slp", None), (".slp", 1.0), (".h5", None)])
+def test_mended_points_of_sleap_alone_differ(tmp_path, suffix, version):
+    pytest.importorskip("sleap_io")
+    write_sleap(tmp_path / f"a{suffix}", SOME, sleap_people(1))
+    if version is not None:
+        with pytest.importorskip("h5py").File(tmp_path / f"a{suffix}", "r+") as file:
+            file["metadata"].attrs["format_id"] = version
+            rows = file["instances"][:]
+            del file["instances"]
+            file["instances"] = rows[[name for name in rows.dtype.names if name != "tracking_score"]]
+    before, after = changed_points(tmp_path / f"a{suffix}", {2: [(0, MENDED)]})
+    assert {(k, i) for k, _, i in np.argwhere((before != after).any(axis=-1) & ~np.isnan(before[..., 0]))} == {
+        (2, 0), (2, 2),
+    }  # fmt: skip
+    assert after[2, 0, 0].tolist() == [10.0, 20.0, 1.0]
+    assert np.isnan(after[2, 0, 2, :2]).all()
+
+
+@pytest.mark.slow
+def test_a_person_whom_sleap_did_not_find_is_added_to_one_picture(tmp_path):
+    sleap_io = pytest.importorskip("sleap_io")
+    write_sleap(tmp_path / "a.slp", SOME, sleap_people(2))
+    before, after = changed_points(tmp_path / "a.slp", {1: [(-1, MENDED), (1, MENDED)]})
+    others = [0, 2, 3]
+    assert np.array_equal(before[others], after[others, :2], equal_nan=True)
+    assert after.shape[1] == 3
+    assert sorted(after[1, :, 0, 0].tolist()) == sorted([10.0, 10.0, before[1, 0, 0, 0]])
+    labels = sleap_io.load_slp(str(tmp_path / "new.slp"), open_videos=False)
+    (picture,) = (f for f in labels.labeled_frames if f.frame_idx == 1)
+    assert (len(picture.user_instances), len(picture.predicted_instances)) == (1, 2)
+
+
+@pytest.mark.slow
+def test_an_analysis_has_no_track_for_one_more_person(tmp_path):
+    pytest.importorskip("sleap_io")
+    write_sleap(tmp_path / "a.h5", SOME, sleap_people(1))
+    with pytest.raises(FormatError, match="expected a track for a person who was not found on frame 1, found none"):
+        patch_hdf5_apart(tmp_path / "a.h5", {0: {1: [(0, MENDED), (-1, MENDED)]}})
+
+
 @pytest.mark.slow
 def test_points_of_other_hdf5_files_are_not_replaced(tmp_path):
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "tracks.h5", "w") as file:
         file["tracks"] = np.zeros((1, 2, 25, N))
-    with pytest.raises(FormatError, match="expected a table of DeepLabCut") as raised:
-        patch_hdf5_apart(tmp_path / "tracks.h5", {0: [(0, np.zeros((25, 3)))]})
+    with pytest.raises(FormatError, match="expected a project or an analysis of SLEAP, or a table of") as raised:
+        patch_hdf5_apart(tmp_path / "tracks.h5", {0: {0: [(0, np.zeros((25, 3)))]}})
     assert raised.value.remedy == Remedy("export_other_format")
 
 

@@ -32,6 +32,12 @@ def cost(block, pose):
     return block.linearize(MODEL, pose, MODEL.kinematics(pose)).cost
 
 
+def test_arguments_of_kernels_are_contiguous():
+    """Kernels are compiled again for each order in memory, which takes twenty seconds."""
+    block = block_of(seen(MODEL.neutral()))
+    assert [a.flags.c_contiguous for a in block.arrays] == [True] * 5
+
+
 def test_the_gradient_is_the_derivative_of_the_cost():
     pose = posed(MODEL, 2)
     block = block_of(seen(MODEL.retract(pose, np.random.default_rng(0).normal(0, 0.1, MODEL.n_dofs))))

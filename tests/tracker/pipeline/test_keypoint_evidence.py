@@ -54,6 +54,7 @@ def off(body, motion, frame):
     return np.mean([np.linalg.norm(found[n] - p) for n, p in joints_of(motion, frame).items()])
 
 
+@pytest.mark.slow
 def test_people_are_found_on_a_frame_without_gross_errors(tmp_path):
     def spoil(points):
         points[:7, 0, :, :, :2] += 80.0  # a view that is far off on most frames
@@ -101,6 +102,7 @@ def test_a_detector_that_was_learnt_is_read_again_for_the_same_body_alone(tmp_pa
         assert stored_seen_bodies(taller, store, "net") is None
 
 
+@pytest.mark.slow
 def test_evidence_is_of_the_cameras_of_the_run(tmp_path):
     session, _ = imported(tmp_path)
     views = [session.camera_names[i] for i in (3, 1)]

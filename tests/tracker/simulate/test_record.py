@@ -49,6 +49,7 @@ def test_true_joints_project_into_the_masks(folder):
             assert all(near), [n for n, hit in zip(truth.names, near, strict=True) if not hit]
 
 
+@pytest.mark.slow
 def test_poses_and_skeleton_give_the_joints_and_bones_keep_their_length(folder):
     model = load_model(folder / "truth_model.toml")
     truth = read_trc(folder / "truth.trc")

@@ -87,6 +87,7 @@ def test_a_view_that_sees_somebody_beside_itself_bounds_nobody():
     assert Carver([*views(), seen]).carve(VoxelGrid.over(-BOX, BOX, SIZE_M)).occupied.any()
 
 
+@pytest.mark.slow
 def test_painted_voxels_are_as_large_as_the_lens_shows_them():
     voxels = Carver(views()).carve(VoxelGrid.over(-BOX, BOX, SIZE_M))
     points = voxels.points_world[voxels.is_surface]

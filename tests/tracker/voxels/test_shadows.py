@@ -32,6 +32,7 @@ def test_legs_before_a_floor_that_others_see_unchanged_come_back(whole):
         assert not np.any(own.shadow & own.mask)
 
 
+@pytest.mark.slow
 def test_legs_in_the_midst_of_a_shadow_come_back_where_other_views_show_them(whole):
     shadows = [on_floor(s, (-0.9, 0.9), (-0.9, 0.9)) for s in whole]
     seen = hide_legs(whole, {2}, shadows)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tracker.errors import FormatError
+from tracker.errors import FormatError, Remedy
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, replace_cells
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
@@ -200,8 +200,8 @@ def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: 
 
 
 Changes = Mapping[int, Sequence[tuple[int, Array]]]
-"""By row, from 0: number of the individual and x, y, confidence of all points, (n_points, 3); rows of NaN stay,
-confidence 0 makes a point absent."""
+"""By row, from 0: number of the individual, or -1 for one who was not found, and x, y, confidence of all points,
+(n_points, 3); rows of NaN stay, confidence 0 makes a point absent."""
 
 
 def patch_deeplabcut_csv(path: Path, changes: Changes) -> bytes:
@@ -240,7 +240,7 @@ def _new_cells(columns: Sequence[_Column], changes: Changes) -> dict[int, dict[i
     names = list(dict.fromkeys(c.point for c in columns))
     new: dict[int, dict[int, float]] = {}
     for row, people in changes.items():
-        for person, values in people:
+        for person, values in _with_free_individuals(people, len(individuals)):
             for i, column in enumerate(columns):
                 value = values[names.index(column.point)]
                 if column.individual == individuals[person] and not np.isnan(value[2]):
@@ -248,3 +248,19 @@ def _new_cells(columns: Sequence[_Column], changes: Changes) -> dict[int, dict[i
                     cell = np.nan if absent else float(value[_COORDINATES.index(column.coordinate)])
                     new.setdefault(row, {})[i] = cell
     return new
+
+
+def _with_free_individuals(some: Sequence[tuple[int, Array]], n: int) -> list[tuple[int, Array]]:
+    """Give those who were not found the first columns that are free: a table has columns for each individual.
+
+    Raises:
+        FormatError: no columns are left.
+    """
+    taken = {k for k, _ in some}
+    left = [k for k in range(n) if k not in taken]
+    if sum(k < 0 for k, _ in some) > len(left):
+        raise FormatError(
+            f"expected columns for a person who was not found, found those of {n} others alone",
+            Remedy("export_other_format"),
+        )
+    return [(k if k >= 0 else left.pop(0), values) for k, values in some]

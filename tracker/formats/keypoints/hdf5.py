@@ -1,4 +1,4 @@
-"""Read HDF5 files (SLEAP, NWB, DeepLabCut) in a process of their own, and replace points in DeepLabCut's.
+"""Read HDF5 files (SLEAP, NWB, DeepLabCut) in a process of their own, and replace points in SLEAP's and DeepLabCut's.
 
 The HDF5 library hangs on some damaged files, or ends the process that reads them. So another process reads a file,
 within a time limit, and hands back plain arrays.
@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from tracker.formats.keypoints.deeplabcut import Changes
 from tracker.formats.keypoints.picture_table import PictureTable
 
 CHANGES, PATCHED = "changes.npz", "patched"
-"""Names of the file of changes to a table, and of the copy that gets them."""
+"""Names of the file of changes to a file of key points, and of the copy that gets them, without its suffix."""
 SECONDS = 300.0
 """Time that a file may take, s. To load sleap-io takes 2 s; damaged files may take for ever."""
 
@@ -62,19 +62,26 @@ def read_hdf5_apart(path: Path) -> list[tuple[Path, PictureTable]]:
         return out
 
 
-def patch_hdf5_apart(path: Path, changes: Changes) -> bytes:
-    """Return DeepLabCut's table with points of some rows replaced; all other numbers stay.
+def patch_hdf5_apart(path: Path, changes: Mapping[int, Changes]) -> bytes:
+    """Return a file with points of some rows replaced, by the number of the video; all other numbers stay.
 
     Raises:
-        FormatError: the file is another one than a table of DeepLabCut; else as `read_hdf5_apart`.
+        FormatError: points of such a file cannot be replaced, or a table has no columns left for a new person; else as
+            `read_hdf5_apart`.
     """
-    flat = [(row, person, values) for row, people in changes.items() for person, values in people]
-    rows, people, values = zip(*flat, strict=True)
+    flat = [
+        (video, row, person, values)
+        for video, rows in changes.items()
+        for row, people in rows.items()
+        for person, values in people
+    ]
+    *numbers, values = zip(*flat, strict=True)
     with _folder_for(path) as folder:
-        np.savez(folder / CHANGES, rows=np.array(rows), people=np.array(people), values=np.stack(values))
-        shutil.copyfile(path, folder / PATCHED)
+        np.savez(folder / CHANGES, numbers=np.array(numbers), values=np.stack(values))
+        copy = folder / (PATCHED + path.suffix.lower())
+        shutil.copyfile(path, copy)
         _answer(path, folder)
-        return (folder / PATCHED).read_bytes()
+        return copy.read_bytes()
 
 
 @contextmanager

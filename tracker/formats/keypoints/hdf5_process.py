@@ -15,10 +15,14 @@ from tracker.formats.keypoints.deeplabcut import is_deeplabcut_hdf5, patch_deepl
 from tracker.formats.keypoints.hdf5 import CHANGES, PATCHED, ReadAnswer, VideoHead
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.keypoints.sleap_files import read_sleap
+from tracker.formats.keypoints.sleap_patching import is_analysis, patch_analysis, patch_project
 from tracker.geometry.arrays import Array
 
+Tables = list[tuple[Path, PictureTable]]
+"""Key points of each video, with its path."""
 
-def read_hdf5(path: Path) -> list[tuple[Path, PictureTable]]:
+
+def read_hdf5(path: Path) -> Tables:
     """Read the key points of each video of a file, with the video's path.
 
     Raises:
@@ -39,23 +43,62 @@ def read_hdf5(path: Path) -> list[tuple[Path, PictureTable]]:
         raise FormatError(f"{where} cannot be read: {words}; export it again") from error
 
 
+Changes = dict[int, dict[int, list[tuple[int, Array]]]]
+"""By video and row of its table: number of the person, and x, y, confidence of the points, (n_points, 3)."""
+
+
 def _change(path: Path, folder: Path) -> None:
     """Replace points in the copy of a file.
 
     Raises:
-        FormatError: it is no table of DeepLabCut.
+        FormatError: points of such a file cannot be replaced.
     """
-    if path.suffix.lower() != ".h5" or not is_deeplabcut_hdf5(path):
+    changes: Changes = {}
+    with np.load(folder / CHANGES, allow_pickle=False) as arrays:
+        for (video, row, person), values in zip(arrays["numbers"].T.tolist(), arrays["values"], strict=True):
+            changes.setdefault(video, {}).setdefault(row, []).append((person, values))
+    copy, suffix = folder / (PATCHED + path.suffix.lower()), path.suffix.lower()
+    if suffix == ".slp":
+        patch_project(copy, changes)
+    elif suffix == ".h5" and is_deeplabcut_hdf5(path):
+        patch_deeplabcut_hdf5(copy, changes[0])
+        return
+    elif suffix == ".h5" and is_analysis(path):
+        patch_analysis(copy, changes[0])
+    else:
         raise FormatError(
-            f"expected a table of DeepLabCut to replace points in, found another kind of file: {path}",
+            "expected a project or an analysis of SLEAP, or a table of DeepLabCut, to replace points in, found another "
+            f"kind of file: {path}",
             Remedy("export_other_format"),
         )
-    changes: dict[int, list[tuple[int, Array]]] = {}
-    with np.load(folder / CHANGES, allow_pickle=False) as arrays:
-        rows, people = arrays["rows"].tolist(), arrays["people"].tolist()
-        for row, person, values in zip(rows, people, arrays["values"], strict=True):
-            changes.setdefault(row, []).append((person, values))
-    patch_deeplabcut_hdf5(folder / PATCHED, changes)
+    _check(read_hdf5(path), read_hdf5(copy), changes, path)
+
+
+def _check(before: Tables, after: Tables, changes: Changes, path: Path) -> None:
+    """Compare a changed file with the file that it was, as sleap-io reads them.
+
+    Raises:
+        FormatError: something else changed than what should.
+    """
+    for video, ((_, old), (_, new)) in enumerate(zip(before, after, strict=True)):
+        rows = changes.get(video, {})
+        others = np.setdiff1d(np.arange(len(old.numbers)), list(rows))
+        n = min(old.points.shape[1], new.points.shape[1])  # one more person makes the table wider
+        is_same = np.array_equal(old.numbers, new.numbers) and np.array_equal(
+            old.points[others, :n], new.points[others, :n], equal_nan=True
+        )
+        wanted = [(new.points[row], values) for row, people in rows.items() for _, values in people]
+        if not is_same or not all(_holds(people, values) for people, values in wanted):
+            raise FormatError(
+                f"expected the points of file {path} in their usual order, found another one; nothing is changed",
+                Remedy("export_other_format"),
+            )
+
+
+def _holds(people: Array, values: Array) -> bool:
+    """Return whether somebody in a picture has some points; rows of NaN are not compared, absent ones are absent."""
+    seen = values[values[:, 2] > 0, :2], people[:, values[:, 2] > 0, :2]
+    return bool((np.isclose(*seen).all(axis=(1, 2)) & np.isnan(people[:, values[:, 2] == 0, 0]).all(axis=1)).any())
 
 
 def main(path: Path, folder: Path) -> None:

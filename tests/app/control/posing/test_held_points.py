@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gestures import FRONT, PAGE, drag, pixel_of
 
-from app.drawing import overlays
+from app.drawing import joint_handles
 from app.state.people import HeldPoint
 from tracker.errors import TrackerError
 
@@ -24,7 +24,7 @@ def test_a_drag_holds_the_point_it_placed_on_its_frame_until_it_is_released(open
     before = world_of(controller, "left_wrist")
     drag(controller, "torso", (3.0, 0.0))
     assert np.linalg.norm(world_of(controller, "left_wrist") - before) < 0.01
-    held = {h.point for h in overlays.handles(controller.session, controller.state, [FRONT]) if h.held}
+    held = {h.point for h in joint_handles.handles(controller.session, controller.state, [FRONT]) if h.held}
     assert held == {"left_wrist", "torso"}
     controller.navigation.seek(1)
     assert controller.state.held_points(0) == frozenset()
@@ -53,13 +53,13 @@ def test_a_point_out_of_reach_says_by_how_much(opened):
     start = pixel_of(controller, "left_wrist")
     controller.dragging.begin(PAGE, FRONT, 0, "left_wrist", tuple(start))
     controller.dragging.move(PAGE, tuple(start + np.array([15.0, -15.0])), 1)
-    assert overlays.out_of_reach(controller.session, controller.state) is None
+    assert joint_handles.out_of_reach(controller.session, controller.state) is None
     controller.dragging.move(PAGE, tuple(start + np.array([200.0, 0.0])), 2)
-    short = overlays.out_of_reach(controller.session, controller.state)
+    short = joint_handles.out_of_reach(controller.session, controller.state)
     assert (short.u, short.v) == pytest.approx(tuple(start + np.array([200.0, 0.0])))
     assert (short.point_u, short.point_v) == pytest.approx(tuple(pixel_of(controller, "left_wrist")), abs=0.01)
     camera = controller.session.cameras[FRONT].camera.pinhole
     far_m = 200 * float(camera.depths(world_of(controller, "left_wrist"))) / camera.K[0, 0]
     assert 0.2 * far_m < short.distance_m < far_m
     controller.dragging.end(PAGE)
-    assert overlays.out_of_reach(controller.session, controller.state) is None
+    assert joint_handles.out_of_reach(controller.session, controller.state) is None

@@ -8,7 +8,8 @@ import pytest
 from gestures import PAGE, drag, pixel_of, wait_for
 
 from app.control.session import comparing
-from app.drawing import former_limbs, overlays
+from app.drawing import joint_handles, overlays
+from app.drawing.ghosts import former_limb_lines
 from app.page import messages
 from app.state.page_view import View
 from app.state.people import ShownPose
@@ -55,7 +56,7 @@ def test_the_views_show_the_pose_before_and_nothing_is_undone(fitted):
     # Joints of the pose that is drawn tell in which views they are visible.
     binary = messages.overlay(controller.session, state, PAGE, CONTOURS, None)
     header = json.loads(binary[4 : 4 + int.from_bytes(binary[:4], "little")])
-    drawn = overlays.handles(controller.session, state.drawn, CONTOURS.cameras)
+    drawn = joint_handles.handles(controller.session, state.drawn, CONTOURS.cameras)
     assert [(h["point"], h["u"], h["visible"]) for h in header["handles"]] == [(h.point, h.u, h.visible) for h in drawn]
     controller.comparing.show_before(False)
     assert controller.state.drawn is controller.state
@@ -213,7 +214,7 @@ def test_a_limb_that_nobody_touched_is_named_drawn_and_taken_back_alone(opened):
     assert controller.state.compared.moved == ()
     comparing.note_comparison(session_state, "fit", before, session_state.costs((after,)), [0])
     assert named.distance_cm == pytest.approx(100 * np.linalg.norm(now[i] - was[i]), abs=0.1)
-    lines = former_limbs.former_limb_lines(controller.session, controller.state, CONTOURS)
+    lines = former_limb_lines(controller.session, controller.state, CONTOURS)
     assert {line.camera for line in lines if len(line.segments_px)} == {0, 1, 2, 3}
     u, v = controller.session.cameras[0].camera.pinhole.project(was[i])
     first = next(line for line in lines if line.camera == 0).segments_px
@@ -227,7 +228,7 @@ def test_a_limb_that_nobody_touched_is_named_drawn_and_taken_back_alone(opened):
     assert leg.dofs.any()
     assert controller.state.undo == "take back right arm, frame 0"
     assert controller.state.compared.moved == ()
-    assert former_limbs.former_limb_lines(controller.session, controller.state, CONTOURS) == []
+    assert former_limb_lines(controller.session, controller.state, CONTOURS) == []
     with pytest.raises(TrackerError, match="undo takes back the whole fit"):
         controller.pinning.take_limb_back(0)
 

@@ -11,7 +11,7 @@ import pytest
 from gestures import wait_for
 
 from app.bench import compile_kernels
-from app.drawing import overlays
+from app.drawing import joint_handles, overlays
 from app.runtime import kernel_compiler
 from app.runtime.kernel_compiler import KernelCompiler
 from app.session.samples import bundled
@@ -74,7 +74,7 @@ def test_the_page_shows_each_thing_once_its_kernels_are_compiled(compiling):
 
 def test_a_drag_before_all_kernels_moves_a_skeleton_without_cost(compiling):
     state = compiling.state
-    handles = overlays.handles(compiling.session, state, {0})
+    handles = joint_handles.handles(compiling.session, state, {0})
     assert all(h.visible for h in handles)
     (skeleton,) = overlays.paths(compiling.session, state, VIEW, None)
     by_name = {h.point: (h.u, h.v) for h in handles}

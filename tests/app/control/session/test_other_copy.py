@@ -65,7 +65,7 @@ def test_the_other_pose_is_drawn_where_the_copy_has_one(both):
     assert copy.poses[0].keys() == {0, 1, 2}
 
 
-@pytest.mark.parametrize("decision", ["take", "mean", "keep"])
+@pytest.mark.parametrize("decision", ["take", pytest.param("mean", marks=pytest.mark.slow), "keep"])
 def test_a_decision_is_one_step_and_undone_as_one(both, decision):
     controller, copy = compared(both)
     own, other = controller.state.poses[0], copy.poses[0][1].values

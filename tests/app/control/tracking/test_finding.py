@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gestures import drag, wait_for
 
-from app.drawing import overlays
+from app.drawing import joint_handles, overlays
 from app.page import inspector_feed
 from app.state.page_view import View
 from tracker.acquisition.from_contours import Acquisition
@@ -208,7 +208,7 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
     assert {p.kind for p in drawn} == {"candidate"}  # not the body that nobody has placed
     assert {p.camera for p in drawn} == set(range(len(controller.session.cameras)))
     assert all(len(p.segments_px) > 0 for p in drawn)
-    assert overlays.handles(controller.session_of(state), state, view.cameras) == []
+    assert joint_handles.handles(controller.session_of(state), state, view.cameras) == []
     go[0].set()
     wait_for(lambda: controller.state.frame == 3)
     assert set(controller.state.finding.candidates) == {2, 3}
@@ -223,7 +223,7 @@ def test_candidates_are_drawn_as_they_are_found_and_nobody_is_taken_from_another
     wait_for(lambda: not controller.state.finding.running)
     found = controller.state.finding
     assert (found.failed, found.tried, dict(found.candidates)) == (True, 2, {})  # the message is about the first frame
-    assert overlays.handles(controller.session_of(state), controller.state, view.cameras)  # to be placed by hand
+    assert joint_handles.handles(controller.session_of(state), controller.state, view.cameras)  # to be placed by hand
 
 
 def test_an_error_is_one_sentence(opened, monkeypatch):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gestures import FRONT, PAGE, drag, pixel_of, wait_for
 
-from app.drawing import overlays, part_outlines, pin_marks
+from app.drawing import joint_handles, overlays, part_outlines, pin_marks
 from app.state.page_view import View
 from tracker.errors import TrackerError
 from tracker.search.best_first import SearchSettings
@@ -20,7 +20,7 @@ def drawn_people(controller):
     session, state = controller.session, controller.state
     drawn = (
         overlays.paths(session, state, ALL, None),
-        overlays.handles(session, state, ALL.cameras),
+        joint_handles.handles(session, state, ALL.cameras),
         part_outlines.part_hulls(session, state, ALL),
         pin_marks.pin_marks(session, state),
     )

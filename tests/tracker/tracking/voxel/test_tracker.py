@@ -43,6 +43,7 @@ def tracked(
     return estimates, np.array(errors)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["gavrila34", pytest.param("mikic10", marks=pytest.mark.slow)])
 def test_a_person_of_another_shape_is_followed(model):
     estimates, errors = tracked(model=model)
