@@ -18,7 +18,7 @@ import numpy as np
 
 from tracker.api.work import Progress, Tracked
 from tracker.batch.stretch_work import FOUND
-from tracker.batch.stretches import Division, SeamRow, Stretch
+from tracker.batch.stretches import Division, RecordingStretch, SeamRow
 from tracker.errors import SessionError
 from tracker.geometry.arrays import Array
 from tracker.pipeline.keyframe_stretches import Seam, seam_of, with_seam
@@ -29,14 +29,12 @@ from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
 
 _JOINING = "joining"
 """Setting of the session: the task that joins stretches, and the entry of the history to which it adds poses."""
-_NOWHERE = np.full((1, 3), np.nan)
-"""Points of a person who has no pose."""
 
 
 class TrackedStretch(NamedTuple):
     """A stretch that was tracked."""
 
-    stretch: Stretch
+    stretch: RecordingStretch
     folder: Path
     """Of its copy of the session."""
     tracked: Tracked
@@ -50,7 +48,7 @@ class Joined(NamedTuple):
 
 
 class _Cut(NamedTuple):
-    """Where two stretches are joined."""
+    """The frame at which two stretches are joined."""
 
     frame: int
     """First frame of the later stretch."""
@@ -165,7 +163,8 @@ class _Joiner:
 
         def places(part: TrackedStretch, person: Person) -> Array:
             poses = self._poses(part, person, shared)
-            points = [person.model.points_world(poses[k].values) if k in poses else _NOWHERE for k in shared]
+            nowhere = np.full((1, 3), np.nan)
+            points = [person.model.points_world(poses[k].values) if k in poses else nowhere for k in shared]
             return np.array([of_frame.mean(axis=0) for of_frame in points])
 
         of_a, of_b = ([places(part, person) for person in self._people] for part in (a, b))
@@ -173,7 +172,10 @@ class _Joiner:
         return [int(j) for j in linear_sum_assignment(apart_m)[1]]
 
     def cut(self, a: TrackedStretch, b: TrackedStretch) -> _Cut:
-        """Return the frame at which two neighbours agree best, of all people together, and their seams; keyframes have none."""
+        """Return the frame at which two neighbours agree best, of all people together, and their seams.
+
+        Keyframes have no seam.
+        """
         shared = self._shared(a, b)
         seams = {i: self._seams(a, b, person, shared) for i, person in enumerate(self._people)}
         apart_mm = {

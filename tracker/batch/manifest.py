@@ -24,7 +24,7 @@ import msgspec
 from tracker.batch import claims
 from tracker.batch.claims import Claim
 from tracker.batch.plan import BatchPlan, PlannedRecording, from_plain, plain
-from tracker.batch.stretches import Division, SeamRow, Stretch, n_stretches
+from tracker.batch.stretches import Division, RecordingStretch, SeamRow, n_stretches
 from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
 from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
@@ -61,7 +61,7 @@ class Result(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     n_stretches: int = 1
     """Number of stretches that the recording was cut into."""
     seams: list[SeamRow] = []
-    """Where they were joined."""
+    """The frames at which they were joined."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class RecordingTask:
     """Number of stretches that it is expected to have."""
     division: Division | None = None
     """The stretches of a long recording; None before it is divided, and for a short one."""
-    stretch: Stretch | None = None
+    stretch: RecordingStretch | None = None
     """The stretch that is to be tracked; None for the recording itself."""
     failed: tuple[tuple[int, str], ...] = ()
     """Stretches that failed, by number, with the reason."""

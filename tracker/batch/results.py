@@ -47,7 +47,7 @@ class RecordingRow:
     n_stretches: int = 1
     """Number of stretches in which it was tracked."""
     seams: tuple[SeamRow, ...] = ()
-    """Where these were joined, the largest seam first."""
+    """The frames at which these were joined, the largest seam first."""
     result: Result | None = None
     """How the task ended; None while it has not."""
 
@@ -120,7 +120,7 @@ def _row(manifest: Manifest, task: RecordingTask) -> RecordingRow:
 
 
 class _Assessed(NamedTuple):
-    """What is known about the poses of a person."""
+    """Status and expected errors of the poses of a person."""
 
     person: str
     frames: IntArray

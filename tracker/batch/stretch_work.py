@@ -14,7 +14,7 @@ from pathlib import Path
 from tracker.api.sessions import open_session, opened, people_of
 from tracker.api.work import Progress, ProgressSink, Tracked, track_plan, tracked_of
 from tracker.batch.plan import Settings
-from tracker.batch.stretches import Division, Stretch, divide
+from tracker.batch.stretches import Division, RecordingStretch, divide
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.fitting.retarget import retarget_pose
@@ -58,7 +58,12 @@ def begin(session: Session, settings: Settings, frames: range, progress: Progres
 
 
 def track_stretch(
-    session: Session, folder: Path, settings: Settings, division: Division, stretch: Stretch, progress: Progress
+    session: Session,
+    folder: Path,
+    settings: Settings,
+    division: Division,
+    stretch: RecordingStretch,
+    progress: Progress,
 ) -> Tracked:
     """Track a stretch. One that was interrupted goes on where it was.
 

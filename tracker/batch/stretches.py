@@ -12,7 +12,7 @@ import msgspec
 from tracker.tracking.pose_errors import OFF_M
 
 
-class Stretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class RecordingStretch(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Frames of a recording that one worker tracks."""
 
     number: int
@@ -40,7 +40,7 @@ class Division(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Indices of the people to track."""
     start: int
     """Frame of their first poses, on which everybody bears the right name."""
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[RecordingStretch, ...]
     seconds: float = 0.0
     """Time that finding, acquiring and joining took so far, by the clock."""
     cpu_seconds: float = 0.0
@@ -72,7 +72,7 @@ def n_stretches(n_frames: int, length: int) -> int:
     return max(1, n_frames // length) if length else 1
 
 
-def divide(frames: range, keyframes: Collection[int], length: int, fps: float) -> tuple[Stretch, ...]:
+def divide(frames: range, keyframes: Collection[int], length: int, fps: float) -> tuple[RecordingStretch, ...]:
     """Cut frames into stretches.
 
     A cut is moved by up to half of the length to the nearest keyframe.
@@ -85,7 +85,7 @@ def divide(frames: range, keyframes: Collection[int], length: int, fps: float) -
     """
     marked = [i for i, frame in enumerate(frames) if frame in keyframes]
     half = min(ceil(fps / frames.step / 2), length // 2)
-    out, begin, at = list[Stretch](), 0, 0
+    out, begin, at = list[RecordingStretch](), 0, 0
     while (n := n_stretches(len(frames) - at, length)) > 1:
         wanted = at + (len(frames) - at) // n
         near = min(marked, key=lambda i: abs(i - wanted), default=None)
@@ -94,6 +94,6 @@ def divide(frames: range, keyframes: Collection[int], length: int, fps: float) -
             following = near
         else:
             at, end, following = wanted, wanted + half - 1, wanted - half
-        out.append(Stretch(len(out), frames[begin], frames[end]))
+        out.append(RecordingStretch(len(out), frames[begin], frames[end]))
         begin = following
-    return (*out, Stretch(len(out), frames[begin], frames[-1]))
+    return (*out, RecordingStretch(len(out), frames[begin], frames[-1]))

@@ -43,11 +43,11 @@ class Done(NamedTuple):
     files: tuple[Path, ...]
     """Exported files."""
     seams: tuple[SeamRow, ...] = ()
-    """Where the stretches of a long recording were joined."""
+    """The frames at which stretches of a long recording were joined."""
 
 
 @dataclass(frozen=True)
-class Found:
+class TrackedBefore:
     """The results of tracking, as the setting `_TRACKED` keeps them."""
 
     tracked: Tracked
@@ -74,12 +74,12 @@ def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done | Div
     found = _tracked_before(at, key)
     if found is None and task.stretch is not None:
         assert task.division is not None
-        found = Found(track_stretch(session, at, settings, task.division, task.stretch, progress))
+        found = TrackedBefore(track_stretch(session, at, settings, task.division, task.stretch, progress))
     elif found is None and task.division is not None:
         joined = join(session, task.division, _parts(task, folder), key, progress)
         if isinstance(joined, Division):
             return joined
-        found = Found(joined.tracked, joined.seams)
+        found = TrackedBefore(joined.tracked, joined.seams)
     elif found is None:
         session = _with_known_bodies(session, task, folder / "bodies")
         frames = frames_of(session, _frames(recording, session.n_frames))[:: settings.stride or 1]
@@ -87,7 +87,7 @@ def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done | Div
             division = begin(session, settings, frames, progress)
             _share_bodies(load_session(session.folder), task, folder / "bodies")
             return division
-        found = Found(_track(session, recording, frames, progress))
+        found = TrackedBefore(_track(session, recording, frames, progress))
     with SessionLock(at), closing(AnnotationStore(at / session.annotations_path.name)) as store:
         store.set_setting(_TRACKED, {"task": key, **msgspec.to_builtins(found)})
     if task.stretch is not None:
@@ -170,7 +170,7 @@ def _frames(recording: PlannedRecording, n_frames: int) -> list[int] | None:
     return None if text is None else list(parse_frame_list(text, n_frames, f"frames of {recording.name}"))
 
 
-def _tracked_before(folder: Path, key: str) -> Found | None:
+def _tracked_before(folder: Path, key: str) -> TrackedBefore | None:
     """Return what this task found, if it was ended between tracking and its result; None if it has not tracked."""
     path = folder / ANNOTATIONS_FILE
     if not path.exists():
@@ -179,7 +179,7 @@ def _tracked_before(folder: Path, key: str) -> Found | None:
         found: Any = store.setting(_TRACKED)
     if found is None or found["task"] != key:
         return None
-    return msgspec.convert({k: v for k, v in found.items() if k != "task"}, Found)
+    return msgspec.convert({k: v for k, v in found.items() if k != "task"}, TrackedBefore)
 
 
 def _with_known_bodies(session: Session, task: RecordingTask, bodies: Path) -> Session:

@@ -16,7 +16,7 @@ from tracker.batch.join import TrackedStretch, join
 from tracker.batch.manifest import Manifest, Result
 from tracker.batch.plan import Settings
 from tracker.batch.stretch_work import FOUND
-from tracker.batch.stretches import Division, Stretch, divide
+from tracker.batch.stretches import Division, RecordingStretch, divide
 from tracker.batch.tasks import Done
 from tracker.batch.worker import work
 from tracker.errors import TrackerError
@@ -62,9 +62,8 @@ class Scene:
         self.folder = folder
         gaps = {(i, f) for i in range(n_people) for f in range(n_frames)}
         self.session, _ = store_motion(folder / "session", [MODEL] * n_people, n_frames=n_frames, gaps=gaps)
-        self.division = Division(
-            (0, n_frames, 1), tuple(range(n_people)), 5, tuple(Stretch(i, a, b) for i, (a, b) in enumerate(cuts))
-        )
+        stretches = tuple(RecordingStretch(i, a, b) for i, (a, b) in enumerate(cuts))
+        self.division = Division((0, n_frames, 1), tuple(range(n_people)), 5, stretches)
 
     def pose(self, person, frame, off_m=0.0):
         """A person walks along x; several stand two metres apart."""
