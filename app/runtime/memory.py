@@ -4,8 +4,9 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-WORKER_BYTES = 2 << 30
-"""Memory of a worker that finds people in four views of 640 x 480: 1 to 2 GB; 0.6 GB where it only tracks."""
+WORKER_BYTES = 5 << 29
+"""Memory of a worker that finds people in four views of 640 x 480: 1.6 to 2.4 GB
+(`tests/benchmarks/long_recording.py`); 0.6 GB where it only tracks."""
 
 
 def free_bytes() -> int | None:

@@ -85,7 +85,7 @@ export function pointPhrases({ source, author, time, views, lost }, pose) {
 }
 
 /**
- * By what a program made values of a source, as in " by contour from keyframes 15 and 30".
+ * By what a program made values of a source, as in " by contour from frames 15 and 30".
  *
  * @param {string} source
  * @param {Provenance} pose
@@ -93,7 +93,7 @@ export function pointPhrases({ source, author, time, views, lost }, pose) {
 function how(source, { method, between, imported_from }) {
   if (source === "imported") return imported_from ? ` from ${imported_from}` : method ? ` from ${displayName(method)}` : "";
   const by = method && method !== "interpolate" ? ` by ${displayName(method)}` : "";
-  return by + (between && ["tracked", "smoothed", "interpolated"].includes(source) ? ` from keyframes ${between[0]} and ${between[1]}` : "");
+  return by + (between && ["tracked", "smoothed", "interpolated"].includes(source) ? ` from frames ${between[0]} and ${between[1]}` : "");
 }
 
 /**

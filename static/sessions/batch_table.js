@@ -3,7 +3,7 @@
 /**
  * @typedef {{name: string, session: string, state: string, expected_error_mm: number | null, share_doubted: number,
  *   poses: number, verified: number, worst_frame: number | null, worst_person: string, seconds: number,
- *   contradiction: string, error: string}} BatchRow
+ *   contradiction: string, error: string, joined?: string}} BatchRow
  * @typedef {{done: number, failed: number, running: number, waiting: number, hours: number, share_verified: number}} Totals
  * @typedef {{name: string, totals: Totals, recordings: BatchRow[]}} Batch
  */
@@ -52,7 +52,7 @@ function addRow(line, row, open) {
   } else {
     first.append(row.name);
   }
-  const note = row.error || row.contradiction;
+  const note = row.error || row.contradiction || (row.joined ?? "");
   if (note) {
     const small = Object.assign(document.createElement("small"), { textContent: note });
     small.classList.toggle("is-failed", row.error !== "");

@@ -10,10 +10,10 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
-from itertools import chain, cycle, islice
 from pathlib import Path
 
 import numpy as np
+from looped_footage import forth_and_back
 
 from app.cli.target import load_target
 from app.cli.track import track
@@ -37,11 +37,6 @@ def resident_mb() -> float:
     """Memory of this process that is in use now, MB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
-
-
-def forth_and_back(n_frames: int, n: int) -> Iterator[int]:
-    """The first n frames of a recording that is played to its end, back to its beginning, and so on, without a jump."""
-    return islice(cycle(chain(range(n_frames), range(n_frames - 2, 0, -1))), n)
 
 
 def lengthened(source: CameraSource, folder: Path, fps: float, n: int) -> CameraSource:

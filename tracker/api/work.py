@@ -1,7 +1,7 @@
 """Find people, acquire their sizes, and track them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -150,22 +150,38 @@ def track(
     """
     with opened(session) as stored:
         used, chosen = frames_of(stored.session, frames), people_of(stored.session, people)
-        if not isinstance(used, range):
-            raise TrackerError("expected frames at one distance from one another, found others; give a range")
-        by = method_named(method)
-        names = {option.name for option in by.options}
-        if unknown := sorted(set(options or {}) - names):
-            raise TrackerError(f"expected options among {', '.join(sorted(names))}, found '{unknown[0]}'; correct it")
-        settings = by.at_stride(by.with_options(by.settings(), dict(options or {})), used.step)
+        plan = track_plan(chosen, used, method, options, keypoints)
         views = check_names(cameras, list(stored.session.camera_names), "camera", "cameras")
-        plan = TrackPlan(used, chosen, settings, tuple(views), keypoints=keypoints)
         find_settings = FindSettings(keypoints=keypoints) if find_missing else None
-        chain, sink = ChainPlan(plan, find_settings, chosen if acquire_sizes else ()), ProgressSink(progress)
-        run_chain(chain, stored, sink)
-        return _tracked(stored)
+        chain = ChainPlan(replace(plan, cameras=tuple(views)), find_settings, chosen if acquire_sizes else ())
+        run_chain(chain, stored, ProgressSink(progress))
+        return tracked_of(stored)
 
 
-def _tracked(stored: StoredSession) -> Tracked:
+def track_plan(
+    people: tuple[int, ...],
+    frames: Sequence[int],
+    method: str,
+    options: Mapping[str, OptionValue] | None,
+    keypoints: str | None,
+) -> TrackPlan:
+    """Return a plan with the settings of a method; see `track` for its arguments.
+
+    Raises:
+        TrackerError: the frames are not at one distance from one another, or an option is not one of the method.
+    """
+    if not isinstance(frames, range):
+        raise TrackerError("expected frames at one distance from one another, found others; give a range")
+    by = method_named(method)
+    names = {option.name for option in by.options}
+    if unknown := sorted(set(options or {}) - names):
+        raise TrackerError(f"expected options among {', '.join(sorted(names))}, found '{unknown[0]}'; correct it")
+    settings = by.at_stride(by.with_options(by.settings(), dict(options or {})), frames.step)
+    return TrackPlan(frames, people, settings, keypoints=keypoints)
+
+
+def tracked_of(stored: StoredSession) -> Tracked:
+    """Return the result of the last run of a session."""
     plan, run = stored.plan, stored.run
     assert plan is not None
     assert run is not None

@@ -3,13 +3,19 @@
 BATCH/tasks/000007.json     what to do, written once
 BATCH/claims/000007         while a worker does it
 BATCH/results/000007.json   once it is done or has failed
+BATCH/stretches/000007.json the stretches of a long recording, once its people are found
+BATCH/stretches/000007_003  the copy of the session in which a stretch is tracked
+
+The task of a long recording is done in parts. Its first visit ends with the division. Then workers claim its stretches,
+which have claims and results of their own, `000007_003`. Once all have ended, the last visit joins them.
+
 BATCH/bodies/NAME.toml      bodies that recordings share
 BATCH/exports               files for other programs
 """
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -18,10 +24,13 @@ import msgspec
 from tracker.batch import claims
 from tracker.batch.claims import Claim
 from tracker.batch.plan import BatchPlan, PlannedRecording, from_plain, plain
+from tracker.batch.stretches import Division, RecordingStretch, SeamRow, n_stretches
 from tracker.errors import TrackerError
 from tracker.files import write_text_atomic
 from tracker.text_files import DOCUMENT_BYTES, TextKind, read_json
 
+STRETCHES = "stretches"
+"""Folder of the divisions and of the copies of sessions."""
 State: TypeAlias = Literal["waiting", "running", "done", "failed"]
 _KIND = TextKind("task", DOCUMENT_BYTES, TrackerError, "make the batch again in another folder")
 
@@ -49,6 +58,10 @@ class Result(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     remedy: str = ""
     """Code of `tracker.errors.Remedy`; empty without one."""
     remedy_fields: dict[str, str] = {}
+    n_stretches: int = 1
+    """Number of stretches that the recording was cut into."""
+    seams: list[SeamRow] = []
+    """The frames at which they were joined."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +74,36 @@ class RecordingTask:
     """Numbers of the tasks that must have ended before: those that acquire bodies which it shares."""
     bodies: tuple[str, ...] = ()
     """Names of the people whose bodies are shared."""
+    n_expected: int = 1
+    """Number of stretches that it is expected to have."""
+    division: Division | None = None
+    """The stretches of a long recording; None before it is divided, and for a short one."""
+    stretch: RecordingStretch | None = None
+    """The stretch that is to be tracked; None for the recording itself."""
+    failed: tuple[tuple[int, str], ...] = ()
+    """Stretches that failed, by number, with the reason."""
 
     @property
     def key(self) -> str:
         """Name of its files."""
-        return f"{self.number:06d}"
+        return f"{self.number:06d}" if self.stretch is None else f"{self.number:06d}_{self.stretch.key}"
+
+    @property
+    def name(self) -> str:
+        """Name of what is tracked, for people."""
+        if self.stretch is None:
+            return self.recording.name
+        return f"{self.recording.name}, frames {self.stretch.first}:{self.stretch.last + 1}"
+
+    def session(self, batch: Path) -> Path:
+        """Return the session folder in which poses are stored while the task is done."""
+        return Path(self.recording.session) if self.stretch is None else batch / STRETCHES / self.key
+
+    def stretches(self) -> list["RecordingTask"]:
+        """Return the tasks of its stretches; none before it is divided."""
+        if self.division is None:
+            return []
+        return [replace(self, stretch=s) for s in self.division.stretches]
 
 
 class Manifest:
@@ -84,7 +122,7 @@ class Manifest:
         """
         tasks = _tasks(plan)
         try:
-            for name in ("tasks", "claims", "results", "attempts", "bodies", "exports", "sessions"):
+            for name in ("tasks", "claims", "results", "attempts", "bodies", "exports", "sessions", STRETCHES):
                 (folder / name).mkdir(parents=True, exist_ok=True)
             before = cls.load(folder).tasks if any((folder / "tasks").iterdir()) else ()
             if before and [t.recording.name for t in before] != [t.recording.name for t in tasks]:
@@ -93,7 +131,12 @@ class Manifest:
                     "plan; choose another folder"
                 )
             for task in tasks:
-                data = {"recording": plain(task.recording), "after": list(task.after), "bodies": list(task.bodies)}
+                data = {
+                    "recording": plain(task.recording),
+                    "after": list(task.after),
+                    "bodies": list(task.bodies),
+                    "stretches": task.n_expected,
+                }
                 write_text_atomic(folder / "tasks" / f"{task.key}.json", msgspec.json.encode(data).decode())
         except OSError as error:
             raise TrackerError(f"cannot write {folder}: {error.strerror}; choose another folder") from error
@@ -116,7 +159,7 @@ class Manifest:
                 recording, after, bodies = from_plain(data["recording"]), tuple(data["after"]), tuple(data["bodies"])
             except (KeyError, TypeError) as error:
                 raise TrackerError(f"task {file}: expected recording, after and bodies, found other keys") from error
-            tasks.append(RecordingTask(number, recording, after, bodies))
+            tasks.append(RecordingTask(number, recording, after, bodies, data.get("stretches", 1)))
         return cls(folder, tasks)
 
     def result(self, task: RecordingTask) -> Result | None:
@@ -126,29 +169,84 @@ class Manifest:
         except FileNotFoundError:
             return None
 
+    def divided(self, task: RecordingTask) -> RecordingTask:
+        """Return the task of a recording with its stretches, if it has some by now."""
+        try:
+            text = (self.folder / STRETCHES / f"{task.key}.json").read_bytes()
+        except FileNotFoundError:
+            return task
+        return replace(task, division=msgspec.json.decode(text, type=Division))
+
     def state(self, task: RecordingTask) -> State:
-        """Return the state of a task."""
+        """Return the state of a task. A recording is running while one of its stretches is."""
         if (found := self.result(task)) is not None:
             return found.state
-        return "running" if claims.has_living(self._claim_path(task)) else "waiting"
+        parts = [task, *self.divided(task).stretches()]
+        return "running" if any(claims.has_living(self._claim_path(part)) for part in parts) else "waiting"
 
     def counts(self) -> Counter[State]:
         """Return the number of tasks in each state."""
         return Counter(map(self.state, self.tasks))
 
     def claim_next(self) -> tuple[RecordingTask, Claim] | None:
-        """Claim a task that can begin; None if there is none at present."""
+        """Claim a task that can begin, or a stretch of one; None if there is none at present."""
         for task in self.tasks:
-            if self.result(task) is not None or any(self.result(self.tasks[i]) is None for i in task.after):
+            if self.result(task) is not None or not all(self._has_bodies(self.tasks[i]) for i in task.after):
                 continue
-            held = claims.claim(self._claim_path(task))
-            if held is None:
-                continue
-            if self.result(task) is not None:  # it ended between the two looks
-                held.release()
-                continue
-            return task, held
+            task = self.divided(task)
+            parts = task.stretches()
+            ended = [self.result(part) for part in parts]
+            waiting = [part for part, result in zip(parts, ended, strict=True) if result is None]
+            if parts and not waiting:
+                failed = ((i, r.error) for i, r in enumerate(ended) if r is not None and r.state == "failed")
+                task = replace(task, failed=tuple(failed))
+            for part in waiting or [task]:
+                if (held := claims.claim(self._claim_path(part))) is None:
+                    continue
+                if self.result(part) is not None or self.divided(task).division != task.division:
+                    held.release()  # it ended, or was divided, between the two looks
+                    continue
+                return part, held
         return None
+
+    def _has_bodies(self, task: RecordingTask) -> bool:
+        """Return whether a recording has the bodies that others wait for, or failed to."""
+        return self.result(task) is not None or self.divided(task).division is not None
+
+    def divide(self, task: RecordingTask, held: Claim, division: Division) -> bool:
+        """Write the stretches of a recording, or their right names, and give up its claim.
+
+        Returns:
+            Whether they were written: False if another worker has taken the task since.
+        """
+        if not held.is_held():
+            return False
+        text = msgspec.json.format(msgspec.json.encode(division)).decode()
+        write_text_atomic(self.folder / STRETCHES / f"{task.key}.json", text)
+        held.release()
+        return True
+
+    def spent_on_stretches(self, task: RecordingTask) -> tuple[float, float]:
+        """Return the time that the stretches of a recording took, by the clock and of processors, s."""
+        found = [
+            msgspec.json.decode(path.read_bytes(), type=Result)
+            for path in sorted((self.folder / "results").glob(f"{task.key}_*.json"))
+        ]
+        return sum(r.seconds for r in found), sum(r.cpu_seconds for r in found)
+
+    def n_parts(self) -> int:
+        """Return how many tasks are left that workers can do side by side: recordings, and stretches of long ones."""
+        n = 0
+        for task in self.tasks:
+            if self.result(task) is None:
+                parts = self.divided(task).stretches()
+                n += max(1, sum(self.result(part) is None for part in parts)) if parts else task.n_expected
+        return n
+
+    def ended_parts(self) -> dict[str, tuple[RecordingTask, Result]]:
+        """Return the tasks that have ended, and the stretches of long recordings, by their keys."""
+        parts = (part for task in self.tasks for part in (*self.divided(task).stretches(), task))
+        return {part.key: (part, result) for part in parts if (result := self.result(part)) is not None}
 
     def is_finished(self) -> bool:
         """Return whether every task has ended."""
@@ -183,8 +281,10 @@ class Manifest:
         """Make failed tasks wait again; return their number."""
         failed = [task for task in self.tasks if (found := self.result(task)) and found.state == "failed"]
         for task in failed:
-            (self.folder / "attempts" / task.key).unlink(missing_ok=True)
-            (self.folder / "results" / f"{task.key}.json").unlink(missing_ok=True)
+            for part in [*self.divided(task).stretches(), task]:
+                if (found := self.result(part)) is None or found.state == "failed":
+                    (self.folder / "attempts" / part.key).unlink(missing_ok=True)
+                    (self.folder / "results" / f"{part.key}.json").unlink(missing_ok=True)
         return len(failed)
 
     def _claim_path(self, task: RecordingTask) -> Path:
@@ -201,5 +301,6 @@ def _tasks(plan: BatchPlan) -> list[RecordingTask]:
         after = sorted({first[p] for p in shared if p in first})
         for person in shared:
             first.setdefault(person, number)
-        tasks.append(RecordingTask(number, recording, tuple(after), tuple(shared)))
+        n_expected = n_stretches(plan.n_frames.get(recording.name, 0), recording.settings.stretch_frames)
+        tasks.append(RecordingTask(number, recording, tuple(after), tuple(shared), n_expected))
     return tasks

@@ -2,17 +2,22 @@
 
 import csv
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
 
 from tracker.errors import TrackerError
 from tracker.session.folder import SESSION_FILE
+from tracker.session.frame_list import parse_frame_list
 from tracker.text_files import DOCUMENT_BYTES, TextKind, read_lines, read_toml
 from tracker.validation import Name, check
+
+if TYPE_CHECKING:
+    from tracker.session.session import Session
 
 FOLDER_FILE = "batch.toml"
 """Name of a file of settings for the recordings in its folder and below."""
@@ -42,11 +47,19 @@ class Settings(msgspec.Struct, forbid_unknown_fields=True, omit_defaults=True):
     """Names of those to track; all by default."""
     export: list[Name] | None = None
     """Formats to write the poses in."""
+    stretch: Annotated[int, Meta(ge=0, description="a whole number from 0")] | None = None
+    """Frames of a stretch at least, of those that are tracked: a recording of twice as many is cut. 0 for never. 1000
+    by default (`tests/benchmarks/long_recording.py`): finding people in each stretch takes a tenth of the time."""
     attempts: Annotated[int, Meta(ge=1, description="a whole number from 1")] | None = None
     """Workers that may die over the recording before it counts as failed, so that it does not kill them all; 3 by
     default."""
     skip: bool | None = None
     """Leave the recording out."""
+
+    @property
+    def stretch_frames(self) -> int:
+        """Frames of a stretch at least; 0 for a recording that is never cut."""
+        return 1000 if self.stretch is None else self.stretch
 
     def over(self, other: "Settings") -> "Settings":
         """Return these settings, with those of another where they are not given. Options are merged one by one."""
@@ -106,6 +119,8 @@ class BatchPlan:
     freeze_bodies: bool = False
     people: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the people of each recording that has a session, as far as it can be read."""
+    n_frames: Mapping[str, int] = field(default_factory=dict)
+    """Number of frames to track of each recording, as far as it is known."""
 
 
 def read_plan(path: Path, out: Path) -> BatchPlan:
@@ -137,8 +152,10 @@ def read_plan(path: Path, out: Path) -> BatchPlan:
         settings = row.recordings.get(name, Settings()).over(inherited)
         if not settings.skip:
             chosen.append(PlannedRecording(name, str(session), settings, footage))
-    people = {r.name: names for r in chosen if (names := _people_of(r))}
-    return BatchPlan(path, tuple(chosen), row.freeze_bodies, people)
+    sessions = {r.name: _session_of(r) for r in chosen}
+    people = {r.name: names for r in chosen if (names := _people_of(r, sessions[r.name]))}
+    n_frames = {r.name: _n_frames(r, s) for r in chosen if (s := sessions[r.name]) is not None}
+    return BatchPlan(path, tuple(chosen), row.freeze_bodies, people, n_frames)
 
 
 def _by_pattern(row: _PlanFile, path: Path) -> dict[str, tuple[Path, Footage | None]]:
@@ -219,16 +236,32 @@ def _inherited(top: Path, session: Path, settings: Settings) -> Settings:
     return settings
 
 
-def _people_of(recording: PlannedRecording) -> tuple[str, ...]:
-    """Return the names of the people of a recording; none where its session cannot be read, which its task says."""
+def _session_of(recording: PlannedRecording) -> "Session | None":
+    """Return the session of a recording; None where there is none or it cannot be read, which its task says."""
     from tracker.session.session import load_session
 
     if recording.footage is not None:
-        return recording.footage.people
+        return None
     try:
-        return tuple(p.name for p in load_session(recording.session).people)
+        return load_session(recording.session)
     except TrackerError:
-        return ()
+        return None
+
+
+def _people_of(recording: PlannedRecording, session: "Session | None") -> tuple[str, ...]:
+    """Return the names of the people of a recording, as far as they are known."""
+    if recording.footage is not None:
+        return recording.footage.people
+    return () if session is None else tuple(p.name for p in session.people)
+
+
+def _n_frames(recording: PlannedRecording, session: "Session") -> int:
+    """Return the number of frames of a recording that are tracked; 0 where the range is wrong, which its task says."""
+    text = recording.settings.frames
+    with suppress(TrackerError):
+        frames = range(session.n_frames) if text is None else parse_frame_list(text, session.n_frames, "frames")
+        return len(frames[:: recording.settings.stride or 1])
+    return 0
 
 
 def plain(recording: PlannedRecording) -> dict[str, Any]:

@@ -1,17 +1,22 @@
 """The morning after a batch: a row for each recording, the one that needs a person most first."""
 
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.api.pose_series import PoseSeries
 from tracker.api.results import read_poses
 from tracker.batch.manifest import Manifest, RecordingTask, Result, State
+from tracker.batch.plan import Settings
+from tracker.batch.stretches import SeamRow
 from tracker.errors import SessionError, TrackerError
 from tracker.formats.joint_maps import LIMB_JOINTS
+from tracker.geometry.arrays import Array, IntArray
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 
@@ -39,6 +44,10 @@ class RecordingRow:
     cpu_seconds: float = 0.0
     contradiction: str = ""
     """A sentence on a camera that seems off; empty without one."""
+    n_stretches: int = 1
+    """Number of stretches in which it was tracked."""
+    seams: tuple[SeamRow, ...] = ()
+    """The frames at which these were joined, the largest seam first."""
     result: Result | None = None
     """How the task ended; None while it has not."""
 
@@ -88,60 +97,80 @@ def _row(manifest: Manifest, task: RecordingTask) -> RecordingRow:
     row = RecordingRow(recording.name, recording.session, manifest.state(task), result=result)
     if result is None or result.state == "failed":
         return row
-    people = _people(Path(recording.session), recording.settings.people)
-    errors_mm = [_errors_mm(p) for p in people]
-    known = np.concatenate([e[np.isfinite(e)] for e in errors_mm]) if people else np.zeros(0)
-    doubted = [np.isin(p.statuses, ("doubtful", "lost")) & ~p.keyframes for p in people]
-    worst_frame, worst_person = _worst(people, errors_mm, doubted)
+    people = _people(Path(recording.session), recording.settings)
+    known = np.concatenate([p.errors_mm[np.isfinite(p.errors_mm)] for p in people]) if people else np.zeros(0)
+    worst_frame, worst_person = _worst(people)
     return RecordingRow(
         recording.name,
         recording.session,
         "done",
         float(known.mean()) if len(known) else None,
-        sum(map(len, people)),
-        int(sum(d.sum() for d in doubted)),
+        sum(len(p.frames) for p in people),
+        int(sum(p.doubted.sum() for p in people)),
         sum(_n_verified(Path(recording.session), p.person) for p in people),
         worst_frame,
         worst_person,
         result.seconds,
         result.cpu_seconds,
         result.contradiction,
+        result.n_stretches,
+        tuple(sorted(result.seams, key=lambda seam: -seam.apart_mm)),
         result,
     )
 
 
-def _people(folder: Path, names: Sequence[str] | None) -> list[PoseSeries]:
-    """Return the poses of the people who have some; none where the session is gone."""
-    found = list[PoseSeries]()
+class _Assessed(NamedTuple):
+    """Status and expected errors of the poses of a person."""
+
+    person: str
+    frames: IntArray
+    """Frames with a pose, (F,)."""
+    errors_mm: Array
+    """Expected error of each, (F,), mm: the mean over limb joints; NaN where not known."""
+    doubted: NDArray[np.bool_]
+    """Whether it is doubtful or lost, and no keyframe, (F,)."""
+    keyframes: NDArray[np.bool_]
+    """Whether a person set or verified it, (F,)."""
+
+
+def _people(folder: Path, settings: Settings) -> list[_Assessed]:
+    """Return what is known about the people who have poses; nothing where the session is gone.
+
+    Long recordings are read in blocks, so that the memory that it takes does not grow with them.
+    """
+    found = list[_Assessed]()
     try:
         session = load_session(folder)
-        for person in names or [p.name for p in session.people]:
-            try:
-                found.append(read_poses(session, person))
-            except SessionError:  # no pose
-                continue
+        step = settings.stretch_frames or session.n_frames
+        blocks = [range(a, min(a + step, session.n_frames)) for a in range(0, session.n_frames, step)]
+        for person in settings.people or [p.name for p in session.people]:
+            own = list[_Assessed]()
+            for block in blocks:
+                with suppress(SessionError):  # no pose
+                    own.append(_assessed(read_poses(session, person, block)))
+            if own:
+                found.append(_Assessed(own[0].person, *map(np.concatenate, list(zip(*own, strict=True))[1:])))
     except TrackerError:
         return []
     return found
 
 
-def _errors_mm(poses: PoseSeries) -> np.ndarray:
-    """Return the expected error of each frame, (F,), mm: the mean over limb joints; NaN where not known."""
+def _assessed(poses: PoseSeries) -> _Assessed:
     joints = [poses.errors_m(name) for name in poses.names if name in LIMB_JOINTS]
-    return 1000 * np.mean(joints, axis=0) if joints else np.full(len(poses), np.nan)
+    errors_mm = 1000 * np.mean(joints, axis=0) if joints else np.full(len(poses), np.nan)
+    doubted = np.isin(poses.statuses, ("doubtful", "lost")) & ~poses.keyframes
+    return _Assessed(poses.person, poses.frames, errors_mm, doubted, poses.keyframes)
 
 
-def _worst(
-    people: Sequence[PoseSeries], errors_mm: Sequence[np.ndarray], doubted: Sequence[np.ndarray]
-) -> tuple[int | None, str]:
+def _worst(people: Sequence[_Assessed]) -> tuple[int | None, str]:
     """Return the frame and the person to look at first: doubted ones before others, then the largest error.
 
     Keyframes are left out unless there is nothing else: a person has seen them.
     """
     found = [
-        (not seen, bool(d), float(np.nan_to_num(e)), -int(frame), poses.person)
-        for poses, errors, doubts in zip(people, errors_mm, doubted, strict=True)
-        for frame, e, d, seen in zip(poses.frames, errors, doubts, poses.keyframes, strict=True)
+        (not seen, bool(doubted), float(np.nan_to_num(error)), -int(frame), person)
+        for person, *columns in people
+        for frame, error, doubted, seen in zip(*columns, strict=True)
     ]
     if not found:
         return None, ""

@@ -1,8 +1,13 @@
-"""Do a task: make the session if there is none, give it the bodies that are known, track it, write its files."""
+"""Do a task: make the session if there is none, give it the bodies that are known, track it, write its files.
+
+A long recording is begun, tracked in stretches, and joined.
+"""
 
 import hashlib
+import shutil
+from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import asdict
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,8 +16,11 @@ import msgspec
 from tracker.api.results import export
 from tracker.api.sessions import frames_of, new_session, open_session
 from tracker.api.work import Progress, Tracked, track
+from tracker.batch.join import TrackedStretch, join
 from tracker.batch.manifest import RecordingTask
 from tracker.batch.plan import PlannedRecording, plain
+from tracker.batch.stretch_work import begin, track_stretch
+from tracker.batch.stretches import Division, SeamRow, n_stretches
 from tracker.errors import TrackerError
 from tracker.exports.formats import FORMATS
 from tracker.files import write_text_atomic
@@ -21,7 +29,7 @@ from tracker.formats.model_toml import format_model, has_preset_proportions, loa
 from tracker.pipeline.body_acquisition import store_body
 from tracker.session.frame_list import parse_frame_list
 from tracker.session.lock import SessionLock
-from tracker.session.session import Session, load_session
+from tracker.session.session import ANNOTATIONS_FILE, Session, load_session
 from tracker.store.annotation_store import AnnotationStore
 
 _TRACKED = "batch"
@@ -34,41 +42,111 @@ class Done(NamedTuple):
     tracked: Tracked
     files: tuple[Path, ...]
     """Exported files."""
+    seams: tuple[SeamRow, ...] = ()
+    """The frames at which stretches of a long recording were joined."""
 
 
-def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done:
-    """Track a recording as its settings say. A task that was interrupted goes on where it was.
+@dataclass(frozen=True)
+class TrackedBefore:
+    """The results of tracking, as the setting `_TRACKED` keeps them."""
+
+    tracked: Tracked
+    seams: tuple[SeamRow, ...] = ()
+
+
+def do_task(task: RecordingTask, folder: Path, progress: Progress) -> Done | Division:
+    """Track a recording as its settings say, or a stretch of one. A task that was interrupted goes on where it was.
 
     Args:
         task: to do; the caller has claimed it.
         folder: of the batch.
         progress: receives the progress. An exception that it raises ends the work.
 
+    Returns:
+        The results; of a long recording its stretches, which are to be tracked before it is done again.
+
     Raises:
         TrackerError: the recording cannot be tracked or exported.
     """
     recording, settings = task.recording, task.recording.settings
-    session = _session(recording)
-    key = hashlib.sha256(msgspec.json.encode(plain(recording))).hexdigest()
-    tracked = _tracked_before(session, key)
-    if tracked is None:
+    session, at = _session(recording), task.session(folder)
+    key = _digest(task)
+    found = _tracked_before(at, key)
+    if found is None and task.stretch is not None:
+        assert task.division is not None
+        found = TrackedBefore(track_stretch(session, at, settings, task.division, task.stretch, progress))
+    elif found is None and task.division is not None:
+        joined = join(session, task.division, _parts(task, folder), key, progress)
+        if isinstance(joined, Division):
+            return joined
+        found = TrackedBefore(joined.tracked, joined.seams)
+    elif found is None:
         session = _with_known_bodies(session, task, folder / "bodies")
-        frames = frames_of(session, _frames(recording, session.n_frames))
-        tracked = track(
-            session,
-            settings.people,
-            frames[:: settings.stride or 1],
-            method=settings.method or "chamfer",
-            options=settings.options,
-            find_missing=settings.find is not False,
-            acquire_sizes=settings.acquire is not False,
-            keypoints=settings.keypoints,
-            progress=progress,
-        )
-        with SessionLock(session.folder), closing(AnnotationStore(session.annotations_path)) as store:
-            store.set_setting(_TRACKED, {"task": key, "tracked": asdict(tracked)})
+        frames = frames_of(session, _frames(recording, session.n_frames))[:: settings.stride or 1]
+        if isinstance(frames, range) and n_stretches(len(frames), settings.stretch_frames) > 1:
+            division = begin(session, settings, frames, progress)
+            _share_bodies(load_session(session.folder), task, folder / "bodies")
+            return division
+        found = TrackedBefore(_track(session, recording, frames, progress))
+    with SessionLock(at), closing(AnnotationStore(at / session.annotations_path.name)) as store:
+        store.set_setting(_TRACKED, {"task": key, **msgspec.to_builtins(found)})
+    if task.stretch is not None:
+        return Done(found.tracked, ())
+    _require_all(task)
+    for part in task.stretches():
+        shutil.rmtree(part.session(folder), ignore_errors=True)
     _share_bodies(load_session(session.folder), task, folder / "bodies")
-    return Done(tracked, _export(session, recording, folder / "exports"))
+    return Done(found.tracked, _export(session, recording, folder / "exports"), found.seams)
+
+
+def _digest(task: RecordingTask) -> str:
+    """Return a text that identifies what a task does."""
+    part = [] if task.stretch is None else [msgspec.to_builtins(task.stretch)]
+    return hashlib.sha256(msgspec.json.encode([plain(task.recording), *part])).hexdigest()
+
+
+def _track(session: Session, recording: PlannedRecording, frames: Sequence[int], progress: Progress) -> Tracked:
+    settings = recording.settings
+    return track(
+        session,
+        settings.people,
+        frames,
+        method=settings.method or "chamfer",
+        options=settings.options,
+        find_missing=settings.find is not False,
+        acquire_sizes=settings.acquire is not False,
+        keypoints=settings.keypoints,
+        progress=progress,
+    )
+
+
+def _parts(task: RecordingTask, folder: Path) -> list[TrackedStretch]:
+    """Return the stretches of a recording that were tracked.
+
+    Raises:
+        TrackerError: all of them failed.
+    """
+    parts = list[TrackedStretch]()
+    for part in task.stretches():
+        found = _tracked_before(part.session(folder), _digest(part))
+        if found is not None and part.stretch is not None:
+            parts.append(TrackedStretch(part.stretch, part.session(folder), found.tracked))
+    if not parts:
+        _require_all(task)
+    return parts
+
+
+def _require_all(task: RecordingTask) -> None:
+    """Refuse a recording of which a stretch failed, after the poses of the others are stored.
+
+    Raises:
+        TrackerError: a stretch failed.
+    """
+    if not task.failed:
+        return
+    parts = {part.stretch.number: part.stretch for part in task.stretches() if part.stretch is not None}
+    lost = ", ".join(f"{parts[i].first}:{parts[i].last + 1}" for i, _ in task.failed)
+    raise TrackerError(f"expected poses on all frames, found none on {lost}: {task.failed[0][1]}")
 
 
 def _session(recording: PlannedRecording) -> Session:
@@ -92,13 +170,16 @@ def _frames(recording: PlannedRecording, n_frames: int) -> list[int] | None:
     return None if text is None else list(parse_frame_list(text, n_frames, f"frames of {recording.name}"))
 
 
-def _tracked_before(session: Session, key: str) -> Tracked | None:
+def _tracked_before(folder: Path, key: str) -> TrackedBefore | None:
     """Return what this task found, if it was ended between tracking and its result; None if it has not tracked."""
-    if not session.annotations_path.exists():
+    path = folder / ANNOTATIONS_FILE
+    if not path.exists():
         return None
-    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+    with closing(AnnotationStore(path, read_only=True)) as store:
         found: Any = store.setting(_TRACKED)
-    return Tracked(**found["tracked"]) if found is not None and found["task"] == key else None
+    if found is None or found["task"] != key:
+        return None
+    return msgspec.convert({k: v for k, v in found.items() if k != "task"}, TrackedBefore)
 
 
 def _with_known_bodies(session: Session, task: RecordingTask, bodies: Path) -> Session:

@@ -6,15 +6,22 @@ import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeAlias
 
 import msgspec
 
 from tracker.batch.claims import BEAT_S, Claim
 from tracker.batch.manifest import Manifest, RecordingTask, Result
+from tracker.batch.stretches import Division
 from tracker.batch.tasks import Done, do_task
+from tracker.compute.threads import one_blas_thread
 from tracker.errors import TrackerError
 
 _LOG = logging.getLogger(__name__)
+
+
+Work: TypeAlias = Callable[[RecordingTask, Path, Callable[[str, float], None]], Done | Division]
+"""Does a task in the folder of a batch, and reports its progress."""
 
 
 class LostClaimError(Exception):
@@ -24,30 +31,33 @@ class LostClaimError(Exception):
 def work(
     folder: Path,
     max_tasks: int | None = None,
-    do: Callable[[RecordingTask, Path, Callable[[str, float], None]], Done] = do_task,
+    do: Work = do_task,
     is_stopped: Callable[[], bool] = lambda: False,
 ) -> int:
     """Do tasks of a batch until all have ended.
 
     Args:
         folder: of the batch.
-        max_tasks: number of tasks after which it ends; None for no limit.
+        max_tasks: number of tasks after which it ends, each stretch being one; None for no limit.
         do: does a task.
         is_stopped: asked at each step; its task is then given back, and goes on where it was later.
 
     Returns:
         Number of tasks that this worker has ended.
     """
+    import scipy.linalg  # noqa: F401  before its threads are limited, which every task would load
+
     manifest, n_done = Manifest.load(folder), 0
-    while not is_stopped() and (max_tasks is None or n_done < max_tasks) and not manifest.is_finished():
-        found = manifest.claim_next()
-        if found is None:
-            time.sleep(BEAT_S)
-            continue
-        try:
-            n_done += _do(manifest, *found, do, is_stopped)
-        except InterruptedError:
-            break
+    with one_blas_thread():  # a worker has its share of the cores already
+        while not is_stopped() and (max_tasks is None or n_done < max_tasks) and not manifest.is_finished():
+            found = manifest.claim_next()
+            if found is None:
+                time.sleep(BEAT_S)
+                continue
+            try:
+                n_done += _do(manifest, *found, do, is_stopped)
+            except InterruptedError:
+                break
     return n_done
 
 
@@ -55,12 +65,12 @@ def _do(
     manifest: Manifest,
     task: RecordingTask,
     held: Claim,
-    do: Callable[[RecordingTask, Path, Callable[[str, float], None]], Done],
+    do: Work,
     is_stopped: Callable[[], bool],
 ) -> bool:
     """Do one task; return whether its result was written."""
     if held.dead is not None:
-        held.free_session(Path(task.recording.session))
+        held.free_session(task.session(manifest.folder))
     began, cpu = time.monotonic(), time.process_time()
 
     def go_on(stage: str, share: float) -> None:
@@ -69,10 +79,15 @@ def _do(
         if not held.is_held():
             raise LostClaimError
 
+    def used(*before: tuple[float, float]) -> dict[str, float]:
+        taken = [(time.monotonic() - began, time.process_time() - cpu), *before]
+        if task.division is not None and task.stretch is None:
+            taken.append((task.division.seconds, task.division.cpu_seconds))
+        return {"seconds": sum(s for s, _ in taken), "cpu_seconds": sum(s for _, s in taken)}
+
     def end(result: Result) -> bool:
-        used = {"seconds": time.monotonic() - began, "cpu_seconds": time.process_time() - cpu}
-        who = f"{socket.gethostname()} {os.getpid()}"
-        return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, **used))
+        who, times = f"{socket.gethostname()} {os.getpid()}", used(manifest.spent_on_stretches(task))
+        return manifest.finish(task, held, msgspec.structs.replace(result, worker=who, **times))
 
     try:
         allowed = task.recording.settings.attempts or 3
@@ -87,17 +102,27 @@ def _do(
         code = "" if remedy is None else remedy.code
         return end(Result("failed", error=str(error), remedy=code, remedy_fields=fields))
     except LostClaimError:
-        _LOG.warning("%s was taken by another worker; this one goes on with the next task", task.recording.name)
+        _LOG.warning("%s was taken by another worker; this one goes on with the next task", task.name)
         return False
     except (InterruptedError, KeyboardInterrupt):
         manifest.forget_attempt(task)
         held.release()
         raise
     except Exception as error:  # one recording must not end the others
-        _LOG.exception("%s failed", task.recording.name)
+        _LOG.exception("%s failed", task.name)
         text = f"internal error: {type(error).__name__}: {error}; please report it with the log"
         return end(Result("failed", error=text))
-    files = [str(path.relative_to(manifest.folder)) for path in done.files]
-    statuses = {name: dict(counts) for name, counts in done.tracked.statuses.items()}
-    tracked = done.tracked
-    return end(Result("done", "", 0.0, 0.0, tracked.first_frame, statuses, tracked.contradiction, files))
+    if isinstance(done, Division):
+        manifest.forget_attempt(task)
+        return manifest.divide(task, held, msgspec.structs.replace(done, **used()))
+    return end(
+        Result(
+            "done",
+            first_pose=done.tracked.first_frame,
+            statuses={name: dict(counts) for name, counts in done.tracked.statuses.items()},
+            contradiction=done.tracked.contradiction,
+            files=[str(path.relative_to(manifest.folder)) for path in done.files],
+            n_stretches=1 if task.stretch is not None else max(1, len(task.stretches())),
+            seams=list(done.seams),
+        )
+    )

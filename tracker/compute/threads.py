@@ -31,6 +31,7 @@ def one_blas_thread() -> AbstractContextManager[object]:
     """Return a context in which linear algebra uses one thread: several make products of some hundred rows slower.
 
     The fit of a rig with 8 frames, 4 views and 160 unknowns took 14.3 s of processor time, and 2.2 s with one thread.
+    Tracking 60 frames of one person in four views took 8.5 s, and 7.4 s with one thread.
     """
     from threadpoolctl import threadpool_limits  # imported lazily: it looks at all loaded libraries
 

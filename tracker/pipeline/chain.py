@@ -118,6 +118,23 @@ def run_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
         The plan of tracking with the frame that the run went out from.
 
     Raises:
+        TrackerError: see `begin_chain`.
+    """
+    return opened.track(begin_chain(plan, opened, sink), sink)
+
+
+def begin_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
+    """Find the people who have no pose, and acquire sizes; nothing is tracked yet.
+
+    Args:
+        plan: what to do.
+        opened: the session.
+        sink: receives progress and results.
+
+    Returns:
+        The plan of tracking everybody who has a pose on the frame that the run is to go out from.
+
+    Raises:
         TrackerError: no frame shows the people well enough, people are placed on different frames alone, or somebody
             has no pose and nobody is looked for.
     """
@@ -147,7 +164,7 @@ def run_chain(plan: ChainPlan, opened: OpenSession, sink: Sink) -> TrackPlan:
             seen = learn_seen_bodies(session, points, acquired)
             opened.store_setting(SEEN_BODIES, seen_bodies_record(session, track.keypoints, seen, before))
     sink.report("tracking", 1.0, f"tracking from frame {start} to {track.frames[0]}, and to {track.frames[-1]}")
-    return opened.track(track, sink)
+    return track
 
 
 def _acquire(

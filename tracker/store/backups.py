@@ -77,6 +77,16 @@ def back_up(db: sqlite3.Connection, path: Path) -> str | None:
     return None
 
 
+def copy_store(path: Path, to: Path) -> None:
+    """Copy a store to a new file; other programs may have it open.
+
+    Raises:
+        OSError, sqlite3.Error: it cannot be read, or the file not be written.
+    """
+    with closing(_reader(path)) as source:
+        _copy(source, to)
+
+
 def restore(path: Path, backup: Path | None = None) -> Restored:
     """Replace a store by a backup and keep the replaced file. The caller holds the session's lock.
 

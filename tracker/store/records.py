@@ -12,8 +12,8 @@ SOURCES = ("manual", "pinned", "searched", "fitted", "tracked", "interpolated", 
 SEEN = "seen"
 """Key of a pose's settings: where a user put points by hand, `{point: {camera: [u, v]}}`, original pixels."""
 BETWEEN, SEAM = "between", "seam_mm"
-"""Keys of a pose's settings: the two keyframes that it was interpolated or tracked between, `[first, last]`, and how
-far the passes from them lie apart, the largest of the limb joints, mm."""
+"""Keys of a pose's settings: the two frames that it was interpolated or tracked between, `[first, last]`, which are
+keyframes or starts of stretches, and how far the passes from them lie apart, the largest of the limb joints, mm."""
 TAKEN_FROM = "taken_from"
 """Key of a pose's settings: words for where a person took it from: the name of a copy of the session, or a mean."""
 STATUSES = ("", "good", "doubtful", "lost")

@@ -37,9 +37,9 @@ def run_on_cluster(manifest: Manifest, address: str, progress: Reporter) -> bool
         if not threads:
             raise TrackerError(f"expected workers at {address}, found none; start some with dask worker {address}")
         progress.say(f"{len(manifest.tasks)} recordings, {threads} threads of workers")
-        futures = [client.submit(work_once, str(manifest.folder), pure=False) for _ in manifest.tasks]
+        futures = list[Any]()
         try:
-            _wait(manifest, futures, client, progress)
+            _wait(manifest, futures, threads, client, progress)
         except KeyboardInterrupt:
             client.cancel(futures, force=True)
             return True
@@ -53,8 +53,8 @@ def work_once(folder: str) -> int:
     return work(Path(folder), max_tasks=1)
 
 
-def _wait(manifest: Manifest, futures: list[Any], client: Any, progress: Reporter) -> None:
-    """Wait for all tasks. Calls whose worker died are made again as long as tasks are left."""
+def _wait(manifest: Manifest, futures: list[Any], threads: int, client: Any, progress: Reporter) -> None:
+    """Keep every thread of the cluster at work until all tasks have ended; `futures` are the calls under way."""
     shown = set[int]()
     while not manifest.is_finished():
         for task in manifest.tasks:
@@ -62,6 +62,6 @@ def _wait(manifest: Manifest, futures: list[Any], client: Any, progress: Reporte
                 shown.add(task.number)
                 progress.say(f"{len(shown)}/{len(manifest.tasks)} {task.recording.name}: {result.state}")
         futures[:] = [f for f in futures if not f.done()]
-        if not futures:
+        for _ in range(min(threads, manifest.n_parts()) - len(futures)):
             futures.append(client.submit(work_once, str(manifest.folder), pure=False))
         time.sleep(_LOOK_S)

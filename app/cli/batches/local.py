@@ -26,7 +26,7 @@ def run_locally(manifest: Manifest, wanted: int | None, progress: Reporter) -> b
         progress: shows a line for each task.
     """
     n_open = len(manifest.tasks) - sum(n for s, n in manifest.counts().items() if s in ("done", "failed"))
-    n, note = n_workers(wanted, n_open, n_cores(), free_bytes())
+    n, note = n_workers(wanted, manifest.n_parts(), n_cores(), free_bytes())
     if note:
         progress.say(note)
     progress.say(f"{n_open} recordings, {n} {'worker' if n == 1 else 'workers'}")
@@ -56,7 +56,7 @@ def n_workers(wanted: int | None, n_tasks: int, cores: int, free: int | None) ->
 
     Args:
         wanted: number asked for; one for each core by default.
-        n_tasks: number of tasks that are left.
+        n_tasks: number of tasks that are left, each stretch being one.
         cores: of the machine.
         free: memory that programs can still have, bytes; None where the system does not provide it.
     """
@@ -90,17 +90,18 @@ def compile_kernels(progress: Reporter) -> None:
 
 
 def _watch(manifest: Manifest, workers: list[subprocess.Popen[bytes]], progress: Reporter) -> None:
-    """Show each task that ends, until all have, or no worker is left."""
-    left = {t.number for t in manifest.tasks if manifest.result(t) is None}
-    n = len(left)
-    while left:
+    """Show each task and each stretch that ends, until all have, or no worker is left."""
+    shown = set(manifest.ended_parts())
+    n = len(manifest.tasks) - len(shown & {t.key for t in manifest.tasks})
+    n_done = 0
+    while n_done < n:
         ended = all(w.poll() is not None for w in workers)
-        for number in sorted(left):
-            task = manifest.tasks[number]
-            if (result := manifest.result(task)) is not None:
-                left.remove(number)
+        for key, (part, result) in manifest.ended_parts().items():
+            if key not in shown:
+                shown.add(key)
+                n_done += part.stretch is None
                 how = f"{result.seconds:.0f} s" if result.state == "done" else f"failed: {result.error}"
-                progress.say(f"{n - len(left)}/{n} {task.recording.name}: {how}")
+                progress.say(f"{n_done}/{n} {part.name}: {how}")
         if ended:
             return
         time.sleep(_LOOK_S)

@@ -40,6 +40,7 @@ def format_table(found: dict[str, Any]) -> str:
         lines.append(f"{row['name']:{width}}  {row['state']:7} {numbers}  {at}")
     lines += [f"{row['name']}: {row['error']}" for row in rows if row["error"]]
     lines += [f"{row['name']}: {row['contradiction']}" for row in rows if row["contradiction"]]
+    lines += [f"{row['name']}: {row['joined']}" for row in rows if row["joined"]]
     sums = found["totals"]
     counts = ", ".join(f"{sums[s]} {s}" for s in ("done", "failed", "running", "waiting") if sums[s])
     lines.append(
@@ -67,10 +68,27 @@ def _record(row: RecordingRow) -> dict[str, Any]:
         "seconds": row.seconds,
         "cpu_seconds": row.cpu_seconds,
         "contradiction": row.contradiction,
+        "stretches": row.n_stretches,
+        "seams": [{"frame": s.frame, "person": s.person, "apart_mm": s.apart_mm, "over": s.is_over} for s in row.seams],
+        "joined": _joined(row),
         "error": "" if row.result is None else _error(row.result),
         "files": [] if row.result is None else row.result.files,
         "open": shlex.join(words) if row.state == "done" else "",
     }
+
+
+def _joined(row: RecordingRow) -> str:
+    """Return a sentence on how the stretches of a recording were joined; empty for one that was not cut."""
+    if row.n_stretches == 1:
+        return ""
+    text = f"joined of {row.n_stretches} stretches"
+    if not row.seams:
+        return f"{text} at keyframes"
+    text += f", at most {row.seams[0].apart_mm:.0f} mm apart"
+    if not (over := [seam for seam in row.seams if seam.is_over]):
+        return text
+    at = ", ".join(f"frame {seam.frame} ({seam.person})" for seam in over[:3])
+    return f"{text}; check {at}{f' and {len(over) - 3} more' if len(over) > 3 else ''}, where the tracks do not meet"
 
 
 def _error(result: Result) -> str:

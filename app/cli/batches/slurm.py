@@ -43,7 +43,7 @@ def write_scripts(manifest: Manifest, plan: Path) -> str:
     (folder / "logs").mkdir(exist_ok=True)
     values = {
         "name": shlex.quote(folder.name),
-        "last": len(manifest.tasks) - 1,
+        "last": manifest.n_parts() - 1,
         "folder": shlex.quote(str(folder)),
         "plan": shlex.quote(str(plan)),
         "kernels": shlex.quote(str(folder / "kernels")),

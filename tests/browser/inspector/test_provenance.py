@@ -52,7 +52,7 @@ async def test_the_section_groups_joints_by_origin_and_selects_them(page, endpoi
     assert "Both passes lie up to 12 mm apart" in text
     assert "revision 2: earlier than the present one" in text
     assert "in FRONT and LEFT" in text
-    assert "Tracked by contour from keyframes 0 and 15\ntorso" in text
+    assert "Tracked by contour from frames 0 and 15\ntorso" in text
     assert "40 % chance that the limb is lost\nhead" in text
     await section.get_by_role("button", name="torso").click()
     await until(lambda: endpoint.received[-1] == {"type": "select", "person": 0, "point": "torso"})

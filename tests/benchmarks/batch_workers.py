@@ -1,0 +1,101 @@
+"""What a second worker gains: `python tests/benchmarks/batch_workers.py --data DIR`.
+
+Twelve copies of a recording in DIR with a first pose are tracked as a batch, by one worker and by two in turn. Each
+line has the time by the clock, the processor time of the batch, how many cores it used on average, and how many all
+other programs of the machine used meanwhile: the clock tells only where those used few. The last lines have the ratio
+by the clock, and the lowest one that two cores allow: half of the processor time of two workers against the time of one
+worker. Linux only: it reads /proc.
+"""
+
+import argparse
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+from typing import NamedTuple
+
+import tracker
+from tracker.evaluation.references import read_joints
+from tracker.pipeline.given_pose import set_pose_at_joints
+
+N_RECORDINGS = 12
+
+
+class Round(NamedTuple):
+    """A batch that was run."""
+
+    wall_s: float
+    cpu_s: float
+    others: float
+    """Cores that other programs used on average."""
+
+    @property
+    def cores(self) -> float:
+        """Cores that the batch used on average."""
+        return self.cpu_s / self.wall_s
+
+
+def busy_s() -> float:
+    """Processor time of all programs since the machine started, s."""
+    user, nice, system, _, _, irq, softirq, *_ = map(int, Path("/proc/stat").read_text().split("\n")[0].split()[1:])
+    return (user + nice + system + irq + softirq) / os.sysconf("SC_CLK_TCK")
+
+
+def used_s() -> float:
+    """Processor time of the children that have ended, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def run(source: Path, n_workers: int, words: argparse.Namespace) -> Round:
+    """Track twelve copies of a session."""
+    with tempfile.TemporaryDirectory() as name:
+        lab = Path(name)
+        for i in range(N_RECORDINGS):
+            shutil.copytree(source, lab / f"r{i:02d}")
+        (lab / "plan.toml").write_text(
+            'sessions = ["r*"]\nsettings = {acquire = false, options = {audit = false}, '
+            f'frames = "0:{words.frames}"}}'
+        )
+        began, busy, used = time.monotonic(), busy_s(), used_s()
+        command = [sys.executable, "-m", "app", "batch", str(lab / "plan.toml"), "--workers", str(n_workers)]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        wall_s, cpu_s = time.monotonic() - began, used_s() - used
+        return Round(wall_s, cpu_s, (busy_s() - busy - cpu_s) / wall_s)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
+    parser.add_argument("--recording", default="walk")
+    parser.add_argument("--frames", type=int, default=30)
+    parser.add_argument("--rounds", type=int, default=3)
+    words = parser.parse_args()
+    data = words.data.resolve() / words.recording
+    with tempfile.TemporaryDirectory() as name:
+        source = Path(name) / "session"
+        session = tracker.new_session(
+            source, sorted(data.glob("*.mp4")), data / "Calib.toml", background=data / "background"
+        )
+        set_pose_at_joints(session, 0, 0, read_joints(data / "ground_truth.trc", session.fps), fit_sizes=False)
+        rounds: dict[int, list[Round]] = {1: [], 2: []}
+        print("workers   by the clock, s   processor time, s   cores   cores of others")
+        for _ in range(words.rounds):
+            for n, done in rounds.items():
+                done.append(run(source, n, words))
+                last = done[-1]
+                print(f"{n:7} {last.wall_s:17.1f} {last.cpu_s:19.1f} {last.cores:7.2f} {last.others:17.2f}", flush=True)
+    one, two = (median(r.wall_s for r in done) for done in rounds.values())
+    print(f"by the clock, two workers need {two / one:.2f} of the time of one")
+    least = min(r.cpu_s for r in rounds[2]) / 2 / min(r.wall_s for r in rounds[1])
+    print(f"two cores allow {least:.2f} at best; a worker alone uses {median(r.cores for r in rounds[1]):.2f} cores")
+
+
+if __name__ == "__main__":
+    main()
