@@ -10,6 +10,8 @@ from pathlib import Path
 from page_driver import shows
 
 ROOT = Path(__file__).resolve().parents[2]
+N_ROLES = 3
+"""Links of `--share`."""
 
 
 class Program:
@@ -40,6 +42,8 @@ class Program:
             self._words.append("--no-token")
         self._process: asyncio.subprocess.Process | None = None
         self.address = ""
+        self.links: dict[str, str] = {}
+        """Addresses for other people by role, with `--share`."""
 
     @property
     def pid(self) -> int:
@@ -70,6 +74,9 @@ class Program:
                 assert line, "the program ended before it served the page"
                 if ": http://127.0.0.1" in line and "viser" not in line.lower():
                     self.address = line.partition(": ")[2].strip()
+            while "--share" in self._words and len(self.links) < N_ROLES:
+                role, _, address = (await self._process.stdout.readline()).decode().strip().partition(": ")
+                self.links[role.removeprefix("to ")] = address
 
     async def kill(self) -> None:
         """End it at once, as a crash would."""
