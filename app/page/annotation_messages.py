@@ -155,14 +155,14 @@ class PresentPerson(Part, frozen=True):
 
 
 class PresenceMessage(Message, frozen=True, tag="presence"):
-    """Who is where. Sent when that changes, at most five times a second."""
+    """The people on the session and their places. Sent when that changes, at most five times a second."""
 
     name: str
     """Name by which the page has joined; empty while it shows what the host shows."""
     refusal: str
     """Why the name that the page asked for could not be had, or empty."""
     link: Role
-    """What the page's link allows once a name is given."""
+    """Role that the link gives once a name is given."""
     people: tuple[PresentPerson, ...]
     """The host first, then in the order of joining."""
 

@@ -96,7 +96,7 @@ class PageConnection:
             number: of the page, unique while the program runs.
             visit: the controller that it shows, and its role; messages that this does not allow are refused.
             socket: to the page.
-            presence: tells it who is where.
+            presence: source of the places of all people.
         """
         self._number, self._visit, self._socket, self._presence = number, visit, socket, presence
         self._controller = visit.controller

@@ -41,24 +41,24 @@ class _Participant:
     n_pages: int = 0
     left_at: float = field(default_factory=time.monotonic)
     seen: Presence | None = None
-    """As the others were last told; None while no page is open."""
+    """Place that was last sent to the others; None while no page is open."""
     unsubscribe: Callable[[], None] = lambda: None
 
 
 class Visit(NamedTuple):
-    """What a page shows, and what it may do."""
+    """The controller that a page shows, and its rights."""
 
     controller: Controller
     role: Role
-    """What it may do now: a link without a name only looks."""
+    """Its present role: a link without a name only looks."""
     name: str
     """Name of the one who has joined; empty for a page that watches the host."""
     link: Role
-    """What its link allows once a name is given."""
+    """Role that its link gives once a name is given."""
     refusal: str = ""
     """Why the wanted name could not be had, or empty."""
     participant: _Participant | None = None
-    """Whose page it is; None for one that watches the host."""
+    """The participant of the page; None for one that watches the host."""
 
     @property
     def has_place(self) -> bool:

@@ -42,7 +42,7 @@ class Turns:
         Args:
             owner: stands for them in all calls.
             name: returns how others call them.
-            state: returns their state, which tells what they do.
+            state: returns their state, with their work in progress.
         """
         self._workers.append(_Worker(owner, name, state))
 

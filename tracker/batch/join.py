@@ -132,7 +132,7 @@ class _Joiner:
     def with_names(self) -> Division:
         """Return the division with the names of people by their places, on from the stretch with their first poses.
 
-        A stretch whose names are sure, or were changed once, stays: its seam tells.
+        A stretch whose names are sure, or were changed once, stays: its seam shows an error.
         """
         if len(self._people) < 2:
             return self._division
