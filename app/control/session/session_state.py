@@ -1,4 +1,4 @@
-"""Hold the session's state and its lock; load, score and save poses for the controller's parts."""
+"""Hold the session's state and its lock; show, score and save poses for the controller's parts."""
 
 import threading
 import time
@@ -10,11 +10,12 @@ from typing import TypeVar, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
+from app.control.session.frame_poses import FramePoses, Pins
 from app.remedies import page_text
 from app.session.frame_cache import FrameCache
 from app.state.people import ShownPose, is_same_pose
 from app.state.search import SearchView
-from app.state.state import Costs, ShownFrame, State, StateChanges, finite_or_none
+from app.state.state import Costs, State, StateChanges, finite_or_none
 from app.storage.saver import Saver
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.interpretation import interpreted
@@ -24,21 +25,11 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.gauss_newton import value_mask, with_locked_dofs
 from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array
-from tracker.geometry.ground_plane import up_rotation
-from tracker.geometry.triangulation import PointObservation
-from tracker.motion.velocity import velocity
 from tracker.pipeline.seen_points import seen_points
-from tracker.posing.default_pose import default_pose
 from tracker.posing.grab import Constraints
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
 from tracker.tracking.estimation.settings import chamfer_cost
-
-Pins = tuple[tuple[PointObservation, ...], ...]
-"""The pins of each person on a frame."""
-_APART_M = 0.9
-"""Distance between people who are not placed yet, metres: each can be seen and dragged by itself."""
-
 
 T = TypeVar("T")
 
@@ -70,7 +61,8 @@ class SessionState:
         """
         self.session, self.saver, self.frames = session, saver, frames
         self.lock = lock or threading.RLock()
-        self.set_default_poses(up_rotation(session.up, session.floor))
+        self.frame_poses = FramePoses(session, saver)
+        """Loads the poses of a frame."""
         self._subscribers: list[Callable[[State], None]] = []
         self._stored: tuple[tuple[ShownPose, ...], Pins] | None = None  # the shown poses and pins that are on disk
         self.unwritten: list[Callable[[], bool]] = []
@@ -81,8 +73,8 @@ class SessionState:
         self.last_save = 0.0
         """Time of the last save, s of the monotonic clock."""
         unlocked = (frozenset[int](),) * len(session.people)
-        shown = self._load(0)
-        self.state = State(frame=0, pins=self._load_pins(0), locked=unlocked, compiled=compiled, **shown)
+        shown = self.frame_poses.people(0)
+        self.state = State(frame=0, pins=self.frame_poses.pins(0), locked=unlocked, compiled=compiled, **shown)
         self.note_stored()
         self.refresh_saving()
         self.request_evidence()
@@ -127,7 +119,7 @@ class SessionState:
             point: [cameras[h.camera].camera for h in here if h.point == point and h.camera is not None]
             for point in {h.point for h in here}
         }
-        x, y, z = (float(c) for c in self._R_world_up[:, 2])
+        x, y, z = (float(c) for c in self.frame_poses.R_world_up[:, 2])
         return Constraints(self.active_dofs(person), held, up_world=(x, y, z))
 
     def fit_constraints(self, person: int) -> Constraints:
@@ -147,24 +139,11 @@ class SessionState:
             for i, (model, new, now) in enumerate(zip(self.models, poses, self.state.poses, strict=True))
         )
 
-    def set_default_poses(self, R_world_up: Array) -> None:
-        """Place people without a pose upright, side by side.
-
-        Args:
-            R_world_up: rotation whose z axis points up, (3, 3).
-        """
-        cameras = [c.camera for c in self.session.cameras]
-        self._R_world_up = R_world_up
-        middle = (len(self.present) - 1) / 2
-        self._default_poses = tuple(
-            default_pose(model, cameras, R_world_up, _APART_M * (i - middle)) for i, model in enumerate(self.present)
-        )
-
     def set_body_models(self, session: Session) -> None:
         """Continue with a session whose people have other bodies; call `show_frame` afterwards."""
         self.session = session
         self.saver.set_body_models(session)
-        self.set_default_poses(self._R_world_up)
+        self.frame_poses.place(session)
 
     def set_cameras(self, session: Session) -> None:
         """Continue with a session that has other cameras; call `show_frame` afterwards.
@@ -179,7 +158,7 @@ class SessionState:
         """Continue with bodies, cameras and floor that the host of the session has changed, and show them."""
         self.session = session
         self.saver.follow_session(session)
-        self.set_default_poses(up_rotation(session.up, session.floor))
+        self.frame_poses.place(session)
         names = [p.model.point_names for p in session.people]
         point = self.state.point if self.state.point in names[self.state.person] else None
         held = frozenset(h for h in self.state.held if h.point in names[h.person])
@@ -208,9 +187,9 @@ class SessionState:
         with self.lock:
             frame = changes.get("frame", self.state.frame)
             if frame != self.state.frame and "pins" not in changes:
-                changes["pins"] = self._load_pins(frame)
+                changes["pins"] = self.frame_poses.pins(frame)
             if frame != self.state.frame and "velocities" not in changes:
-                changes["velocities"] = self.stored_velocities(frame)
+                changes["velocities"] = self.frame_poses.velocities(frame)
             if frame != self.state.frame and "search_view" not in changes:
                 changes["search_view"] = SearchView(speed=self.state.search_view.speed)
             state = replace(self.state, **changes)
@@ -221,10 +200,10 @@ class SessionState:
     def show_frame(self, frame: int, /, **changes: Unpack[StateChanges]) -> None:
         """Show the stored poses of a frame, with other changes; the next save makes a new entry of the history."""
         self.open_edit_owner = None
-        shown, velocities = self._load(frame), self.stored_velocities(frame)
+        shown, velocities = self.frame_poses.people(frame), self.frame_poses.velocities(frame)
         costs = self.costs(tuple(p.values for p in shown["people"]), frame, shown["models"], velocities)
         loaded: StateChanges = {
-            "frame": frame, "pins": self._load_pins(frame), "velocities": velocities, **shown, **costs
+            "frame": frame, "pins": self.frame_poses.pins(frame), "velocities": velocities, **shown, **costs
         }  # fmt: skip
         no_gesture: StateChanges = {"drag": None, "is_pin_held": False}
         after: StateChanges = {**loaded, **no_gesture, **changes}
@@ -242,7 +221,7 @@ class SessionState:
         The others leave poses alone that change here, so that these stay as they are shown.
         """
         state, (stored, stored_pins) = self.state, self._stored or (self.state.people, self.state.pins)
-        loaded, pins = self._load(state.frame), self._load_pins(state.frame)
+        loaded, pins = self.frame_poses.people(state.frame), self.frame_poses.pins(state.frame)
         new = [not is_same_pose(*pair) for pair in zip(stored, loaded["people"], strict=True)]
         new_pins = [now != before for now, before in zip(pins, stored_pins, strict=True)]
         if not any(new + new_pins):
@@ -420,43 +399,6 @@ class SessionState:
             and self.is_shown_stored(state)
             and not any(is_unwritten() for is_unwritten in self.unwritten)
         )
-
-    def _load(self, frame: int) -> ShownFrame:
-        """Return the stored poses of a frame; a person without one is shown in the pose of the nearest frame."""
-        people: list[ShownPose] = []
-        for person, default in enumerate(self._default_poses):
-            stored = self.saver.pose(person, frame)
-            if stored is not None:
-                people.append(stored)
-            else:
-                nearest = self.saver.nearest_pose(person, frame)
-                people.append(ShownPose(default if nearest is None else nearest, None))
-        present = tuple(self.saver.revisions.current(person) for person in range(len(people)))
-        models, revisions = self.bodies(people)
-        return {"people": tuple(people), "models": models, "revisions": revisions, "present": present}
-
-    def bodies(self, shown: Sequence[ShownPose]) -> tuple[tuple[BodyModel, ...], tuple[int, ...]]:
-        """Return the bodies of poses and their model revisions; poses that are not stored have the present body."""
-        saver = self.saver
-        revisions = tuple(saver.revisions.current(i) if p.revision is None else p.revision for i, p in enumerate(shown))
-        return tuple(saver.revisions.body(r) for r in revisions), revisions
-
-    def stored_velocities(self, frame: int) -> tuple[Array | None, ...]:
-        """Return the velocity of each person by the stored poses around a frame; empty where no camera needs them."""
-        if not any(c.clock.ahead(frame) for c in self.session.cameras):
-            return ()
-        out: list[Array | None] = []
-        for person in range(len(self.session.people)):
-            around = {k: self.saver.pose(person, k) for k in range(frame - 2, frame + 3)}
-            own = around[frame]
-            same = {k: p.values for k, p in around.items() if p and own and p.revision == own.revision}
-            known = None if own is None else own.revision
-            out.append(None if known is None else velocity(self.saver.revisions.body(known), same, frame))
-        return tuple(out)
-
-    def _load_pins(self, frame: int) -> tuple[tuple[PointObservation, ...], ...]:
-        """Return the pins of all people on a frame."""
-        return tuple(self.saver.pins(person, frame) for person in range(len(self.session.people)))
 
     def _evidence_ready(self, frame: int) -> None:
         with self.lock:

@@ -41,7 +41,7 @@ class StoredPoses:
         their velocities where a camera needs them."""
         saver, found = self._session_state.saver, dict[int, PosedBody]()
         with self._session_state.lock:
-            velocities = dict(enumerate(self._session_state.stored_velocities(frame)))
+            velocities = dict(enumerate(self._session_state.frame_poses.velocities(frame)))
             for person in range(len(self._session_state.session.people)):
                 pose = saver.pose(person, frame)
                 if pose is not None:

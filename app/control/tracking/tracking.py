@@ -364,7 +364,7 @@ class Tracking:
                 trace = found.traces[i] if found.traces else None
                 shown = ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], part_costs_px)
                 people.append(replace(shown, trace=trace))
-        models, revisions = self._session_state.bodies(people)
+        models, revisions = self._session_state.frame_poses.bodies(people)
         return {
             "frame": found.frame,
             "people": tuple(people),

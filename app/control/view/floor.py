@@ -10,7 +10,7 @@ from app.control.session.session_state import SessionState
 from app.state.floor_picking import FloorState, Picking, with_mark, with_next, without_last
 from tracker.errors import TrackerError
 from tracker.geometry.cameras import Camera
-from tracker.geometry.ground_plane import GroundPlane, nearest_axis, up_rotation
+from tracker.geometry.ground_plane import GroundPlane, nearest_axis
 from tracker.session.session import save_floor
 from tracker.session.session_file import UPS
 
@@ -102,7 +102,7 @@ class FloorEditing:
         before = self._session_state.state.floor
         self._session_state.session = save_floor(self._session_state.session, up, plane)
         self._session_state.saver.store_setting(_KEY, _plane_setting(before.up, before.plane))
-        self._session_state.set_default_poses(up_rotation(up, plane))
+        self._session_state.frame_poses.place(self._session_state.session)
         self._session_state.set(floor=FloorState(up, plane, former=True))
 
     def _pick(self, picking: Picking | None) -> None:
