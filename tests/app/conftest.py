@@ -2,6 +2,7 @@
 
 import shutil
 import sys
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
@@ -45,12 +46,23 @@ def session(tmp_path):
     return Path(shutil.copytree(SAMPLE, tmp_path / "session"))
 
 
+class RememberingObserver(Observer):
+    """Keeps the evidence of the frames that tests look at most."""
+
+    def evidence(self, k, *asked, **also):
+        return super().evidence(k, *asked, **also) if asked or also else self._of_frame(k)
+
+    @lru_cache(maxsize=16)  # noqa: B019 it lives as long as the tests
+    def _of_frame(self, k):
+        return super().evidence(k)
+
+
 @pytest.fixture(scope="session")
 def observer(tmp_path_factory):
     """The sample's footage, opened once for all tests that only look at it."""
     loaded = load_session(shutil.copytree(SAMPLE, tmp_path_factory.mktemp("footage") / "session"))
     recording = Recording(loaded.cameras)
-    yield Observer(loaded.cameras, recording)
+    yield RememberingObserver(loaded.cameras, recording)
     recording.close()
 
 
