@@ -43,6 +43,11 @@ WITHOUT_KERNELS = {
     *(f"app/{room}" for room in ["runtime", "state", "drawing"]),
 }
 """Rooms whose tests call no compiled kernels, or few."""
+OF_SOURCES = {
+    *(f"tests/test_{name}.py" for name in ("architecture", "census", "docs", "vocabulary")),
+    "tests/app/test_remedies.py",
+}
+"""Files whose tests read all modules; see `architecture.trees`."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -53,6 +58,19 @@ def pytest_collection_modifyitems(items):
         if folder.as_posix() != "." and folder.parts[0] != "browser" and folder.as_posix() not in WITHOUT_KERNELS:
             item.add_marker("kernels")
     items.sort(key=lambda item: item.get_closest_marker("kernels") is not None)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Give the tests that parse all sources to one process, and each other file to one."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class OneForSources(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file = super()._split_scope(nodeid)
+            return "sources" if file in OF_SOURCES else file
+
+    return OneForSources(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 def pytest_collection_finish():
