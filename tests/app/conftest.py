@@ -22,7 +22,6 @@ from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.annotator import VARIABLE
 
-
 _fits = {}
 """Poses that have been fitted to joints in this process."""
 
