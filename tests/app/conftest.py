@@ -67,6 +67,10 @@ class RememberingObserver(Observer):
     def evidence(self, k, *asked, **also):
         return super().evidence(k, *asked, **also) if asked or also else self._of_frame(k)
 
+    def forget(self):
+        """For tests of what is shown before there is evidence."""
+        self._of_frame.cache_clear()
+
     @lru_cache(maxsize=16)  # noqa: B019 it lives as long as the tests
     def _of_frame(self, k):
         return super().evidence(k)
