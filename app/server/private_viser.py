@@ -81,8 +81,8 @@ def _served_on(path: Path) -> Generator[None, None, None]:
     def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
         return original(handler, sock=listener, **options)
 
-    websockets.asyncio.server.serve = serve  # type: ignore[misc, assignment]
+    websockets.asyncio.server.serve = serve  # pyrefly: ignore[bad-assignment]
     try:
         yield
     finally:
-        websockets.asyncio.server.serve = original  # type: ignore[misc]
+        websockets.asyncio.server.serve = original

@@ -66,7 +66,7 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
             load_character(value)
         elif value not in allowed[name]:
             raise TrackerError(f"expected --{name} to be one of {', '.join(allowed[name])}, found '{value}'")
-    return replace(ExportOptions(chosen.axes, chosen.units), **values)  # type: ignore[arg-type]
+    return replace(ExportOptions(chosen.axes, chosen.units), **values)  # pyrefly: ignore[bad-argument-type]
 
 
 def for_format(chosen: ExportFormat, motion: ExportedMotion) -> ExportedMotion:
