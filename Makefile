@@ -65,7 +65,7 @@ lint: $(VENV)/.tested
 	$(BIN)/ruff format --check $(PYTHON_FILES)
 
 types: $(VENV)/.tested
-	$(BIN)/mypy
+	$(BIN)/pyrefly check --progress-bar no
 
 page-types: $(VENV)/.typescript
 	$(BIN)/node node_modules/typescript/bin/tsc
@@ -88,7 +88,7 @@ release: $(VENV)/.tested
 	ls -l dist
 
 clean:
-	rm -rf dist $(VENV) node_modules .mypy_cache .ruff_cache .hypothesis
+	rm -rf dist $(VENV) node_modules .ruff_cache .hypothesis
 
 # A pip of today resolves in two thirds of the time of the one that Python 3.11 brings.
 $(BIN)/python:
