@@ -65,7 +65,7 @@ lint: $(VENV)/.tested
 	$(BIN)/ruff format --check $(PYTHON_FILES)
 
 types: $(VENV)/.tested
-	$(BIN)/mypy
+	$(BIN)/pyrefly check --progress-bar no
 
 page-types: $(VENV)/.typescript
 	$(BIN)/node node_modules/typescript/bin/tsc
@@ -88,11 +88,13 @@ release: $(VENV)/.tested
 	ls -l dist
 
 clean:
-	rm -rf dist $(VENV) node_modules .mypy_cache .ruff_cache .hypothesis
+	rm -rf dist $(VENV) node_modules .ruff_cache .hypothesis
 
+# A pip of today resolves in two thirds of the time of the one that Python 3.11 brings.
 $(BIN)/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Quadrille needs Python 3.11 or newer: make PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile --constraint constraints.txt --upgrade pip
 
 $(VENV)/.installed: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP_INSTALL) .

@@ -84,8 +84,8 @@ def test_prose_keeps_to_plain_words():
 
 def test_one_class_has_one_name():
     """No two classes of the program share a name; messages are named after what they carry."""
-    declarations = "client_messages pose_messages search_messages server_messages message_types binary_headers"
-    messages = {f"app.page.{name}" for name in declarations.split()}
+    declarations = "client pose search server base binary_headers"
+    messages = {f"app.messages.{name}" for name in declarations.split()}
     places = {}
     for module in FILES.keys() - messages:
         for name in re.findall(r"^class ([A-Z]\w*)", FILES[module].read_text("utf-8"), re.MULTILINE):

@@ -8,7 +8,7 @@ import codecs
 import os
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BufferedReader, TextIOWrapper
@@ -208,7 +208,7 @@ def _open(path: Path) -> BufferedReader:
 
 
 @contextmanager
-def _reading(path: Path, kind: TextKind) -> Iterator[None]:
+def _reading(path: Path, kind: TextKind) -> Generator[None, None, None]:
     """Raise the kind's error for what goes wrong while a file is read."""
     try:
         yield

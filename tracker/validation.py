@@ -101,7 +101,9 @@ def explain(error: msgspec.ValidationError, value: Any, declaration: Any) -> tup
         value: the data that does not fit.
         declaration: the type that it was to have.
     """
-    what, path = re.fullmatch(r"(.*?)(?: - at `\$([\w.\[\]]*)`)?", str(error), re.DOTALL).groups("")  # type: ignore[union-attr]
+    parts = re.fullmatch(r"(.*?)(?: - at `\$([\w.\[\]]*)`)?", str(error), re.DOTALL)
+    assert parts is not None, "any text has these parts"
+    what, path = parts.groups("")
     trail = _trail(msgspec.inspect.type_info(declaration), value, path)
     at = trail[-1]
     if missing := re.fullmatch(r"Object missing required field `(.*)`", what):

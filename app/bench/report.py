@@ -8,7 +8,7 @@ programs hardly change; time by the clock and the load of the machine stand besi
 import json
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -75,7 +75,7 @@ def measure() -> Iterator[Row]:
 
 
 @contextmanager
-def _one_thread() -> Iterator[None]:
+def _one_thread() -> Generator[None, None, None]:
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:

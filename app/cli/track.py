@@ -1,7 +1,7 @@
 """`quadrille track`: track people and store the poses; the same command resumes an interrupted run."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, make_dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -66,7 +66,7 @@ def arguments_class() -> type[TrackWords]:
     papers = [f"{m.name} as {_paper_text(m.paper)}" for m in METHODS.values() if m.paper is not None]
     methods = " ".join(f"{m.name}: {m.help}." for m in METHODS.values())
     own = [
-        _field("method", next(iter(METHODS)), Literal[tuple(METHODS)], methods),
+        _field("method", next(iter(METHODS)), _one_of(METHODS), methods),
         _field("paper", False, bool, f"as the method's paper: {'; '.join(papers)}. See docs/trackers.md."),
     ]
     for option in all_options().values():
@@ -74,9 +74,14 @@ def arguments_class() -> type[TrackWords]:
         prefix = "" if len(owners) == len(METHODS) else f"{', '.join(owners)}: "
         text = f"{prefix}{option.help}{'; ' * bool(option.defaults)}{option.defaults}."
         kinds = {"switch": bool, "whole": OptionalWhole, "number": OptionalNumber}
-        kind = kinds.get(option.kind) or Literal[tuple(option.choices or ())] | None
+        kind = kinds.get(option.kind) or _one_of(option.choices or ()) | None
         own.append(_field(option.name, True if option.kind == "switch" else None, kind, text))
     return make_dataclass("TrackArguments", own, bases=(TrackWords,), frozen=True)
+
+
+def _one_of(words: Iterable[str]) -> Any:
+    """Return the type of words that are known at run time only."""
+    return Literal[tuple(words)]  # pyrefly: ignore[invalid-literal]
 
 
 def _field(name: str, default: object, kind: Any, text: str) -> tuple[str, Any, Any]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array, FloatArray
+from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 
 _HEAD = "head"
@@ -51,7 +51,7 @@ def face_part(model: BodyModel) -> Array:
     return np.asarray(model.centers_part[part] + (vertices[:, 0].max(), 0.0, 0.0))
 
 
-def nose(model: BodyModel, part: int) -> tuple[Array, Array]:
+def nose(model: BodyModel, part: int) -> tuple[Array, IntArray]:
     """Return the vertices, (n, 3), and triangles, (m, 3), of a nose in the frame of the head, metres.
 
     They are empty for any other part.

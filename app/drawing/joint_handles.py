@@ -85,7 +85,7 @@ def _handles(
     out: dict[int, list[Handle]] = {index: [] for index in cameras}
     for index, camera, by_body in zip(cameras, views, occluded, strict=True):
         first = 0
-        hidden, occluders = by_body.any(axis=0), _other_occluders(by_body, people)
+        hidden, occluders = np.asarray(by_body.any(axis=0)), _other_occluders(by_body, people)
         for person, body in enumerate(bodies):
             px, held = camera.project(points[person]), state.held_points(person)
             is_in_front = np.all(np.isfinite(px), axis=1)

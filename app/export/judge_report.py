@@ -128,4 +128,4 @@ def _cropped(canvas: Image, px: Array) -> Image:
     u1, v1 = np.minimum(high + margin, canvas.shape[1::-1]).astype(int)
     part = canvas[v0 : max(v1, v0 + 1), u0 : max(u1, u0 + 1)]
     scale = _HEIGHT_PX / part.shape[0]
-    return np.asarray(cv2.resize(part, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA))
+    return np.asarray(cv2.resize(part, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), dtype=np.uint8)

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 from app.control.controller import Controller
-from app.page import client_messages as wire
-from app.page import pose_messages as pose_wire
+from app.messages import client as wire
+from app.messages import pose as pose_wire
+from app.messages.base import Command
+from app.messages.parsing import MessageError
 from app.page.inspector_commands import INSPECTOR_COMMANDS
-from app.page.message_parsing import MessageError
-from app.page.message_types import Command
 from app.page.pose_commands import POSE_COMMANDS, check_point
 from app.page.search_commands import SEARCH_COMMANDS
 

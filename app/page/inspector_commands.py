@@ -7,11 +7,11 @@ import msgspec
 
 from app.control.controller import Controller
 from app.control.tracking import track_settings
-from app.page import annotation_messages as plan_wire
-from app.page import inspector_messages as wire
-from app.page.message_parsing import MessageError
-from app.page.message_types import Command
-from app.page.observation_messages import SetCopyTolerance, UseCopy, UseObservations
+from app.messages import annotation as plan_wire
+from app.messages import inspector as wire
+from app.messages.base import Command
+from app.messages.observation import SetCopyTolerance, UseCopy, UseObservations
+from app.messages.parsing import MessageError
 from tracker.annotation.frame_choice import FrameChoice
 from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.formats.model_toml import PRESETS

@@ -5,9 +5,9 @@ from typing import Any
 
 from app.control.controller import Controller
 from app.drawing import dof_labels
-from app.page import pose_messages as wire
-from app.page.message_parsing import MessageError
-from app.page.message_types import Command
+from app.messages import pose as wire
+from app.messages.base import Command
+from app.messages.parsing import MessageError
 
 
 def _set(controller: Controller, _: int, message: wire.SetDof) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 from app.control.controller import Controller
 from app.control.search import search_settings
 from app.drawing import dof_labels
-from app.page import search_messages as wire
-from app.page.message_types import Command
+from app.messages import search as wire
+from app.messages.base import Command
 
 
 def _search(controller: Controller, _: int, message: wire.RunSearch) -> None:

@@ -10,28 +10,29 @@ from typing import Any
 import aiohttp
 from aiohttp import web
 
-from app.drawing.curves import CurveGroup
-from app.page import client_messages as wire
-from app.page import commands, messages, picture_sets
-from app.page.inspector_feed import InspectorFeed
-from app.page.message_parsing import MISUNDERSTOOD, MessageError, check_allowed, parse
-from app.page.message_types import Message, encode_text
-from app.page.observability_feed import ObservabilityFeed
-from app.page.observation_messages import WatchProvenance
-from app.page.provenance_feed import ProvenanceFeed
-from app.page.search_feed import SearchFeed
-from app.page.search_messages import PreviewCandidate, ReplayStep, SetSearchSpeed
-from app.page.server_messages import HistoryMessage, NoticeMessage, StateMessage
+from app.messages import client as wire
+from app.messages import encoding
+from app.messages.base import Message, encode_text
+from app.messages.observation import WatchProvenance
+from app.messages.parsing import MISUNDERSTOOD, MessageError, check_allowed, parse
+from app.messages.search import PreviewCandidate, ReplayStep, SetSearchSpeed
+from app.messages.server import HistoryMessage, NoticeMessage, StateMessage
+from app.page import commands
+from app.page.feeds.curves import CurveFeed
+from app.page.feeds.inspector import InspectorFeed
+from app.page.feeds.observability import ObservabilityFeed
+from app.page.feeds.overlay import OverlayFeed
+from app.page.feeds.pictures import PictureSets
+from app.page.feeds.provenance import ProvenanceFeed
+from app.page.feeds.search import SearchFeed
 from app.participants.participants import Participants, Visit
 from app.participants.presence_feed import PresenceFeed
 from app.remedies import page_text
-from app.state import page_view
 from app.state.identity import Identity
 from app.state.page_view import View
 from app.state.role import Role
 from app.state.state import State
 from tracker.errors import TrackerError
-from tracker.evidence.view_evidence import ViewEvidence
 from tracker.session.session import Session
 
 _LOG = logging.getLogger(__name__)
@@ -41,8 +42,6 @@ _WATCHABLE_S = 1 / 60
 """Time between two updates of a running search: faster ones are invisible and take time from the search."""
 _MAX_HISTORY = 2000
 """Largest number of history entries, in each direction, that a page may request."""
-_EDGES = ("accepted", "rejected")
-"""Layers of lines that are drawn from the evidence."""
 _COALESCED = (
     wire.Seek,
     wire.SetView,
@@ -107,14 +106,13 @@ class PageConnection:
         self._sent_text: StateMessage | None = None
         self._sent_text_at = 0.0
         self._reminder: asyncio.TimerHandle | None = None  # for figures that were held back
-        self._sent_overlay: tuple[object, ...] = ()  # what it was drawn from
+        self._overlay = OverlayFeed(visit.controller, number, self._wake)
         self._view: View | None = None  # nothing is drawn before the page's first view
-        self._pictures = picture_sets.PictureSets(visit.controller)
+        self._pictures = PictureSets(visit.controller)
         self._epipolar: tuple[tuple[int, float, float], ...] = ()
         self._sent_epipolar: tuple[object, ...] = ((),)  # what the lines were drawn from
-        self._curves: CurveGroup | None = None
-        self._sent_curves: tuple[CurveGroup, int, int] | None = None  # group, person, version of the timeline
-        self._feed = SearchFeed()
+        self._curves = CurveFeed()
+        self._searches = SearchFeed()
         self._inspector = InspectorFeed()
         self._observability = ObservabilityFeed()
         self._provenance = ProvenanceFeed()
@@ -147,7 +145,7 @@ class PageConnection:
             self._controller.cost_landscape.watch(self._number, False)
             self._controller.reasons.watch(self._number, False)
             self._controller.cost_map.leave(self._number)
-            self._controller.frames.forget(self)
+            self._overlay.close()
 
     def _wake(self, _: State) -> None:
         """Wake the sender; called from any thread."""
@@ -200,9 +198,9 @@ class PageConnection:
     def _carry_out(self, message: wire.ClientMessage) -> None:
         match message:
             case wire.ShowCurves(group=group):
-                self._curves = group
+                self._curves.show(group)
             case wire.WatchTab(tab=tab):
-                self._feed = SearchFeed(tab)
+                self._searches = SearchFeed(tab)
                 self._controller.cost_landscape.watch(self._number, tab == "landscape")
             case wire.ShowHistory(limit=limit):
                 self._history_limit = min(limit, _MAX_HISTORY)
@@ -226,7 +224,7 @@ class PageConnection:
 
     async def _send_all(self, notices: Sequence[str]) -> None:
         names = _value_names(self._controller.session)
-        await self._send(messages.session(self._controller.session, self._visit.role, self._visit.has_place))
+        await self._send(encoding.session(self._controller.session, self._visit.role, self._visit.has_place))
         for notice in notices:
             await self._send(NoticeMessage("info", notice))
         while True:
@@ -251,10 +249,9 @@ class PageConnection:
                     await self._send_drawn(state, self._view)
                 await self._send_epipolar(state)
                 await self._send_checks(sent, state)
-                await self._send_curves(state)
                 await self._send_details(state)
                 await self._send_history()
-                for update in await asyncio.to_thread(self._feed.updates, self._controller, with_figures):
+                for update in await asyncio.to_thread(self._searches.updates, self._controller, with_figures):
                     await self._send(update)
                 if state.footage.error and (sent is None or sent.footage.error != state.footage.error):
                     await self._notice(state.footage.error)
@@ -283,7 +280,7 @@ class PageConnection:
 
     async def _send_state(self, state: State) -> None:
         """Send the page's texts and figures if they changed."""
-        message = messages.state(self._controller.session, state)
+        message = encoding.state(self._controller.session, state)
         if message != self._sent_text:
             self._sent_text = message
             await self._send(message)
@@ -295,66 +292,27 @@ class PageConnection:
         """
         pictures = asyncio.create_task(self._pictures.missing(state, view))
         try:
-            await self._send_overlay(state, view)
+            overlay = await self._overlay.update(state, view)
+            if overlay is not None:
+                await self._send(overlay)
         finally:
             made = await pictures
         for message in made:
             await self._send(message)
 
-    async def _send_overlay(self, state: State, view: View) -> None:
-        views, replay = self._evidence(state, view), state.search_view.replay
-        shows_residuals = replay is not None and replay.fitted_from is not None
-        if (view.layers.isdisjoint(_EDGES) and not shows_residuals) or "contours" not in state.compiled:
-            views = None
-        drawn = (*_drawn(state), view, views is None)
-        if drawn == self._sent_overlay:
-            return
-        self._sent_overlay = drawn
-        message = await asyncio.to_thread(
-            messages.overlay, self._controller.session_of(state), state, self._number, view, views
-        )
-        await self._send(message)
-
-    def _evidence(self, state: State, view: View) -> tuple[ViewEvidence, ...] | None:
-        """Return the cached evidence of the shown frame if the page shows any; request it if it is not cached."""
-        replay = state.search_view.replay
-        if view.layers.isdisjoint(page_view.EVIDENCE) and (replay is None or replay.fitted_from is None):
-            return None
-        frames, views = self._controller.frames, self._controller.frames.cached_evidence(state.frame)
-        if views is None and "evidence" in state.compiled:
-            frames.request(state.frame, lambda _: self._wake(state), self)
-        return views
-
     async def _send_timeline(self, since: int) -> None:
         several = range(len(self._controller.models)) if len(self._controller.models) > 1 else ()
         for person in (None, *several):
             cells = self._controller.stored_poses.timeline(since, person)
-            await self._send(await asyncio.to_thread(messages.timeline, cells, since == 0, person))
-
-    async def _send_curves(self, state: State) -> None:
-        """Send the subscribed group of curves: all of a new group, otherwise the frames that changed."""
-        if self._curves is None:
-            self._sent_curves = None
-            return
-        wanted, sent = (self._curves, state.person, state.timeline_version), self._sent_curves
-        if wanted == sent:
-            return
-        self._sent_curves = wanted
-        since = sent[2] if sent is not None and sent[:2] == wanted[:2] else 0
-        group, person = wanted[:2]
-        frames, rows = await asyncio.to_thread(self._controller.stored_poses.rows, person, since)
-        message = await asyncio.to_thread(
-            messages.curves, self._controller.session, person, group, frames, rows, since == 0
-        )
-        await self._send(message)
+            await self._send(await asyncio.to_thread(encoding.timeline, cells, since == 0, person))
 
     async def _send_checks(self, sent: State | None, state: State) -> None:
         """Send what was found about frames other than the shown one, if it changed."""
         checked = (state.inconsistent_frames, state.keyframe_doubts)
         if sent is None or (sent.inconsistent_frames, sent.keyframe_doubts) != checked:
-            await self._send(messages.inconsistent(state))
+            await self._send(encoding.inconsistent(state))
         if sent is None or sent.range_comparison is not state.range_comparison:
-            await self._send(messages.range_comparison(state.range_comparison))
+            await self._send(encoding.range_comparison(state.range_comparison))
 
     async def _send_epipolar(self, state: State) -> None:
         """Send the lines of the pixel that the page asks about, if they changed."""
@@ -365,10 +323,12 @@ class PageConnection:
             made_from += (state.frame, shown, state.calibration.n_changes, preview)
         if made_from != self._sent_epipolar:
             self._sent_epipolar = made_from
-            await self._send(messages.epipolar(self._controller.session_of(state), state, self._epipolar))
+            await self._send(encoding.epipolar(self._controller.session_of(state), state, self._epipolar))
 
     async def _send_details(self, state: State) -> None:
-        """Send how well the views constrain the shown pose and where it comes from, if the page shows that."""
+        """Send curves, how well the views constrain the shown pose and where it comes from, if the page shows that."""
+        if self._curves.is_due(state):
+            await self._send(await asyncio.to_thread(self._curves.update, self._controller, state))
         if self._provenance.is_due(state):
             for news in await asyncio.to_thread(self._provenance.updates, self._controller, state):
                 await self._send(news)
@@ -380,7 +340,7 @@ class PageConnection:
         if (limit := self._history_limit) == 0:
             return
         entries = await asyncio.to_thread(self._controller.history.entries, limit + 1)
-        message = messages.history(entries, limit)
+        message = encoding.history(entries, limit)
         if message != self._sent_history:
             self._sent_history = message
             await self._send(message)
@@ -388,7 +348,7 @@ class PageConnection:
     async def _send_presence(self) -> None:
         """Send who is where whenever that changes."""
         async for people in self._presence.changes():
-            await self._send(messages.presence(self._visit, people))
+            await self._send(encoding.presence(self._visit, people))
 
     async def _refuse(self, error: TrackerError) -> None:
         """Tell the page why a message was not carried out, in the words of the page."""
@@ -422,40 +382,6 @@ def view_of(message: wire.SetView, n_cameras: int) -> View:
 def _is_move(last: wire.ClientMessage, message: wire.ClientMessage) -> bool:
     """Return whether two messages of one type are moves of a drag."""
     return getattr(last, "phase", None) == getattr(message, "phase", None) == "move"
-
-
-def _drawn(state: State) -> tuple[object, ...]:
-    """Return what an overlay depends on, for comparison. Poses are compared by identity."""
-    drawn = (
-        state.frame,
-        tuple(Identity(p.values) for p in state.people),
-        Identity(state.drawn.people[state.person].errors),
-        state.revisions,
-        state.draft,
-        None if state.search.candidate is None else tuple(map(Identity, state.search.candidate)),
-        state.search.running,
-        state.search_view,
-        state.range_comparison,
-        state.compared if not state.is_stored_drawn else None,
-        () if state.compared is None else state.compared.moved,
-        state.drag,
-        state.drag_seqs,
-        state.undrawn,
-        state.compiled,
-        Identity(state.finding.candidates),
-        state.calibration.n_changes,
-        Identity(state.calibration.preview) if state.calibration.is_previewed else None,
-        Identity(None if state.reason is None else state.reason.alternatives),
-        Identity(None if state.other_copy is None else state.other_copy.poses),
-        Identity(state.observations.drawn),
-        Identity(state.observations.drawn_judgements),
-    )
-    return (*drawn, _pins(state), state.floor.picking)
-
-
-def _pins(state: State) -> object:
-    """Return what the drawing of pins depends on: the joint worked on has lines and a triangulated point."""
-    return (state.pins, state.person, state.point) if any(state.pins) else None
 
 
 def _value_names(session: Session) -> list[tuple[str, ...]]:

@@ -1,7 +1,7 @@
 """Show the progress of long work on a terminal."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -55,7 +55,7 @@ class Reporter:
             self._console.print(printable(line), soft_wrap=True, highlight=False, markup=False)
 
     @contextmanager
-    def over(self, total: int, what: str) -> Iterator[Callable[[], None]]:
+    def over(self, total: int, what: str) -> Generator[Callable[[], None], None, None]:
         """Yield a function to call after each of `total` items."""
         pace, what = Pace(), printable(what)
         if self._silent:
@@ -84,7 +84,7 @@ class Reporter:
             yield tick
 
     @contextmanager
-    def share(self, what: str) -> Iterator[Callable[[float], None]]:
+    def share(self, what: str) -> Generator[Callable[[float], None], None, None]:
         """Yield a function to call with the share of the work that is done, 0 to 1, after each step.
 
         Steps are of any size, so that the time left follows from the share, not from the number of calls.

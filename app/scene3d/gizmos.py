@@ -92,12 +92,12 @@ class Gizmos:
         shown = not is_busy and state.person not in state.undrawn
         with self._server.atomic():
             for which, part in (("root", 0), ("joint", joint)):
-                handle = self._handles[which]  # type: ignore[index]
+                handle = self._handles[which]
                 visible = shown and state.view_3d.gizmos and (which == "root" or joint != 0)
                 if handle.visible != visible:
                     handle.visible = visible
                 if which == self._held or not visible:
                     continue
-                self._about[which] = state.person, part  # type: ignore[index]
+                self._about[which] = state.person, part
                 handle.position = Ts[part, :3, 3]
                 handle.wxyz = rigid.quaternion_from_matrix(Ts[part, :3, :3])

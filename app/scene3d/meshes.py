@@ -12,7 +12,7 @@ from app.state.view_3d import View3d
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours.occluding_contours import part_poses
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.session.session import Person
 
 _DIMMED = 0.2
@@ -94,7 +94,7 @@ class PeopleMeshes:
             _set_visible(handles, view.bodies and index not in hidden)
 
 
-def _mesh(model: BodyModel, part: int) -> tuple[Array, Array]:
+def _mesh(model: BodyModel, part: int) -> tuple[Array, IntArray]:
     """Return the vertices, (n, 3), metres, and triangles, (m, 3), of a part; a head has a nose."""
     triangles = model.shapes[part].triangles()
     vertices, (extra, faces) = triangles.vertices + model.centers_part[part], nose(model, part)
@@ -105,9 +105,9 @@ def shaded(color: str, side: Side) -> tuple[int, int, int]:
     """Return a person's colour for a side of the body: lighter on the left, darker on the right."""
     red, green, blue = rgb(color)
     if side == "left":
-        return tuple(round(c + _LIGHTER * (255 - c)) for c in (red, green, blue))  # type: ignore[return-value]
+        red, green, blue = (round(c + _LIGHTER * (255 - c)) for c in (red, green, blue))
     if side == "right":
-        return tuple(round(_DARKER * c) for c in (red, green, blue))  # type: ignore[return-value]
+        red, green, blue = (round(_DARKER * c) for c in (red, green, blue))
     return red, green, blue
 
 

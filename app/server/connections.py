@@ -56,7 +56,7 @@ class LimitedRunner(web.AppRunner):
         return server
 
     @property
-    def server(self) -> Callable[[], asyncio.Protocol] | None:  # type: ignore[override]
+    def server(self) -> Callable[[], asyncio.Protocol] | None:  # pyrefly: ignore[bad-override]
         """The factory that sites call for each connection."""
         inner = super().server
         return None if inner is None else lambda: _Connection(inner(), self._open)

@@ -14,11 +14,13 @@ import threading
 import webbrowser
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from multiprocessing.context import ForkProcess
+from socketserver import BaseServer
 from types import TracebackType
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 from platformdirs import user_state_path
 
@@ -180,27 +182,30 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(self, listening: socket.socket, doorway: Doorway) -> None:
-        super().__init__(listening.getsockname()[:2], _Handler, bind_and_activate=False)
+        super().__init__(listening.getsockname()[:2], partial(_Handler, doorway), bind_and_activate=False)
         self.socket.close()
-        self.socket, self.doorway = listening, doorway
+        self.socket = listening
 
     def handle_error(self, request: object, client_address: object) -> None:
         """Pass over pages that went away."""
 
 
 class _Handler(BaseHTTPRequestHandler):
-    server: _Server
     timeout = _TIMEOUT_S
+
+    def __init__(self, doorway: Doorway, request: socket.socket, address: Any, server: BaseServer) -> None:
+        self._doorway = doorway
+        super().__init__(request, address, server)  # answers the request
 
     def do_GET(self) -> None:
         """Answer a request; the connection ends with it."""
         hosts = self.headers.get_all("Host", [])
         host = hosts[0] if len(hosts) == 1 else None
         path = self.path.partition("?")[0]
-        for root in self.server.doorway.access.roots:
+        for root in self._doorway.access.roots:
             if path.startswith(root):
                 path = "/" + path.removeprefix(root)
-        answer = self.server.doorway.answer(path, host, self.headers.get("Origin"))
+        answer = self._doorway.answer(path, host, self.headers.get("Origin"))
         sources = "'none'" if host is None or answer.status == HTTPStatus.FORBIDDEN else connect_sources(host)
         with suppress(OSError):
             self.send_response(answer.status)

@@ -169,7 +169,7 @@ class ExportRoutes:
         observations = load_observations(session, name)
         is_one = len(observations.sources) == 1
         # A single file keeps its name below an existing folder.
-        done = export_like(session, observations, folder if is_one else folder / name, poses)  # type: ignore[arg-type]
+        done = export_like(session, observations, folder if is_one else folder / name, poses)
         return done.paths[0] if is_one else _archive([folder / name], folder / f"{name}.zip")
 
     def _tick(self, request: web.Request) -> Callable[[], None]:
@@ -199,7 +199,7 @@ def _checked(text: str | None) -> "Checked | None":
         TrackerError: it is no such choice.
     """
     if text is None or text == "keyframes" or text == "reviewed":
-        return text  # type: ignore[return-value]
+        return text
     raise TrackerError(f"expected only as keyframes or reviewed, found '{text[:40]}'; reload the page")
 
 

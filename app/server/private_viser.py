@@ -4,7 +4,7 @@ import contextlib
 import io
 import socket
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +68,7 @@ def _private_folder() -> TemporaryFolder:
 
 
 @contextlib.contextmanager
-def _served_on(path: Path) -> Iterator[None]:
+def _served_on(path: Path) -> Generator[None, None, None]:
     """Make `websockets` serve on a Unix socket at `path`, whatever host and port its caller passes.
 
     viser has no option for it. It starts the server before its constructor returns, so nothing else is served
@@ -81,8 +81,8 @@ def _served_on(path: Path) -> Iterator[None]:
     def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
         return original(handler, sock=listener, **options)
 
-    websockets.asyncio.server.serve = serve  # type: ignore[misc, assignment]
+    websockets.asyncio.server.serve = serve  # pyrefly: ignore[bad-assignment]
     try:
         yield
     finally:
-        websockets.asyncio.server.serve = original  # type: ignore[misc]
+        websockets.asyncio.server.serve = original

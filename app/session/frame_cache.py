@@ -3,7 +3,7 @@
 import logging
 import threading
 import time
-from collections.abc import Callable, Hashable, Iterator, Sequence
+from collections.abc import Callable, Generator, Hashable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import lru_cache
@@ -206,7 +206,7 @@ class FrameCache:
         return self._n_pictures > 0
 
     @contextmanager
-    def _making_picture(self) -> Iterator[None]:
+    def _making_picture(self) -> Generator[None, None, None]:
         with self._idle:
             self._n_pictures += 1
         try:

@@ -79,8 +79,9 @@ def _content(
     n_views = len(encoder.views)
     pictures: list[list[str]] = [[] for _ in range(n_views)]
     lines = []
-    for view in range(n_views) if folder is not None else ():
-        (folder / str(view)).mkdir(parents=True)  # type: ignore[operator]
+    if folder is not None:
+        for view in range(n_views):
+            (folder / str(view)).mkdir(parents=True)
     for frame in motion.frames:
         for view, image in enumerate(recording.read(frame)):
             encoded = encoder.encode(view, image)

@@ -1,6 +1,6 @@
 /**
  * Reasons why commands are unavailable: sentences for the user, null if a command is available; and the messages that a page
- * with a shared link sends. The program refuses all others, too (app/page/message_parsing.py).
+ * with a shared link sends. The program refuses all others, too (app/messages/parsing.py).
  */
 
 import { hasSearch, hasTrack } from "./selectors.js";

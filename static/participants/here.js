@@ -26,10 +26,12 @@ export class Here {
     this.#form = join;
     this.#panel.append(join.form);
     opensPopover(this.#panel, this.#button, () => this.toggle());
+    this.#panel.addEventListener("toggle", () => this.#showButton());
     context.store.subscribe((changed) => changed.has("presence") && this.#show());
   }
 
   toggle() {
+    this.#button.hidden = false; // the list opens below it
     togglePopover(this.#panel, this.#button);
     if (this.#panel.matches(":popover-open")) this.#form.input.focus();
   }
@@ -40,11 +42,17 @@ export class Here {
     const chips = others.slice(0, SHOWN).map((person) => chipOf(person, people.indexOf(person)));
     if (others.length > SHOWN) chips.push(Object.assign(document.createElement("span"), { textContent: `+${others.length - SHOWN}` }));
     this.#chips.replaceChildren(...chips);
-    this.#button.hidden = people.length < 2 && this.#context.store.facts.presence?.link === "host";
+    this.#showButton();
     const names = others.map((person) => `${nameOf(person)} on frame ${person.frame}`);
     this.#button.title = `${names.length ? `Here: ${names.join(", ")}` : "Nobody else is here"} (Alt+E)`;
     this.#button.setAttribute("aria-label", names.length ? `Who is here: ${names.length} others` : "Who is here: nobody else");
     this.#list.replaceChildren(...people.map((person, index) => this.#row(person, index)));
+  }
+
+  /** A host who is alone needs the button only while the list is open. */
+  #showButton() {
+    const { people, link } = this.#context.store.facts.presence ?? { people: [], link: "host" };
+    this.#button.hidden = people.length < 2 && link === "host" && !this.#panel.matches(":popover-open");
   }
 
   /**

@@ -9,7 +9,7 @@ import asyncio
 import contextlib
 import socket
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 
 import numpy as np
 from playwright.async_api import Page
@@ -21,7 +21,7 @@ MOVES, INTERVAL_S = 300, 1 / 30
 
 
 @contextlib.asynccontextmanager
-async def floor_page() -> AsyncIterator[Page]:
+async def floor_page() -> AsyncGenerator[Page, None]:
     """The page of the made-up program."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))

@@ -20,7 +20,7 @@ sys.path[:0] = [str(ROOT / "tests" / "support"), str(ROOT)]
 
 from staging import cameras_around
 
-from app.page import messages
+from app.messages import encoding
 from app.state.page_view import View
 from app.state.people import ShownPose
 from app.state.state import State
@@ -64,7 +64,7 @@ def overlay_s(session: Session, state: State, reductions: tuple[float, ...]) -> 
     view, took = View(LAYERS, reductions), []
     for _ in range(6):
         began = time.process_time()
-        messages.overlay(session, state, 1, view, None)
+        encoding.overlay(session, state, 1, view, None)
         took.append(time.process_time() - began)
     return min(took[1:])
 
@@ -117,7 +117,7 @@ def cells(saver: Saver, since: int) -> list[object]:
     """Make the messages of cells that a page receives: of all people, and of each of several."""
     n_people = len(saver._session.people)
     several = range(n_people) if n_people > 1 else ()
-    return [messages.timeline(saver.index.timeline(since, p), since == 0, p) for p in (None, *several)]
+    return [encoding.timeline(saver.index.timeline(since, p), since == 0, p) for p in (None, *several)]
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ everything stored, and prints the resident memory every 100 frames. Linux only: 
 import argparse
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -69,7 +69,7 @@ class Watch(Reporter):
         self.figures_mb: list[float] = []
 
     @contextmanager
-    def over(self, total: int, what: str) -> Iterator[Callable[[], None]]:
+    def over(self, total: int, what: str) -> Generator[Callable[[], None], None, None]:
         """Give a function to call after each frame."""
         done = 0
 

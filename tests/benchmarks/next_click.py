@@ -1,10 +1,11 @@
 """Count actions until a recording is good enough: `python tests/benchmarks/next_click.py SESSION... --data DIR`.
 
 Each SESSION has bodies and a start. It is named as a recording in `--data DIR`, or as a folder in
-`--scenes DIR`. A scripted annotator sees the true joints with 3 px of noise and corrects copies, one limb of one frame
-by an action, in two views. The frame becomes a keyframe, and the stretches beside it are tracked again. He follows the
-proposals of `quadrille next`, the list of doubts, or corrects everything on keyframes at equal distances. It is counted
-how many actions it takes until the mean error is at most 20 mm (30 for two people) and no frame is lost.
+`--scenes DIR`. A scripted annotator sees the true joints with 3 px of noise and corrects copies. An action corrects one
+limb of one frame by pins in two views and a fit, as *Fit* in the page does. The frame becomes a keyframe, and the
+stretches beside it are tracked again. He follows the proposals of `quadrille next`, the list of doubts, or corrects
+everything on keyframes at equal distances. It is counted how many actions it takes until the mean error is at most
+20 mm (30 for two people) and no frame is lost.
 """
 
 import argparse
@@ -123,9 +124,16 @@ class Annotator:
             for v in action.views
             if np.isfinite(truth[n]).all()
         ]
-        fit = fit_frame([pose.body], [pins], cameras, None, TrackSettings(), [0], [Constraints(active)])
-        sources = tuple("pinned" if p else s for p, s in zip(fit.pinned[0], pose.record.sources, strict=True))
-        record = replace(pose.record, values=fit.poses[0], sources=sources, keyframe=True, reviewed=True, errors=None,
+        with open_stored_session(self.session) as opened:
+            views = opened.observer.evidence(action.frame)
+        bodies = [person[action.frame].body for person in own]
+        of_all = [pins if i == action.person else [] for i in range(len(bodies))]
+        limits = [Constraints(active if i == action.person else None) for i in range(len(bodies))]
+        fit = fit_frame(bodies, of_all, cameras, views, TrackSettings(), [action.person], limits)
+        values, pinned = fit.poses[action.person], fit.pinned[action.person]
+        moved = np.where(values != pose.record.values, "fitted", pose.record.sources)
+        sources = tuple(np.where(pinned, "pinned", moved).tolist())
+        record = replace(pose.record, values=values, sources=sources, keyframe=True, reviewed=True, errors=None,
                          limbs_lost=(), status="", remark="", trace=None)  # fmt: skip
         with closing(AnnotationStore(self.session.annotations_path)) as store:
             store.commit("correct", [PoseChange(self.session.people[action.person].name, action.frame, record)])

@@ -5,7 +5,7 @@ import contextlib
 import shutil
 import sys
 import tempfile
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from pathlib import Path
 
 from playwright.async_api import Page, async_playwright
@@ -19,7 +19,7 @@ from program import Program
 
 
 @contextlib.asynccontextmanager
-async def sample_page() -> AsyncIterator[Page]:
+async def sample_page() -> AsyncGenerator[Page, None]:
     """The page, at rest with the real 3-D view beside its panes."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary) / "session"
@@ -32,7 +32,7 @@ async def sample_page() -> AsyncIterator[Page]:
 
 
 @contextlib.asynccontextmanager
-async def opened_page(address: str) -> AsyncIterator[Page]:
+async def opened_page(address: str) -> AsyncGenerator[Page, None]:
     """The page at an address, at rest."""
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS)

@@ -14,21 +14,11 @@ from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_ori
 
 import msgspec
 
-from app.page import (
-    annotation_messages,
-    binary_headers,
-    client_messages,
-    inspector_messages,
-    message_types,
-    observation_messages,
-    pose_messages,
-    search_messages,
-    server_messages,
-)
-from app.page.binary_headers import BINARY_HEADERS
-from app.page.client_messages import CLIENT_MESSAGES
-from app.page.pose_messages import PoseEdit
-from app.page.server_messages import TEXT_MESSAGES
+from app.messages import annotation, base, binary_headers, client, inspector, observation, pose, search, server
+from app.messages.binary_headers import BINARY_HEADERS
+from app.messages.client import CLIENT_MESSAGES
+from app.messages.pose import PoseEdit
+from app.messages.server import TEXT_MESSAGES
 
 TYPES = Path("static/model/protocol.js")
 DOCS = Path("docs/protocol.md")
@@ -173,8 +163,8 @@ def _names() -> dict[Any, str]:
 
 def _named(name: str) -> Any:
     modules = (
-        message_types, client_messages, pose_messages, search_messages, inspector_messages,
-        observation_messages, annotation_messages, server_messages,
+        base, client, pose, search, inspector,
+        observation, annotation, server,
         binary_headers,
     )  # fmt: skip
     return next(getattr(module, name) for module in modules if hasattr(module, name))
@@ -218,9 +208,9 @@ def _declared(field: Field) -> str:
 def _field_docs(kind: type) -> dict[str, str]:
     """Return the docstring under each field, by name, with those of base classes."""
     docs: dict[str, str] = {}
-    for base in reversed(kind.__mro__):
-        if base.__module__.startswith("app."):
-            docs |= _own_field_docs(base)
+    for parent in reversed(kind.__mro__):
+        if parent.__module__.startswith("app."):
+            docs |= _own_field_docs(parent)
     return docs
 
 

@@ -25,6 +25,8 @@ HOUSE = {
         ["cli", "share"],
         ["bench", "server"],
         ["page", "scene3d"],
+        ["page/feeds"],
+        ["messages"],
         ["participants"],
         ["control"],
         ["control/posing", "control/tracking"],

@@ -13,7 +13,7 @@ from fake_tracker import STEP_M, Walker
 
 from app.cli.track import arguments_class, settings_of
 from app.control.tracking import track_settings
-from app.page.inspector_feed import methods
+from app.page.feeds.inspector import methods
 from app.state.run_choices import RunChoices
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import format_model

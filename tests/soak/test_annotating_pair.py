@@ -1,7 +1,7 @@
 """An annotator and a reviewer make a verified dataset of two people, each in a browser: plan, drags, verdicts, export.
 
-Both see the true joints in the views, some pixels off, and nothing else. `QUADRILLE_SOAK=1` goes on with denser plans
-for an hour: `QUADRILLE_SOAK=1 python -m pytest -m slow tests/soak/test_annotating_pair.py`.
+Both see the true joints in the views, some pixels off, and nothing else. `QUADRILLE_SOAK=1` goes on with denser plans,
+up to every frame, for at most an hour: `QUADRILLE_SOAK=1 python -m pytest -m slow tests/soak/test_annotating_pair.py`.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.slow
 
 PEOPLE = ("person1", "person2")
 HOUR_S = 3600.0
-EVERY = (20, 10, 5, 2)
+EVERY = (20, 10, 5, 2, 1)
 """Frames between planned ones, plan after plan."""
 CORRECTED_PX, REJECTED_PX = 9.0, 18.0
 """The annotator drags a joint that seems farther off in a view, the reviewer rejects it: 3 and 6 times their noise."""

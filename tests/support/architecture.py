@@ -67,6 +67,8 @@ ROOMS = [
     "app.control.tracking",
     "app.control",
     "app.participants",
+    "app.messages",
+    "app.page.feeds",
     "app.page",
     "app.scene3d",
     "app.server",

@@ -4,8 +4,8 @@ import json
 
 import msgspec
 
-from app.page.binary_headers import BINARY_HEADERS
-from app.page.server_messages import TEXT_MESSAGES
+from app.messages.binary_headers import BINARY_HEADERS
+from app.messages.server import TEXT_MESSAGES
 
 _KINDS = {kind.__struct_config__.tag: kind for kind in (*TEXT_MESSAGES, *BINARY_HEADERS)}
 

@@ -20,8 +20,8 @@ import numpy as np
 from aiohttp import WSMsgType, web
 from declared_messages import checked
 
-from app.page.inspector_feed import methods
-from app.page.message_parsing import parse
+from app.messages.parsing import parse
+from app.page.feeds.inspector import methods
 
 WIDTH, HEIGHT, N_FRAMES = 640, 480, 120
 CAMERA_NAMES = ("FRONT", "RIGHT", "BACK", "LEFT")

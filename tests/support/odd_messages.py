@@ -4,7 +4,7 @@ import json
 
 import msgspec
 
-from app.page.client_messages import CLIENT_MESSAGES
+from app.messages.client import CLIENT_MESSAGES
 
 _ODD = (
     "Infinity", "-Infinity", "NaN", "1e400", "-1e400", "1e308", "-1", "2.5", "2147483648", "2147483649",

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import os
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from pathlib import Path
 
 from page_driver import shows
@@ -116,7 +116,7 @@ READY = "window.quadrille?.state.overlay && quadrille.state.state?.cost_px !== n
 
 
 @contextlib.asynccontextmanager
-async def started(session: Path, *options: str, has_token: bool = False) -> AsyncIterator[Program]:
+async def started(session: Path, *options: str, has_token: bool = False) -> AsyncGenerator[Program, None]:
     """A running program, killed in the end."""
     program = Program(session, *options, has_token=has_token)
     try:

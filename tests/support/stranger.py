@@ -4,7 +4,7 @@ An action is one press to release of the mouse, one key, or one field filled by 
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -66,7 +66,7 @@ class Stranger:
         self.page, self.stages, self._sent = page, [], drags_of(page)
 
     @contextmanager
-    def stage(self, name) -> Iterator[Stage]:
+    def stage(self, name) -> Generator[Stage, None, None]:
         """Count and time what is done within."""
         stage = Stage(name)
         self.stages.append(stage)

@@ -77,7 +77,7 @@ def read_copies(sessions: Sequence[Session], poses: Poses = "keyframes", people:
         )
     joints = (*JOINTS, *FOOT_POINTS)
     points = np.array([[joint_centers(body, joints) for body in of] for of in bodies.values()])
-    known = np.isfinite(points).all(axis=(1, 3)).any(axis=0)
+    known = np.asarray(np.isfinite(points).all(axis=(1, 3)).any(axis=0))
     joints = tuple(joint for joint, is_known in zip(joints, known, strict=True) if is_known)
     notes = notes_on(sessions, bodies)
     return Copies(

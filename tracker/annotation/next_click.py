@@ -18,7 +18,7 @@ from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.contours import occluding_contours
 from tracker.errors import SessionError, TrackerError
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.images.working_view import working_scale
 from tracker.session.session import Session
@@ -264,7 +264,7 @@ class _Person:
     def _pair(self, t: int, unit: int) -> tuple[int, ...]:
         return self._pairs[int(self._pair_of[t, unit])]
 
-    def _parts(self, unit: int) -> Array:
+    def _parts(self, unit: int) -> IntArray:
         """Return the indices of the parts of a unit."""
         at = [self._model.point_names.index(n) for n, u in zip(self.errors.joints, self.errors.unit_of, strict=True)
               if u == unit]  # fmt: skip

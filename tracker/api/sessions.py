@@ -1,6 +1,6 @@
 """Open and make sessions, and find people by their names."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -123,7 +123,7 @@ def frames_of(session: Session, frames: Sequence[int] | None) -> Sequence[int]:
 
 
 @contextmanager
-def opened(session: SessionOrFolder) -> Iterator[StoredSession]:
+def opened(session: SessionOrFolder) -> Generator[StoredSession, None, None]:
     """Lock a session, and open its store and footage.
 
     Raises:

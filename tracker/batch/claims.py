@@ -9,7 +9,7 @@ import os
 import secrets
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,7 +52,7 @@ class Claim:
             lock.unlink(missing_ok=True)
 
     @contextmanager
-    def beating(self) -> Iterator[None]:
+    def beating(self) -> Generator[None, None, None]:
         """Show signs of life within the context, from a thread of their own."""
         ended = threading.Event()
 

@@ -27,7 +27,7 @@ _MARKER_SHARE = 0.75
 _Count: TypeAlias = Annotated[int, Meta(ge=2, le=100, description="a whole number from 2 to 100")]
 _Length: TypeAlias = Annotated[float, Meta(gt=0, le=1e6, description="a length above 0")]
 _Share: TypeAlias = Annotated[float, Meta(gt=0, lt=1, description="a share between 0 and 1")]
-_Dictionary = Literal[DICTIONARIES]  # type: ignore[valid-type]
+_Dictionary = Literal[DICTIONARIES]  # pyrefly: ignore[not-a-type]
 
 
 @dataclass(frozen=True)

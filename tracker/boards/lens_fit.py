@@ -84,11 +84,16 @@ def fit_lens(board: Board, seen: SeenCorners, blank: Camera, frames: IntArray) -
         own = best_poses(trials, [camera], board_poses(board, chosen, camera))
         found.append(solve_bundle(trials, Rig((camera,), own), _TRIAL_STEPS, _TRIAL_GAIN))
     camera = min(found, key=lambda trial: trial.cost).state.cameras[0]
-    for _ in range(_CHOICES):
+
+    def fitted(problem: BoardProblem, camera: Camera) -> RigFit:
         own = best_poses(problem, [camera], board_poses(board, chosen, camera))
-        fit = fit_rig(problem, Rig((camera,), own))
-        camera, problem = fit.rig.cameras[0], problem.with_sigmas(fit.sigmas_px)
-    return _lens_fit(problem, fit, len(frames))
+        return fit_rig(problem, Rig((camera,), own))
+
+    fit = fitted(problem, camera)
+    for _ in range(1, _CHOICES):
+        problem = problem.with_sigmas(fit.sigmas_px)
+        fit = fitted(problem, fit.rig.cameras[0])
+    return _lens_fit(problem.with_sigmas(fit.sigmas_px), fit, len(frames))
 
 
 def _first_lenses(blank: Camera) -> Iterator[Camera]:

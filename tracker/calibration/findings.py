@@ -94,7 +94,8 @@ def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tup
             moved = np.sum((mended.project(then) - view.project(now)) ** 2, axis=-1)
             px.append(moved / frame.views[camera].scale ** 2)
             mm.append(moved * _mm_per_px(view, body.points_world) ** 2)
-    return tuple(float(np.sqrt(np.nanmean(np.concatenate(squares)))) for squares in (px, mm))  # type: ignore[return-value]
+    rms_px, rms_mm = (float(np.sqrt(np.nanmean(np.concatenate(squares)))) for squares in (px, mm))
+    return rms_px, rms_mm
 
 
 def _mm_per_px(camera: Camera, points_world: Array) -> Array:

@@ -12,7 +12,7 @@ from tracker.calibration.rig_problem import RigProblem, RigState
 from tracker.calibration.viewed_frames import ViewedFrame, seen_people
 from tracker.fitting.bundle import solve_bundle
 from tracker.fitting.hypothesis import CLEAR_NATS
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 
 
 class FrameScore(NamedTuple):
@@ -66,7 +66,7 @@ class Change(NamedTuple):
 
 
 def find_change(
-    scores: Sequence[tuple[FrameScore, FrameScore]], camera: int, columns: Array, correction: Array, sigmas: Array
+    scores: Sequence[tuple[FrameScore, FrameScore]], camera: int, columns: IntArray, correction: Array, sigmas: Array
 ) -> Change:
     """Find since when a camera is off, by the likelihood of each frame (a change point; Page 1954).
 

@@ -79,7 +79,7 @@ def _caliscope_name(key: str, group: Mapping[str, Any]) -> str:
     for number in _CALISCOPE_NUMBERS:
         if isinstance(group.get(number), int):
             return f"{number.removesuffix('_id')}_{group[number]}"
-    return str(key)
+    return key
 
 
 def board_square(document: Document) -> float | None:

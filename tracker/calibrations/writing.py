@@ -71,7 +71,7 @@ def opencv_text(cameras: Sequence[Camera]) -> str:
         if camera.fisheye:
             storage.write("fisheye", 1)
         storage.endWriteStruct()
-    return str(storage.releaseAndGetString())
+    return storage.releaseAndGetString()
 
 
 LAYOUT_TEXTS: Mapping[str, Callable[[Sequence[Camera]], str]] = {

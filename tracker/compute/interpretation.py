@@ -5,7 +5,7 @@ the pixels of an image take minutes as plain Python, so that nothing is interpre
 """
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 _this_thread = threading.local()
@@ -13,7 +13,7 @@ _modules: frozenset[str] = frozenset()
 
 
 @contextmanager
-def interpreted() -> Iterator[None]:
+def interpreted() -> Generator[None, None, None]:
     """Interpret all kernels that this thread calls and the program has not loaded."""
     before = getattr(_this_thread, "interprets", False)
     _this_thread.interprets = True

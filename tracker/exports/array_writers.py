@@ -55,7 +55,7 @@ def write_npz(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Pa
     arrays |= _values(motion) | _cameras(motion.session.cameras, exported_cameras(motion, options))
     plain = {name: np.asarray(values) for name, values in arrays.items()}
     assert not any(values.dtype.hasobject for values in plain.values()), "readers refuse pickled objects"
-    np.savez_compressed(paths[0], **plain)  # type: ignore[arg-type]
+    np.savez_compressed(paths[0], **plain)  # pyrefly: ignore[bad-argument-type]
     for _ in motion.frames:
         tick()
 

@@ -94,6 +94,7 @@ def _provenance_rows(found: list[PoseProvenance]) -> list[tuple[str, str]]:
         ("status", [p.record.status or "not assessed" for p in found]),
         ("source", [p.source for p in found]),
         ("annotator", [p.record.author or "not named" for p in found]),
+        ("verified by", [p.verified_by for p in found if p.verified_by]),
         ("body", [f"revision {p.record.model_revision}" for p in found]),
     ):
         rows += [(f"{what}: {value}", str(n)) for value, n in Counter(values).most_common()]

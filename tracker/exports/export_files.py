@@ -3,7 +3,7 @@
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -66,7 +66,7 @@ def check_options(chosen: ExportFormat, session: "Session", given: dict[str, str
             load_character(value)
         elif value not in allowed[name]:
             raise TrackerError(f"expected --{name} to be one of {', '.join(allowed[name])}, found '{value}'")
-    return replace(ExportOptions(chosen.axes, chosen.units), **values)  # type: ignore[arg-type]
+    return replace(ExportOptions(chosen.axes, chosen.units), **values)  # pyrefly: ignore[bad-argument-type]
 
 
 def for_format(chosen: ExportFormat, motion: ExportedMotion) -> ExportedMotion:
@@ -161,7 +161,7 @@ def refuse_existing(paths: Sequence[Path], overwrite: bool, may_replace: Callabl
 
 
 @contextmanager
-def moved_at_end(paths: Sequence[Path]) -> Iterator[Path]:
+def moved_at_end(paths: Sequence[Path]) -> Generator[Path, None, None]:
     """Yield an empty folder beside some files; at the end, files of the same names move from there to their places."""
     folder = paths[0].with_name(f".{paths[0].name}.{secrets.token_hex(4)}.tmp")
     folder.mkdir()

@@ -16,7 +16,7 @@ from tracker.files import write_text_atomic
 from tracker.formats.interchange.indexed_png import write_indexed_png
 from tracker.geometry.cameras import Camera
 
-SOMEBODY = int(np.iinfo(np.uint8).max)
+SOMEBODY = np.iinfo(np.uint8).max
 """Label of a person whose pose is not exported, as in masks of footage (`tracker.footage.recording.read_mask`)."""
 _SOMEBODY_COLOR = "#808080"
 

@@ -89,7 +89,7 @@ def _edited_points(pose: StoredPose, counterparts: Sequence[tuple[str, ...]]) ->
     model, first = pose.body.model, min(SOURCES.index(s) for s in _BY_PROGRAMS)
     is_edited = np.array([SOURCES.index(s) < first for s in pose.record.sources])
     edited_dofs = is_edited[model.dof_value]  # the values of a quaternion are edited together
-    is_moved = model.moves[edited_dofs].any(axis=0)[model.proximal_parts]
+    is_moved = np.asarray(model.moves[edited_dofs].any(axis=0))[model.proximal_parts]
     moved = {name for name, moves in zip(model.point_names, is_moved, strict=True) if moves}
     return np.array([any(p in moved for p in points) for points in counterparts])
 

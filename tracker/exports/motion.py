@@ -1,6 +1,7 @@
 """Read the stored poses of a session that are exported."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -14,8 +15,10 @@ from tracker.geometry.arrays import Array
 from tracker.motion.interpolation import interpolate_pose
 from tracker.motion.velocity import velocity
 from tracker.session.session import Person, Session
+from tracker.store.annotation_store import AnnotationStore
 from tracker.store.calibration_log import PosedRevisions, read_posed_revisions
 from tracker.store.stored_poses import StoredPose, read_stored_poses
+from tracker.store.task_log import StateRow
 
 Checked = Literal["keyframes", "reviewed"]
 """Poses that a person set or verified, or that a person has checked; a keyframe is one of both."""
@@ -112,6 +115,8 @@ class ExportedMotion:
     """Number of poses of exported people whose status is lost; they are in `people` unless they were left out."""
     calibrations: PosedRevisions = field(default_factory=PosedRevisions)
     """The present calibration, and those that the poses were made with."""
+    verifications: Mapping[tuple[str, int], StateRow] = field(default_factory=dict)
+    """The decisions by which poses are verified, by name of the person and frame."""
 
     @property
     def exported(self) -> tuple[PersonMotion, ...]:
@@ -205,7 +210,9 @@ def read_motion(
     elif frames is None:
         within = range(found[0], found[-1] + 1)
     calibrations = read_posed_revisions(session.annotations_path, [p.name for p in session.people])
-    return ExportedMotion(session, within, tuple(people), having, n_lost, calibrations)
+    with closing(AnnotationStore(session.annotations_path, read_only=True)) as store:
+        verifications = store.tasks.verifications()
+    return ExportedMotion(session, within, tuple(people), having, n_lost, calibrations, verifications)
 
 
 def _is_checked(pose: StoredPose, only: Checked | None) -> bool:

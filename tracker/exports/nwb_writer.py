@@ -26,6 +26,8 @@ _COLUMNS = {
     "edit_time": "time of that edit, ISO 8601, UTC",
     "program": "version of Quadrille that made it",
     "remark": "reason of the status",
+    "verified_by": "who verified the pose as a task of the plan; empty for nobody",
+    "verified_time": "time of that, ISO 8601, UTC",
     "keyframe": "whether a person set or verified the pose",
     "reviewed": "whether a person has checked it",
     "body_revision": "body that the pose was made with, from 1; 0 without a pose",

@@ -12,7 +12,7 @@ from tracker.exports.provenance import PoseProvenance, pose_provenance
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 
-POSE_FIELDS = ("status", "source", "annotator", "edit_time", "program", "remark")
+POSE_FIELDS = ("status", "source", "annotator", "edit_time", "program", "remark", "verified_by", "verified_time")
 """Texts of a pose in `PoseArrays.texts`."""
 
 
@@ -133,5 +133,6 @@ def _set_pose(
 
 def _texts(found: PoseProvenance) -> dict[str, str]:
     record = found.record
-    values = (record.status, found.source, record.author, record.time, record.program, record.remark)
+    made = (record.status, found.source, record.author, record.time, record.program, record.remark)
+    values = (*made, found.verified_by, found.verified_time)
     return dict(zip(POSE_FIELDS, values, strict=True))

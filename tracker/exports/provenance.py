@@ -37,6 +37,10 @@ class PoseProvenance:
     """The calibration that the pose was made with, from 1."""
     is_earlier_calibration: bool
     """Whether the session has another calibration now."""
+    verified_by: str
+    """Name of the person who verified it as a task of the plan; empty for nobody."""
+    verified_time: str
+    """Time of that, ISO 8601, UTC; empty for nobody."""
 
     @property
     def is_reviewed(self) -> bool:
@@ -59,7 +63,10 @@ def pose_provenance(motion: ExportedMotion, person: PersonMotion, frame: int) ->
     revision = motion.calibration_of(person, frame)
     sources = sources_of_points(model, record.sources)
     is_earlier = revision != motion.calibrations.present
-    return PoseProvenance(record, stored.source, sources, point_lost(model, record.limbs_lost), revision, is_earlier)
+    lost = point_lost(model, record.limbs_lost)
+    verified = motion.verifications.get((person.person.name, frame))
+    by, time = ("", "") if verified is None else (verified.author, verified.time)
+    return PoseProvenance(record, stored.source, sources, lost, revision, is_earlier, by, time)
 
 
 def sources_of_points(model: BodyModel, sources: Sequence[str]) -> tuple[str, ...]:
@@ -148,6 +155,8 @@ def _pose_document(found: PoseProvenance, R_file_world: Array) -> dict[str, Any]
         "program": record.program,
         "keyframe": record.keyframe,
         "reviewed": found.is_reviewed,
+        "verified_by": found.verified_by,
+        "verified_time": found.verified_time,
         "remark": record.remark,
         "body_revision": record.model_revision,
         "calibration_revision": found.calibration_revision,

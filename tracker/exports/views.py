@@ -1,6 +1,6 @@
 """The views of an export: their cameras in its pixels, their pictures, and the labels of their pixels."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -79,7 +79,9 @@ class Pictures:
 
 
 @contextmanager
-def undistorted_pictures(motion: ExportedMotion, options: ExportOptions, folder: Path) -> Iterator[Pictures | None]:
+def undistorted_pictures(
+    motion: ExportedMotion, options: ExportOptions, folder: Path
+) -> Generator[Pictures | None, None, None]:
     """Write the cameras of undistorted pixels, and yield the writer of such pictures; None in original pixels.
 
     Raises:

@@ -92,7 +92,7 @@ class ArrowEquations(NamedTuple):
         at = np.arange(m)
         own[:, at, at] *= 1 + damping
         right = np.concatenate([self.cross, self.own_gradients[..., None]], axis=2)
-        solved = np.linalg.solve(own, right).reshape(-1, n + 1)
+        solved = np.asarray(np.linalg.solve(own, right), dtype=np.float64).reshape(-1, n + 1)
         taken = self.cross.reshape(len(solved), n).T @ solved
         H, g = self.hessian - taken[:, :-1], self.gradient - taken[:, -1]
         shared = damped_step(H, g, damping * np.diag(self.hessian)) if n else g
@@ -107,15 +107,15 @@ class ArrowEquations(NamedTuple):
 class BundleProblem(Protocol[S]):
     """A problem for `solve_bundle`; its state holds all unknowns."""
 
-    def linearize(self, state: S) -> ArrowEquations:
+    def linearize(self, state: S, /) -> ArrowEquations:
         """Return the normal equations at a state."""
         ...
 
-    def moved(self, state: S, shared: Array, own: Array) -> S:
+    def moved(self, state: S, shared: Array, own: Array, /) -> S:
         """Return the state after a step of the shared unknowns, (n,), and of the own ones, (G, m)."""
         ...
 
-    def free(self, state: S, equations: ArrowEquations) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def free(self, state: S, equations: ArrowEquations, /) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return which shared unknowns, (n,), and which own ones, (G, m), may move from there."""
         ...
 

@@ -90,7 +90,7 @@ class Observability:
 
     def _covariance(self, information: Array) -> Array:
         n = self.model.n_dofs
-        return np.asarray(np.linalg.inv(information + np.diag(self.prior))[:n, :n])
+        return np.asarray(np.linalg.inv(information + np.diag(self.prior))[:n, :n], dtype=np.float64)
 
     @cached_property
     def best_views(self) -> NDArray[np.int64]:

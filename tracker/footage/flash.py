@@ -50,4 +50,4 @@ def flash_of(brightness: list[Array]) -> Flash | None:
     share = (means[first + 1] - means[first]) / rise if rise > 0 else 1.0
     others = np.delete(np.abs(np.diff(means)), [first, last - 1])
     ratio = float(rise / max(np.nanmax(others, initial=0.0), 1e-6))
-    return Flash(first + 1 + float(np.clip(1 - share, 0.0, 1.0)), ratio, bool(ratio >= 5.0))
+    return Flash(first + 1 + float(np.clip(1 - share, 0.0, 1.0)), ratio, ratio >= 5.0)

@@ -80,7 +80,7 @@ class VideoDecoder:
             raise
         self.tick_s = float(self.stream.time_base or 0)
         """Unit of time stamps, s."""
-        self.has_b_frames = bool(self.stream.codec_context.has_b_frames)
+        self.has_b_frames = self.stream.codec_context.has_b_frames
         """Whether frames may be stored in another order than they are shown in."""
         self.frames = self._decode(self._container.demux(self.stream))
         """The frames from here on, in display order; damaged packets yield nothing."""

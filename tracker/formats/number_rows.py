@@ -88,9 +88,10 @@ class NumberRows:
         where = f"{self._where}, line {line}"
         try:
             fields = next(csv.reader([text], delimiter=self._separator))
-            row = [np.nan if f.strip().lower() in _MISSING else float(f) for f in fields]
         except csv.Error as error:
             raise FormatError(f"{where}: {error}; export it again") from error
+        try:
+            row = [np.nan if f.strip().lower() in _MISSING else float(f) for f in fields]
         except ValueError as error:
             wrong = next(f for f in fields if not _is_number(f))
             raise FormatError(f"{where}: {not_a_number(wrong)}") from error

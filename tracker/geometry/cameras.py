@@ -229,11 +229,12 @@ class Camera:
         assert image.shape[:2] == (self.height, self.width), (image.shape, self.size)
         if self.is_pinhole:
             return image
-        return cv2.remap(image, *self._undistort_maps, cv2.INTER_LINEAR)  # type: ignore[return-value]
+        return np.asarray(cv2.remap(image, *self._undistort_maps, cv2.INTER_LINEAR), dtype=np.uint8)
 
     @cached_property
     def _undistort_maps(self) -> tuple[NDArray[np.int16], NDArray[np.uint16]]:
-        return cv2.convertMaps(*self.distortion_map(self.pinhole), cv2.CV_16SC2)  # type: ignore[return-value]
+        whole, fractions = cv2.convertMaps(*self.distortion_map(self.pinhole), cv2.CV_16SC2)
+        return np.asarray(whole, dtype=np.int16), np.asarray(fractions, dtype=np.uint16)
 
     def distortion_map(self, view: "Camera") -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Return the original pixel of each pixel of a view without distortion, columns and rows, (H, W) each.
@@ -243,9 +244,8 @@ class Camera:
         """
         assert view.is_pinhole
         if not self.fisheye:
-            return cv2.initUndistortRectifyMap(  # type: ignore[return-value]
-                self.K, self.distortion, np.eye(3), view.K, view.size, cv2.CV_32FC1
-            )
+            found = cv2.initUndistortRectifyMap(self.K, self.distortion, np.eye(3), view.K, view.size, cv2.CV_32FC1)
+            return np.asarray(found[0], dtype=np.float32), np.asarray(found[1], dtype=np.float32)
         k = np.pad(self.distortion, (0, 4 - self.distortion.size))
         columns, rows = cv2.fisheye.initUndistortRectifyMap(self.K, k, np.eye(3), view.K, view.size, cv2.CV_32FC1)
         # OpenCV leaves out the skew here.
@@ -254,7 +254,7 @@ class Camera:
             grid = np.stack(np.meshgrid(np.arange(view.width), np.arange(view.height)), axis=-1)
             radii = np.linalg.norm(view._px_to_slopes(grid.astype(np.float64)), axis=-1)
             columns[radii >= self._lens_radius] = BEYOND_PX
-        return columns, rows  # type: ignore[return-value]
+        return np.asarray(columns, dtype=np.float32), np.asarray(rows, dtype=np.float32)
 
     def _directions_to_px(self, directions: Array) -> Array:
         """Map directions in camera coordinates, (..., 3), of any length to original pixels, (..., 2)."""

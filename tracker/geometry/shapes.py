@@ -109,7 +109,7 @@ class TaperedSuperquadric:
         are spread so that the normal turns evenly: bends get more of them than straight sides.
         """
         eta = np.linspace(-np.pi / 2, np.pi / 2, n_rings + 2)[1:-1]
-        omega = np.arange(n_sectors) * (2 * np.pi / n_sectors) + np.pi / n_sectors
+        omega = np.arange(n_sectors, dtype=np.float64) * (2 * np.pi / n_sectors) + np.pi / n_sectors
         return self.surface(*np.meshgrid(eta, omega, indexing="ij"))
 
     def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
@@ -169,7 +169,7 @@ class EllipticalCone:
         heights = np.concatenate([-np.ones(n_end), side, np.ones(n_end)])
         away = np.concatenate([np.zeros(n_end), np.ones(len(side)), np.zeros(n_end)])
         along = np.concatenate([-np.ones(n_end), np.full(len(side), -k), np.ones(n_end)])
-        omega = np.arange(n_sectors) * (2 * np.pi / n_sectors) + np.pi / n_sectors
+        omega = np.arange(n_sectors, dtype=np.float64) * (2 * np.pi / n_sectors) + np.pi / n_sectors
 
         def turned(radius: Array, height: Array) -> Array:
             x, y = np.outer(radius, np.cos(omega)), np.outer(radius, np.sin(omega))

@@ -199,12 +199,14 @@ def _from_arrays(
     joints = points = None
     if "joints_world" in arrays:
         joints = ObservedJoints(row.points, row.people, arrays["joints_world"], arrays.get("covariances"))
+        n_frames = joints.n_frames
     else:
         points = ObservedPoints(row.points, row.cameras, arrays["points_px"], arrays["confidence"])
         if row.cameras != session.camera_names:
             raise ValueError(f"cameras {', '.join(row.cameras)}")
-    if (points or joints).n_frames != session.n_frames:  # type: ignore[union-attr]
-        raise ValueError(f"{(points or joints).n_frames} frames")  # type: ignore[union-attr]
+        n_frames = points.n_frames
+    if n_frames != session.n_frames:
+        raise ValueError(f"{n_frames} frames")
     return points, joints, rows
 
 

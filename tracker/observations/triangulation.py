@@ -225,7 +225,7 @@ def _refine(views: Views, points: Array, points_px: Array, weights: Array) -> tu
     Returns:
         Positions, (n, 3); J'WJ, (n, 3, 3), per m^2; and the standard deviation of an observation of confidence 1.
     """
-    points = _gauss_newton(views, points, points_px, weights)[0]
+    points, information = _gauss_newton(views, points, points_px, weights)
     sigma = _sigma(views, points, points_px, weights)
     robust = weights
     for _ in range(_ROBUST_ROUNDS):

@@ -93,17 +93,16 @@ def acquire_body(
     if not len(known.bodies) < settings.n_frames < len(frames):
         return _acquire(observer, _with_joints(known, joints), settings, report)
     rounds = settings.rounds if isinstance(settings, AcquisitionSettings) else 1
-    body = session.people[person].model
-    for number in range(rounds):
+    body, number = session.people[person].model, 0
+    while True:
         begin, end = number / rounds, (number + 1) / rounds
         between = (begin + end) / 2  # tracking takes about half of a round
         tracked = _tracked_with(body, session, observer, person, frames, known, part_of(report, begin, between))
         found = _acquire(observer, _with_joints(tracked, joints), settings, part_of(report, between, end))
-        body = found.body
+        body, number = found.body, number + 1
         is_enough = len(tracked.bodies) > _ENOUGH * min(len(frames), _MOST_TRACKED)
-        if is_enough or not found.is_better:
-            break
-    return found
+        if number == rounds or is_enough or not found.is_better:
+            return found
 
 
 def _with_joints(known: PosedFrames, joints: Mapping[int, PointTargets]) -> PosedFrames:

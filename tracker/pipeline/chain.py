@@ -4,7 +4,7 @@ Command line, page and batch call `run_chain` with a plan, an open session that 
 shows them. Each stage is stored when it is done. The same plan goes on where it was stopped.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -288,7 +288,7 @@ class StoredSession:
 
 
 @contextmanager
-def open_stored_session(session: Session) -> Iterator[StoredSession]:
+def open_stored_session(session: Session) -> Generator[StoredSession, None, None]:
     """Lock a session and open its store and footage.
 
     Raises:

@@ -92,8 +92,8 @@ class RunRepair:
 
     def steps(self) -> Iterator[RepairStep]:
         """Do the work. A caller that stops asking leaves it undone."""
-        n, changed = len(self._frames), list[int]()
-        for first in range(0, 2 * n * _MAX_TRIES, 2 * n):
+        n, first, changed = len(self._frames), 0, list[int]()
+        while True:
             learnt, before = self._chosen(), dict(self._bodies)
             known, scores = self._learn(learnt), dict[int, Array]()
             for k in self._frames:
@@ -104,8 +104,9 @@ class RunRepair:
             for done in self._repair(known, self._elsewhere(scores)[0]):
                 yield RepairStep(first + n + min(done, n), first + 2 * n)
             changed = [k for k in self._frames if self._bodies[k] is not before[k]]
-            if not changed:
+            if not changed or first == 2 * n * (_MAX_TRIES - 1):
                 break
+            first += 2 * n
         for k in changed:
             scores[k] = self._score(known, k)
         yield RepairStep(first + 2 * n, first + 2 * n, self._results(scores))

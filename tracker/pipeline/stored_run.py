@@ -1,7 +1,7 @@
 """Prepare a tracking run from the stored poses of a session, and resume one that was interrupted."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
@@ -81,7 +81,9 @@ class TrackPlan:
 
 
 @contextmanager
-def stored_run(session: Session, store: AnnotationStore, observer: Observer, plan: TrackPlan) -> Iterator[TrackSession]:
+def stored_run(
+    session: Session, store: AnnotationStore, observer: Observer, plan: TrackPlan
+) -> Generator[TrackSession, None, None]:
     """Prepare a run that begins at stored poses. At the end it is saved, and its rest noted if it is not finished.
 
     Keyframes and locked degrees of freedom stay as they are. People who are not tracked keep their stored poses.

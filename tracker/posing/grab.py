@@ -65,11 +65,11 @@ class Holds:
 
     def joined(self, other: "Holds") -> "Holds":
         """Return both."""
-        rows = zip(
-            (self.points, self.targets_world, self.weights),
-            (other.points, other.targets_world, other.weights), strict=True,
-        )  # fmt: skip
-        return Holds(*(np.concatenate(pair) for pair in rows))
+        return Holds(
+            np.concatenate([self.points, other.points]),
+            np.concatenate([self.targets_world, other.targets_world]),
+            np.concatenate([self.weights, other.weights]),
+        )
 
     def scaled(self, factor: float) -> "Holds":
         """Return them with other weights."""

@@ -362,7 +362,7 @@ def _chain(grabbed: Grab, pose: Array, active_dofs: NDArray[np.bool_]) -> tuple[
     Ts_world_part = model.kinematics(pose).Ts_world_part
     while part != first:
         places.append(Ts_world_part[part, :3, 3])
-        part = int(model.parents[part])
+        part = model.parents[part]
     found = np.array([*places, Ts_world_part[first, :3, 3]])
     return found, float(np.linalg.norm(np.diff(found, axis=0), axis=1).sum())
 

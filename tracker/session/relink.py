@@ -90,7 +90,7 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
     changes: dict[str, dict[str, Path]] = {}
     for f in found:
         changes.setdefault(f.camera, {})[f.kind] = f.new
-    cameras = tuple(replace(c, **changes.get(c.camera.name, {})) for c in session.cameras)  # type: ignore[arg-type]
+    cameras = tuple(replace(c, **changes.get(c.camera.name, {})) for c in session.cameras)  # pyrefly: ignore[bad-argument-type]
     return save_cameras(session, cameras), tuple(found)
 
 

@@ -1,7 +1,7 @@
 """Bound the steps of a query, so that odd rows cannot keep the program busy for ever, and let signals end it."""
 
 import sqlite3
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
 _TICK_STEPS = 10_000
@@ -17,7 +17,7 @@ class EndlessQueryError(Exception):
 
 
 @contextmanager
-def limited(db: sqlite3.Connection, n_bytes: Callable[[], int]) -> Iterator[None]:
+def limited(db: sqlite3.Connection, n_bytes: Callable[[], int]) -> Generator[None, None, None]:
     """Limit the steps of the queries within a `with` block, together.
 
     Args:

@@ -143,6 +143,16 @@ class TaskLog:
             _made,
         )
 
+    def verifications(self) -> dict[tuple[str, int], StateRow]:
+        """Return the decision by which each present pose is verified, by person and frame.
+
+        The last decision on any task of the pose counts, and none from before the pose was made.
+        """
+        poses = {task.uid: (task.person, task.frame) for task in self.tasks()}
+        decided = {poses[s.task]: s for s in self.states() if s.task in poses and s.state != "withdrawn"}
+        made = {(m.person, m.frame): m.time for m in self.present_poses()}
+        return {at: s for at, s in decided.items() if s.state == "verified" and at in made and made[at] <= s.time}
+
     def edit_times(self) -> list[tuple[str, str]]:
         """Return author and time of all edits, undone ones too, earliest first."""
         return self._connection.all(

@@ -115,7 +115,7 @@ def _record(arguments: CalibrateArguments, found: "FilmedCalibration") -> dict[s
             "focal_px": [float(c.K[0, 0]), float(c.K[1, 1])],
             "focal_sigma_percent": 100 * float(board.focal_sigmas[i]),
             "depth_ratio": board.lenses[i].depth_ratio,
-            "views": int(np.unique(found.views.seen.frames[found.views.seen.cameras == i]).size),
+            "views": np.unique(found.views.seen.frames[found.views.seen.cameras == i]).size,
             "noise_px": float(rig.fit.sigmas_px[i]),
             "held_out_px": board.held_out_rms_px(i),
         }

@@ -1,7 +1,7 @@
 """Change poses without a drag: by values, by steps, or as a whole. Each change is one entry of the history."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 
 import numpy as np
@@ -184,7 +184,7 @@ class PoseEdits:
             self._apply(person, values, f"reset {limb_display_name(limb)}")
 
     @contextmanager
-    def _on(self, person: int, frame: int | None) -> Iterator[BodyModel]:
+    def _on(self, person: int, frame: int | None) -> Generator[BodyModel, None, None]:
         """Edit the frame that the user saw; yields the person's model."""
         with self._activities.editing():
             self._session_state.go_to(frame)

@@ -130,7 +130,7 @@ class Reasons:
     def _set(self, **changes: object) -> None:
         session_state = self._session_state
         with session_state.lock:
-            session_state.set(reasons=replace(session_state.state.reasons, **changes))  # type: ignore[arg-type]
+            session_state.set(reasons=replace(session_state.state.reasons, **changes))  # pyrefly: ignore[bad-argument-type]
 
     def _report(self, stage: str, share: float, text: str = "", /) -> None:
         """Show progress, and let a drag go first."""

@@ -1,7 +1,7 @@
 """Let one activity at a time change poses: jobs are halted and gestures finished before an edit."""
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from typing import Protocol
 
@@ -61,7 +61,7 @@ class Activities:
         self._finish_gestures.append(finish)
 
     @contextmanager
-    def editing(self, alone: bool = False) -> Iterator[None]:
+    def editing(self, alone: bool = False) -> Generator[None, None, None]:
         """Hold the lock for an edit, with all jobs discarded and all gestures finished.
 
         Args:
@@ -89,7 +89,7 @@ class Activities:
                 return
 
     @contextmanager
-    def starting(self, job: BackgroundJob) -> Iterator[None]:
+    def starting(self, job: BackgroundJob) -> Generator[None, None, None]:
         """Hold the lock to start or resume a job, with its rivals discarded and all gestures finished."""
         rivals = [other for other in self._on_shown_frame if other is not job]
         for rival in rivals:

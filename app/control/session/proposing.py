@@ -52,12 +52,13 @@ class Proposing:
 
     def _work(self, kind: str) -> None:
         version = self._session_state.state.timeline_version
+        found, text = None, ""
         try:
             found = self._propose(1 if kind == _NEW else 0)
         except Exception as error:
             if not isinstance(error, TrackerError):
                 _LOG.exception("no click could be proposed")
-            text, found = page_text(error), None
+            text = page_text(error)
         if kind == _GAIN:
             if found is not None and not self._session_state.state.annotation.proposed.running:
                 self._set(after_mm=found.error_mm)

@@ -66,7 +66,7 @@ class FollowingHost:
         changes: StateChanges = {}
         if own.footage != host.footage:
             changes["footage"] = host.footage
-            changes |= session_state.costs(own.poses)
+            changes = {**changes, **session_state.costs(own.poses)}
         if own.inconsistent_frames is not host.inconsistent_frames:
             changes["inconsistent_frames"] = host.inconsistent_frames
         if own.keyframe_doubts is not host.keyframe_doubts:

@@ -7,11 +7,11 @@ from gestures import PAGE
 
 from app.control.posing import dragging
 from app.control.session import session_state
-from app.page import messages
-from app.page.client_messages import CompareRange, EditRange
+from app.messages import encoding
+from app.messages.client import CompareRange, EditRange
+from app.messages.parsing import MessageError
+from app.messages.pose import Drag, FitPose, LockDofs, Nudge, SetDof
 from app.page.commands import dispatch
-from app.page.message_parsing import MessageError
-from app.page.pose_messages import Drag, FitPose, LockDofs, Nudge, SetDof
 from tracker.errors import TrackerError
 
 
@@ -68,4 +68,4 @@ def test_a_comparison_without_replaced_poses_is_refused_and_its_end_is_sent(plac
         dispatch(placed, PAGE, EditRange(action="take_replaced", first=0, last=3))
     dispatch(placed, PAGE, CompareRange(first=None, last=None))
     assert placed.state.range_comparison is None
-    assert messages.range_comparison(None).first is None
+    assert encoding.range_comparison(None).first is None

@@ -9,9 +9,9 @@ import pytest
 from gestures import drag
 
 from app.control.tracking import track_settings
+from app.messages.parsing import MessageError, parse
 from app.page.commands import dispatch
-from app.page.inspector_feed import InspectorFeed
-from app.page.message_parsing import MessageError, parse
+from app.page.feeds.inspector import InspectorFeed
 from tracker.body.dimensions import dimensions_of
 from tracker.body.searches import Search
 from tracker.errors import TrackerError

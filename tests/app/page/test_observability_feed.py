@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from app.page.observability_feed import LAYER, ObservabilityFeed, observability
+from app.page.feeds.observability import LAYER, ObservabilityFeed, observability
 from app.state.page_view import View
 
 SHOWN, HIDDEN = View(frozenset({"joints", LAYER}), (1.0,)), View(frozenset({"joints"}), (1.0,))

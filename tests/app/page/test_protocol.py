@@ -6,14 +6,15 @@ import msgspec
 import protocol_docs
 import pytest
 
-from app.page import client_messages, observation_messages, pose_messages, socket
-from app.page.client_messages import CLIENT_MESSAGES
+from app.messages import client, observation, pose
+from app.messages.client import CLIENT_MESSAGES
+from app.messages.parsing import MessageError, parse
+from app.page import socket
 from app.page.commands import COMMANDS
-from app.page.message_parsing import MessageError, parse
 
 SUBSCRIPTIONS = {
-    client_messages.SetView, client_messages.CheckEpipolar, client_messages.ShowCurves, client_messages.WatchTab,
-    client_messages.ShowHistory, observation_messages.WatchProvenance,
+    client.SetView, client.CheckEpipolar, client.ShowCurves, client.WatchTab,
+    client.ShowHistory, observation.WatchProvenance,
 }  # fmt: skip
 
 DRAG = '{"type":"drag","phase":"move","frame":2,"camera":0,"person":0,"point":"torso","seq":1,"u":%s,"v":2}'
@@ -33,9 +34,9 @@ def test_every_message_is_carried_out():
 
 def test_messages_of_one_type_differ_by_action():
     message = parse('{"type":"pose","action":"copy","frame":2,"person":1,"from":3}')
-    assert message == pose_messages.CopyFrame(frame=2, person=1, action="copy", source=3)
-    assert parse('{"type":"track","action":"pause"}') == client_messages.ControlTracking("pause")
-    for action in get_args(client_messages.RangeAction):
+    assert message == pose.CopyFrame(frame=2, person=1, action="copy", source=3)
+    assert parse('{"type":"track","action":"pause"}') == client.ControlTracking("pause")
+    for action in get_args(client.RangeAction):
         assert parse(f'{{"type":"range","action":"{action}","first":1,"last":2}}').action == action
 
 

@@ -6,8 +6,8 @@ from contextlib import closing
 import pytest
 from gestures import drag
 
-from app.page.observation_messages import AnnotatorsMessage, OtherCopyMessage, ProvenanceMessage, WatchProvenance
-from app.page.provenance_feed import ProvenanceFeed
+from app.messages.observation import AnnotatorsMessage, OtherCopyMessage, ProvenanceMessage, WatchProvenance
+from app.page.feeds.provenance import ProvenanceFeed
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import BETWEEN, SEAM, PoseChange, PoseRecord
 

@@ -6,10 +6,10 @@ import pytest
 from gestures import FRONT, drag, pixel_of, wait_for
 from page_visits import visiting
 
-from app.page import annotation_messages as plan_wire
-from app.page import client_messages as wire
-from app.page.message_parsing import check_allowed
-from app.page.message_types import Command
+from app.messages import annotation as plan_wire
+from app.messages import client as wire
+from app.messages.base import Command
+from app.messages.parsing import check_allowed
 from app.participants.participants import Participants
 from tracker.annotation.frame_choice import FrameChoice
 from tracker.errors import TrackerError

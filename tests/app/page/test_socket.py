@@ -8,8 +8,8 @@ import pytest
 from gestures import drag
 from page_visits import visiting
 
-from app.page import messages
-from app.page.message_parsing import MISUNDERSTOOD
+from app.messages import encoding
+from app.messages.parsing import MISUNDERSTOOD
 
 
 @pytest.fixture
@@ -299,7 +299,7 @@ async def test_many_cells_travel_as_columns(controller, monkeypatch):
     controller.ranges.interpolate(2, 6)
     controller.ranges.mark(4, 4, "reviewed")
     named = controller.stored_poses.timeline()
-    monkeypatch.setattr(messages, "_FEW_CELLS", 0)
+    monkeypatch.setattr(encoding, "_FEW_CELLS", 0)
     async with visiting(controller) as page:
         message = await page.hear("cells")
         n, payload = message["count"], message["payload"]

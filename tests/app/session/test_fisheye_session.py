@@ -11,7 +11,7 @@ from gestures import FRONT, PAGE, drag, pixel_of
 
 from app.drawing import overlays
 from app.export.overlay_video import write_overlay_video
-from app.page import messages
+from app.messages import encoding
 from app.state.page_view import View
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
@@ -54,7 +54,7 @@ def test_the_session_keeps_its_lens(session):
 def test_the_page_gets_the_undistorted_picture_and_its_size(opened):
     controller = opened()
     camera = controller.session.cameras[FRONT].camera
-    info = messages.session(controller.session).cameras[FRONT]
+    info = encoding.session(controller.session).cameras[FRONT]
     assert (info.width, info.height) == camera.pinhole.size
     assert controller.frames.images(0)[FRONT].shape == (info.height, info.width, 3)
     (path, *_) = [

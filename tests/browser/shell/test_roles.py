@@ -84,3 +84,13 @@ async def test_others_have_marks_at_their_frames(page, endpoint):
     await join(page, endpoint, "review")
     await expect(page.locator("#participant-chips .participant-chip")).to_have_text(["A"])
     await expect(page.locator(".place-mark")).to_have_attribute("title", "Anna is on frame 0")
+
+
+async def test_the_list_of_a_host_who_is_alone_opens_below_its_button(page):
+    button, panel = page.locator("#show-participants"), page.locator("#participants-panel")
+    assert not await button.is_visible()
+    await page.keyboard.press("Alt+e")
+    above, below = await button.bounding_box(), await panel.bounding_box()
+    assert below["y"] >= above["y"] + above["height"]
+    await page.keyboard.press("Escape")
+    await shows(page, "document.querySelector('#show-participants').hidden")

@@ -168,6 +168,8 @@ async def test_the_card_says_what_the_tracker_thinks_of_the_frame(page):
     await shows(page, "document.querySelector('#frame-status').textContent === 'doubtful'")
     assert await page.locator("#frame-remark").inner_text() == REMARK
     assert not await page.locator("#frame-parts").is_visible()
+    await page.evaluate("document.querySelector('#frame-remark').append(' and so on'.repeat(90))")
+    assert (await page.locator("#frame-status").bounding_box())["height"] < 30, "the badge stays on one line"
     await card.locator("summary").click()
     await shows(page, "document.querySelector('#frame-parts').childElementCount > 0")
     texts = await page.locator("#frame-parts").locator("span, output").all_inner_texts()

@@ -10,11 +10,13 @@ from bodies import MODELS
 from pycocotools.coco import COCO
 from stored_motions import store_motion
 
+from tracker.annotation import plan
 from tracker.body.limbs import limbs
 from tracker.errors import Remedy, SessionError
 from tracker.exports import writers
 from tracker.exports.motion import read_motion
 from tracker.exports.options import ExportOptions
+from tracker.exports.pose_arrays import pose_arrays
 from tracker.exports.provenance import pose_provenance, sources_of_points, write_provenance
 from tracker.pipeline.calibration_revisions import change_calibration
 from tracker.session.session import load_session
@@ -131,3 +133,17 @@ def test_frames_of_a_list_are_exported_alone(session):
     assert sorted(motion.people[0].poses) == [1, 5]
     found = pose_provenance(motion, motion.people[0], 5)
     assert found.record.author == ""
+
+
+def test_a_verified_pose_names_who_verified_it_until_it_is_edited(tmp_path, session):
+    with closing(AnnotationStore(session.annotations_path)) as store:
+        plan.add_tasks(store, [("ann", 2, "eve"), ("ann", 4, ""), ("ann", 5, "")])
+        for frame, state in ((2, "verified"), (4, "verified"), (5, "verified"), (5, "rejected")):
+            plan.decide(store, ("ann", frame), state, author="rita")
+    edited(session, "ann", 4, "eve", remark="again")
+    poses = {p["frame"]: p for p in written(tmp_path, session)["people"]["ann"]}
+    assert {f: p["verified_by"] for f, p in poses.items()} == {0: "", 1: "", 2: "rita", 4: "", 5: ""}
+    assert poses[2]["verified_time"] >= poses[2]["edit_time"]
+    assert poses[4]["verified_time"] == ""
+    table = pose_arrays(read_motion(session, (0, 1)), ExportOptions())
+    assert table.by_pose["verified_by"][2].tolist() == ["rita", ""]

@@ -10,9 +10,9 @@ from tracker.errors import FormatError, Remedy
 from tracker.formats.interchange.optional_packages import require
 from tracker.geometry.arrays import Array
 
-MAX_FRAME = int(np.iinfo(np.uint16).max)
+MAX_FRAME = np.iinfo(np.uint16).max
 """Highest frame number of a C3D file, which stores the first and last one in 16 bits (C3D user guide, header)."""
-_RESIDUAL_STEPS = int(np.iinfo(np.uint8).max)
+_RESIDUAL_STEPS = np.iinfo(np.uint8).max
 """Largest residual in its unit, the scale of the file: it is stored in 8 bits (C3D user guide, 3D data)."""
 
 

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -85,7 +85,7 @@ def patch_hdf5_apart(path: Path, changes: Mapping[int, Changes]) -> bytes:
 
 
 @contextmanager
-def _folder_for(path: Path) -> Iterator[Path]:
+def _folder_for(path: Path) -> Generator[Path, None, None]:
     """Make a temporary folder for a file and its answer; errors within become sentences."""
     where = f"file {path}"
     try:

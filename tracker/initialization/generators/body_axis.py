@@ -118,7 +118,7 @@ def _center(axes: Sequence[MajorAxis], direction: Array) -> Array:
         ray = a.camera.rays(a.lines_px[-1].mean(axis=0))
         M = a.elongation * np.outer(normal, normal) + _CENTER_WEIGHT * (np.eye(3) - np.outer(ray, ray))
         A, b = A + M, b + M @ eye
-    return np.asarray(np.linalg.solve(A, b))
+    return np.asarray(np.linalg.solve(A, b), dtype=np.float64)
 
 
 def _along(axis: MajorAxis, center: Array, direction: Array) -> tuple[Array, Array, Array]:

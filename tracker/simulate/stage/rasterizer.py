@@ -102,7 +102,14 @@ def pixel_means(samples: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 @njit(nogil=True, cache=True)
-def _rasterize(points, inverse_z, triangles, faces, inverse_depths, weights):  # type: ignore[no-untyped-def]
+def _rasterize(
+    points: Array,
+    inverse_z: Array,
+    triangles: IntArray,
+    faces: NDArray[np.int32],
+    inverse_depths: NDArray[np.float32],
+    weights: NDArray[np.float32],
+) -> None:
     """Draw triangles into the arrays of a `Hits`; triangles with a corner behind the camera are left out."""
     height, width = faces.shape
     for f in range(triangles.shape[0]):

@@ -112,7 +112,9 @@ def _shaded(points: Array, lamp: Array, *boxes: Array) -> NDArray[np.bool_]:
 
 
 @njit(nogil=True, cache=True)
-def _first_hits(origins, directions, reaches, any_hit, centers, halves, yaws):  # type: ignore[no-untyped-def]
+def _first_hits(
+    origins: Array, directions: Array, reaches: Array, any_hit: bool, centers: Array, halves: Array, yaws: Array
+) -> tuple[IntArray, Array]:
     """Return the index of the first box (or of any) on each ray within its reach, -1 for none, and its distance."""
     n = directions.shape[0]
     boxes, distances = np.full(n, -1, dtype=np.int64), reaches.copy()

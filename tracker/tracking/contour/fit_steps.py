@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -65,23 +66,20 @@ def contour_steps(views: Sequence[ViewEvidence], poses: Sequence[Array], plan: F
         iterations. Of the chains of a person, only the first has a step for its start.
     """
     unlimited, now, done = unlimited_views(views, _SETTINGS), tuple(poses), 0
-    first: FitIteration | None = None
-    before: Stage | None = None
-    for stage in plan.stages:
-        person, model = stage.person, plan.models[stage.person]
-        if before is None or before.person != person:
-            bodies = [PosedBody(m, pose) for m, pose in zip(plan.models, now, strict=True)]
-            residuals, first = paper_residuals(unlimited, bodies, person, _SETTINGS), None
-        active = np.isin(model.dof_names, stage.group.dofs)
-        most = MAX_ITERATIONS if plan.by_chains else _SETTINGS.max_iterations
-        for i, is_last in _with_last(fit_by_iterations(model, now[person], residuals, most, active)):
-            is_start = i.name == START
-            if is_start and first is not None and not is_last:
-                continue
-            first, done = first or i, done + (not is_start)
-            now = (*now[:person], i.pose, *now[person + 1 :])
-            yield _step(stage, now, _relative(i, first), done, is_last, len(views))
-        before = stage
+    most = MAX_ITERATIONS if plan.by_chains else _SETTINGS.max_iterations
+    for person, stages in groupby(plan.stages, key=lambda stage: stage.person):
+        model, first = plan.models[person], None
+        bodies = [PosedBody(m, pose) for m, pose in zip(plan.models, now, strict=True)]
+        residuals = paper_residuals(unlimited, bodies, person, _SETTINGS)
+        for stage in stages:
+            active = np.isin(model.dof_names, stage.group.dofs)
+            for i, is_last in _with_last(fit_by_iterations(model, now[person], residuals, most, active)):
+                is_start = i.name == START
+                if is_start and first is not None and not is_last:
+                    continue
+                first, done = first or i, done + (not is_start)
+                now = (*now[:person], i.pose, *now[person + 1 :])
+                yield _step(stage, now, _relative(i, first), done, is_last, len(views))
 
 
 def _with_last(iterations: Iterator[FitIteration]) -> Iterator[tuple[FitIteration, bool]]:

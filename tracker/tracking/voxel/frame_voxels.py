@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.evidence.silhouettes import ViewSilhouette
 from tracker.geometry.arrays import Array
@@ -68,7 +69,7 @@ def axis_points(state: FilterState, at: Array) -> Array:
     return np.asarray(state.centers[:, None] + z * state.rotations[:, None, :, 2])
 
 
-def occupied_at(voxels: Voxels, points: Array) -> Array:
+def occupied_at(voxels: Voxels, points: Array) -> NDArray[np.bool_]:
     """Return whether points, (..., 3), lie in occupied voxels, (...)."""
     at = np.round((points - voxels.grid.origin) / voxels.grid.size_m).astype(np.int64)
     inside = np.all((at >= 0) & (at < voxels.grid.shape), axis=-1)
@@ -76,7 +77,7 @@ def occupied_at(voxels: Voxels, points: Array) -> Array:
     return np.asarray(voxels.occupied[at[..., 0], at[..., 1], at[..., 2]] & inside)
 
 
-def occupied_near(voxels: Voxels, points: Array) -> Array:
+def occupied_near(voxels: Voxels, points: Array) -> NDArray[np.bool_]:
     """Return whether points, (..., 3), lie in occupied voxels or beside their faces, (...)."""
     steps = voxels.grid.size_m * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     return np.asarray(occupied_at(voxels, points[..., None, :] + steps).any(axis=-1))

@@ -69,7 +69,7 @@ def update(
         S = product(HP, H.T) + found.noise
         residual = found.residual if i == 0 else found.residual + H @ state.difference(predicted)
         solved = np.linalg.solve((S + S.T) / 2, np.column_stack([HP, residual]))
-        gain = np.asarray(solved[:, :-1].T)
+        gain = np.asarray(solved[:, :-1].T, dtype=np.float64)
         if i == 0:
             innovation, n_rows = float(residual @ solved[:, -1]), len(residual)
         state = predicted.retract(gain @ residual).with_covariance(joseph(P, gain, found))

@@ -7,7 +7,7 @@ import pytest
 from gestures import drag, wait_for
 
 from app.control.posing import body_acquisition
-from app.page import inspector_feed
+from app.page.feeds import inspector
 from tracker.acquisition.from_contours import Acquisition
 from tracker.acquisition.size_fit import SizeFit
 from tracker.acquisition.size_parameters import SizeParameters
@@ -51,7 +51,7 @@ def test_the_result_is_a_draft_that_is_applied_and_undone(posed, acquiring):
     before = posed.models[0]
     begun(posed)
     assert posed.state.acquisition.stage == "fitting sizes"
-    assert inspector_feed.acquisition(posed.state.acquisition).result is None
+    assert inspector.acquisition(posed.state.acquisition).result is None
     acquiring.set()
     wait_for(lambda: not posed.state.acquisition.running)
     found = posed.state.acquisition
@@ -59,7 +59,7 @@ def test_the_result_is_a_draft_that_is_applied_and_undone(posed, acquiring):
     assert found.message.startswith("Shoulder centre not observable: it turned by 0 degrees; ")
     assert posed.models[0] is before  # nothing but the draft has changed
     assert posed.body_sizes.model(0).height_m == pytest.approx(before.height_m * np.exp(0.05))
-    message = inspector_feed.acquisition(found)
+    message = inspector.acquisition(found)
     assert len(message.result.front.before) > 50 < len(message.result.side.after)
     # The person grows by 5%, and with it the picture's scale.
     tall = [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gestures import PAGE, drag, pixel_of, wait_for
 
-from app.page import messages
+from app.messages import encoding
 from app.state.page_view import View
 from tracker.body.dimensions import PartDimensions, dimensions_of
 from tracker.errors import TrackerError
@@ -49,7 +49,7 @@ def test_a_draft_is_drawn_and_changes_nothing(posed, session):
         length(before) + 0.01
     )  # both sides alike
     view = View(frozenset(["contours"]), (1.0,) * 4)
-    drawn = messages.overlay(posed.session_of(posed.state), posed.state, PAGE, view, None)
+    drawn = encoding.overlay(posed.session_of(posed.state), posed.state, PAGE, view, None)
     assert b'"new_sizes"' in drawn
     assert posed.models == (before,)
     posed.body_sizes.discard()
@@ -100,12 +100,12 @@ def test_poses_that_are_kept_are_shown_with_their_own_body_and_marked(posed):
     for frame in FRAMES:
         np.testing.assert_array_equal(joints(posed, frame), was[frame])
         assert posed.models == (old,)
-        assert messages.state(posed.session, posed.state).other_sizes
+        assert encoding.state(posed.session, posed.state).other_sizes
     # A draft on a frame without a pose has the present body, its joints near those of the nearest pose.
     draft = joints(posed, 4)
     assert length(posed.models[0]) == pytest.approx(length(old) + 0.01)
     assert np.linalg.norm(draft - was[3], axis=1).max() < 0.01
-    assert not messages.state(posed.session, posed.state).other_sizes
+    assert not encoding.state(posed.session, posed.state).other_sizes
     # An edit of a kept pose leaves it its body; refitting afterwards is a second edit.
     posed.navigation.seek(3)
     drag(posed, "left_wrist", (3.0, 0.0))

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from gestures import drag
 
-from app.page import messages
+from app.messages import encoding
 
 FRONT, RIGHT, BACK, LEFT = range(4)
 
 
 def unseen(controller):
-    return messages.state(controller.session, controller.state).unseen_depth
+    return encoding.state(controller.session, controller.state).unseen_depth
 
 
 def test_opposite_views_alone_miss_the_depth_until_a_view_across_is_used(opened):

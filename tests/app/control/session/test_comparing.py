@@ -10,7 +10,7 @@ from gestures import PAGE, drag, pixel_of, wait_for
 from app.control.session import comparing
 from app.drawing import joint_handles, overlays
 from app.drawing.ghosts import former_limb_lines
-from app.page import messages
+from app.messages import encoding
 from app.state.page_view import View
 from app.state.people import ShownPose
 from tracker.body.limbs import limbs
@@ -34,7 +34,7 @@ def fitted(opened):
 def test_a_fit_is_compared_with_the_pose_before_it(fitted):
     controller, before = fitted
     state = controller.state
-    message = messages.state(controller.session, state).compared
+    message = encoding.state(controller.session, state).compared
     assert (message.work, message.is_before_shown) == ("fit", False)
     assert message.before_px == pytest.approx(before.cost_px)
     assert message.after_px == state.cost_px < message.before_px
@@ -48,13 +48,13 @@ def test_the_views_show_the_pose_before_and_nothing_is_undone(fitted):
     controller.comparing.show_before(True)
     state = controller.state
     assert state.drawn.poses[0] is before.poses[0]
-    assert messages.state(controller.session, state).cost_px == pytest.approx(before.cost_px)
+    assert encoding.state(controller.session, state).cost_px == pytest.approx(before.cost_px)
     assert (state.people, state.undo, state.saved) == (result.people, undo, True)
     kinds = {p.kind for p in overlays.paths(controller.session_of(state), state, CONTOURS, None)}
     assert "result" in kinds  # the result, to see where they differ
     assert not state.is_stored_drawn
     # Joints of the pose that is drawn tell in which views they are visible.
-    binary = messages.overlay(controller.session, state, PAGE, CONTOURS, None)
+    binary = encoding.overlay(controller.session, state, PAGE, CONTOURS, None)
     header = json.loads(binary[4 : 4 + int.from_bytes(binary[:4], "little")])
     drawn = joint_handles.handles(controller.session, state.drawn, CONTOURS.cameras)
     assert [(h["point"], h["u"], h["visible"]) for h in header["handles"]] == [(h.point, h.u, h.visible) for h in drawn]
@@ -206,7 +206,7 @@ def test_a_limb_that_nobody_touched_is_named_drawn_and_taken_back_alone(opened):
     comparing.note_comparison(session_state, "fit", before, session_state.costs((after,)), [0])
     session_state.save("fit", "fitted", None, 0)
     # The left leg was touched, and the right one hardly moved.
-    (named,) = messages.state(controller.session, controller.state).compared.moved
+    (named,) = encoding.state(controller.session, controller.state).compared.moved
     assert (named.person, named.limb) == (0, "right arm")
     was, now = model.points_world(before[0].values), model.points_world(after)
     i = model.point_names.index("right_wrist")

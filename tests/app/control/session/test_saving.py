@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gestures import FRONT, PAGE, drag, pixel_of, wait_for
 
-from app.page.messages import state as state_message
+from app.messages.encoding import state as state_message
 from tracker.body.dimensions import dimensions_of
 from tracker.errors import SessionError
 from tracker.search.best_first import SearchSettings

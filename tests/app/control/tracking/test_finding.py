@@ -7,7 +7,7 @@ import pytest
 from gestures import drag, wait_for
 
 from app.drawing import joint_handles, overlays
-from app.page import inspector_feed
+from app.page.feeds import inspector
 from app.state.page_view import View
 from tracker.acquisition.from_contours import Acquisition
 from tracker.body.model import PosedBody
@@ -138,7 +138,7 @@ def test_the_axes_of_the_silhouettes_are_shown_and_kept(opened, found, tracked):
     found.set()
     wait_for(lambda: not controller.state.finding.running)
     controller = opened()  # a restart
-    message = inspector_feed.finding(controller.state.finding, [c.camera.name for c in controller.session.cameras])
+    message = inspector.finding(controller.state.finding, [c.camera.name for c in controller.session.cameras])
     assert message.frame == FRAME
     (axes,) = message.axes
     assert axes.camera == 0

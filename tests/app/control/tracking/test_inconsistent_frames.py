@@ -7,7 +7,7 @@ import pytest
 from gestures import wait_for
 
 from app.control.tracking import inconsistent_frames
-from app.page import messages
+from app.messages import encoding
 from tracker.store.records import AssessmentChange, MarkChange, PoseChange, PoseRecord
 
 KEY = 10
@@ -41,7 +41,7 @@ def steady(opened):
 def checked(controller):
     checker = controller.inconsistent_frames
     wait_for(lambda: checker._seen == controller._session_state.saver.index.version)
-    return messages.inconsistent(controller.state)
+    return encoding.inconsistent(controller.state)
 
 
 def test_a_wrong_keyframe_stands_for_its_neighbours_and_is_left_unchanged(steady):

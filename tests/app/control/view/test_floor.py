@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from app.drawing.floor_lines import floor_lines
-from app.page.client_messages import EditFloor, MarkFloor
+from app.messages.client import EditFloor, MarkFloor
+from app.messages.encoding import state as state_message
+from app.messages.parsing import MessageError
 from app.page.commands import dispatch
-from app.page.message_parsing import MessageError
-from app.page.messages import state as state_message
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
 from tracker.geometry.ground_plane import UP_ROTATIONS, GroundPlane, nearest_axis, up_rotation

@@ -7,10 +7,10 @@ import numpy as np
 from app.control.controller import Controller
 from app.control.search import search_settings
 from app.control.search.search_runs import SearchRun
-from app.page import search_messages as wire
-from app.page.binary_headers import LandscapeHeader, SearchCandidatesHeader, SearchStepsHeader
-from app.page.client_messages import Tab
-from app.page.message_types import Message, encode_binary
+from app.messages import search as wire
+from app.messages.base import Message, encode_binary
+from app.messages.binary_headers import LandscapeHeader, SearchCandidatesHeader, SearchStepsHeader
+from app.messages.client import Tab
 from app.state.identity import Identity
 from app.state.search import CostLandscape, ReplayState
 from app.state.state import State, finite_or_none

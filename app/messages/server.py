@@ -1,15 +1,15 @@
 """Text messages from the program to the page: the one declaration of their types and fields.
 
-Messages about searches and poses that deserve a look are in `search_messages`, the inspector's in
-`inspector_messages`. `messages` and the feeds make them. `tests/recipes/protocol_docs.py` writes the page's types and
-docs/protocol.md from them.
+Messages about searches and poses that deserve a look are in `search`, the inspector's in `inspector`. `encoding` and
+the feeds make them. `tests/recipes/protocol_docs.py` writes the page's types and docs/protocol.md from them.
 """
 
 from typing import Literal, TypeAlias, Union, get_args
 
 from app.drawing.epipolar_check import EpipolarDistance, EpipolarLine
-from app.page.annotation_messages import AnnotationMessage, PresenceMessage
-from app.page.inspector_messages import (
+from app.messages.annotation import AnnotationMessage, PresenceMessage
+from app.messages.base import Message, Part, Status
+from app.messages.inspector import (
     AcquisitionMessage,
     BodySizesMessage,
     CalibrationMessage,
@@ -17,9 +17,8 @@ from app.page.inspector_messages import (
     SettingsMessage,
     View3dMessage,
 )
-from app.page.message_types import Message, Part, Status
-from app.page.observation_messages import AnnotatorsMessage, ObservationsMessage, OtherCopyMessage, ProvenanceMessage
-from app.page.search_messages import (
+from app.messages.observation import AnnotatorsMessage, ObservationsMessage, OtherCopyMessage, ProvenanceMessage
+from app.messages.search import (
     CostMapMessage,
     InconsistentMessage,
     MovedLimb,

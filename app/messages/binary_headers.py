@@ -10,7 +10,7 @@ from app.drawing.curves import CurveGroup
 from app.drawing.joint_handles import Handle, OutOfReach, Side
 from app.drawing.overlays import PathKind
 from app.drawing.pin_marks import PinMark, PinTriangulation
-from app.page.message_types import Message, Part, Status
+from app.messages.base import Message, Part, Status
 from app.state.page_view import PictureLayer
 
 

@@ -1,10 +1,10 @@
-"""Messages from the page that change poses, as `message_types` explains."""
+"""Messages from the page that change poses, as `base` explains."""
 
 from typing import Annotated, Literal, TypeAlias, Union
 
 from msgspec import Meta
 
-from app.page.message_types import Command, Frame, GesturePhase, Index, Name, Number
+from app.messages.base import Command, Frame, GesturePhase, Index, Name, Number
 
 DragMode: TypeAlias = Literal["move", "turn", "push", "bend"]
 

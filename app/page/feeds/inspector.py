@@ -9,11 +9,11 @@ from app.control.controller import Controller
 from app.control.tracking import track_settings
 from app.drawing import dof_labels
 from app.drawing.misfit_field import NO_MISFITS, MisfitField, misfit_field
-from app.page import annotation_messages as plan_wire
-from app.page import inspector_messages as wire
-from app.page import observation_messages as observed
-from app.page.message_types import Message
-from app.page.search_messages import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
+from app.messages import annotation as plan_wire
+from app.messages import inspector as wire
+from app.messages import observation as observed
+from app.messages.base import Message
+from app.messages.search import CostMapMessage, GhostPose, LimbReason, PartReason, ReasonMessage, TriedSearch
 from app.state.annotation import AnnotationState, ProposedClick
 from app.state.calibration import CalibrationState
 from app.state.floor_picking import FloorState

@@ -5,11 +5,11 @@ from typing import Any, get_args
 
 import msgspec
 
-from app.page import annotation_messages as plan_wire
-from app.page import client_messages as wire
-from app.page.client_messages import CLIENT_MESSAGES, ClientMessage
-from app.page.message_types import Command
-from app.page.observation_messages import UseObservations
+from app.messages import annotation as plan_wire
+from app.messages import client as wire
+from app.messages.base import Command
+from app.messages.client import CLIENT_MESSAGES, ClientMessage
+from app.messages.observation import UseObservations
 from app.state.role import Role
 from tracker.errors import TrackerError
 from tracker.validation import explain, quoted

@@ -1,4 +1,4 @@
-"""Messages about what the inspector edits: settings, the 3-D view and body sizes, as `message_types` explains."""
+"""Messages about what the inspector edits: settings, the 3-D view and body sizes, as `base` explains."""
 
 from typing import Annotated, Literal, TypeAlias
 
@@ -6,8 +6,8 @@ import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
 from app.drawing.misfit_field import MisfitArrow
-from app.page.message_types import Command, Index, Message, Name, Part
-from app.page.search_messages import OutlierMode
+from app.messages.base import Command, Index, Message, Name, Part
+from app.messages.search import OutlierMode
 from app.state.run_choices import MAX_STRIDE
 from app.state.view_3d import MAX_TRAIL_FRAMES, View3d
 from tracker.acquisition.from_contours import SizeMethod

@@ -6,8 +6,8 @@ import itertools
 from app.control.controller import Controller
 from app.drawing import overlays, pictures
 from app.drawing.seen_bodies import bodies_in
-from app.page.binary_headers import ImageHeader
-from app.page.message_types import encode_binary
+from app.messages.base import encode_binary
+from app.messages.binary_headers import ImageHeader
 from app.state.identity import Identity
 from app.state.page_view import EVIDENCE, PictureLayer, View
 from app.state.state import State

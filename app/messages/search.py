@@ -1,4 +1,4 @@
-"""Messages about searches, and about poses that deserve a look, as `message_types` explains."""
+"""Messages about searches, and about poses that deserve a look, as `base` explains."""
 
 from typing import Annotated, Literal, TypeAlias
 
@@ -6,7 +6,7 @@ import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
 from app.control.search.search_settings import SearchLeaf
-from app.page.message_types import MAX_INT, Command, Index, Message, Name, Number, Part
+from app.messages.base import MAX_INT, Command, Index, Message, Name, Number, Part
 from app.state.comparison import ComparedPose, Stretch
 
 OutlierMode: TypeAlias = Literal["truncated", "paper"]

@@ -1,10 +1,10 @@
-"""Messages about the plan of annotation and the next best click, as `message_types` explains."""
+"""Messages about the plan of annotation and the next best click, as `base` explains."""
 
 from typing import Annotated, Literal, TypeAlias
 
 from msgspec import Meta
 
-from app.page.message_types import Command, Frame, Index, Message, Name, Part
+from app.messages.base import Command, Frame, Index, Message, Name, Part
 from app.state.role import Role
 
 Text: TypeAlias = Annotated[str, Meta(max_length=2000)]

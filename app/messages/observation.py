@@ -1,11 +1,11 @@
-"""Messages about work from elsewhere, as `message_types` explains: imported observations, another copy of the session,
+"""Messages about work from elsewhere, as `base` explains: imported observations, another copy of the session,
 and where each pose comes from."""
 
 from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from app.page.message_types import Command, Frame, Index, Message, Name, Part
+from app.messages.base import Command, Frame, Index, Message, Name, Part
 
 # --- from the page --------------------------------------------------------------------------------------------------
 

@@ -1,8 +1,8 @@
 """Updates on where the shown pose comes from, and on another copy of the session (docs/protocol.md)."""
 
 from app.control.controller import Controller
-from app.page.message_types import Message
-from app.page.observation_messages import (
+from app.messages.base import Message
+from app.messages.observation import (
     AnnotatorsMessage,
     CopyDifferenceInfo,
     OtherCopyMessage,

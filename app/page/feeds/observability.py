@@ -3,7 +3,7 @@
 import numpy as np
 
 from app.control.controller import Controller
-from app.page.server_messages import DofObservability, ObservabilityMessage
+from app.messages.server import DofObservability, ObservabilityMessage
 from app.state.identity import Identity
 from app.state.page_view import View
 from app.state.state import State

@@ -1,9 +1,8 @@
 """Messages from the page to the program: the one declaration of their types, fields and limits.
 
-`message_parsing` checks messages by these declarations. `tests/recipes/protocol_docs.py` writes the page's types and
+`parsing` checks messages by these declarations. `tests/recipes/protocol_docs.py` writes the page's types and
 docs/protocol.md from them.
-Messages that change poses or run searches are in `pose_messages` and `search_messages`, those of the inspector in
-`inspector_messages`.
+Messages that change poses or run searches are in `pose` and `search`, those of the inspector in `inspector`.
 """
 
 from typing import Annotated, Literal, TypeAlias, Union, get_args
@@ -11,8 +10,9 @@ from typing import Annotated, Literal, TypeAlias, Union, get_args
 from msgspec import Meta
 
 from app.drawing.curves import CurveGroup
-from app.page.annotation_messages import AskNextClick, DecideTask, PlanTasks, ResolveComment, WriteComment
-from app.page.inspector_messages import (
+from app.messages.annotation import AskNextClick, DecideTask, PlanTasks, ResolveComment, WriteComment
+from app.messages.base import Command, Frame, Index, Name, Number
+from app.messages.inspector import (
     AcquireSizes,
     ApplySizes,
     ChangeBody,
@@ -26,10 +26,9 @@ from app.page.inspector_messages import (
     SetTrackSettings,
     SetView3d,
 )
-from app.page.message_types import Command, Frame, Index, Name, Number
-from app.page.observation_messages import SetCopyTolerance, UseCopy, UseObservations, WatchProvenance
-from app.page.pose_messages import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack
-from app.page.search_messages import (
+from app.messages.observation import SetCopyTolerance, UseCopy, UseObservations, WatchProvenance
+from app.messages.pose import Drag, DragPin, FitPose, PoseEdit, RemovePins, TakeLimbBack
+from app.messages.search import (
     AskReason,
     CompareRun,
     PreviewCandidate,

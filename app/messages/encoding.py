@@ -14,11 +14,11 @@ from app.drawing.error_ellipses import error_ellipses
 from app.drawing.floor_lines import floor_lines
 from app.drawing.ghosts import copy_lines, former_limb_lines, ghost_lines
 from app.drawing.seen_bodies import bodies_in
-from app.page import annotation_messages as plan_wire
-from app.page import search_messages
-from app.page import server_messages as wire
-from app.page.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
-from app.page.message_types import encode_binary
+from app.messages import annotation as plan_wire
+from app.messages import search
+from app.messages import server as wire
+from app.messages.base import encode_binary
+from app.messages.binary_headers import CellsHeader, CurvesHeader, Outline, OverlayHeader, Path, Plot
 from app.participants.participants import Presence, Visit
 from app.state.comparison import PoseComparison, RangeComparison
 from app.state.floor_picking import Picking
@@ -302,15 +302,15 @@ def _compared(last: PoseComparison | None) -> wire.Compared | None:
         after_view_costs_px=last.after_view_costs_px,
         warning=last.warning,
         moved=tuple(
-            search_messages.MovedLimb(person, limb_display_name(move.limb.name), round(100 * move.distance_m, 1))
+            search.MovedLimb(person, limb_display_name(move.limb.name), round(100 * move.distance_m, 1))
             for person, move in last.moved
         ),
         is_before_shown=last.is_before_shown,
     )
 
 
-def _unseen_depth(note: DepthNote | None) -> search_messages.UnseenDepth | None:
-    return None if note is None else search_messages.UnseenDepth(note.person, note.unseen.points, note.unseen.camera)
+def _unseen_depth(note: DepthNote | None) -> search.UnseenDepth | None:
+    return None if note is None else search.UnseenDepth(note.person, note.unseen.points, note.unseen.camera)
 
 
 def _track(track: TrackState) -> wire.Track:
@@ -329,21 +329,21 @@ def _track(track: TrackState) -> wire.Track:
     )
 
 
-def inconsistent(state: State) -> search_messages.InconsistentMessage:
+def inconsistent(state: State) -> search.InconsistentMessage:
     """List the frames and keyframes that disagree with the motion around them or with views."""
     doubts = tuple(
-        search_messages.KeyframeDoubt(
+        search.KeyframeDoubt(
             doubt.person, doubt.frame, None if doubt.distance_m is None else round(100 * doubt.distance_m, 1),
             doubt.point,
             tuple(
-                search_messages.RaisedViewCost(view.camera, round(view.cost_px, 2), round(view.usual_px, 2))
+                search.RaisedViewCost(view.camera, round(view.cost_px, 2), round(view.usual_px, 2))
                 for view in doubt.views
             ),
             doubt.reason,
         )
         for doubt in state.keyframe_doubts
     )  # fmt: skip
-    return search_messages.InconsistentMessage(state.inconsistent_frames, doubts)
+    return search.InconsistentMessage(state.inconsistent_frames, doubts)
 
 
 def epipolar(session: Session, state: State, points: Sequence[tuple[int, float, float]]) -> wire.EpipolarMessage:
@@ -355,8 +355,8 @@ def epipolar(session: Session, state: State, points: Sequence[tuple[int, float, 
     return wire.EpipolarMessage(found.lines, found.distance)
 
 
-def range_comparison(found: RangeComparison | None) -> search_messages.RangeComparisonMessage:
+def range_comparison(found: RangeComparison | None) -> search.RangeComparisonMessage:
     """Describe the poses of a range against those that they replaced."""
     if found is None:
-        return search_messages.RangeComparisonMessage(None, None, (), (), None)
-    return search_messages.RangeComparisonMessage(found.first, found.last, found.frames, found.stretches, found.run)
+        return search.RangeComparisonMessage(None, None, (), (), None)
+    return search.RangeComparisonMessage(found.first, found.last, found.frames, found.stretches, found.run)
