@@ -1,5 +1,8 @@
 """A figure of voxels with known joints, unlike any body model of the program."""
 
+from functools import lru_cache
+from types import MappingProxyType
+
 import numpy as np
 from staging import camera_at
 
@@ -31,6 +34,7 @@ def joints_of(arms_deg=35.0, legs_deg=12.0, turn_deg=0.0):
     return {n: R @ np.array(p, float) for n, p in found.items()}, R
 
 
+@lru_cache(maxsize=16)
 def figure(size_m=0.025, noise=0.0, head=1.0, **pose):
     """Voxels of such a person, and the true joints.
 
@@ -53,7 +57,7 @@ def figure(size_m=0.025, noise=0.0, head=1.0, **pose):
     if noise:
         rng = np.random.default_rng(0)
         voxels = voxels.without(voxels.is_surface & (rng.random(len(voxels.indices)) < noise))
-    return voxels.cropped(), joints
+    return voxels.cropped(), MappingProxyType(joints)
 
 
 def child(share=0.6, head=0.8, size_m=0.025, **pose):

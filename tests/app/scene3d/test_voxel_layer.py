@@ -5,21 +5,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from figures import cameras_about_a_figure, figure, parts_of, silhouettes_of_figure
+from figures import cameras_about_a_figure, figure, silhouettes_of_figure
 from gestures import wait_for
 
 from app.drawing.overlay_colors import rgb
 from app.scene3d import voxel_layer
 from app.scene3d.voxel_layer import VoxelLayer, part_colors
 from tracker.formats.model_toml import load_model
-from tracker.initialization.generators.voxel_start import start_pose
 from tracker.tracking.voxel.body_pose import state_of
 from tracker.tracking.voxel.figure import figure_of
 from tracker.tracking.voxel.settings import VoxelSettings
 
 MODEL = load_model("gavrila34", 1.72)
-VOXELS, _ = figure(noise=0.1)
-POSE = start_pose(MODEL, parts_of(VOXELS))
+POSE = MODEL.neutral()
 GREY = [150, 150, 150]
 
 
@@ -75,7 +73,7 @@ class Controller:
 @pytest.fixture
 def views(monkeypatch):
     """Silhouettes by frame: a person on frame 0, nobody on frame 1."""
-    seen = silhouettes_of_figure(VOXELS, cameras_about_a_figure())
+    seen = silhouettes_of_figure(figure(noise=0.1)[0], cameras_about_a_figure())
     frames = [seen, [s._replace(mask=np.zeros_like(s.mask)) for s in seen]]
     finder = SimpleNamespace(silhouettes=lambda k: frames[k], close=lambda: None)
     monkeypatch.setattr(voxel_layer, "SilhouetteFinder", lambda cameras, recording: finder)
@@ -91,7 +89,7 @@ def test_voxels_are_drawn_while_they_are_switched_on(views):
     wait_for(lambda: scene.clouds)
     points = scene.clouds[0]
     assert len(points) > 500
-    height = VOXELS.points_world[:, 2]
+    height = figure(noise=0.1)[0].points_world[:, 2]
     np.testing.assert_allclose([points[:, 2].min(), points[:, 2].max()], [height.min(), height.max()], atol=0.1)
     controller.offer(controller.of(voxels=False))
     wait_for(lambda: len(scene.clouds) > 1)
