@@ -13,6 +13,7 @@ from stored_motions import filmed, store_motion
 from true_poses import sample_with_poses
 
 from app.share import folder as folder_module
+from app.share import pictures
 from app.share.content import describe
 from app.share.folder import is_shared_folder, share
 from app.share.overlay_lines import UNITS_PER_PX, polylines, view_lines
@@ -27,8 +28,9 @@ LARGE = 30e6
 
 
 @pytest.fixture
-def couple(tmp_path):
+def couple(tmp_path, monkeypatch):
     """Two people in four frames of small pictures, one with a gap; a fisheye and lens distortion among the views."""
+    monkeypatch.setattr(pictures, "GRADES", GRADES[-1:])
     models = [MODELS["gavrila22"], MODELS["gavrila34"]]
     session, _ = store_motion(tmp_path / "s", models, n_frames=4, gaps=[(1, 2)], lost=[(0, 3)])
     session = filmed(session, tmp_path)

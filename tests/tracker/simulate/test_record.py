@@ -68,6 +68,7 @@ def test_poses_and_skeleton_give_the_joints_and_bones_keep_their_length(folder):
             assert abs(lengths[0] / np.linalg.norm(generic[f"{side}_{a}"] - generic[f"{side}_{b}"]) - 1.0) > 0.05
 
 
+@pytest.mark.slow
 def test_the_footage_shows_the_person_against_the_background(folder):
     source = load_session(folder).cameras[0]
     frame = open_footage(source.footage, "cam1").read(8).astype(int)
@@ -131,7 +132,7 @@ def test_an_interrupted_run_leaves_nothing(tmp_path):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        simulate(tmp_path / "s", Simulation(**ARGUMENTS), progress=interrupt)
+        simulate(tmp_path / "s", Simulation(**(ARGUMENTS | {"n_frames": 1, "size": (80, 60)})), progress=interrupt)
     assert list(tmp_path.iterdir()) == []
 
 
