@@ -2,6 +2,7 @@
 
 import gc
 import os
+import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,10 @@ from tracker.formats.model_toml import load_model
 
 # Programs that tests start remember their sessions there, not in the user's list.
 os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / "quadrille-test-state")
+# Stores sync each commit: in memory the tests need a sixth less time. Those of one run take 0.7 GB.
+MEMORY, ROOM_BYTES = Path("/dev/shm"), 4e9
+if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ROOM_BYTES:
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
 # No time limit: the first call of a numba kernel compiles. No files in the source tree.
 settings.register_profile("quadrille", deadline=None, database=None, derandomize=True)
 settings.load_profile("quadrille")
@@ -43,6 +48,11 @@ WITHOUT_KERNELS = {
     *(f"app/{room}" for room in ["runtime", "state", "drawing"]),
 }
 """Rooms whose tests call no compiled kernels, or few."""
+OF_SOURCES = {
+    *(f"tests/test_{name}.py" for name in ("architecture", "census", "docs", "vocabulary")),
+    "tests/app/test_remedies.py",
+}
+"""Files whose tests read all modules; see `architecture.trees`."""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -53,6 +63,19 @@ def pytest_collection_modifyitems(items):
         if folder.as_posix() != "." and folder.parts[0] != "browser" and folder.as_posix() not in WITHOUT_KERNELS:
             item.add_marker("kernels")
     items.sort(key=lambda item: item.get_closest_marker("kernels") is not None)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """Give the tests that parse all sources to one process, and each other file to one."""
+    from xdist.scheduler import LoadFileScheduling
+
+    class OneForSources(LoadFileScheduling):
+        def _split_scope(self, nodeid):
+            file = super()._split_scope(nodeid)
+            return "sources" if file in OF_SOURCES else file
+
+    return OneForSources(config, log) if config.getoption("dist") == "loadfile" else None
 
 
 def pytest_collection_finish():

@@ -5,7 +5,7 @@ import re
 import string
 from pathlib import Path
 
-from architecture import FILES, ROOT, trees
+from architecture import FILES, ROOT, nodes
 
 from app.remedies import PHRASES, Phrases, command_line_text, page_text
 from tracker.errors import Remedy, SessionError, TrackerError
@@ -19,30 +19,30 @@ OF_THE_START = {
 }
 
 
-def sentences(tree):
-    """Strings of a module that are no docstrings and no annotations; of f-strings the constant parts."""
+def sentences(found):
+    """Strings among the nodes of a module that are no docstrings; of f-strings the constant parts."""
     skipped = set()
-    for node in ast.walk(tree):
+    for node in found:
         body = getattr(node, "body", None)
         for statement in body if isinstance(body, list) else []:
             if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
                 skipped.add(id(statement.value))
     return [
         node.value
-        for node in ast.walk(tree)
+        for node in found
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in skipped
     ]
 
 
 def options_in(name):
-    return [option for text in sentences(trees()[name]) for option in OPTION.findall(text)]
+    return [option for text in sentences(nodes()[name]) for option in OPTION.findall(text)]
 
 
 def remedies():
     """Code and names of fields of each remedy that the program makes, with the module."""
     found = []
-    for name, tree in trees().items():
-        for node in ast.walk(tree):
+    for name, of_module in nodes().items():
+        for node in of_module:
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Remedy":
                 (code,) = node.args
                 assert isinstance(code, ast.Constant), f"{name}: the code of a remedy is written where it is made"
@@ -52,7 +52,7 @@ def remedies():
 
 def test_the_scan_sees_options():
     text = '"""Docs --a."""\ndef f(x):\n    """--b"""\n    raise E(f"say --camera {x}=PATH, c--y", R("c", o="--o"))\n'
-    assert [o for t in sentences(ast.parse(text)) for o in OPTION.findall(t)] == ["--camera", "--o"]
+    assert [o for t in sentences([*ast.walk(ast.parse(text))]) for o in OPTION.findall(t)] == ["--camera", "--o"]
 
 
 def test_no_text_that_can_reach_the_page_names_an_option():

@@ -64,6 +64,7 @@ def test_a_recording_is_tracked(sample, tmp_path):
     assert (tmp_path / "a.trc").is_file()
 
 
+@pytest.mark.slow
 def test_poses_are_drawn(tmp_path):
     session, _ = store_motion(tmp_path / "s", [MODELS["gavrila38"]], n_frames=5)
     assert "5 frames" in run(EXAMPLES / "plot_poses.py", session.folder, "left_elbow", tmp_path / "a.png")

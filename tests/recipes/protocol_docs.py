@@ -8,6 +8,7 @@ import dataclasses
 import inspect
 import types
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
@@ -213,6 +214,7 @@ def _field_docs(kind: type) -> dict[str, str]:
     return docs
 
 
+@cache
 def _own_field_docs(kind: type) -> dict[str, str]:
     (node,) = ast.parse(inspect.getsource(kind)).body
     assert isinstance(node, ast.ClassDef)

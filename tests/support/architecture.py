@@ -106,10 +106,10 @@ def room_of(module):
     return module.rpartition(".")[0]
 
 
-def imported(tree, known):
+def imported(nodes_of_module, known):
     """Dotted names that a module imports anywhere, within functions too; of the project's own the very modules."""
     found = set()
-    for node in ast.walk(tree):
+    for node in nodes_of_module:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -130,9 +130,15 @@ def trees():
 
 
 @cache
+def nodes():
+    """All nodes of the syntax tree of each module, walked once."""
+    return {name: [*ast.walk(tree)] for name, tree in trees().items()}
+
+
+@cache
 def imports():
     """Dotted names that each module imports."""
-    return {name: imported(tree, FILES) for name, tree in trees().items()}
+    return {name: imported(found, FILES) for name, found in nodes().items()}
 
 
 @cache

@@ -5,6 +5,8 @@ from pathlib import Path
 from tracker.store.annotation_store import AnnotationStore
 
 SAMPLE = Path(__file__).resolve().parents[2] / "sample_sessions" / "elbow_rotation"
+WITH_POSE = ("--method", "poses", "--poses", SAMPLE / "truth.csv")
+"""Options of `init` for a true pose of the sample, which need no fit."""
 
 
 def stored(session, person="person"):

@@ -133,10 +133,16 @@ def _environment() -> str:
 
 def _keys_file() -> Path:
     """Return the file of the keys of the present sources."""
-    texts = hashlib.sha256(_environment().encode())
-    for path in sorted(_PACKAGE.rglob("*.py")):
-        texts.update(f"{path.relative_to(_PACKAGE)}\n".encode() + path.read_bytes())
-    return _folder() / f"{_KEYS}{texts.hexdigest()[:20]}.json"
+    return _folder() / f"{_KEYS}{_digest(_PACKAGE, _environment())}.json"
+
+
+@lru_cache
+def _digest(package: Path, environment: str) -> str:
+    """Return the digest of an environment and of the sources, which are read once: what runs does not change."""
+    texts = hashlib.sha256(environment.encode())
+    for path in sorted(package.rglob("*.py")):
+        texts.update(f"{path.relative_to(package)}\n".encode() + path.read_bytes())
+    return texts.hexdigest()[:20]
 
 
 def _computed_keys(environment: str) -> dict[str, str]:

@@ -6,6 +6,7 @@ that is shown as saved, or never end.
 
 import re
 import sqlite3
+from functools import cache
 
 from tracker.store import schema
 
@@ -36,6 +37,7 @@ def _words(text: str) -> set[str]:
     return found - {""}
 
 
+@cache
 def _own_words() -> tuple[set[str], set[str]]:
     """Return the words that definitions of the program consist of, and the names of its tables."""
     text = "; ".join(schema.STATEMENTS)

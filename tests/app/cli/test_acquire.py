@@ -6,7 +6,7 @@ import signal
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, assert_refused, stored
+from command_line import SAMPLE, WITH_POSE, assert_refused, stored
 
 from tracker.acquisition import size_fit
 from tracker.acquisition.chamfer_search import ChamferSearchSettings
@@ -24,7 +24,7 @@ KEYS = {
 @pytest.fixture
 def placed(run, session):
     """The sample with the known pose of one frame."""
-    assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "20", "--json")[0] == 0
+    assert run("init", session, *WITH_POSE, "--frame", "20", "--json")[0] == 0
     return session
 
 

@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, assert_refused, stored
+from command_line import WITH_POSE, assert_refused, stored
 
 from tracker.session.session import load_session
 
 
 def test_a_person_gets_feet_and_undo_takes_them_away(run, session, opened):
-    assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "4", "--json")[0] == 0
+    assert run("init", session, *WITH_POSE, "--frame", "4", "--json")[0] == 0
     (before,) = stored(session).values()
     status, out, _ = run("body", session, "--to", "gavrila38", "--json")
     told = json.loads(out)

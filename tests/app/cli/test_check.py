@@ -5,7 +5,7 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, assert_refused
+from command_line import WITH_POSE, assert_refused
 
 from app.cli.track_report import format_summary
 from tracker.calibration.camera_correction import corrected
@@ -19,7 +19,7 @@ FRAMES = range(10, 34)
 @pytest.fixture
 def posed(run, session):
     """The sample with known poses on some frames."""
-    assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "10", "--json")[0] == 0
+    assert run("init", session, *WITH_POSE, "--frame", "10", "--json")[0] == 0
     assert run("track", session, "--frames", f"{FRAMES.start}:{FRAMES.stop}", "--no-audit", "--json")[0] == 0
     return session
 

@@ -10,7 +10,7 @@ from typing import get_args, get_type_hints
 
 import numpy as np
 import pytest
-from command_line import SAMPLE, assert_refused, stored
+from command_line import SAMPLE, WITH_POSE, assert_refused, stored
 from gestures import wait_for
 
 from app.cli.track import TrackArguments, settings_of
@@ -121,7 +121,7 @@ def test_init_says_where_the_body_is_and_refuses_what_is_nowhere(run, session, t
 
 
 def test_evaluate_notes_a_reference_that_is_of_something_else(run, session, tmp_path):
-    run("init", session, "--joints", SAMPLE / "truth.trc")
+    run("init", session, *WITH_POSE)
     same = json.loads(run("evaluate", session, "--reference", SAMPLE / "truth.trc", "--json")[1])
     assert same["notes"] == []
     joints = read_trc(SAMPLE / "truth.trc")
@@ -159,7 +159,7 @@ def test_tracking_leaves_keyframes_and_can_be_undone(run, session):
 
 
 def test_the_contour_method_reports_its_normal_matrices(run, session):
-    run("init", session, "--joints", SAMPLE / "truth.trc")
+    run("init", session, *WITH_POSE)
     words = ("track", session, "--frames", "0:2", "--method", "contour", "--paper")
     _, out, _ = run(*words)
     assert "person: normal matrix of rank 22 of 22 or more, condition number " in out
@@ -189,7 +189,7 @@ def test_tracking_says_that_kernels_may_have_to_be_compiled(run, session, tmp_pa
 
 
 def test_tracking_leaves_what_is_locked(run, session):
-    run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "0")
+    run("init", session, *WITH_POSE, "--frame", "0")
     with closing(AnnotationStore(session / "annotations.sqlite")) as store:
         store.set_setting("locked", {"person": ["left_elbow.extension", "no_joint.twist"], "nobody": ["torso.x"]})
     names = load_session(session).people[0].model.value_names

@@ -148,6 +148,7 @@ def test_text_table_and_report(run, apart):
     assert_refused(run(*words[:-2], "--overwrite", "--report", folder / "no" / "r.html"), ["cannot write", "r.html"])
 
 
+@pytest.mark.slow
 def test_keyframes_or_all_poses_of_one_or_more_people_and_annotators(run, tmp_path):
     session, _ = store_motion(tmp_path / "a", [MODEL, MODELS["gavrila34"]], n_frames=8)
     for other in ("b", "c"):

@@ -22,7 +22,9 @@ print(*sys.modules, file=sys.stderr)
 """
 
 
-@pytest.mark.parametrize(("options", "unneeded"), [([], LARGE), (["--no-check"], LARGE | {"av"})])
+@pytest.mark.parametrize(
+    ("options", "unneeded"), [pytest.param([], LARGE, marks=pytest.mark.slow), (["--no-check"], LARGE | {"av"})]
+)
 def test_info_loads_no_kernels_and_no_decoder_it_does_not_use(options, unneeded):
     words = [sys.executable, "-c", RUN, "info", str(SAMPLE), *options]
     done = subprocess.run(words, capture_output=True, text=True, check=True)

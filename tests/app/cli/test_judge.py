@@ -43,9 +43,9 @@ def imported(run, session, tmp_path, monkeypatch):
         with closing(AnnotationStore(session.annotations_path)) as store:
             revision = store.add_model_revision("person", format_model(model))
             errors = np.broadcast_to(0.02**2 * np.eye(3), (len(model.point_names), 3, 3))
-            changes = []
+            changes, pose = [], None
             for k in FRAMES:
-                pose = fit_to_points(model, dict(zip(truth.names, truth.points[k], strict=True))).pose
+                pose = fit_to_points(model, dict(zip(truth.names, truth.points[k], strict=True)), pose).pose
                 changes.append(
                     PoseChange("person", k, PoseRecord(pose, ("tracked",) * len(pose), revision, errors=errors))
                 )

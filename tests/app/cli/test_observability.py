@@ -3,13 +3,13 @@
 import json
 
 import pytest
-from command_line import SAMPLE, assert_refused
+from command_line import WITH_POSE, assert_refused
 
 
 @pytest.fixture
 def placed(run, session):
     """The sample with the known pose of one frame."""
-    assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "20", "--json")[0] == 0
+    assert run("init", session, *WITH_POSE, "--frame", "20", "--json")[0] == 0
     return session
 
 

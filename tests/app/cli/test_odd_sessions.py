@@ -5,7 +5,7 @@ import sqlite3
 from contextlib import closing
 
 import pytest
-from command_line import SAMPLE, assert_refused
+from command_line import SAMPLE, WITH_POSE, assert_refused
 
 
 def replaced_by_a_pipe(path):
@@ -16,7 +16,7 @@ def replaced_by_a_pipe(path):
 
 @pytest.fixture
 def placed(run, session):
-    assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", "3")[0] == 0
+    assert run("init", session, *WITH_POSE, "--frame", "3")[0] == 0
     return session
 
 
@@ -55,7 +55,7 @@ def test_named_pipes_do_not_hang_a_command_that_reads(run, placed, name, expecte
 )
 def test_named_pipes_do_not_hang_a_command_that_writes(run, placed, name):
     replaced_by_a_pipe(placed / name)
-    status, _, err = run("init", placed, "--joints", SAMPLE / "truth.trc", "--frame", "5")
+    status, _, err = run("init", placed, *WITH_POSE, "--frame", "5")
     assert (status, "Traceback" in err) == (int("backups" not in name), False)
 
 

@@ -5,7 +5,7 @@ import sqlite3
 from contextlib import closing
 
 import pytest
-from command_line import SAMPLE, assert_refused, stored
+from command_line import SAMPLE, WITH_POSE, assert_refused, stored
 from crashes import crashed_in_a_commit
 
 from tracker.session.lock import SessionLock
@@ -15,7 +15,7 @@ from tracker.session.lock import SessionLock
 def edited(run, session):
     """A session with poses of two frames, of which a backup has one."""
     for frame in ("3", "5"):
-        assert run("init", session, "--joints", SAMPLE / "truth.trc", "--frame", frame)[0] == 0
+        assert run("init", session, *WITH_POSE, "--frame", frame)[0] == 0
     return session
 
 

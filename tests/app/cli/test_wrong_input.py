@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tomli_w
-from command_line import SAMPLE, assert_refused, stored
+from command_line import SAMPLE, WITH_POSE, assert_refused, stored
 
 from tracker.evidence.camera_exchange import CameraExchange
 from tracker.footage.video_writer import VideoWriter
@@ -202,7 +202,7 @@ def test_a_session_with_a_syntax_error(run, session):
 
 
 def test_a_session_whose_video_is_gone(run, session):
-    run("init", session, "--joints", SAMPLE / "truth.trc")
+    run("init", session, *WITH_POSE)
     (session / "BACK.mp4").unlink()
     for words in (("track", session), ("open", session, "--port", "0", "--no-browser")):
         assert_refused(run(*words), ["'BACK'", "BACK.mp4", f"quadrille relink {session} --search FOLDER"])

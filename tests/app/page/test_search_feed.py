@@ -6,7 +6,7 @@ from page_visits import visiting
 from app.page import socket
 
 
-@pytest.mark.parametrize("readable_s", [0.0, 1e6])
+@pytest.mark.parametrize("readable_s", [pytest.param(0.0, marks=pytest.mark.slow), 1e6])
 async def test_figures_of_a_search_come_at_a_readable_rate_and_its_steps_at_once(placed, monkeypatch, readable_s):
     monkeypatch.setattr(socket, "_READABLE_S", readable_s)
     async with visiting(placed) as page:

@@ -319,7 +319,8 @@ async def test_many_cells_travel_as_columns(controller, monkeypatch):
         assert np.frombuffer(gone["payload"], np.uint8, 3, 8 * 3).tolist() == [255] * 3
 
 
-async def test_pictures_of_a_frame_come_as_sets_of_the_size_asked_for(controller):
+async def test_pictures_of_a_frame_come_as_sets_of_the_size_asked_for(controller, observer):
+    observer.forget()
     async with visiting(controller) as page:
         await page.hear("timeline")
         await page.shows("image", "distance", "silhouette", "parts", reductions=(1, 1.6, 0, 4))

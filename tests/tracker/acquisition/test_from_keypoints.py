@@ -67,6 +67,7 @@ def test_a_body_of_another_shape_follows_the_key_points(recording):
     assert np.median(off) < 0.03  # bodies of 1.70 and 1.78 m, offsets of 45 mm
 
 
+@pytest.mark.slow
 def test_sparse_points_leave_frames_out(recording):
     _, points = recording
     joints = points.joints_world[:2].copy()

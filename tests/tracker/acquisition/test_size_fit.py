@@ -79,6 +79,7 @@ def test_an_own_body_stays_as_it_is():
     assert np.abs(thicknesses(found.body) / thicknesses(model) - 1).max() < 0.03
 
 
+@pytest.mark.slow
 def test_the_time_of_a_late_view_is_heeded():
     """One of four views shows the body half a frame later: with its velocity the poses come out better."""
     model = load_model("gavrila22", 1.7)

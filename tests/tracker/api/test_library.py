@@ -10,8 +10,8 @@ from stored_motions import store_motion
 
 import tracker
 from tracker.api.sessions import frames_of
-from tracker.evaluation.references import read_joints
-from tracker.pipeline.given_pose import set_pose_at_joints
+from tracker.formats.pose_csv import read_pose_table
+from tracker.pipeline.given_pose import set_pose_from_table
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_a_name_alone_is_no_list_of_names(stored):
 def test_footage_is_tracked_and_the_progress_stops_it(tmp_path):
     folder = shutil.copytree(SAMPLE, tmp_path / "s")
     session = tracker.open_session(folder)
-    set_pose_at_joints(session, 0, 0, read_joints(SAMPLE / "truth.trc", session.fps), fit_sizes=False)
+    set_pose_from_table(session, 0, 0, read_pose_table(SAMPLE / "truth.csv"))
     tracker.track(folder, frames=range(3), options={"audit": False})
     assert tracker.read_poses(folder).frames.tolist() == [0, 1, 2]
 

@@ -33,6 +33,7 @@ def test_a_turned_camera_is_named_and_mended():
     assert "camera cam2 is turned" in sentence(cameras[2])
 
 
+@pytest.mark.slow
 def test_a_glance_names_a_turned_camera_and_no_healthy_one():
     for off, expected in (({2: turned(yaw_deg=0.8)}, ["cam2"]), ({}, [])):
         frames = viewed(off, range(3))

@@ -45,8 +45,17 @@ def scales(found):
 
 
 @each_model
-@each_direction
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (1, 2))])
+@pytest.mark.parametrize(
+    ("match", "seed"),
+    [
+        (MatchSettings(), 0),
+        *(
+            pytest.param(match, seed, marks=pytest.mark.slow)
+            for match, seeds in ((MatchSettings(), (1, 2)), (FORWARD, range(3)), (BACKWARD, range(3)))
+            for seed in seeds
+        ),
+    ],
+)
 def test_against_rows_built_one_by_one(model, match, seed):
     """Cost, gradient and Hessian are those of a least-squares problem whose every row is differentiated numerically.
 

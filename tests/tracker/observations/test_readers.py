@@ -112,6 +112,7 @@ def test_damaged_hdf5(tmp_path, name):
         read_hdf5_apart(tmp_path / name)
 
 
+@pytest.mark.slow
 def test_a_missing_package_is_one_sentence(tmp_path, monkeypatch):
     """A module that raises on import stands for one that is not there."""
     for package in ("sleap_io", "h5py"):

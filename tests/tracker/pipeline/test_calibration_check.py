@@ -73,6 +73,7 @@ def test_a_correction_without_other_frames_is_refused():
         check.require_applicable([])
 
 
+@pytest.mark.slow
 def test_a_glance_says_nothing_of_few_frames():
     frames = viewed({1: turned(yaw_deg=1.0)}, [0, 1, 2])
     assert contradiction(Seen(frames)) == ""

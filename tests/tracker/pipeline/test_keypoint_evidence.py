@@ -79,6 +79,7 @@ def test_a_preset_body_takes_the_height_of_the_points(tmp_path):
     assert small.height_m == pytest.approx(0.8 * usual.height_m, rel=0.02)
 
 
+@pytest.mark.slow
 def test_who_has_no_key_points_is_named(tmp_path):
     session, _ = imported(tmp_path)
     other = make_session(tmp_path / "other", N, people=("ann", "bob"))
@@ -89,6 +90,7 @@ def test_who_has_no_key_points_is_named(tmp_path):
     assert session.people[0].name == "ann"
 
 
+@pytest.mark.slow
 def test_a_detector_that_was_learnt_is_read_again_for_the_same_body_alone(tmp_path):
     session, _ = imported(tmp_path)
     learnt = learn_seen_bodies(session, read_points(session, "net"))

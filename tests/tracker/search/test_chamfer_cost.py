@@ -179,7 +179,7 @@ def away(cameras):
 
 
 @both_modes
-@pytest.mark.parametrize("evidence", ["own contours", "real frame"])
+@pytest.mark.parametrize("evidence", [pytest.param("own contours", marks=pytest.mark.slow), "real frame"])
 def test_moving_off_the_evidence_never_lowers_the_cost(real_frame, outliers, evidence):
     model, values, views = real_frame
     if evidence == "own contours":

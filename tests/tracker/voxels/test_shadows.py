@@ -44,6 +44,7 @@ def test_legs_in_the_midst_of_a_shadow_come_back_where_other_views_show_them(who
     assert np.count_nonzero(found.mask & ~whole[2].mask) < 0.1 * np.count_nonzero(whole[2].mask)
 
 
+@pytest.mark.slow
 def test_a_shadow_on_the_floor_stays_one(whole):
     seen = [s._replace(shadow=on_floor(s, (0.3, 0.9), (-0.3, 0.3))) for s in whole]
     assert all(s.shadow.sum() > 0.1 * s.mask.sum() for s in seen)

@@ -141,7 +141,7 @@ def test_where_a_live_pin_ends_decides_not_its_way(opened):
     np.testing.assert_array_equal(*ends)
 
 
-@pytest.mark.parametrize("checkpoint_s", [1.0, 0.0])
+@pytest.mark.parametrize("checkpoint_s", [60.0, 0.0])
 def test_a_cancelled_pin_leaves_nothing(opened, session, monkeypatch, checkpoint_s):
     monkeypatch.setattr("app.control.posing.pinning._CHECKPOINT_S", checkpoint_s)
     controller = opened()

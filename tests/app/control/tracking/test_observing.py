@@ -157,7 +157,8 @@ def test_people_without_a_pose_are_placed_in_the_same_entry(imported):
     assert imported.state.undo is None
 
 
-@pytest.mark.parametrize("as_evidence", [pytest.param(True, marks=pytest.mark.slow), False])
+@pytest.mark.slow
+@pytest.mark.parametrize("as_evidence", [True, False])
 def test_people_are_found_and_tracked_with_key_points(imported, monkeypatch, as_evidence):
     runs = []
 

@@ -207,6 +207,7 @@ def test_standing_feet_stay_where_they_are(true_model):
     assert to_left @ (-np.sin(HEADING_RAD), np.cos(HEADING_RAD)) > 0.98 * np.linalg.norm(to_left)
 
 
+@pytest.mark.slow
 def test_walking_lifts_the_knees_in_turn_and_swings_the_arms(true_model):
     poses = solve_posture(cast_of("walk_in_place")[0], true_model, 100, FPS)
     points = points_of(true_model, poses)

@@ -131,6 +131,7 @@ def test_a_camera_that_moved_is_left_out():
     assert estimates[-1].statuses[0] == "doubtful"
 
 
+@pytest.mark.slow
 def test_a_person_who_is_cut_off_is_named():
     def cut(k, views):
         return [v._replace(mask=np.where(np.arange(v.mask.shape[0])[:, None] > 60, False, v.mask)) for v in views]
