@@ -158,8 +158,11 @@ def show_change(db: sqlite3.Connection, kind: str, change: int | None, shown: in
 
 
 def now() -> str:
-    """Return the time as the store writes it: ISO 8601, UTC, milliseconds."""
-    return datetime.now(UTC).isoformat(timespec="milliseconds")
+    """Return the time as the store writes it: ISO 8601, UTC.
+
+    It counts microseconds, because events at the same time have no order.
+    """
+    return datetime.now(UTC).isoformat(timespec="microseconds")
 
 
 def undo_edit(db: sqlite3.Connection, edit: int) -> None:
