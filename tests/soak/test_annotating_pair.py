@@ -210,6 +210,10 @@ async def review(eye):
             await eye.page.keyboard.type(f"{worst.replace('_', ' ')} is off")
             await eye.page.keyboard.press("Enter")
         await shows(eye.page, f"document.querySelectorAll('.plan-tasks button').length === {left - 1}", 30)
+        if left > 1:  # the same frame, perhaps, and another person
+            await shows(
+                eye.page, f"[quadrille.state.state.frame, quadrille.state.state.person].join() !== '{frame},{person}'"
+            )
     return n
 
 

@@ -6,9 +6,8 @@ stays in the log but is out of reach.
 """
 
 import sqlite3
-import threading
 from collections.abc import Collection
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from functools import cache
 from importlib import metadata
 from typing import Any
@@ -158,25 +157,12 @@ def show_change(db: sqlite3.Connection, kind: str, change: int | None, shown: in
     )
 
 
-class _Clock:
-    """Times of one program, each later than the one before: rows are ordered by them."""
-
-    def __init__(self) -> None:
-        self._last, self._lock = datetime.min.replace(tzinfo=UTC), threading.Lock()
-
-    def next(self) -> datetime:
-        """Return the time, or the millisecond after the last one returned if that is later."""
-        with self._lock:
-            self._last = max(datetime.now(UTC), self._last + timedelta(milliseconds=1))
-            return self._last
-
-
-_clock = _Clock()
-
-
 def now() -> str:
-    """Return the time as the store writes it: ISO 8601, UTC, milliseconds. No two times of a program are equal."""
-    return _clock.next().isoformat(timespec="milliseconds")
+    """Return the time as the store writes it: ISO 8601, UTC.
+
+    It counts microseconds, because events at the same time have no order.
+    """
+    return datetime.now(UTC).isoformat(timespec="microseconds")
 
 
 def undo_edit(db: sqlite3.Connection, edit: int) -> None:

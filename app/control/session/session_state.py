@@ -153,6 +153,7 @@ class SessionState:
         """
         self.frames.set_cameras(session.cameras)
         self.session = replace(self.session, cameras=session.cameras)
+        self.frame_poses.place(self.session)
 
     def follow_session(self, session: Session) -> None:
         """Continue with bodies, cameras and floor that the host of the session has changed, and show them."""

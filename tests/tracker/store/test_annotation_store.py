@@ -11,7 +11,6 @@ import pytest
 
 from tracker.errors import SessionError
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.edit_tree import now
 from tracker.store.records import (
     Alternative,
     AssessmentChange,
@@ -534,8 +533,3 @@ def test_a_log_is_read_as_of_one_moment(store, path, monkeypatch):
     reader.close()
     store.commit("c", [put(2, 20.0)])
     assert xs(store) == {1: 10.0, 2: 20.0}
-
-
-def test_no_two_times_of_a_program_are_equal():
-    times = [now() for _ in range(50)]
-    assert sorted(set(times)) == times
