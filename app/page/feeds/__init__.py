@@ -1,5 +1,4 @@
-"""What one page has received of each kind of news, and what it lacks.
+"""News for one page: each feed remembers messages that the page has received, and makes those that it lacks.
 
-Each feed makes messages of the state for one page, and only those that are new to it. Imports `app.control`,
-`app.drawing` and the messages of `app.page`. Public: the feed of each module.
+Imports `app.control`, `app.drawing` and `app.messages`. Public: the feed of each module.
 """
