@@ -328,7 +328,9 @@ class PageConnection:
     async def _send_details(self, state: State) -> None:
         """Send curves, how well the views constrain the shown pose and where it comes from, if the page shows that."""
         if self._curves.is_due(state):
-            await self._send(await asyncio.to_thread(self._curves.update, self._controller, state))
+            curves = await asyncio.to_thread(self._curves.update, self._controller, state)
+            if curves is not None:
+                await self._send(curves)
         if self._provenance.is_due(state):
             for news in await asyncio.to_thread(self._provenance.updates, self._controller, state):
                 await self._send(news)

@@ -24,14 +24,17 @@ class CurveFeed:
             self._sent = None
         return self._group is not None and self._sent != (self._group, state.person, state.timeline_version)
 
-    def update(self, controller: Controller, state: State) -> bytes:
+    def update(self, controller: Controller, state: State) -> bytes | None:
         """Return the curves that the page lacks as an encoded message. It reads the annotations: call it in a worker.
+
+        Returns None where the page has put the curves away since they were due.
 
         Raises:
             SessionError: the annotations cannot be read.
         """
         group, sent = self._group, self._sent
-        assert group is not None, "curves are due"
+        if group is None:
+            return None
         self._sent = group, state.person, state.timeline_version
         since = sent[2] if sent is not None and sent[:2] == self._sent[:2] else 0
         frames, rows = controller.stored_poses.rows(state.person, since)
