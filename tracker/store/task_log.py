@@ -150,6 +150,8 @@ class TaskLog:
         """
         poses = {task.uid: (task.person, task.frame) for task in self.tasks()}
         decided = {poses[s.task]: s for s in self.states() if s.task in poses and s.state != "withdrawn"}
+        if not decided:
+            return {}
         made = {(m.person, m.frame): m.time for m in self.present_poses()}
         return {at: s for at, s in decided.items() if s.state == "verified" and at in made and made[at] <= s.time}
 
