@@ -5,10 +5,11 @@ import os
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tracker.geometry.arrays import DAMAGED_ARRAYS
 
 VERSION = 1
 """Version of the stored lists; with another one they are made again."""
@@ -67,7 +68,7 @@ def load(video: Path, folder: Path | None) -> Index | None:
                 return None
             every = cached["every"].tolist()
             return Index(cached["pts"], {pts: i for i, pts in enumerate(every)}, cached["key_pts"])
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # missing or incomplete: list the packets again
+    except DAMAGED_ARRAYS:  # missing or incomplete: list the packets again
         return None
     except SystemError:  # Python 3.11 may fail to parse the header of an array while another thread parses one
         return None

@@ -1,4 +1,7 @@
-"""Type aliases of arrays, and how much masks overlap."""
+"""Type aliases of arrays, errors of files of arrays, and how much masks overlap."""
+
+import zipfile
+import zlib
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +16,8 @@ Image = NDArray[np.uint8]
 """Pixels, (H, W) or (H, W, 3) in BGR, as each function states."""
 Mask = NDArray[np.bool_]
 """Whether each pixel belongs to something, (H, W)."""
+DAMAGED_ARRAYS = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, RuntimeError)
+"""Errors of `numpy.load` on a file that is missing, damaged, encrypted or compressed in a way that is not known."""
 
 
 def intersection_over_union(one: Mask, other: Mask) -> float:

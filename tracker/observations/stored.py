@@ -13,7 +13,6 @@ import io
 import secrets
 import shutil
 import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any
@@ -26,7 +25,7 @@ from tracker.errors import SessionError
 from tracker.files import refuse_links, sync_folder, write_text_atomic
 from tracker.formats.joint_maps import format_joint_map, parse_joint_map
 from tracker.formats.number_rows import MAX_NAMES, MAX_VALUES
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import DAMAGED_ARRAYS, Array
 from tracker.observations.observed import ObservationSet, ObservedJoints, ObservedPoints, SourceFile
 from tracker.session.session import Session
 from tracker.text_files import TABLE_BYTES, TextKind, read_toml
@@ -224,7 +223,7 @@ def _read_arrays(path: Path) -> dict[str, Array]:
             raise ValueError("an array is too large")
         with np.load(io.BytesIO(data), allow_pickle=False) as found:
             arrays = {name: np.asarray(found[name], dtype=np.float64) for name in found.files}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
+    except DAMAGED_ARRAYS as error:
         raise SessionError(f"{path} cannot be read: {error}; import the files again") from error
     return arrays
 

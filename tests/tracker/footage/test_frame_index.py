@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 from clips import N, encode, number
+from damaged_arrays import encrypted
 
 from tracker.footage.video import VideoFile
 
@@ -58,11 +59,11 @@ def test_a_video_that_was_changed_is_listed_again(clip, tmp_path, listed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 half a file", b"nothing of the kind"])
+@pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 half a file", b"nothing of the kind", encrypted])
 def test_a_damaged_list_is_made_again(clip, tmp_path, listed, damage):
     frames(clip, tmp_path / "kept")
     (kept,) = (tmp_path / "kept").iterdir()
-    kept.write_bytes(damage)
+    kept.write_bytes(damage(kept.read_bytes()) if callable(damage) else damage)
     assert [number(i) for i in frames(clip, tmp_path / "kept")] == [0, 31, 5, N - 1]
     assert len(listed) == 2
 

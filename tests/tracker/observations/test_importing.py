@@ -4,6 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
+from damaged_arrays import encrypted
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
 from tracker.errors import FormatError, SessionError
@@ -272,9 +273,10 @@ def test_unknown_and_damaged_observations(session, keypoints):
     store_import(session, planned(session, keypoints))
     path = session.folder / "observations" / "mp" / "points.npz"
     data = path.read_bytes()
-    path.write_bytes(data[: len(data) // 2])
-    with pytest.raises(SessionError, match=r"cannot be read.*import the files again"):
-        load_observations(session, "mp")
+    for damaged in (data[: len(data) // 2], encrypted(data)):
+        path.write_bytes(damaged)
+        with pytest.raises(SessionError, match=r"cannot be read.*import the files again"):
+            load_observations(session, "mp")
     path.unlink()
     with pytest.raises(SessionError, match="import the files again"):
         load_observations(session, "mp")
