@@ -63,10 +63,21 @@ program.program()
 """
 
 
+def heed_hangups():
+    """Undo what nohup hands down, if the tests run under it."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
+def take_terminal(terminal):
+    heed_hangups()
+    os.login_tty(terminal)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 def test_termination_cleans_up_as_an_interrupt_does(tmp_path, number, status):
-    with subprocess.Popen([sys.executable, "-c", EXPORTING, str(tmp_path)], stdout=subprocess.PIPE) as process:
+    words = [sys.executable, "-c", EXPORTING, str(tmp_path)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, preexec_fn=heed_hangups) as process:
         assert process.stdout.readline() == b"at work\n"
         assert list(tmp_path.iterdir())
         process.send_signal(number)
@@ -96,7 +107,7 @@ def test_the_end_of_the_terminal_does_not_keep_work_from_being_saved(tmp_path):
     ours, theirs = os.openpty()
     process = subprocess.Popen(
         [sys.executable, "-c", OF_A_TERMINAL, str(tmp_path / "saved")],
-        stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True, preexec_fn=lambda: os.login_tty(theirs),
+        stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True, preexec_fn=lambda: take_terminal(theirs),
     )  # fmt: skip
     os.close(theirs)
     assert b"at work" in os.read(ours, 100)
