@@ -54,12 +54,13 @@ class ArrowEquations(NamedTuple):
         self.cross[group] += found.hessian[n:, :n]
 
     def held(self, shared: NDArray[np.bool_], own: NDArray[np.bool_]) -> "ArrowEquations":
-        """Return the equations in which some unknowns cannot move.
+        """Return the equations in which some unknowns cannot move, nor own ones that no residual depends on.
 
         Args:
             shared: which shared unknowns may move, (n,).
             own: which own unknowns may move, (G, m).
         """
+        own = own & (np.einsum("gii->gi", self.own_hessians) > 0)
         hessian = self.hessian * np.outer(shared, shared) + np.diag(~shared)
         own_hessians = self.own_hessians * (own[:, :, None] & own[:, None, :])
         at = np.arange(own.shape[1])

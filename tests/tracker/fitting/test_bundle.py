@@ -80,6 +80,15 @@ def test_held_unknowns_do_not_move():
     np.testing.assert_allclose(np.concatenate([found[0], found[1].ravel()]), expected, rtol=1e-8, atol=1e-12)
 
 
+def test_an_own_unknown_that_no_residual_depends_on_stays():
+    curves = Curves()
+    curves.A[2, :, N + 1] = 0.0  # as the angle of a limb that no view shows
+    found = solve_bundle(curves, START, tolerance=1e-9)
+    gradient, hessian = found.equations.held(*curves.free(None, None)).reduced()
+    assert found.state[1][2, 1] == 0
+    assert np.abs(np.linalg.solve(hessian, gradient)).max() < 1e-3
+
+
 def test_the_minimum_is_scipys():
     problem = Curves(1)
 
