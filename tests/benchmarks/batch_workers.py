@@ -4,7 +4,8 @@ Twelve copies of a recording in DIR with a first pose are tracked as a batch, by
 line has the time by the clock, the processor time of the batch, how many cores it used on average, and how many all
 other programs of the machine used meanwhile: the clock tells only where those used few. The last lines have the ratio
 by the clock, and the lowest one that two cores allow: half of the processor time of two workers against the time of one
-worker. Linux only: it reads /proc.
+worker. Beside it stands what the machine gives to two programs that share nothing: loops that do the same work, one
+after the other and at once. Linux only: it reads /proc.
 """
 
 import argparse
@@ -24,6 +25,8 @@ from tracker.evaluation.references import read_joints
 from tracker.pipeline.given_pose import set_pose_at_joints
 
 N_RECORDINGS = 12
+LOOP = "for i in range(50_000_000): pass"
+"""A program that needs one core, and no memory."""
 
 
 class Round(NamedTuple):
@@ -50,6 +53,18 @@ def used_s() -> float:
     """Processor time of the children that have ended, s."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
+
+
+def second_core() -> float:
+    """Return the time of two loops at once, as a share of their time one after the other."""
+    took = []
+    for n in (1, 2):
+        began = time.monotonic()
+        loops = [subprocess.Popen([sys.executable, "-c", LOOP]) for _ in range(n)]
+        for loop in loops:
+            loop.wait()
+        took.append(time.monotonic() - began)
+    return took[1] / (2 * took[0])
 
 
 def run(source: Path, n_workers: int, words: argparse.Namespace) -> Round:
@@ -85,8 +100,10 @@ def main() -> None:
         )
         set_pose_at_joints(session, 0, 0, read_joints(data / "ground_truth.trc", session.fps), fit_sizes=False)
         rounds: dict[int, list[Round]] = {1: [], 2: []}
+        machine = list[float]()
         print("workers   by the clock, s   processor time, s   cores   cores of others")
         for _ in range(words.rounds):
+            machine.append(second_core())
             for n, done in rounds.items():
                 done.append(run(source, n, words))
                 last = done[-1]
@@ -95,6 +112,7 @@ def main() -> None:
     print(f"by the clock, two workers need {two / one:.2f} of the time of one")
     least = min(r.cpu_s for r in rounds[2]) / 2 / min(r.wall_s for r in rounds[1])
     print(f"two cores allow {least:.2f} at best; a worker alone uses {median(r.cores for r in rounds[1]):.2f} cores")
+    print(f"two loops at once need {median(machine):.2f} of their time one after the other")
 
 
 if __name__ == "__main__":
