@@ -58,6 +58,8 @@ class TrackingRun:
     estimates_keyframes: bool = False
     """Whether tracked people are also estimated on their keyframes, from the frames before. Tracking goes on from the
     keyframe all the same."""
+    searches_around: bool = True
+    """Whether the surroundings of a pose that is not good are searched, see `covariance_search`."""
     velocities: Callable[[int], Sequence[Array | None]] | None = None
     """Returns the velocity of each person on a frame, (n_dofs,), per frame, if another run has found it; otherwise it
     follows from the prediction. It counts in views whose pictures were taken between frames."""

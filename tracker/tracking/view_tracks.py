@@ -49,7 +49,8 @@ def tracks_without_views(
 ) -> Iterator[tuple[int, dict[int, FrameTracks]]]:
     """Track all frames of a run without each view in turn, side by side.
 
-    The tracks have not seen the keyframes that they are compared with, but go on from them.
+    The tracks have not seen the keyframes that they are compared with, but go on from them. Many of their poses are in
+    doubt because a view is missing. Their surroundings are not searched: the repair does that, with all views.
 
     Args:
         tracker: the method.
@@ -77,7 +78,7 @@ def tracks_without_views(
     if any(any(run.observer.ahead_frames(k)) for k in run.frames):
         run = replace(run, velocities=velocities_of(models, known))
     runs = [
-        replace(run, observer=o, regions=around(views), estimates_keyframes=True)
+        replace(run, observer=o, regions=around(views), estimates_keyframes=True, searches_around=False)
         for o, views in zip(observers, groups, strict=True)
     ]
     ways = [tracker.estimates(own) for own in runs]

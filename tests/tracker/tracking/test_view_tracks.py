@@ -37,6 +37,7 @@ class Walker:
         n = run.subjects.models[0].n_dofs
         for i, frame in enumerate(run.frames):
             assert len(run.regions(frame)) == len(names)
+            assert not run.searches_around  # they doubt because a view is missing
             pose = np.array(run.start[0][-1])
             pose[:2] += 0.01 * i, 0.0 if "LEFT" in names else 0.1
             lost = np.array([0.0, 0.9])

@@ -45,10 +45,7 @@ def track_forward(
     """
     observer, subjects, frames, models = run.observer, run.subjects, run.frames, run.subjects.models
     several, held = len(models) > 1, subjects.without_keyframes() if run.estimates_keyframes else subjects
-    memories = [
-        PersonMemory(m, start, active, alone=not several)
-        for m, start, active in zip(models, run.start, subjects.active_dofs, strict=True)
-    ]
+    memories = [_memory(run, p, start) for p, start in enumerate(run.start)]
     learns_static, edges = settings.segments and settings.edges.static, settings.edges
     static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if learns_static else None
     cameras, chosen = observer.working_cameras, _Regions(run, edges.whole_images)
@@ -88,7 +85,7 @@ def track_forward(
             starts = settle_starts(begun, memories, subjects.tracked, settings)
             settled = {p: s.body for p, s in starts.items() if s.taken}
             for p, body in settled.items():
-                memories[p] = PersonMemory(models[p], body.values, subjects.active_dofs[p], alone=not several)
+                memories[p] = _memory(run, p, body.values)
             if not settled.keys() <= fixed.keys():
                 predicted = tuple(b if p in fixed else settled.get(p, b) for p, b in enumerate(predicted))
                 contours, views = observe(frame, predicted, chosen.new(predicted))
@@ -111,6 +108,12 @@ def track_forward(
             found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in range(len(models))]
             found = [e.after(starts[p].trace) if p in starts else e for p, e in enumerate(found)]
             yield make_estimate(frame, cost_of, estimator.bodies, found, settings)
+
+
+def _memory(run: TrackingRun, person: int, start: Array | Sequence[Array]) -> PersonMemory:
+    """Return the state of a person who begins in some poses."""
+    model, active = run.subjects.models[person], run.subjects.active_dofs[person]
+    return PersonMemory(model, start, active, len(run.subjects.models) == 1, run.searches_around)
 
 
 class _Regions:
