@@ -20,6 +20,7 @@ def command(
     size: tuple[int, int] = (640, 480),
     person: str = "",
     fisheye: tuple[str, ...] = (),
+    room: str = "laboratory",
 ) -> None:
     """Make a session of a simulated recording with known truth.
 
@@ -34,13 +35,23 @@ def command(
         size: width and height of the images, px, both even.
         person: who plays a scene of one person, such as child_6 or heavy_man; the usual adult by default.
         fisheye: names of cameras to give a fisheye lens of 120 degrees, such as FRONT; all for all of them.
+        room: laboratory, full of things; studio, empty and gray; theater, dark.
     """
     from tracker.simulate import Simulation, simulate
 
     reporter = Reporter()
     with reporter.over(frames * cameras, "rendering") as tick:  # one tick per image
         simulation = Simulation(
-            scene, cameras, frames, seed, size, body=body, masks=masks, person=person, fisheyes=fisheye
+            scene,
+            cameras,
+            frames,
+            seed,
+            size,
+            body=body,
+            masks=masks,
+            person=person,
+            fisheyes=fisheye,
+            room=room,
         )
         simulate(out, simulation, progress=lambda *_: tick())
     print(f"made {out}")

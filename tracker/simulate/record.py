@@ -66,6 +66,8 @@ class Simulation:
     """Whether to write true masks too, `masks/CAM/%06d.png`: 0 background, k person k."""
     fisheyes: tuple[str, ...] = ()
     """Names of the cameras with a fisheye lens, or `all`."""
+    room: str = "laboratory"
+    """One of `furniture.ROOMS`."""
 
 
 _DEFAULT = Simulation()
@@ -102,7 +104,8 @@ def simulate(out: str | Path, simulation: Simulation = _DEFAULT, progress: Progr
         temporary.mkdir(parents=True)
         sources = [_source(temporary, c, simulation.masks) for c in cameras]
         figures = [_figure(role, model, body) for role, model in zip(cast, models, strict=True)]
-        _shoot(sources, figures, poses, fps, seed, progress)
+        backdrops = [see_room(c, seed, simulation.room) for c in cameras]
+        _shoot(sources, backdrops, figures, poses, simulation, progress)
         _write_truth(temporary, cast, models, poses, fps)
         people = [Person(r.name, m, color) for r, m, color in zip(cast, presets, cycle(PALETTE), strict=False)]
         save_session(Session(temporary, out.name, float(fps), n_frames, tuple(sources), tuple(people)))
@@ -142,15 +145,14 @@ def _source(folder: Path, camera: Camera, masks: bool) -> CameraSource:
 
 def _shoot(
     sources: Sequence[CameraSource],
+    backdrops: Sequence[Backdrop],
     figures: Sequence[Figure],
     poses: Sequence[Array],
-    fps: float,
-    seed: int,
+    simulation: Simulation,
     progress: Progress | None,
 ) -> None:
     """Film the empty room, then the people, with all cameras."""
-    rngs = [np.random.default_rng([seed, 3, i]) for i in range(len(sources))]
-    backdrops = [see_room(source.camera, seed) for source in sources]
+    fps, rngs = simulation.fps, [np.random.default_rng([simulation.seed, 3, i]) for i in range(len(sources))]
     for source, backdrop, rng in zip(sources, backdrops, rngs, strict=True):
         _shoot_background(source, backdrop, fps, rng)
     done, total = 0, len(poses[0]) * len(sources)

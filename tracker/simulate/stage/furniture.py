@@ -1,10 +1,13 @@
-"""The furniture of the simulated room: textured boxes, most of them along the walls."""
+"""The furniture of the simulated rooms: textured boxes, most of them along the walls."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
 
+from tracker.errors import TrackerError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.simulate.people.textures import value_noise
@@ -57,20 +60,55 @@ class Box:
         return np.clip((first + share[:, None] * (second - first)) * grain[:, None], 0.0, 1.0)
 
 
-def furnished(seed: int) -> tuple[Box, ...]:
-    """Furnish the room: shell, racks full of things, wall bars, desk, scaffold poles and posters."""
-    rng = np.random.default_rng([seed, 1])
+def furnished(seed: int, room: str) -> tuple[Box, ...]:
+    """Furnish a room of a kind.
+
+    Args:
+        seed: of its furniture.
+        room: one of `ROOMS`.
+
+    Raises:
+        TrackerError: there is no such kind.
+    """
+    if room not in ROOMS:
+        raise TrackerError(f"expected one of the rooms {', '.join(ROOMS)}, found '{room}'")
+    return tuple(ROOMS[room](np.random.default_rng([seed, 1])))
+
+
+def _laboratory(rng: np.random.Generator) -> list[Box]:
+    """Return racks full of things, wall bars, a desk, scaffold poles and posters. The corners are the cameras'."""
     a = HALF_WIDTH_M
-    out = _shell()
-    # The corners stay free for the cameras.
+    out = _shell(((0.70, 0.68, 0.63), (0.62, 0.60, 0.56)), ((0.47, 0.43, 0.38), (0.30, 0.27, 0.24)), "planks")
     out += _rack(rng, (-a + 0.22, -0.35), 1.9, 0.0)
     out += _rack(rng, (0.5, -a + 0.22), 2.2, np.pi / 2)
     out += _rack(rng, (a - 0.22, -0.6), 1.5, np.pi)
     out += _wall_bars((-0.3, a - 0.12), 1.9, -np.pi / 2)
     out += _scaffold((-a + 0.5, 1.1), 0.7, 0.0) + _scaffold((-1.1, -a + 0.5), 0.7, np.pi / 2)
     out += _desk(rng, (a - 0.4, 0.9), 1.1)
-    out += _posters(rng)
-    return tuple(out)
+    return out + _posters(rng)
+
+
+def _studio(rng: np.random.Generator) -> list[Box]:
+    """Return an empty room, gray as clothes are: hardly an edge in it, and little contrast to a person."""
+    tone = rng.uniform(0.3, 0.6)
+    gray: tuple[Vector, Vector] = ((tone, tone, tone), (tone - 0.08, tone - 0.08, tone - 0.07))
+    return _shell(gray, gray, "plain")
+
+
+def _theater(rng: np.random.Generator) -> list[Box]:
+    """Return a dark stage: black curtains in folds along three walls, black boards, and set pieces in front."""
+    a = HALF_WIDTH_M
+    black: tuple[Vector, Vector] = ((0.10, 0.09, 0.10), (0.17, 0.14, 0.15))
+    out = _shell(black, black, "planks")
+    for base, yaw in (((-a + 0.08, 0.0), 0.0), ((a - 0.08, 0.0), np.pi), ((0.0, a - 0.08), -np.pi / 2)):
+        for y in np.arange(-1.7, 1.8, 0.2):
+            place = _placed(base, yaw, rng.uniform(0.0, 0.05), float(y), 1.3)
+            out.append(Box(place, (0.03, 0.075, 1.3), yaw + rng.uniform(-0.4, 0.4), "plain", black, 0.1))
+    for side in (-1.0, 1.0):
+        half = (rng.uniform(0.1, 0.2), rng.uniform(0.2, 0.4), rng.uniform(0.4, 0.9))
+        where = (side * (a - 0.45), rng.uniform(-0.9, 0.9), half[2])
+        out.append(Box(where, half, rng.uniform(-0.5, 0.5), "checks", (_color(rng), _color(rng)), 0.12))
+    return out + _posters(rng)
 
 
 def _share(pattern: Pattern, u: Array, v: Array) -> Array:
@@ -96,12 +134,11 @@ def _share(pattern: Pattern, u: Array, v: Array) -> Array:
     return np.clip(0.1 + 0.1 * noise, 0.0, 1.0)
 
 
-def _shell() -> list[Box]:
+def _shell(wall: tuple[Vector, Vector], floor: tuple[Vector, Vector], boards: Pattern) -> list[Box]:
+    """Return floor, ceiling, walls and skirting boards."""
     a, h = HALF_WIDTH_M, HEIGHT_M
-    wall: tuple[Vector, Vector] = ((0.70, 0.68, 0.63), (0.62, 0.60, 0.56))
-    floor: tuple[Vector, Vector] = ((0.47, 0.43, 0.38), (0.30, 0.27, 0.24))
     out = [
-        Box((0, 0, -0.1), (a + 0.2, a + 0.2, 0.1), 0.0, "planks", floor, 0.16),
+        Box((0, 0, -0.1), (a + 0.2, a + 0.2, 0.1), 0.0, boards, floor, 0.16),
         Box((0, 0, h + 0.1), (a + 0.2, a + 0.2, 0.1), 0.0, "tiles", ((0.85, 0.85, 0.83), (0.7, 0.7, 0.7)), 0.6),
     ]
     for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1)):
@@ -206,3 +243,9 @@ def _posters(rng: np.random.Generator) -> list[Box]:
         half = (rng.uniform(0.2, 0.35), 0.006, rng.uniform(0.2, 0.35))
         out.append(Box((x, a, 1.5), half, 0.0, "poster", (_color(rng), _color(rng)), 0.08))
     return out
+
+
+ROOMS: Mapping[str, Callable[[np.random.Generator], list[Box]]] = MappingProxyType(
+    {"laboratory": _laboratory, "studio": _studio, "theater": _theater}
+)
+"""Kinds of rooms: full of things, empty and gray, and dark."""

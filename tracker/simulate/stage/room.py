@@ -69,9 +69,18 @@ def floor_shadow(vertices_world: Array, faces: IntArray) -> NDArray[np.float32]:
     return np.asarray(cv2.GaussianBlur(total / LAMP_POINTS**2, (0, 0), 2.5), dtype=np.float32)
 
 
-def see_room(camera: Camera, seed: int) -> Backdrop:
-    """Render the empty room, furnished by a random seed."""
-    boxes = furnished(seed)
+def see_room(camera: Camera, seed: int, room: str = "laboratory") -> Backdrop:
+    """Render the empty room, furnished by a random seed.
+
+    Args:
+        camera: from which it is seen.
+        seed: of its furniture.
+        room: one of `furniture.ROOMS`.
+
+    Raises:
+        TrackerError: there is no such kind.
+    """
+    boxes = furnished(seed, room)
     samples = camera.scaled(SAMPLES)
     u, v = np.meshgrid(np.arange(samples.width), np.arange(samples.height))
     rays = samples.rays(np.stack([u, v], axis=-1).reshape(-1, 2).astype(np.float64))

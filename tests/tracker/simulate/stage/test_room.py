@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from tracker.errors import TrackerError
 from tracker.simulate.stage.camera_rig import make_cameras
-from tracker.simulate.stage.furniture import HALF_WIDTH_M
+from tracker.simulate.stage.furniture import HALF_WIDTH_M, ROOMS, furnished
 from tracker.simulate.stage.room import SHADOW_CELL_M, floor_shadow, see_room
 
 SIZE = (160, 120)
@@ -40,6 +41,19 @@ def test_the_same_seed_furnishes_the_same_room_and_another_another():
     first, again, other = (see_room(camera, seed).image for seed in (0, 0, 1))
     assert np.array_equal(first, again)
     assert np.mean(np.abs(first - other) > 0.05) > 0.05
+
+
+def test_rooms_of_each_kind_look_different():
+    camera = make_cameras(4, SIZE, 0)[1]
+    images = {kind: see_room(camera, 0, kind).image for kind in ROOMS}
+    edges = {kind: np.abs(np.diff(image, axis=1)).mean() for kind, image in images.items()}
+    assert edges["laboratory"] > 2 * edges["studio"]
+    assert images["theater"].mean() < 0.5 * images["studio"].mean()
+
+
+def test_a_room_of_another_kind_is_refused():
+    with pytest.raises(TrackerError, match="expected one of the rooms laboratory, studio, theater, found 'cave'"):
+        furnished(0, "cave")
 
 
 def test_a_slab_shades_the_floor_away_from_the_lamp():
