@@ -1,6 +1,7 @@
 """Track people forward through the frames of a run: predict, observe, estimate, remember."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from tracker.body.model import PosedBody, ahead
 from tracker.compute.threads import map_parallel
@@ -43,77 +44,125 @@ def track_forward(
     Yields:
         The poses of each frame.
     """
-    observer, subjects, frames, models = run.observer, run.subjects, run.frames, run.subjects.models
-    several, held = len(models) > 1, subjects.without_keyframes() if run.estimates_keyframes else subjects
-    memories = [_memory(run, p, start) for p, start in enumerate(run.start)]
-    learns_static, edges = settings.segments and settings.edges.static, settings.edges
-    static_edges = [StaticEdgeModel(c.size) for c in observer.working_cameras] if learns_static else None
-    cameras, chosen = observer.working_cameras, _Regions(run, edges.whole_images)
-
-    def placed(frame: int, predict: _Predict) -> Bodies:
-        return _placed(held, memories, frame, lambda m: predict(m, settings.predict))
-
-    def observe(
-        frame: int, bodies: Bodies, where: Sequence[Region | None]
-    ) -> tuple[list[Contour], tuple[ViewEvidence, ...]]:
-        """Return the contours of all people in each view, and the evidence around them."""
-        times = observer.ahead_frames(frame)
-        contours = [occluding_contours.trace(ahead(bodies, t), c) for c, t in zip(cameras, times, strict=True)]
-        visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
-        return contours, observer.evidence(frame, where, visible, static_edges, edges)
-
-    for i, frame in enumerate(frames):
-        if i == 0:  # a run that goes on from known poses uses the regions that one without a break would use
-            if run.regions is not None:
-                chosen.look_ahead(frame, ())
-            elif several and all(len(m.history) > 1 for m in memories):
-                chosen.look_ahead(frame, placed(frame, PersonMemory.predict_before_last))
-            observer.prefetch(frame, chosen.ahead or None, learns_static, edges)
-        keyframes, fixed = subjects.keyframes_at(frame), held.keyframes_at(frame)
-        predicted = _moving(run, memories, placed(frame, PersonMemory.predict), i)
-        where = chosen.around(predicted)
-        following = frames[i + 1 : i + 2]
-        for k in following if chosen.is_ahead else ():
-            chosen.look_ahead(k, placed(k, PersonMemory.predict_two_ahead))
-            observer.prefetch(k, chosen.ahead, learns_static, edges)
-        contours, views = observe(frame, predicted, where)
-        starts, settled = dict[int, SearchedStart](), dict[int, PosedBody]()
-        if i == 0 and not lead_in:
-            begun = StartFrame(
-                predicted, contours, views, lambda bodies: observe(frames[0], bodies, chosen.new(bodies))[1]
-            )
-            starts = settle_starts(begun, memories, subjects.tracked, settings)
-            settled = {p: s.body for p, s in starts.items() if s.taken}
-            for p, body in settled.items():
-                memories[p] = _memory(run, p, body.values)
-            if not settled.keys() <= fixed.keys():
-                predicted = tuple(b if p in fixed else settled.get(p, b) for p, b in enumerate(predicted))
-                contours, views = observe(frame, predicted, chosen.new(predicted))
-        for k in () if chosen.is_ahead else following:  # for one person later: this frame has kept all cores busy
-            observer.prefetch(k)
-        estimator = make_estimator(views, memories, predicted, settings, contours)
-        estimates = estimator.estimate([p for p in subjects.tracked if p not in fixed])
-        statuses: list[Status] = [
-            estimates[p].status if p in estimates and p not in keyframes else "good" for p in range(len(models))
-        ]
-        learnt = _learnt(estimator.bodies, {p: v for p, v in keyframes.items() if p not in fixed})
-        # If a frame contradicts its keyframe, colours are learnt from the settled pose.
-        learnt = tuple(settled.get(p, b) if p in keyframes else b for p, b in enumerate(learnt))
-        _remember(memories, estimator, learnt, statuses, keyframes)
-        cost_of = chamfer_cost(views, estimator.bodies, settings)
-        if static_edges is not None:
-            there = cost_of if learnt == estimator.bodies else chamfer_cost(views, learnt, settings)
-            update_static_edges(static_edges, views, there.predicted_pieces_px)
+    way = _ForwardPass(run, settings, make_estimator)
+    for i in range(len(run.frames)):
+        found = way.estimate(i, is_start=i == 0 and not lead_in)
         if i >= lead_in:
-            found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in range(len(models))]
-            found = [e.after(starts[p].trace) if p in starts else e for p, e in enumerate(found)]
-            yield make_estimate(frame, cost_of, estimator.bodies, found, settings)
+            yield found
 
 
-def _memory(run: TrackingRun, person: int, start: Array | Sequence[Array]) -> PersonMemory:
-    """Return the state of a person who begins in some poses."""
-    model, active = run.subjects.models[person], run.subjects.active_dofs[person]
-    return PersonMemory(model, start, active, len(run.subjects.models) == 1, run.searches_around)
+class _Seen(NamedTuple):
+    """All people on a frame before they are refined, and the evidence around them."""
+
+    bodies: Bodies
+    contours: list[Contour]
+    """Of all people in each view."""
+    views: tuple[ViewEvidence, ...]
+
+
+class _ForwardPass:
+    """The state of a run from frame to frame."""
+
+    def __init__(self, run: TrackingRun, settings: EstimationSettings, make_estimator: type[FrameEstimator]) -> None:
+        """Begin before the first frame; see `track_forward`."""
+        self._run, self._settings, self._make_estimator = run, settings, make_estimator
+        self._held = run.subjects.without_keyframes() if run.estimates_keyframes else run.subjects
+        self._memories = [self._memory(p, start) for p, start in enumerate(run.start)]
+        cameras, self._learns_static = run.observer.working_cameras, settings.segments and settings.edges.static
+        self._static_edges = [StaticEdgeModel(c.size) for c in cameras] if self._learns_static else None
+        self._regions = _Regions(run, settings.edges.whole_images)
+
+    def estimate(self, i: int, is_start: bool) -> PoseEstimate:
+        """Estimate the ith frame of the run, and learn from it.
+
+        Args:
+            i: the frames before it have been estimated.
+            is_start: whether the poses before the run were not tracked, and are compared with their surroundings.
+        """
+        run, settings, subjects, frame = self._run, self._settings, self._run.subjects, self._run.frames[i]
+        if i == 0:
+            self._read_first(frame)
+        predicted = _moving(run, self._memories, self._placed(frame, PersonMemory.predict), i)
+        where, following = self._regions.around(predicted), run.frames[i + 1 : i + 2]
+        for k in following if self._regions.is_ahead else ():
+            self._regions.look_ahead(k, self._placed(k, PersonMemory.predict_two_ahead))
+            self._read_ahead(k)
+        seen = self._observe(frame, predicted, where)
+        seen, starts = self._settled(seen) if is_start else (seen, {})
+        for k in () if self._regions.is_ahead else following:  # for one person now: this frame has kept all cores busy
+            run.observer.prefetch(k)
+        estimator = self._make_estimator(seen.views, self._memories, seen.bodies, settings, seen.contours)
+        keyframes, fixed = subjects.keyframes_at(frame), self._held.keyframes_at(frame)
+        estimates = estimator.estimate([p for p in subjects.tracked if p not in fixed])
+        people, statuses = range(len(subjects.models)), list[Status]()
+        for p in people:
+            statuses.append(estimates[p].status if p in estimates and p not in keyframes else "good")
+        cost_of = self._learn(frame, estimator, seen.views, statuses, starts)
+        found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in people]
+        found = [e.after(starts[p].trace) if p in starts else e for p, e in enumerate(found)]
+        return make_estimate(frame, cost_of, estimator.bodies, found, settings)
+
+    def _memory(self, person: int, start: Array | Sequence[Array]) -> PersonMemory:
+        """Return the state of a person who begins in some poses."""
+        subjects, is_alone = self._run.subjects, len(self._run.subjects.models) == 1
+        model, active = subjects.models[person], subjects.active_dofs[person]
+        return PersonMemory(model, start, active, is_alone, self._run.searches_around)
+
+    def _placed(self, frame: int, predict: _Predict) -> Bodies:
+        return _placed(self._held, self._memories, frame, lambda m: predict(m, self._settings.predict))
+
+    def _read_first(self, frame: int) -> None:
+        """Read the first frame. A run that goes on from known poses uses the regions of one without a break."""
+        goes_on = len(self._memories) > 1 and all(len(m.history) > 1 for m in self._memories)
+        if self._run.regions is not None:
+            self._regions.look_ahead(frame, ())
+        elif goes_on:
+            self._regions.look_ahead(frame, self._placed(frame, PersonMemory.predict_before_last))
+        self._read_ahead(frame)
+
+    def _read_ahead(self, frame: int) -> None:
+        self._run.observer.prefetch(frame, self._regions.ahead or None, self._learns_static, self._settings.edges)
+
+    def _observe(self, frame: int, bodies: Bodies, where: Sequence[Region | None]) -> _Seen:
+        """Trace the contours of all people in each view, and compute the evidence around them."""
+        observer, settings = self._run.observer, self._settings
+        times = zip(observer.working_cameras, observer.ahead_frames(frame), strict=True)
+        contours = [occluding_contours.trace(ahead(bodies, t), c) for c, t in times]
+        visible = [visible_pieces_px(c) for c in contours] if settings.segments else None
+        return _Seen(bodies, contours, observer.evidence(frame, where, visible, self._static_edges, settings.edges))
+
+    def _settled(self, seen: _Seen) -> tuple[_Seen, dict[int, SearchedStart]]:
+        """Search the poses that the run begins with, where the first frame contradicts them; return what is seen from
+        there, and the searches by person."""
+        frame, fixed = self._run.frames[0], self._held.keyframes_at(self._run.frames[0])
+        begun = StartFrame(*seen, lambda bodies: self._observe(frame, bodies, self._regions.new(bodies)).views)
+        starts = settle_starts(begun, self._memories, self._run.subjects.tracked, self._settings)
+        settled = {p: s.body for p, s in starts.items() if s.taken}
+        for p, body in settled.items():
+            self._memories[p] = self._memory(p, body.values)
+        if not settled.keys() <= fixed.keys():
+            bodies = tuple(b if p in fixed else settled.get(p, b) for p, b in enumerate(seen.bodies))
+            seen = self._observe(frame, bodies, self._regions.new(bodies))
+        return seen, starts
+
+    def _learn(
+        self, frame: int, estimator: FrameEstimator, views: Sequence[ViewEvidence], statuses: Sequence[Status],
+        starts: Mapping[int, SearchedStart],
+    ) -> ChamferCost:  # fmt: skip
+        """Learn from the poses of a frame, and return the cost around its estimates.
+
+        If a frame contradicts its keyframe, colours are learnt from the settled pose.
+        """
+        keyframes, fixed = self._run.subjects.keyframes_at(frame), self._held.keyframes_at(frame)
+        learnt = _learnt(estimator.bodies, {p: v for p, v in keyframes.items() if p not in fixed})
+        settled = {p: starts[p].body for p in starts if starts[p].taken and p in keyframes}
+        learnt = tuple(settled.get(p, b) for p, b in enumerate(learnt))
+        _remember(self._memories, estimator, learnt, statuses, keyframes)
+        cost_of = chamfer_cost(views, estimator.bodies, self._settings)
+        if self._static_edges is not None:
+            there = cost_of if learnt == estimator.bodies else chamfer_cost(views, learnt, self._settings)
+            update_static_edges(self._static_edges, views, there.predicted_pieces_px)
+        return cost_of
 
 
 class _Regions:
