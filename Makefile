@@ -1,14 +1,16 @@
 # Everything happens in .venv. The files .venv/.* mark finished steps, so that a second run is quick.
 # Needs Python 3.11 or newer with pip, and make; no other program and no rights.
 
-PYTHON ?= $(shell command -v python3.11 || command -v python3)
+WHERE := 'import sys; print(sys.executable)'
+# The first that runs: of versions that are not chosen, pyenv has names that do not.
+PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell $(name) -c $(WHERE) 2>/dev/null)))
 VENV := .venv
 BIN := $(VENV)/bin
 # Without compiling to bytecode: the first import of a module does that, and most modules are never imported.
 PIP_INSTALL := $(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile --constraint constraints.txt --editable
 SITE := $(VENV)/site
 # Interpreters that a release is tried with.
-RELEASE_PYTHONS ?= $(foreach version,3.11 3.12 3.13,$(shell command -v python$(version)))
+RELEASE_PYTHONS ?= $(foreach version,3.11 3.12 3.13,$(shell python$(version) -c $(WHERE) 2>/dev/null))
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile
 PYTHON_FILES := app tracker tests
 PARALLEL := $(MAKE) --jobs 4 $(if $(filter output-sync,$(.FEATURES)),--output-sync)
@@ -92,6 +94,7 @@ clean:
 
 # A pip of today resolves in two thirds of the time of the one that Python 3.11 brings.
 $(BIN)/python:
+	@test -n "$(PYTHON)" || { echo "expected Python 3.11 or newer, found none: make PYTHON=..."; exit 1; }
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Quadrille needs Python 3.11 or newer: make PYTHON=...")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip --disable-pip-version-check --quiet install --no-compile --constraint constraints.txt --upgrade pip
