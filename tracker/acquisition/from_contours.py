@@ -187,7 +187,7 @@ def _fit_to_voxels(
     settings: VoxelSizeSettings, report: Callable[[float], None],
 ) -> VoxelSizes:  # fmt: skip
     """Fit sizes to the voxels of some frames. On each, the person is the first of the people."""
-    finder = SilhouetteFinder(observer.cameras, observer.recording)
+    finder = SilhouetteFinder(observer.cameras, observer.recording, in_recording=observer.in_recording)
     try:
         seen = [SilhouettedPerson(k, finder.silhouettes(k), own) for k, own in people.items()]
     finally:

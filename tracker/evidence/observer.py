@@ -112,11 +112,16 @@ class Observer:
         self, chosen: Sequence[int]
     ) -> tuple[list[CameraSource], Recording, list[int], list[Foreground], KeypointEvidence | None, bool]:
         """Return the arguments of an observer of some of the views."""
-        known = range(len(self.cameras)) if self._in_recording is None else self._in_recording
+        known = self.in_recording
         cameras = [self.cameras[i] for i in chosen]
         keypoints = None if self.keypoints is None else self.keypoints.of_views(chosen)
         in_recording, views = [known[i] for i in chosen], [self._views[i] for i in chosen]
         return cameras, self.recording, in_recording, views, keypoints, self._is_in_time
+
+    @property
+    def in_recording(self) -> Sequence[int]:
+        """Index of each view in the recording, (V,)."""
+        return range(len(self.cameras)) if self._in_recording is None else self._in_recording
 
     @property
     def working_cameras(self) -> tuple[Camera, ...]:

@@ -72,6 +72,7 @@ class SilhouetteFinder:
         recording: Recording,
         shading: Shading = SHADOWS_AND_HIGHLIGHTS,
         step: Callable[[], None] = lambda: None,
+        in_recording: Sequence[int] | None = None,
     ) -> None:
         """Read the backgrounds, or learn them from the recording where there are none.
 
@@ -81,12 +82,13 @@ class SilhouetteFinder:
             shading: changes of the light that are background.
             step: called for each image whose background is learnt or subtracted, from several threads. An exception
                 that it raises ends the work.
+            in_recording: index of each view in the recording, if it has others too.
 
         Raises:
             RecordingError: a background is unreadable or of the wrong size.
         """
         self.cameras, self.recording = tuple(cameras), recording
-        self._shading, self._step = shading, step
+        self._shading, self._step, self._in_recording = shading, step, in_recording
         # Without a lens, a camera's working view is the footage itself, reduced.
         self._views = [WorkingView(replace(c.camera, distortion=np.zeros(0), fisheye=False)) for c in self.cameras]
         self._pool = ThreadPoolExecutor(2, "silhouettes", initializer=cv2.setNumThreads, initargs=(1,))
@@ -103,7 +105,8 @@ class SilhouetteFinder:
             RecordingError: the frame or a mask cannot be read.
         """
         shown = [c.clock.nearest(k, self.recording.n_frames) for c in self.cameras]
-        frames = self.recording.read(k) if set(shown) == {k} else self.recording.read_each(shown)
+        of, where = self.recording, self._in_recording
+        frames = of.read(k, where) if set(shown) == {k} else of.read_each(shown, where)
         return tuple(self._pool.map(lambda i: self._silhouette(i, frames[i], shown[i], person), range(len(frames))))
 
     def close(self) -> None:
@@ -146,9 +149,9 @@ class SilhouetteFinder:
         return self._learnt(i) if found is None else found
 
     def _learnt(self, i: int) -> BackgroundModel:
-        last = self.recording.n_frames - 1
+        last, view = self.recording.n_frames - 1, i if self._in_recording is None else self._in_recording[i]
         spread = sorted({round(j * last / (N_LEARNED - 1)) for j in range(N_LEARNED)})
-        frames = (self.recording.read_view(i, k) for k in spread)
+        frames = (self.recording.read_view(view, k) for k in spread)
         images = [self._smooth(i, f) for f in frames if f is not None]
         if not images:
             raise RecordingError(

@@ -85,6 +85,16 @@ def test_the_recording_itself_gives_the_background(camera):
     assert silhouette.source == "recording"
 
 
+def test_a_finder_of_some_of_the_views_reads_their_footage(camera, tmp_path):
+    (tmp_path / "empty").mkdir()
+    for i in range(N):
+        cv2.imwrite(str(tmp_path / "empty" / f"{i:03d}.png"), texture().round().astype(np.uint8))
+    other, camera = replace(camera, footage=tmp_path / "empty"), replace(camera, background=None)
+    with Recording([other, camera]) as recording:
+        (silhouette,) = SilhouetteFinder([camera], recording, in_recording=[1]).silhouettes(4)
+    assert jaccard(silhouette.mask, person(4)) > 0.9
+
+
 def test_masks_come_first_and_may_be_numbered(camera, tmp_path):
     masks = tmp_path / "masks"
     masks.mkdir()

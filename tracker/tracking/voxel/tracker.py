@@ -20,7 +20,8 @@ class VoxelTracker:
 
     def estimates(self, run: TrackingRun) -> Iterator[PoseEstimate]:
         """See `Tracker.estimates`."""
-        finder = SilhouetteFinder(run.observer.cameras, run.observer.recording)
+        of = run.observer
+        finder = SilhouetteFinder(of.cameras, of.recording, in_recording=of.in_recording)
 
         def silhouettes_of(frame: int) -> Sequence[ViewSilhouette]:
             found = finder.silhouettes(frame)
