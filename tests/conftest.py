@@ -78,6 +78,12 @@ def pytest_xdist_make_scheduler(config, log):
     return OneForSources(config, log) if config.getoption("dist") == "loadfile" else None
 
 
+def pytest_runtest_logreport(report):
+    """Name a failure at once: a run of hours may be broken off before its summary."""
+    if report.failed:
+        print(f"\nfailed: {report.nodeid}", flush=True)
+
+
 def pytest_collection_finish():
     """Leave what was imported and collected out of garbage collection, which otherwise costs a tenth of the time."""
     gc.collect()
