@@ -358,7 +358,7 @@ def test_without_a_command_the_page_is_opened(run, session, monkeypatch):
     asked, samples, browsed = [], [], []
     monkeypatch.setattr(
         "app.server.workbench.open_session",
-        lambda found, doorway, compiler, say: asked.append((found.folder, doorway.serving)),
+        lambda found, doorway, *_: asked.append((found.folder, doorway.serving)),
     )
     monkeypatch.setattr("app.session.samples.sample_copy", lambda *words: samples.append(words) or session)
     monkeypatch.setattr("app.server.doorway.listen", lambda host, _: address.listen(host, 0))

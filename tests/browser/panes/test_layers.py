@@ -115,7 +115,10 @@ async def test_layers_are_remembered_and_reset(page, endpoint):
     await page.keyboard.press("a")
     await page.get_by_role("button", name="Reset layers").click()
     await until(
-        lambda: endpoint.views[-1]["layers"] == ["image", "contours", "joints", "alternatives", "epipolar", "axes"]
+        lambda: (
+            endpoint.views[-1]["layers"]
+            == ["image", "contours", "joints", "alternatives", "epipolar", "imported", "axes"]
+        )
     )
     assert (await state_of(page))["layers"]["opacity"]["silhouette"] == 0.45
 

@@ -177,14 +177,15 @@ async def test_zoom_stays_at_the_pointer_and_zero_resets_it(page):
 @pytest.mark.slow
 async def test_layers_are_asked_for_and_shown_at_once(page, endpoint):
     (first,) = endpoint.views
-    assert first["layers"] == ["image", "contours", "joints", "alternatives", "epipolar", "axes"]
+    assert first["layers"] == ["image", "contours", "joints", "alternatives", "epipolar", "imported", "axes"]
     assert first["reductions"] == pytest.approx([1 / view["scale"] for view in (await state_of(page))["views"]])
     await page.locator("#quick-layers").get_by_text("Distance").click()
     await shows(page, "'distance 3' in quadrille.state.shown.pictures")
     await page.locator("#quick-layers").get_by_text("Contours").click()
     await page.locator("#quick-layers").get_by_text("Joints").click()
     await shows(page, f"({DRAWN}) === 0")
-    await until(lambda: set(endpoint.views[-1]["layers"]) == {"image", "distance", "alternatives", "epipolar", "axes"})
+    others = {"alternatives", "epipolar", "imported", "axes"}
+    await until(lambda: set(endpoint.views[-1]["layers"]) == {"image", "distance"} | others)
 
 
 async def test_contours_and_joints_are_drawn_in_the_persons_colour(page):

@@ -200,7 +200,8 @@ async def test_the_menu_counts_what_there_is_to_go_to(page):
     counts = {await r.locator("span").inner_text(): await r.locator("output").inner_text() for r in await rows.all()}
     assert counts == {
         "Doubtful or lost": "3", "Ambiguous": "2", "Not reviewed": "80", "Inconsistent": "2",
-        "Earlier calibration": "0", "Keyframes": "5", "Without a pose": "20",
+        "Earlier calibration": "0", "Other copy differs": "0", "Filtered by provenance": "0", "Keyframes": "5",
+        "Without a pose": "20",
     }  # fmt: skip
     await rows.nth(3).locator("button").nth(1).click()
     await shows(page, "quadrille.state.shown.frame === 44")
