@@ -172,7 +172,7 @@ async def test_the_list_of_keys_is_searched_and_fits(page):
         assert box["x"] + box["width"] <= width
         assert inner["y"] + inner["height"] <= box["y"] + box["height"] <= height  # the end can be scrolled to
         assert await scroller.evaluate("(element) => element.scrollWidth <= element.clientWidth")
-    assert await scroller.evaluate("(element) => element.scrollHeight <= element.clientHeight")  # nothing is below
+        assert await scroller.evaluate("(element) => element.scrollHeight <= element.clientHeight")  # nothing is below
     assert "More" not in await page.locator("#key-list h3").all_inner_texts()  # every key is about something
     await page.keyboard.type("previous doubt")
     assert await page.locator("#key-list dd:visible").all_inner_texts() == [
