@@ -88,7 +88,8 @@ class SilhouetteFinder:
             RecordingError: a background is unreadable or of the wrong size.
         """
         self.cameras, self.recording = tuple(cameras), recording
-        self._shading, self._step, self._in_recording = shading, step, in_recording
+        self._shading, self._step = shading, step
+        self._in_recording = range(len(self.cameras)) if in_recording is None else in_recording
         # Without a lens, a camera's working view is the footage itself, reduced.
         self._views = [WorkingView(replace(c.camera, distortion=np.zeros(0), fisheye=False)) for c in self.cameras]
         self._pool = ThreadPoolExecutor(2, "silhouettes", initializer=cv2.setNumThreads, initargs=(1,))
@@ -149,7 +150,7 @@ class SilhouetteFinder:
         return self._learnt(i) if found is None else found
 
     def _learnt(self, i: int) -> BackgroundModel:
-        last, view = self.recording.n_frames - 1, i if self._in_recording is None else self._in_recording[i]
+        last, view = self.recording.n_frames - 1, self._in_recording[i]
         spread = sorted({round(j * last / (N_LEARNED - 1)) for j in range(N_LEARNED)})
         frames = (self.recording.read_view(view, k) for k in spread)
         images = [self._smooth(i, f) for f in frames if f is not None]

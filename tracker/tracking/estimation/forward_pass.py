@@ -21,7 +21,6 @@ from tracker.tracking.estimation.frame_problem import Bodies
 from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost
 from tracker.tracking.estimation.start_pose import SearchedStart, StartFrame, settle_starts
 from tracker.tracking.person_memory import PersonMemory
-from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.view_regions import confirmed_regions, regions, regions_ahead, visible_pieces_px
 
@@ -46,9 +45,22 @@ def track_forward(
     """
     way = _ForwardPass(run, settings, make_estimator)
     for i in range(len(run.frames)):
-        found = way.estimate(i, is_start=i == 0 and not lead_in)
+        found = way.advance(i, is_start=i == 0 and not lead_in)
         if i >= lead_in:
-            yield found
+            yield way.collected(found)
+
+
+class _Found(NamedTuple):
+    """What was found on a frame, and learnt from."""
+
+    frame: int
+    estimator: FrameEstimator
+    estimates: Mapping[int, PersonEstimate]
+    """Of the people who have no fixed pose."""
+    starts: Mapping[int, SearchedStart]
+    """Searches of the poses that the run began with, by person."""
+    cost_of: ChamferCost
+    """Around the estimated poses."""
 
 
 class _Seen(NamedTuple):
@@ -72,7 +84,7 @@ class _ForwardPass:
         self._static_edges = [StaticEdgeModel(c.size) for c in cameras] if self._learns_static else None
         self._regions = _Regions(run, settings.edges.whole_images)
 
-    def estimate(self, i: int, is_start: bool) -> PoseEstimate:
+    def advance(self, i: int, is_start: bool) -> _Found:
         """Estimate the ith frame of the run, and learn from it.
 
         Args:
@@ -94,13 +106,19 @@ class _ForwardPass:
         estimator = self._make_estimator(seen.views, self._memories, seen.bodies, settings, seen.contours)
         keyframes, fixed = subjects.keyframes_at(frame), self._held.keyframes_at(frame)
         estimates = estimator.estimate([p for p in subjects.tracked if p not in fixed])
-        people, statuses = range(len(subjects.models)), list[Status]()
-        for p in people:
-            statuses.append(estimates[p].status if p in estimates and p not in keyframes else "good")
+        people = range(len(subjects.models))
+        statuses: list[Status] = [
+            estimates[p].status if p in estimates and p not in keyframes else "good" for p in people
+        ]
         cost_of = self._learn(frame, estimator, seen.views, statuses, starts)
-        found = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in people]
-        found = [e.after(starts[p].trace) if p in starts else e for p, e in enumerate(found)]
-        return make_estimate(frame, cost_of, estimator.bodies, found, settings)
+        return _Found(frame, estimator, estimates, starts, cost_of)
+
+    def collected(self, found: _Found) -> PoseEstimate:
+        """Collect the estimates of all people of a frame."""
+        frame, estimator, estimates, starts, cost_of = found
+        people = [estimates[p] if p in estimates else estimator.estimate_fixed(p) for p in range(len(estimator.bodies))]
+        people = [e.after(starts[p].trace) if p in starts else e for p, e in enumerate(people)]
+        return make_estimate(frame, cost_of, estimator.bodies, people, self._settings)
 
     def _memory(self, person: int, start: Array | Sequence[Array]) -> PersonMemory:
         """Return the state of a person who begins in some poses."""
@@ -109,7 +127,13 @@ class _ForwardPass:
         return PersonMemory(model, start, active, is_alone, self._run.searches_around)
 
     def _placed(self, frame: int, predict: _Predict) -> Bodies:
-        return _placed(self._held, self._memories, frame, lambda m: predict(m, self._settings.predict))
+        """Return all people on a frame: in their keyframes, as predicted, or where they stay if not tracked."""
+        subjects, keyframes, settings = self._held, self._held.keyframes_at(frame), self._settings.predict
+        poses = [
+            keyframes.get(p, predict(m, settings) if p in subjects.tracked else m.history[-1])
+            for p, m in enumerate(self._memories)
+        ]
+        return tuple(PosedBody(m, v) for m, v in zip(subjects.models, poses, strict=True))
 
     def _read_first(self, frame: int) -> None:
         """Read the first frame. A run that goes on from known poses uses the regions of one without a break."""
@@ -191,15 +215,6 @@ class _Regions:
     def new(self, bodies: Bodies) -> list[Region | None]:
         """Return regions around all bodies."""
         return self._whole or regions(self._cameras, bodies)
-
-
-def _placed(
-    subjects: Subjects, memories: Sequence[PersonMemory], frame: int, predict: Callable[[PersonMemory], Array]
-) -> Bodies:
-    """Return all people on a frame, in their keyframes, as predicted, or where they stay if they are not tracked."""
-    keyframes = subjects.keyframes_at(frame)
-    poses = [keyframes.get(p, predict(m) if p in subjects.tracked else m.history[-1]) for p, m in enumerate(memories)]
-    return tuple(PosedBody(m, v) for m, v in zip(subjects.models, poses, strict=True))
 
 
 def _learnt(bodies: Bodies, keyframes: Mapping[int, Array]) -> Bodies:
