@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from tracker.session.session import load_session
-from tracker.simulate.motion.scenes import SCENES
+from tracker.simulate.motion.scenes import SCENES, cast_of
 from tracker.simulate.people.population import POPULATION
 from tracker.simulate.stage.furniture import ROOMS
 
@@ -33,7 +33,7 @@ def random_scene(draw: random.Random, out: Path) -> Words:
     scene, room = draw.choice(sorted(SCENES)), draw.choice(sorted(ROOMS))
     words: Words = ["simulate", out, "--scene", scene, "--seed", draw.randrange(1000), "--room", room]
     words += ["--size", *SIZE, "--cameras", draw.randint(2, 6), "--frames", draw.randint(2, 14)]
-    if draw.random() < 0.5 and "couple" not in scene and scene not in ("tango", "crowd_of_three"):
+    if draw.random() < 0.5 and len(cast_of(scene)) == 1:
         words += ["--person", draw.choice(sorted(POPULATION))]
     if draw.random() < 0.2:
         words += ["--fisheye", "all"]
