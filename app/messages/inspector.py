@@ -366,8 +366,8 @@ class CameraCheck(Part, frozen=True):
     misfit_mm: float
     kinds: tuple[str, ...]
     """How it is off: `rotation`, `position`, `focal`, `time`, `drift`; empty where it is not."""
-    rivals: tuple[str, ...]
-    """Kinds that explain the contours as well."""
+    rivals: dict[str, tuple[float, ...]]
+    """The numbers of each kind that explains the contours as well, in the units of its field."""
     rotation_deg: tuple[float, ...]
     """About its right, down and forward axes."""
     position_mm: tuple[float, ...]

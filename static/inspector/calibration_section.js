@@ -226,7 +226,11 @@ function mended(camera) {
     return names.map(([name, title], i) => ({ text: `${name} ${signed(values[i], digits)} ± ${sigmas[i].toFixed(digits)}${unit}`, title }));
   });
   if (camera.since_frame !== null) lines.push({ text: `since frame ${camera.since_frame}`, title: "" });
-  if (camera.rivals.length) lines.push({ text: `or ${camera.rivals.map((kind) => WORDS[kind]).join(" or ")}`, title: "Explains the contours as well" });
+  for (const [kind, values] of Object.entries(camera.rivals)) {
+    const { names, unit, digits } = NUMBERS[kind];
+    const numbers = names.map(([name], i) => `${name} ${signed(values[i], digits)}${unit}`);
+    lines.push({ text: `or ${WORDS[kind]}: ${numbers.join(", ")}`, title: "Explains the contours as well" });
+  }
   return lines;
 }
 

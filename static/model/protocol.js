@@ -211,9 +211,9 @@
  * @typedef {{camera: number, people: [number, number, number, number][][]}} SilhouetteAxes
  * @typedef {{type: "finding", running: boolean, stage: string, share: number, notes: string[], message: string, failed:
  *   boolean, tried: number | null, camera: number | null, frame: number | null, axes: SilhouetteAxes[]}} FindingMessage
- * @typedef {{name: string, misfit_px: number, misfit_mm: number, kinds: string[], rivals: string[], rotation_deg:
- *   number[], position_mm: number[], focal_percent: number, time_ms: number, drift_ms_per_s: number, sigma:
- *   Record<string, number[]>, since_frame: number | null, is_seen: boolean}} CameraCheck
+ * @typedef {{name: string, misfit_px: number, misfit_mm: number, kinds: string[], rivals: Record<string, number[]>,
+ *   rotation_deg: number[], position_mm: number[], focal_percent: number, time_ms: number, drift_ms_per_s: number,
+ *   sigma: Record<string, number[]>, since_frame: number | null, is_seen: boolean}} CameraCheck
  * @typedef {{camera: number, u: number, v: number, du: number, dv: number}} MisfitArrow
  * @typedef {{type: "calibration", running: boolean, stage: string, share: number, message: string, failed: boolean,
  *   is_checked: boolean, frames: number[], cameras: CameraCheck[], sentences: string[], misfits: MisfitArrow[],

@@ -1,11 +1,12 @@
 """What a second worker gains: `python tests/benchmarks/batch_workers.py --data DIR`.
 
-Twelve copies of a recording in DIR with a first pose are tracked as a batch, by one worker and by two in turn. Each
-line has the time by the clock, the processor time of the batch, how many cores it used on average, and how many all
-other programs of the machine used meanwhile: the clock tells only where those used few. The last lines have the ratio
-by the clock, and the lowest one that two cores allow: half of the processor time of two workers against the time of one
-worker. Beside it stands what the machine gives to two programs that share nothing: loops that do the same work, one
-after the other and at once. Linux only: it reads /proc.
+Twelve copies of a recording in DIR with a first pose are tracked as a batch in turn by one worker that is held to one
+core, by one worker and by two. Each line has the time by the clock, the processor time of the batch, how many cores it
+used on average, and how many all other programs of the machine used meanwhile: the clock tells only where those used
+few. The last lines have the time of two workers against that of one on one core and on all, and the lowest ratio that
+two cores allow: half of the processor time of two workers against the time of one worker. Beside it stands what the
+machine gives to two programs that share nothing: loops that do the same work, one after the other and at once. Linux
+only: it reads /proc.
 """
 
 import argparse
@@ -67,8 +68,8 @@ def second_core() -> float:
     return took[1] / (2 * took[0])
 
 
-def run(source: Path, n_workers: int, words: argparse.Namespace) -> Round:
-    """Track twelve copies of a session."""
+def run(source: Path, n_workers: int, cores: set[int], words: argparse.Namespace) -> Round:
+    """Track twelve copies of a session by workers that may use some of the cores."""
     with tempfile.TemporaryDirectory() as name:
         lab = Path(name)
         for i in range(N_RECORDINGS):
@@ -79,7 +80,13 @@ def run(source: Path, n_workers: int, words: argparse.Namespace) -> Round:
         )
         began, busy, used = time.monotonic(), busy_s(), used_s()
         command = [sys.executable, "-m", "app", "batch", str(lab / "plan.toml"), "--workers", str(n_workers)]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        subprocess.run(
+            command,
+            check=True,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            preexec_fn=lambda: os.sched_setaffinity(0, cores),
+        )
         wall_s, cpu_s = time.monotonic() - began, used_s() - used
         return Round(wall_s, cpu_s, (busy_s() - busy - cpu_s) / wall_s)
 
@@ -99,19 +106,26 @@ def main() -> None:
             source, sorted(data.glob("*.mp4")), data / "Calib.toml", background=data / "background"
         )
         set_pose_at_joints(session, 0, 0, read_joints(data / "ground_truth.trc", session.fps), fit_sizes=False)
-        rounds: dict[int, list[Round]] = {1: [], 2: []}
+        cores = os.sched_getaffinity(0)
+        kinds = {"1 on 1 core": (1, {min(cores)}), "1": (1, cores), "2": (2, cores)}
+        rounds: dict[str, list[Round]] = {kind: [] for kind in kinds}
         machine = list[float]()
-        print("workers   by the clock, s   processor time, s   cores   cores of others")
+        print("    workers   by the clock, s   processor time, s   cores   cores of others")
         for _ in range(words.rounds):
             machine.append(second_core())
-            for n, done in rounds.items():
-                done.append(run(source, n, words))
-                last = done[-1]
-                print(f"{n:7} {last.wall_s:17.1f} {last.cpu_s:19.1f} {last.cores:7.2f} {last.others:17.2f}", flush=True)
-    one, two = (median(r.wall_s for r in done) for done in rounds.values())
-    print(f"by the clock, two workers need {two / one:.2f} of the time of one")
-    least = min(r.cpu_s for r in rounds[2]) / 2 / min(r.wall_s for r in rounds[1])
-    print(f"two cores allow {least:.2f} at best; a worker alone uses {median(r.cores for r in rounds[1]):.2f} cores")
+            for kind, (n, own) in kinds.items():
+                last = run(source, n, own, words)
+                rounds[kind].append(last)
+                print(
+                    f"{kind:>11} {last.wall_s:17.1f} {last.cpu_s:19.1f} {last.cores:7.2f} {last.others:17.2f}",
+                    flush=True,
+                )
+    held, one, two = (median(r.wall_s for r in done) for done in rounds.values())
+    print(
+        f"by the clock, two workers need {two / held:.2f} of the time of one on one core, {two / one:.2f} of one on all"
+    )
+    least = min(r.cpu_s for r in rounds["2"]) / 2 / min(r.wall_s for r in rounds["1"])
+    print(f"two cores allow {least:.2f} at best; a worker alone uses {median(r.cores for r in rounds['1']):.2f} cores")
     print(f"two loops at once need {median(machine):.2f} of their time one after the other")
 
 

@@ -20,7 +20,6 @@ from tracker.calibration.viewed_frames import ViewedFrame, seen_people
 from tracker.compute.progress import Report, unreported
 from tracker.compute.threads import one_blas_thread
 from tracker.fitting.bundle import ArrowEquations, solve_bundle
-from tracker.fitting.hypothesis import CLEAR_NATS
 from tracker.geometry.arrays import Array
 
 
@@ -40,7 +39,7 @@ It fixes the gauge where several cameras are corrected; of one camera, contours 
 WORTH_NATS = 4.0
 """Fall of the cost, for each number that a fault corrects, from which it is taken for real. A number that fits noise
 gains half a nat, and one of 20,000 pixels is worth 4.8 nats by the Bayesian information criterion (Schwarz 1978), of as
-many as are independent some 4."""
+many as are independent some 4. Two faults that differ by less than they need explain the contours equally well."""
 
 
 class _Effort(NamedTuple):
@@ -95,8 +94,9 @@ class FoundFault(NamedTuple):
     fault: Fault
     gain_nats: float
     """Fall of the cost by it."""
-    rivals: tuple[Fault, ...]
-    """Faults that explained the contours as well when it was kept."""
+    rivals: Mapping[Fault, Array]
+    """Faults that explained the contours as well when it was kept, and the correction of their camera by each,
+    (N_CORRECTIONS,)."""
 
 
 class Step(NamedTuple):
@@ -297,13 +297,14 @@ class _Search:
         best = max(worth, key=lambda h: worth[h], default=None)
         if best is None or worth[best] <= 0:
             return None
-        rivals = [h for h in worth if h != best and worth[h] > worth[best] - CLEAR_NATS]
-        return FoundFault(best, fit.cost - fits[best].cost, tuple(rivals)), fits[best]
+        close = [h for h in worth if h != best and worth[h] > worth[best] - _needed(best)]
+        rivals = {h: fits[h].state.corrections[h.camera] for h in close}
+        return FoundFault(best, fit.cost - fits[best].cost, rivals), fits[best]
 
     def _raced(self, fit: _Fitted, faults: Mapping[Fault, Collection[Fault]]) -> dict[Fault, _Fitted]:
         """Fit each fault with those that go with it; not to the end where it cannot become the best or a rival."""
         fits = {h: self.refitted(fit, chosen, EFFORT.heat) for h, chosen in faults.items()}
-        least = min((f.cost + _needed(h) for h, f in fits.items()), default=0.0) + CLEAR_NATS
+        least = min((f.cost + 2 * _needed(h) for h, f in fits.items()), default=0.0)
         return {
             h: self.refitted(f, faults[h]) if f.cost + _needed(h) - f.promise < least else f for h, f in fits.items()
         }

@@ -1,6 +1,6 @@
 """Findings of a diagnosis on each camera: the correction, its certainty, its effect on the body, and its rivals."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -38,8 +38,9 @@ class CameraFinding(NamedTuple):
     """The same at the body, mm."""
     gain_nats: float
     """Fall of the cost by its corrections, or by the most likely one."""
-    rivals: tuple[str, ...]
-    """Kinds of corrections of the same camera that explain the contours as well."""
+    rivals: Mapping[str, Array]
+    """Kinds of corrections of the same camera that explain the contours as well, and the correction by each,
+    (N_CORRECTIONS,)."""
     is_seen: bool
     """Whether the camera shows contours of the people at all."""
 
@@ -55,13 +56,13 @@ def findings(diagnosis: Diagnosis, frames: Sequence[ViewedFrame], names: Sequenc
         shown = correction if kinds else diagnosis.steps[likely].correction
         misfit_px, misfit_mm = misfit(frames, i, shown)
         gain = sum(k.gain_nats for k in kept) if kinds else diagnosis.steps[likely].gain_nats
-        rivals = {r.kind for k in kept for r in k.rivals if r.camera == i} - set(kinds)
+        rivals = {r.kind: c for k in kept for r, c in k.rivals.items() if r.camera == i and r.kind not in kinds}
         named = kinds if misfit_px >= SEEN_PX or _is_followed(frames, i, kinds) else ()
         is_seen = any(len(f.views[i].points_px) for f in frames)
         out.append(
             CameraFinding(
                 name, named, correction if named else np.zeros(N_CORRECTIONS), _sigma(diagnosis, i), misfit_px,
-                misfit_mm, gain, tuple(sorted(rivals)), is_seen,
+                misfit_mm, gain, rivals, is_seen,
             )
         )  # fmt: skip
     return out

@@ -31,7 +31,7 @@ CHILD = textwrap.dedent("""
     folder, last, left = sys.argv[1], sys.argv[2], [int(sys.argv[3])]
     correction = np.fromstring(last, sep=",")
     cameras = [SimpleNamespace(
-        name=n, kinds=("rotation", "time", "drift") if n == "FRONT" else (), rivals=(), misfit_px=9.0, misfit_mm=50.0,
+        name=n, kinds=("rotation", "time", "drift") if n == "FRONT" else (), rivals={}, misfit_px=9.0, misfit_mm=50.0,
         gain_nats=100.0, is_seen=True, sigma=np.zeros_like(correction),
         correction=correction if n == "FRONT" else np.zeros_like(correction),
     ) for n in ("FRONT", "RIGHT", "BACK", "LEFT")]

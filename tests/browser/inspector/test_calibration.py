@@ -11,13 +11,13 @@ SIGMA = {
     "drift_ms_per_s": [1.5],
 }
 CAMERA = {
-    "name": "FRONT", "misfit_px": 0.4, "misfit_mm": 3.0, "kinds": [], "rivals": [], "rotation_deg": [0, 0, 0],
+    "name": "FRONT", "misfit_px": 0.4, "misfit_mm": 3.0, "kinds": [], "rivals": {}, "rotation_deg": [0, 0, 0],
     "position_mm": [0, 0, 0], "focal_percent": 0, "time_ms": 0, "drift_ms_per_s": 0, "sigma": SIGMA,
     "since_frame": None, "is_seen": True,
 }  # fmt: skip
 TURNED = CAMERA | {
-    "name": "LEFT", "misfit_px": 9.4, "misfit_mm": 70.0, "kinds": ["rotation", "time"], "rivals": ["position"],
-    "rotation_deg": [0.04, -1.1, -0.76], "time_ms": 37.2, "since_frame": 30,
+    "name": "LEFT", "misfit_px": 9.4, "misfit_mm": 70.0, "kinds": ["rotation", "time"],
+    "rivals": {"position": [1, -70, 0]}, "rotation_deg": [0.04, -1.1, -0.76], "time_ms": 37.2, "since_frame": 30,
 }  # fmt: skip
 CHECKED = {
     "type": "calibration", "running": False, "stage": "", "share": 0, "message": "", "failed": False,
@@ -52,8 +52,9 @@ async def test_a_check_names_the_camera_and_what_mends_it(page, endpoint, sectio
     await shows(page, "document.querySelector('.calibration-cameras')")
     rows = await page.locator(".calibration-cameras tbody tr").all_inner_texts()
     mended = ["pitch 0.04 ± 0.03°", "yaw −1.10 ± 0.03°", "roll −0.76 ± 0.20°", "time 37.2 ± 1.5 ms"]
+    also = "or moved: right 1 mm, down −70 mm, forward 0 mm"
     assert rows[0].split() == ["FRONT", "0.4", "3", "–"]
-    assert rows[1].split() == " ".join(["LEFT 9.4 70", *mended, "since frame 30", "or moved"]).split()
+    assert rows[1].split() == " ".join(["LEFT 9.4 70", *mended, "since frame 30", also]).split()
     await section.get_by_role("button", name="Preview").click()
     await until(lambda: endpoint.received[-1] == {"type": "calibration_check", "action": "preview"})
     await endpoint.broadcast(CHECKED | {"refused": "expected other frames to fit better, found 2 of 11"})

@@ -72,7 +72,7 @@ def test_a_small_rest_of_time_is_named_of_a_corrected_clock_alone():
     frames, corrections = viewed({}, range(1)), np.zeros((4, N_CORRECTIONS))
     corrections[1, TIME] = 0.0005
     nothing = Step(np.zeros(N_CORRECTIONS), np.zeros(N_CORRECTIONS), 0.0)
-    kept = (FoundFault(Fault(1, "time"), 30.0, ()),)
+    kept = (FoundFault(Fault(1, "time"), 30.0, {}),)
     steps = {h: nothing for i in range(4) for k in KINDS if (h := Fault(i, k)) != kept[0].fault}
     found = Diagnosis(corrections, np.zeros((corrections.size,) * 2), kept, steps, None)
     assert named(findings(found, frames, NAMES)) == []
