@@ -100,11 +100,16 @@ def _folder_for(path: Path) -> Generator[Path, None, None]:
         raise FormatError(f"{where} cannot be read: {error.strerror or error}; check the path") from error
 
 
-def _answer(path: Path, folder: Path) -> ReadAnswer:
+def _run(path: Path, folder: Path) -> None:
+    """Run the other process on a file; its answer goes to the folder."""
     root = str(Path(__file__).resolve().parents[3])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
     words = [sys.executable, "-m", "tracker.formats.keypoints.hdf5_process", str(path.resolve()), str(folder)]
     subprocess.run(words, env=environment, timeout=SECONDS, capture_output=True, check=False, stdin=subprocess.DEVNULL)
+
+
+def _answer(path: Path, folder: Path) -> ReadAnswer:
+    _run(path, folder)
     try:
         answer = msgspec.json.decode((folder / "answer.json").read_bytes(), type=ReadAnswer)
     except (OSError, msgspec.DecodeError) as error:
