@@ -22,19 +22,30 @@ def all_lines(path, kind):
     return list(read_lines(path, kind))
 
 
+def seconds(text):
+    """Return the processor time in which a text is parsed or refused."""
+    start = time.thread_time()
+    with contextlib.suppress(SessionError):
+        parse_toml(text, "x", KIND)
+    return time.thread_time() - start
+
+
+def plain_seconds(n):
+    """Return the processor time of an ordinary text of n characters."""
+    return seconds("".join(f"a{i:06}=1\n" for i in range(n // 10)))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("read", [read_text, read_toml, read_json, all_lines])
 def test_a_file_of_many_megabytes_is_refused_unread(tmp_path, read):
     """Parsed, this one took a minute and a half."""
     path = tmp_path / "a.toml"
     path.write_text(f"a = [{'0,' * 10_000_000}]")
-    start = time.thread_time()
     tracemalloc.start()
     with pytest.raises(SessionError, match=r"odd file .*a\.toml: expected at most 1 MB, found more; check that"):
         read(path, KIND)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert time.thread_time() - start < 0.1
     assert peak < 200_000
 
 
@@ -148,10 +159,9 @@ def test_lines(tmp_path, newline):
     ids=lambda text: text[:12],
 )
 def test_deep_nesting_is_refused_at_once(text):
-    start = time.thread_time()
     with pytest.raises(SessionError, match="odd file x: expected at most 32 levels of nesting, found more; correct it"):
         parse_toml(text, "x", KIND)
-    assert time.thread_time() - start < 0.5
+    assert seconds(text) < plain_seconds(100_000)
 
 
 @pytest.mark.parametrize(
@@ -184,9 +194,7 @@ def test_brackets_that_do_not_nest_are_read(text):
     ],
     ids=lambda text: text[:12],
 )  # fmt: skip
-def test_the_largest_files_take_less_than_two_seconds(text):
+def test_the_largest_files_take_little_longer_than_ordinary_ones(text):
+    """At most twice as long here; a search that starts again at each character takes hundreds of times as long."""
     assert len(text) <= KIND.max_bytes
-    start = time.thread_time()
-    with contextlib.suppress(SessionError):
-        parse_toml(text, "x", KIND)
-    assert time.thread_time() - start < 2.0
+    assert seconds(text) < 10 * plain_seconds(KIND.max_bytes)

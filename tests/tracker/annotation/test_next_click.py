@@ -152,9 +152,12 @@ def test_units_are_limbs_and_the_trunk(session, model):
 
 
 @pytest.mark.slow
-def test_a_proposal_for_300_frames_takes_less_than_a_second(session):
-    poses = recording(session, ("right arm",), range(100, 160), lost=0.4, n=300)
-    propose(session, [poses])  # loads
-    start = time.process_time()
-    propose(session, [poses])
-    assert time.process_time() - start < 1.0
+def test_a_proposal_takes_time_in_proportion_to_the_frames(session):
+    times = []
+    for n in (75, 300):
+        poses = recording(session, ("right arm",), range(n // 3, n // 2), lost=0.4, n=n)
+        propose(session, [poses])  # loads
+        start = time.process_time()
+        propose(session, [poses])
+        times.append(time.process_time() - start)
+    assert times[1] < 8 * times[0]  # 16 if it grew by the square
