@@ -8,6 +8,14 @@ from page_driver import shows, state_of, until
 from tracker.store.records import SOURCES
 
 GUTTER, PADDING = 52, 8
+INSIDE_THE_MENU = """(() => {
+  const menu = document.querySelector("#jump-menu").getBoundingClientRect();
+  return [...document.querySelectorAll("#jump-menu button")].every((button) => {
+    const { left, right, top, bottom } = button.getBoundingClientRect();
+    return left >= menu.left && right <= menu.right && top >= menu.top && bottom <= menu.bottom;
+  });
+})()"""
+"""JavaScript: whether all buttons of the menu lie in it."""
 
 
 async def box_of(page):
@@ -193,6 +201,7 @@ async def test_timeline_and_curves_share_the_zoom(page):
 @pytest.mark.slow
 async def test_the_menu_counts_what_there_is_to_go_to(page):
     await page.locator("#show-jumps").click()
+    assert await page.evaluate(INSIDE_THE_MENU)
     await page.keyboard.press("Escape")
     assert await page.locator("#jump-menu").is_hidden()
     await page.locator("#show-jumps").click()
