@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, corrected, later_s
-from tracker.calibration.diagnosis import Diagnosis, Fault
+from tracker.calibration.diagnosis import Diagnosis, Fault, is_followed
 from tracker.calibration.viewed_frames import ViewedFrame
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
@@ -57,7 +57,7 @@ def findings(diagnosis: Diagnosis, frames: Sequence[ViewedFrame], names: Sequenc
         misfit_px, misfit_mm = misfit(frames, i, shown)
         gain = sum(k.gain_nats for k in kept) if kinds else diagnosis.steps[likely].gain_nats
         rivals = {r.kind: c for k in kept for r, c in k.rivals.items() if r.camera == i and r.kind not in kinds}
-        named = kinds if misfit_px >= SEEN_PX or _is_followed(frames, i, kinds) else ()
+        named = kinds if misfit_px >= SEEN_PX or is_followed(frames, i, kinds) else ()
         is_seen = any(len(f.views[i].points_px) for f in frames)
         out.append(
             CameraFinding(
@@ -66,15 +66,6 @@ def findings(diagnosis: Diagnosis, frames: Sequence[ViewedFrame], names: Sequenc
             )
         )  # fmt: skip
     return out
-
-
-def _is_followed(frames: Sequence[ViewedFrame], camera: int, kinds: Sequence[str]) -> bool:
-    """Return whether a fault is one of time alone, of a camera whose clock was corrected before.
-
-    Such a fault is followed until it stands: the time is found a little short where people were tracked with the wrong
-    one, and no shape of a body looks like it.
-    """
-    return bool(kinds) and set(kinds) <= {"time", "drift"} and any(f.ahead_s[camera] for f in frames)
 
 
 def misfit(frames: Sequence[ViewedFrame], camera: int, correction: Array) -> tuple[float, float]:

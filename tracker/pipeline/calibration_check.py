@@ -70,7 +70,7 @@ class CalibrationCheck:
             scores: of `held_out_scores`.
 
         Raises:
-            TrackerError: there are no such frames, most of them fit worse, or a camera moved within the recording.
+            TrackerError: there are no such frames, together they fit worse, or a camera moved within the recording.
         """
         for name, k in self.since.items():
             raise TrackerError(
@@ -82,11 +82,12 @@ class CalibrationCheck:
                 "expected other frames with poses to confirm the correction, found none; track more frames, or use "
                 "fewer for the check"
             )
-        better = n_better(scores)
-        if 2 * better <= len(scores) or sum(b.cost - a.cost for b, a in scores) <= 0:
+        fall_nats = sum(before.cost - after.cost for before, after in scores)
+        if fall_nats <= 0:
             raise TrackerError(
-                f"expected frames that the check did not use to fit better with the corrected cameras, found {better} "
-                f"of {len(scores)}; the calibration stays as it is"
+                "expected frames that the check did not use to fit better with the corrected cameras, found "
+                f"{n_better(scores)} of {len(scores)}, and together worse by {-fall_nats:.1f} nats; the calibration "
+                "stays as it is"
             )
 
 

@@ -6,7 +6,17 @@ from rig_scenes import FPS, NAMES, nothing_seen, person_of, turned, viewed
 
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import DRIFT, KINDS, N_CORRECTIONS, ROTATION, TIME, with_step
-from tracker.calibration.diagnosis import Diagnosis, Fault, FoundFault, Step, diagnose, glance
+from tracker.calibration.diagnosis import (
+    Diagnosis,
+    Fault,
+    FoundFault,
+    Step,
+    _as_tracked,
+    _Search,
+    diagnose,
+    glance,
+    prior_sigmas,
+)
 from tracker.calibration.findings import SEEN_PX, findings, misfit, sentence
 from tracker.formats.model_toml import load_model
 from tracker.motion.pose_path import PosePath
@@ -78,6 +88,35 @@ def test_a_small_rest_of_time_is_named_of_a_corrected_clock_alone():
     assert named(findings(found, frames, NAMES)) == []
     late = [f._replace(ahead_s=(0.0, 0.02, 0.0, 0.0)) for f in frames]
     assert named(findings(found, late, NAMES)) == ["cam1"]
+
+
+@pytest.fixture
+def settled():
+    """Healthy cameras, of which camera 1 has a clock, by next to nothing: no fault promises anything."""
+    frames = [f._replace(ahead_s=(0.0, 1e-9, 0.0, 0.0)) for f in viewed({}, range(3))]
+    search = _Search(frames, [SizeParameters(frames[0].bodies[0].model)], prior_sigmas(FPS))
+    return search, search.fitted(_as_tracked(frames, search._parameters), ())
+
+
+def test_a_corrected_clock_is_tried_again_whatever_it_promises(settled, monkeypatch):
+    search, fit = settled
+    tried = list[Fault]()
+    monkeypatch.setattr(search, "_raced", lambda fit, faults: (tried.extend(faults), {})[1])
+    assert search.best(fit, (), ()) is None
+    assert set(tried) == {Fault(1, "time"), Fault(1, "drift")}
+
+
+@pytest.mark.parametrize(("size_s", "is_found"), [(1e-5, False), (0.1, True)])
+def test_a_fault_must_be_worth_it_by_its_size_too(settled, monkeypatch, size_s, is_found):
+    """Contours match other edges, so that the cost falls by 50 nats, by however little the clock is corrected."""
+    search, fit = settled
+    late = Fault(1, "time")
+    found = search.refitted(fit, {late}, 0)
+    found.state.corrections[1, TIME] = size_s
+    found = found._replace(equations=found.equations._replace(cost=fit.cost - 50.0))
+    monkeypatch.setattr(search, "_raced", lambda fit, faults: {late: found})
+    best = search.best(fit, (), ())
+    assert (best is not None and best[0].fault == late) is is_found
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """The sentences of a check on what its frames cannot show, and on two cameras."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from rig_scenes import CAMERAS, FPS, NAMES, nothing_seen, turned, viewed
@@ -71,6 +73,18 @@ def test_a_correction_without_other_frames_is_refused():
     assert check.named == ("cam1",)
     with pytest.raises(TrackerError, match="other frames with poses to confirm the correction, found none"):
         check.require_applicable([])
+
+
+def test_other_frames_confirm_a_correction_by_their_summed_cost():
+    """Frames that do not show it fit a little better or worse by chance."""
+    check = check_calibration(Seen(viewed({}, range(3))))
+
+    def scores(*falls_nats):
+        return [(SimpleNamespace(cost=10.0), SimpleNamespace(cost=10.0 - fall)) for fall in falls_nats]
+
+    check.require_applicable(scores(-0.1, -0.1, -0.2, 3.0))
+    with pytest.raises(TrackerError, match=r"found 3 of 4, and together worse by 2\.6 nats; the calibration stays"):
+        check.require_applicable(scores(0.1, 0.1, 0.2, -3.0))
 
 
 @pytest.mark.slow
