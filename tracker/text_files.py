@@ -210,13 +210,15 @@ def _open(path: Path) -> BufferedReader:
 @contextmanager
 def _reading(path: Path, kind: TextKind) -> Generator[None, None, None]:
     """Raise the kind's error for what goes wrong while a file is read."""
+    if "\0" in str(path):
+        raise kind.error(f"{kind.name} {path} cannot be read: expected a path without null bytes, found one; check it")
     try:
         yield
     except FileNotFoundError as error:
         raise kind.error(f"{kind.name} {path} not found; check the path") from error
     except IrregularFileError as error:
         raise kind.error(f"{kind.name} {path} cannot be read: {error.strerror}; {kind.remedy}") from error
-    except (OSError, ValueError) as error:  # a null byte in a path is a ValueError, wrong UTF-8 too
+    except (OSError, ValueError) as error:  # wrong UTF-8 is a ValueError
         raise kind.error(
             f"{kind.name} {path} cannot be read: expected UTF-8 text, found: {error}; {kind.remedy}"
         ) from error
