@@ -1,4 +1,4 @@
-"""What a second worker gains: `python tests/benchmarks/batch_workers.py --data DIR`.
+"""Measure the gain of a second worker: `python tests/benchmarks/batch_workers.py --data DIR`.
 
 Twelve copies of a recording in DIR with a first pose are tracked as a batch in turn by one worker that is held to one
 core, by one worker and by two. Each line has the time by the clock, the processor time of the batch, how many cores it

@@ -47,6 +47,10 @@ def test_a_file_of_many_megabytes_is_refused_unread(tmp_path, read):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 200_000
+    start = time.thread_time()
+    with contextlib.suppress(SessionError):
+        read(path, KIND)
+    assert time.thread_time() - start < plain_seconds(100_000)
 
 
 @pytest.mark.parametrize("read", [read_text, read_toml, read_json, all_lines])

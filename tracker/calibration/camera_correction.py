@@ -49,18 +49,9 @@ def with_step(correction: Array, step: Array) -> Array:
     return out
 
 
-UNITS = MappingProxyType(
-    {
-        "rotation": "rotation_deg", "position": "position_mm", "focal": "focal_percent", "time": "time_ms",
-        "drift": "drift_ms_per_s",
-    }
-)  # fmt: skip
-"""The key of each kind among the results of `in_units`."""
-
-
 def in_units(correction: Array) -> dict[str, list[float] | float]:
     """Return a correction, or its standard deviations, (N_CORRECTIONS,), in the units of people: degrees, mm, percent,
-    ms, and ms per second."""
+    ms, and ms per second; in the order of `KINDS`."""
     return {
         "rotation_deg": np.degrees(correction[ROTATION]).tolist(),
         "position_mm": (1000 * correction[POSITION]).tolist(),

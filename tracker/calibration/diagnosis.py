@@ -311,7 +311,8 @@ class _Search:
     def _raced(self, fit: _Fitted, faults: Mapping[Fault, Collection[Fault]]) -> dict[Fault, _Fitted]:
         """Fit each fault with those that go with it; not to the end where it cannot become the best or a rival."""
         fits = {h: self.refitted(fit, chosen, EFFORT.heat) for h, chosen in faults.items()}
-        least = min((f.cost + 2 * _needed(h) for h, f in fits.items()), default=0.0)
+        # Of the best so far, the cost from which a fault is no rival of it.
+        _, least = min(((f.cost + _needed(h), f.cost + 2 * _needed(h)) for h, f in fits.items()), default=(0.0, 0.0))
         return {
             h: self.refitted(f, faults[h]) if f.cost + _needed(h) - f.promise < least else f for h, f in fits.items()
         }

@@ -26,7 +26,7 @@ from app.state.state import State
 from tracker.body.dimensions import HEIGHT_LIMITS_M, dimensions_of, size_limits_m
 from tracker.body.limbs import limb_display_name, limbs
 from tracker.body.searches import Search, SearchKind
-from tracker.calibration.camera_correction import UNITS, in_units
+from tracker.calibration.camera_correction import KINDS, in_units
 from tracker.calibration.findings import CameraFinding
 from tracker.formats.model_toml import PRESETS
 from tracker.geometry.arrays import Array
@@ -305,14 +305,18 @@ def _intervals(frames: Sequence[int]) -> tuple[tuple[int, int], ...]:
 
 
 def _camera(found: CameraFinding, since: int | None) -> wire.CameraCheck:
-    units, sigma = in_units(found.correction), in_units(found.sigma)
-    turned, moved, zoomed, shifted, drift = (tuple(np.atleast_1d(v).tolist()) for v in units.values())
-    deviations = {key: tuple(np.atleast_1d(v).tolist()) for key, v in sigma.items()}
-    rivals = {kind: tuple(np.atleast_1d(in_units(c)[UNITS[kind]]).tolist()) for kind, c in found.rivals.items()}
+    turned, moved, zoomed, shifted, drift = _numbers(found.correction)
+    deviations = dict(zip(in_units(found.sigma), _numbers(found.sigma), strict=True))
+    rivals = {kind: dict(zip(KINDS, _numbers(c), strict=True))[kind] for kind, c in found.rivals.items()}
     return wire.CameraCheck(
         found.name, found.misfit_px, found.misfit_mm, found.kinds, rivals, turned, moved, zoomed[0], shifted[0],
         drift[0], deviations, since, found.is_seen,
     )  # fmt: skip
+
+
+def _numbers(correction: Array) -> list[tuple[float, ...]]:
+    """Return the numbers of each kind of a correction, in the units of people and the order of `KINDS`."""
+    return [tuple(np.atleast_1d(v).tolist()) for v in in_units(correction).values()]
 
 
 def reason(state: State, cameras: Sequence[str]) -> ReasonMessage:

@@ -51,7 +51,7 @@ def track_forward(
 
 
 class _Found(NamedTuple):
-    """What was found on a frame, and learnt from."""
+    """A frame that was estimated and learnt from, before the estimates of all people are collected."""
 
     frame: int
     estimator: FrameEstimator
