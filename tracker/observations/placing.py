@@ -13,7 +13,10 @@ from tracker.session.session import Session
 
 
 def place_pictures(
-    tables: Mapping[str, PictureTable], session: Session, first_frame: int | None
+    tables: Mapping[str, PictureTable],
+    session: Session,
+    first_frame: int | None,
+    absent: str = "the points are absent there",
 ) -> tuple[dict[str, IntArray], list[FormatError], list[str]]:
     """Return the frame of the session of each picture by camera, what contradicts the session, and notes.
 
@@ -21,9 +24,10 @@ def place_pictures(
     `first_frame`, the lowest number of all cameras is that frame of the session, and equal numbers are one instant.
 
     Args:
-        tables: key points by camera.
+        tables: key points by camera, or pictures without any.
         session: its cameras and number of frames.
         first_frame: the user's choice; None for none.
+        absent: consequence of a picture that is missing, for the note.
     """
     offsets = {c.camera.name: c.offset for c in session.cameras}
     lowest = min((int(t.numbers[0]) for t in tables.values() if len(t.numbers)), default=0)
@@ -52,7 +56,7 @@ def place_pictures(
         span = np.setdiff1d(np.arange(placed[0], placed[-1] + 1), placed) if len(placed) else placed
         missing = span[(span >= 0) & (span < session.n_frames)]
         if len(missing):
-            notes.append(f"camera '{name}': no picture for frames {short_list(missing)}; the points are absent there")
+            notes.append(f"camera '{name}': no picture for frames {short_list(missing)}; {absent}")
         if first_frame is not None and not inside.all():
             notes.append(f"camera '{name}': {(~inside).sum()} pictures lie outside of the session and were left out")
         if not inside.any():
