@@ -88,7 +88,8 @@ class ObservationRoutes:
         )  # fmt: skip
         found = import_summary(session, self._controller.observing.plan(request), page_text)
         for view in found["views"]:
-            view["confidence"] = view["confidence"] if math.isfinite(view["confidence"]) else None
+            for key in ("confidence", "share"):
+                view[key] = view[key] if math.isfinite(view[key]) else None
         return found
 
     async def _import(self, request: web.Request) -> web.Response:

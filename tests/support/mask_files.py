@@ -5,15 +5,15 @@ import json
 import numpy as np
 from PIL import Image
 
-SIZE = (640, 480)
-"""Of the pictures of `observed_people.make_session`."""
+SIZE = (80, 60)
+"""Of small pictures, which are read quickly."""
 
 
 def person_masks(n_frames, n_views, size=SIZE, people=1):
     """Blocks of people that walk, (n_frames, n_views, H, W): k person k."""
     out = np.zeros((n_frames, n_views, *size[::-1]), np.uint8)
     for k, v, p in np.ndindex(n_frames, n_views, people):
-        left = (40 + 12 * k + 30 * v + 150 * p) * size[0] // SIZE[0]
+        left = (4 + k + 3 * v + 18 * p) * size[0] // SIZE[0]
         out[k, v, size[1] // 4 : size[1] * 3 // 4, left : left + size[0] // 8] = p + 1
     return out
 
@@ -21,10 +21,8 @@ def person_masks(n_frames, n_views, size=SIZE, people=1):
 def image_of(mask, mode="L"):
     """A mask of values up to 255 as an image of Pillow's mode; `cut out` is a colour picture with opacity."""
     if mode == "cut out":
-        rng = np.random.default_rng(0)
-        return Image.fromarray(
-            np.dstack([rng.integers(0, 255, (*mask.shape, 3), np.uint8), 255 * (mask > 0)]).astype(np.uint8)
-        )
+        colors = np.random.default_rng(0).integers(0, 255, (*mask.shape, 3), np.uint8)
+        return Image.fromarray(np.dstack([colors, np.where(mask > 0, 255, 0).astype(np.uint8)]))
     if mode == "P":
         image = Image.fromarray(mask, "P")
         image.putpalette([0, 0, 0, *np.random.default_rng(1).integers(0, 255, 3 * 255).tolist()])

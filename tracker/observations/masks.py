@@ -43,7 +43,7 @@ def plan_masks(session: Session, request: ImportRequest, format_name: str, files
             try:
                 surveys[name] = survey(masks[name], request.picture_size or source.camera.size)
             except TrackerError as error:
-                problems.append(error if name in str(error) else FormatError(f"camera '{name}': {error}", error.remedy))
+                problems.append(FormatError(f"camera '{name}': {error}", error.remedy))
     problems += wrong
     rules, odd = _rules(session, request, surveys)
     problems += odd
@@ -118,7 +118,7 @@ def _value_notes(rules: MaskRules, surveys: Mapping[str, MaskSurvey]) -> list[st
         return ["values are opacities: a pixel of half the highest value or more is a person"]
     others = [value for value in values if value not in (rules.people or {})]
     if len(values) > 1 and others:
-        listed = short_list(np.array(others))
+        listed = ", ".join(map(str, others[:10])) + (" and others" if len(others) > 10 else "")
         return [f"people of {'value' if len(others) == 1 else 'values'} {listed} are not told from each other"]
     return []
 

@@ -3,6 +3,7 @@
 import json
 import re
 
+import cv2
 import numpy as np
 import pytest
 from mask_files import SIZE, coco_data, person_masks, segmentation_of, write_coco_masks, write_masks
@@ -23,7 +24,7 @@ MASKS = person_masks(N, 4)
 
 @pytest.fixture
 def session(tmp_path):
-    return make_session(tmp_path / "s", N, people=("ann", "bob"))
+    return make_session(tmp_path / "s", N, people=("ann", "bob"), size=SIZE)
 
 
 def planned(session, path, **choices):
@@ -65,13 +66,14 @@ def test_segmentations_of_coco_are_stored_and_used(session, tmp_path, of):
     found = stored(session, write_coco_masks(tmp_path / "c.json", session.camera_names, MASKS, of))
     masks, truth = read(found) > 0, MASKS > 0
     assert (masks & truth).sum() == truth.sum()
-    assert masks.sum() <= (1.03 if of == "polygon" else 1.0) * truth.sum()  # OpenCV fills the border of a polygon
+    near = cv2.dilate(truth[0, 0].astype(np.uint8), np.ones((3, 3))) > 0  # OpenCV fills the border of a polygon
+    assert not (masks[0, 0] & ~(near if of == "polygon" else truth[0, 0])).any()
 
 
 def test_text_of_run_lengths_is_read_as_pycocotools_wrote_it(session, tmp_path):
     pytest.importorskip("pycocotools")
     noise = (np.random.default_rng(3).random((N, 4, *SIZE[::-1])) < 0.4).astype(np.uint8)
-    noise[:, :, :, 300:] = 0
+    noise[:, :, :, 50:] = 0
     found = stored(session, write_coco_masks(tmp_path / "c.json", session.camera_names, noise, "text"))
     assert np.array_equal(read(found) > 0, noise > 0)
 
@@ -80,7 +82,7 @@ def test_values_tell_people_apart(session, tmp_path):
     masks = person_masks(N, 4, people=3) * 20
     folder = write_masks(tmp_path / "m", session.camera_names, masks)
     plan = planned(session, folder)
-    assert "people of values 20,40,60 are not told from each other" in plan.notes
+    assert "people of values 20, 40, 60 are not told from each other" in plan.notes
     found = stored(session, folder, values={"bob": 20, "ann": 60})
     assert np.array_equal(read(found), np.select([masks == 20, masks == 40, masks == 60], [2, 255, 1]))
 
@@ -101,7 +103,7 @@ def test_values_that_do_not_fit(session, tmp_path, values, expected):
 
 def test_a_matte_is_cut_at_half(session, tmp_path):
     ramp = np.zeros((N, 4, *SIZE[::-1]), np.uint8)
-    ramp[..., 100:356] = np.arange(256)
+    ramp[..., 10:30, 10:30] = np.linspace(1, 255, 400).reshape(20, 20)
     plan = planned(session, write_masks(tmp_path / "m", session.camera_names, ramp))
     assert any("values are opacities" in note for note in plan.notes)
     store_import(session, plan)
@@ -110,7 +112,7 @@ def test_a_matte_is_cut_at_half(session, tmp_path):
 
 @pytest.mark.parametrize(("name", "first"), [("{k:06d}.png", 0), ("frame{k}_mask.png", 1), ("{camera}-{k:04d}.png", 1)])
 def test_the_last_number_in_a_name_is_the_picture(tmp_path, name, first):
-    session = make_session(tmp_path / "s", N, offsets=[("cam2", 1)])
+    session = make_session(tmp_path / "s", N, offsets=[("cam2", 1)], size=SIZE)
     masks = person_masks(N + 1, 4)
     for v, camera in enumerate(session.camera_names):
         own = masks[: N + (camera == "cam2"), v]
@@ -151,20 +153,20 @@ def test_an_image_of_coco_without_people_is_an_empty_mask(session, tmp_path):
 
 
 def test_masks_of_another_size_are_refused_or_scaled(session, tmp_path):
-    small = person_masks(N, 4, (320, 240))
+    small = person_masks(N, 4, (40, 30))
     folder = write_masks(tmp_path / "m", session.camera_names, small)
     plan = planned(session, folder)
-    assert "a mask of 640x480 pixels, found 320x240" in str(plan.problems[0])
+    assert "a mask of 80x60 pixels, found 40x30" in str(plan.problems[0])
     assert len(plan.problems) == 4
-    found = stored(session, folder, picture_size=(320, 240))
+    found = stored(session, folder, picture_size=(40, 30))
     assert np.array_equal(read(found) > 0, small.repeat(2, axis=2).repeat(2, axis=3) > 0)
 
 
 @pytest.mark.parametrize("of", ["polygon", "runs"])
 def test_coco_of_another_size_is_refused(session, tmp_path, of):
-    masks = person_masks(N, 4, (320, 240))
+    masks = person_masks(N, 4, (40, 30))
     plan = planned(session, write_coco_masks(tmp_path / "c.json", session.camera_names, masks, of))
-    assert "image 1: expected a mask of 640x480 pixels, found 320x240" in str(plan.problems[0])
+    assert "image 1: expected a mask of 80x60 pixels, found 40x30" in str(plan.problems[0])
 
 
 def damaged(folder, what):
@@ -224,10 +226,10 @@ def test_masks_that_do_not_fit_are_named_and_not_stored(session, tmp_path, what,
         ([[1, 2, 3]], "x and y of three corners or more"),
         ([[1, 2, 3, 4, 5, 6, 7]], "x and y of each corner, found 7 numbers"),
         ([[1, 2, 3, 4, 5, 1e7]], "pixels of at most 32767"),
-        ({"size": [480, 640], "counts": [5, 7]}, "run lengths of 307200 pixels, found others"),
-        ({"size": [480, 640], "counts": "é"}, "run lengths of 307200 pixels, found others"),
-        ({"size": [480, 640], "counts": "o" * 300}, "run lengths of 307200 pixels, found others"),
-        ({"size": [480, 640], "counts": -1}, "expected"),
+        ({"size": [60, 80], "counts": [5, 7]}, "run lengths of 4800 pixels, found others"),
+        ({"size": [60, 80], "counts": "é"}, "run lengths of 4800 pixels, found others"),
+        ({"size": [60, 80], "counts": "o" * 300}, "run lengths of 4800 pixels, found others"),
+        ({"size": [60, 80], "counts": -1}, "expected"),
         ("mask.png", "expected"),
     ],
 )
@@ -254,7 +256,7 @@ def test_only_the_category_of_people_is_taken(session, tmp_path):
 
 
 def test_a_file_with_both_holds_key_points_unless_masks_are_asked_for(session, tmp_path):
-    points = [320, 240, 2] * 17
+    points = [40, 30, 2] * 17
     path = write_coco_masks(tmp_path / "c.json", session.camera_names, MASKS, keypoints=points, score=0.9)
     plan = planned(session, path)
     assert plan.observations.format == "coco"
