@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from tracker.judging.judge import Judgement
-from tracker.observations.plans import ImportPlan, MaskPlan
 from tracker.observations.observed import ObservationSet
+from tracker.observations.plans import ImportPlan, MaskPlan
 
 
 @dataclass(frozen=True)

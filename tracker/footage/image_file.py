@@ -65,7 +65,7 @@ def decode_image(data: bytes, where: str, flags: int = cv2.IMREAD_COLOR_RGB) -> 
         with Pillow.open(BytesIO(data)) as header:
             size = header.size
     except Pillow.DecompressionBombError:
-        raise RecordingError(_too_large(where, "more than twice as many")) from None
+        raise RecordingError(too_large(where, "more than twice as many")) from None
     except NO_HEADER:
         return None
     check_pixels(size, where)
@@ -83,10 +83,11 @@ def check_pixels(size: tuple[int, int], where: str) -> None:
         RecordingError: it has more than `MAX_PIXELS`.
     """
     if size[0] * size[1] > MAX_PIXELS:
-        raise RecordingError(_too_large(where, f"{size[0]}x{size[1]}"))
+        raise RecordingError(too_large(where, f"{size[0]}x{size[1]}"))
 
 
-def _too_large(where: str, found: str) -> str:
+def too_large(where: str, found: str) -> str:
+    """Return that an image has too many pixels."""
     return f"{where}: expected at most {MAX_PIXELS // 10**6} million pixels, found {found}; reduce it"
 
 

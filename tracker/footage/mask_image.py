@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image as Pillow
 
 from tracker.errors import RecordingError
-from tracker.footage.image_file import NO_HEADER, check_pixels, read_bytes
+from tracker.footage.image_file import NO_HEADER, check_pixels, read_bytes, too_large
 
 _BROKEN = (*NO_HEADER, zlib.error, EOFError, MemoryError)
 """The errors by which Pillow says that the pixels of an image are damaged."""
@@ -44,7 +44,9 @@ def read_label_image(path: Path, where: str) -> LabelImage:
                 _check_background(image, where)
                 return LabelImage(np.asarray(image, dtype=np.uint8))
             return _labels(image if image.mode != "1" else image.convert("L"), where)
-    except (Pillow.DecompressionBombError, *_BROKEN) as error:
+    except Pillow.DecompressionBombError:
+        raise RecordingError(too_large(where, "more than twice as many")) from None
+    except _BROKEN as error:
         raise RecordingError(f"{where} is damaged or no PNG image; export it again") from error
 
 

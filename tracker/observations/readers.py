@@ -158,7 +158,12 @@ def find_files(paths: Sequence[Path], masks: bool = False) -> tuple[str, list[Fo
     if len(formats) > 1:
         listed = " and ".join(f"{path.name} ({FORMATS[name].title})" for name, path in list(formats.items())[:2])
         raise FormatError(f"expected files of one format, found {listed}; import them one after the other")
-    return next(iter(formats)), files
+    name = next(iter(formats))
+    if masks and name not in MASK_FORMATS:
+        raise FormatError(
+            f"expected masks among the files, found {FORMATS[name].title}; export PNG files or COCO segmentations"
+        )
+    return name, files
 
 
 def _samples(files: Sequence[Found]) -> list[Found]:

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from command_line import assert_refused
+from mask_files import SIZE, person_masks, write_masks
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
 from tracker.formats.trc import write_trc
@@ -69,6 +70,43 @@ def test_damaged_observations_are_listed_with_the_reason(run, session, keypoints
     assert "warning: observations mp: " in out
 
 
+def test_masks_are_used_and_left(run, tmp_path):
+    session = make_session(tmp_path / "s", N, size=SIZE)
+    for source in session.cameras:
+        source.footage.touch()
+    folder = write_masks(tmp_path / "m", session.camera_names, person_masks(N, 4))
+    status, out, _ = run("import", session.folder, folder, "--as", "net", "--dry-run")
+    assert status == 0
+    lines = out.splitlines()
+    assert lines[0] == "net: masks, of anyone"
+    assert lines[1] == f"  cam0: {folder}/cam0, 6 rows, people in frames 0 to 5, 6.2% of the picture"
+    assert lines[-1] == "nothing was stored"
+    assert not (session.folder / "observations").exists()
+    status, out, _ = run("import", session.folder, folder, "--as", "net", "--values", "ann=1")
+    assert status == 0
+    assert out.startswith("net: masks, of ann\n")
+    assert out.endswith("stored as net; the cameras use these masks as silhouettes\n")
+    used = "  masks net: 24 pictures of cam0, cam1, cam2, cam3, masks, used by cam0, cam1, cam2, cam3"
+    assert used in run("info", session.folder, "--no-check")[1]
+    status, out, _ = run("relink", session.folder, "--no-masks")
+    assert (status, out.count(" are left")) == (0, 4)
+    assert "cam3, masks, not used" in run("info", session.folder, "--no-check")[1]
+    own = session.folder / "observations" / "net" / "masks"
+    status, out, _ = run("relink", session.folder, "--masks", own, "--json")
+    assert (status, json.loads(out)["relinked"][0]["old"]) == (0, None)
+    assert used in run("info", session.folder, "--no-check")[1]
+    (session.folder / "observations" / "net" / "masks.toml").write_text("x")
+    assert "warning: masks net: " in run("info", session.folder, "--no-check")[1]
+
+
+def test_masks_of_the_wrong_size_name_the_option(run, tmp_path):
+    session = make_session(tmp_path / "s", N, size=SIZE)
+    folder = write_masks(tmp_path / "m", session.camera_names, person_masks(N, 4, (40, 30)))
+    status, _, err = run("import", session.folder, folder, "--as", "net")
+    assert (status, err.count("\n")) == (1, 1)
+    assert "a mask of 80x60 pixels, found 40x30; export them from this footage, or say --picture-size 40x30" in err
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
@@ -78,6 +116,9 @@ def test_damaged_observations_are_listed_with_the_reason(run, session, keypoints
         (["--picture-size", "640"], "--picture-size as WIDTHxHEIGHT"),
         (["--cameras", "cam0"], "--cameras as NAME=VALUE"),
         (["--joint-map", "nothing.toml"], "joint map nothing.toml not found"),
+        (["--values", "ann"], "--values as NAME=VALUE"),
+        (["--values", "ann=1"], "masks, whose values tell people apart, found key points or joints"),
+        (["--masks"], "expected masks among the files, found OpenPose JSON"),
         (["--cameras", "cam9=x"], "unknown camera 'cam9'"),
     ],
 )
