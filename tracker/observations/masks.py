@@ -48,7 +48,10 @@ def plan_masks(session: Session, request: ImportRequest, format_name: str, files
     rules, odd = _rules(session, request, surveys)
     problems += odd
     for name, seen in surveys.items():
-        problems += _extremes(name, seen.shares_by(rules), frames[name])
+        shares = seen.shares_by(rules)
+        problems += _extremes(name, shares, frames[name])
+        if not shares.all():
+            notes.append(f"camera '{name}': nobody in the masks of frames {short_list(frames[name][shares == 0])}")
     notes += [*_value_notes(rules, surveys), *dict.fromkeys(n for m in masks.values() for n in m.notes)]
     notes += [
         f"camera '{c.camera.name}': these masks take the place of those in {c.masks}"

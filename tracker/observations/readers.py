@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.files import read_regular
 from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import read_c3d
@@ -23,8 +21,9 @@ from tracker.formats.points_csv import read_points_csv
 from tracker.formats.trc import MarkerTable, read_trc
 from tracker.observations.mask_files import MaskFiles, check_mask_size
 from tracker.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
-from tracker.text_files import TABLE_BYTES
+from tracker.text_files import TABLE_BYTES, TextKind, read_json
 
+_JSON = TextKind("JSON file", TABLE_BYTES, FormatError)
 Groups = list[tuple[FileGroup, PictureTable]]
 
 
@@ -200,6 +199,6 @@ def _format_of(path: Path, masks: bool) -> str:
 def _decoded(path: Path) -> Any:
     """Return plain data of a JSON file; None if it is none, which its reader explains."""
     try:
-        return msgspec.json.decode(read_regular(path, TABLE_BYTES))
-    except (OSError, msgspec.DecodeError, RecursionError):
+        return read_json(path, _JSON)
+    except FormatError:
         return None

@@ -148,8 +148,9 @@ def test_missing_masks_are_named_and_are_no_masks(session, tmp_path):
 def test_an_image_of_coco_without_people_is_an_empty_mask(session, tmp_path):
     masks = MASKS.copy()
     masks[1, 0] = 0
-    found = stored(session, write_coco_masks(tmp_path / "c.json", session.camera_names, masks))
-    assert not read_mask(found.cameras[0], 1).any()
+    plan = planned(session, write_coco_masks(tmp_path / "c.json", session.camera_names, masks))
+    assert plan.notes == ("camera 'cam0': nobody in the masks of frames 1",)
+    assert not read_mask(store_import(session, plan).cameras[0], 1).any()
 
 
 def test_masks_of_another_size_are_refused_or_scaled(session, tmp_path):
