@@ -40,6 +40,8 @@ def read_label_image(path: Path, where: str) -> LabelImage:
     try:
         with Pillow.open(BytesIO(data), formats=("PNG",)) as image:
             check_pixels(image.size, where)
+            image.verify()  # checksums: some damaged data can be decoded
+        with Pillow.open(BytesIO(data), formats=("PNG",)) as image:
             if image.mode == "P":
                 _check_background(image, where)
                 return LabelImage(np.asarray(image, dtype=np.uint8))

@@ -314,3 +314,12 @@ def test_an_import_that_cannot_be_written_leaves_nothing(session, tmp_path, monk
 
 def test_runs_of_the_helper_are_those_of_the_mask():
     assert segmentation_of(np.array([[0, 1], [1, 1]]), "runs") == {"size": [2, 2], "counts": [1, 3]}
+
+
+def test_a_mask_whose_checksum_is_wrong_is_refused(session, tmp_path):
+    folder = write_masks(tmp_path / "m", session.camera_names, MASKS)
+    path = folder / "cam2" / "cam2_000001.png"
+    data = bytearray(path.read_bytes())
+    data[data.index(b"IEND") - 5] ^= 1  # the last byte of the checksum of the pixels, which can be decoded
+    path.write_bytes(data)
+    assert "camera 'cam2': mask: " in problems(planned(session, folder))
