@@ -12,7 +12,7 @@ from tracker.footage.mask_image import LabelImage
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.observations.sources import FileGroup
 
-ANYONE = 255
+ANYONE = np.iinfo(np.uint8).max
 """Value of a person who is not told from others, as `tracker.footage.recording.read_mask` has it."""
 
 

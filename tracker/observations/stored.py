@@ -33,8 +33,8 @@ from tracker.validation import FileStem, Name, check, check_version, quoted
 
 FOLDER = "observations"
 _FILE, _POINTS, _FILES = "observations.toml", "points.npz", "files"
-_VERSION = 1
-"""Newest version of the file that this program writes and reads."""
+VERSION = 1
+"""Newest version of the files that this program writes and reads."""
 KIND = TextKind("observations", TABLE_BYTES, SessionError)
 
 
@@ -55,7 +55,7 @@ class _Content(msgspec.Struct, forbid_unknown_fields=True):
     ]
     skeleton: Name
     joint_map: dict[str, Any]
-    version: int = _VERSION
+    version: int = VERSION
     cameras: tuple[Name, ...] = ()
     notes: tuple[str, ...] = ()
     options: dict[str, str] = {}
@@ -136,7 +136,7 @@ def load_observations(session: Session, name: str) -> ObservationSet:
         )
     where = f"observations {folder / _FILE}"
     data = read_toml(folder / _FILE, KIND)
-    check_version(data, _VERSION, where, SessionError)
+    check_version(data, VERSION, where, SessionError)
     row = check(data, _Content, where, SessionError)
     unknown = [p for p in row.people if p not in {person.name for person in session.people}]
     if unknown:
@@ -164,7 +164,7 @@ def load_observations(session: Session, name: str) -> ObservationSet:
 def _content(observations: ObservationSet) -> dict[str, Any]:
     points = observations.points
     data = {
-        "version": _VERSION,
+        "version": VERSION,
         "name": observations.name,
         "format": observations.format,
         "people": list(observations.people),

@@ -22,21 +22,19 @@ from tracker.errors import SessionError, TrackerError
 from tracker.files import write_text_atomic
 from tracker.observations.observed import SourceFile, checksum
 from tracker.observations.plans import MaskPlan
-from tracker.observations.stored import FOLDER, KIND, SourceRow, appearing_folder
+from tracker.observations.stored import FOLDER, KIND, VERSION, SourceRow, appearing_folder
 from tracker.session.session import Session, save_cameras
 from tracker.text_files import read_toml
 from tracker.validation import FileStem, Name, check, check_version
 
 MASKS_FILE, _MASKS = "masks.toml", "masks"
-_VERSION = 1
-"""Newest version of the file that this program writes and reads."""
 
 
 class _Content(msgspec.Struct, forbid_unknown_fields=True):
     name: FileStem
     format: Name
     cameras: dict[FileStem, int]
-    version: int = _VERSION
+    version: int = VERSION
     notes: tuple[str, ...] = ()
     options: dict[str, str] = {}
     sources: tuple[SourceRow, ...] = ()
@@ -78,7 +76,7 @@ def load_masks(session: Session, name: str) -> StoredMasks:
     path = session.folder / FOLDER / name / MASKS_FILE
     where = f"masks {path}"
     data = read_toml(path, KIND)
-    check_version(data, _VERSION, where, SessionError)
+    check_version(data, VERSION, where, SessionError)
     row = check(data, _Content, where, SessionError)
     folder = masks_folder(session, name)
     users = tuple(c.camera.name for c in session.cameras if c.masks is not None and c.masks.parent == folder)
@@ -133,7 +131,7 @@ def _write_masks(plan: MaskPlan, camera: str, size: tuple[int, int], folder: Pat
 
 def _content(plan: MaskPlan) -> dict[str, Any]:
     data: dict[str, Any] = {
-        "version": _VERSION,
+        "version": VERSION,
         "name": plan.name,
         "format": plan.format,
         "cameras": {name: int((own >= 0).sum()) for name, own in plan.pictures.items()},
