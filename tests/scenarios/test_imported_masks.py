@@ -1,5 +1,6 @@
 """Masks that are imported into a session without any background do what masks given to a new session do."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -51,9 +52,10 @@ def test_people_are_found_by_imported_masks_as_by_given_ones(made):
         assert all(np.array_equal(read_mask(one, k), read_mask(other, k)) for k in range(N))
     first, same = found(imported), found(given)
     assert first.frame == same.frame
-    assert np.abs(first.poses[0].start.body.pose - same.poses[0].start.body.pose).max() < 1e-6
+    assert np.abs(first.poses[0].start.body.values - same.poses[0].start.body.values).max() < 1e-6
     joints = read_joints(scene.folder / "truth.trc", FPS)
     body = first.poses[0].start.body
     centers = dict(zip(body.model.point_names, body.joint_centers_world, strict=True))
     off = [np.linalg.norm(joints.points[first.frame, joints.names.index(j)] - centers[j]) for j in LIMB_JOINTS]
+    sys.stderr.write(f"mean error of the first pose {1000 * np.mean(off):.1f} mm\n")
     assert np.mean(off) < 0.06

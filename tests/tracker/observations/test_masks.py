@@ -133,6 +133,7 @@ def test_a_first_frame_places_masks_and_leaves_out_others(session, tmp_path):
     found = store_import(session, plan)
     assert [read_mask(found.cameras[0], k) is None for k in range(N)] == [True, True, False, False]
     assert np.array_equal(read_mask(found.cameras[1], 3) > 0, MASKS[1, 1] > 0)
+    assert sorted(p.name for p in found.cameras[1].masks.iterdir()) == ["000002.png", "000003.png"]
 
 
 def test_missing_masks_are_named_and_are_no_masks(session, tmp_path):
