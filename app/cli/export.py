@@ -107,7 +107,7 @@ def _refuse_without_like(arguments: ExportArguments) -> None:
 
 def _send_back(arguments: ExportArguments) -> None:
     """Write the files of observations, with the points of mended poses replaced."""
-    from tracker.exports.like import export_like
+    from tracker.exports.like.sending import export_like
     from tracker.observations.stored import load_observations
     from tracker.session.session import load_session
 

@@ -10,7 +10,7 @@ __all__ = [
     "export_files",
     "export_format",
     "formats",
-    "like",
+    "keypoints",
     "motion",
     "options",
     "point_origins",

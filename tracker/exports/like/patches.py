@@ -1,18 +1,13 @@
-"""Send imported files back in their own format: what was mended is replaced, all other bytes stay."""
+"""Replace points in imported files: key points in pictures and points in space."""
 
-import os
-import secrets
-import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from tracker.body.model import PosedBody
-from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.keypoints import project_through_lens
-from tracker.exports.mended_points import MendedPoints, PoseChoice, mended_points
+from tracker.exports.like.mended_points import MendedPoints
 from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
 from tracker.formats.keypoints.coco_patching import patch_coco
@@ -23,11 +18,10 @@ from tracker.formats.points_csv import patch_points_csv
 from tracker.formats.trc import patch_trc
 from tracker.geometry.arrays import Array, IntArray
 from tracker.motion.velocity import velocity
-from tracker.observations.joints import observed_joints, triangulate_observations
+from tracker.observations.joints import triangulate_observations
 from tracker.observations.observed import ObservationSet
 from tracker.observations.placing import rescaled
-from tracker.observations.readers import FORMATS
-from tracker.observations.stored import checksum, source_path
+from tracker.observations.stored import source_path
 from tracker.observations.stored_files import StoredPictures, picture_size, stored_pictures
 from tracker.session.session import Session
 
@@ -35,85 +29,11 @@ Files = dict[str, bytes]
 """Content of files that differ from those that came, by their path."""
 Changes = dict[int, list[tuple[int, Array]]]
 """Number of a person in the file and x, y, confidence of the points, (n_points, 3), by row."""
-
-
-@dataclass(frozen=True)
-class LikeExport:
-    """Files that were sent back."""
-
-    paths: tuple[Path, ...]
-    """The files."""
-    changed: tuple[Path, ...]
-    """Files that differ from those that came."""
-    frames: tuple[int, ...]
-    """Frames whose points were replaced in some file."""
-
-
-def export_like(
-    session: Session,
-    observations: ObservationSet,
-    out: Path,
-    poses: PoseChoice = "edited",
-    learn_offsets: bool = True,
-) -> LikeExport:
-    """Write the files of observations as they came, with the points of mended poses replaced.
-
-    Args:
-        session: its stored poses.
-        observations: imported ones.
-        out: file to write, or the folder of several files; it must not exist.
-        poses: replace the points that a person edited, or those of all poses.
-        learn_offsets: place points as far from the joints as the files usually do.
-
-    Raises:
-        TrackerError: a stored file was changed or is missing, its format cannot be changed in place, or `out` cannot be
-            written.
-    """
-    contents = _stored_contents(session, observations)
-    cameras = [c.camera for c in session.cameras]
-    mended = mended_points(
-        session, observations, observed_joints(observations, cameras).joints_world, poses, learn_offsets
-    )
-    frames = sorted({f for person in mended for f in person.bodies})
-    if frames and observations.format not in _PATCHED:
-        listed = ", ".join(FORMATS[name].title for name in _PATCHED)
-        raise FormatError(
-            f"expected observations of a format whose points can be replaced in place ({listed}), found "
-            f"{FORMATS[observations.format].title}",
-            Remedy("export_other_format"),
-        )
-    changed: Files = {}
-    if frames:
-        of_pictures = observations.points is not None
-        changed = (_mended_pictures if of_pictures else _mended_space)(session, observations, mended)
-        changed = {path: data for path, data in changed.items() if data != contents[path]}
-    paths = _write(out, contents | changed)
-    return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames))
-
-
-_PATCHED = ("openpose", "coco", "deeplabcut", "hdf5", "trc", "csv", "c3d")
+PATCHED = ("openpose", "coco", "deeplabcut", "hdf5", "trc", "csv", "c3d")
 """Formats whose points can be replaced; of HDF5 all but NWB."""
 
 
-def _stored_contents(session: Session, observations: ObservationSet) -> Files:
-    """Return the imported files.
-
-    Raises:
-        SessionError: one is missing or changed.
-    """
-    found: Files = {}
-    for source in observations.sources:
-        path = source_path(session, observations.name, source)
-        try:
-            found[source.path] = path.read_bytes()
-        except OSError as error:
-            raise SessionError(f"cannot read the imported file {path}: {error}; import it again") from error
-        if checksum(found[source.path]) != source.sha256:
-            raise SessionError(f"{path} is not as it was imported; import it again")
-    return found
-
-
-def _mended_pictures(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> Files:
+def mended_pictures(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> Files:
     """Return the files of key points that change."""
     cameras = [c.camera for c in session.cameras]
     detections = triangulate_observations(observations, cameras).detections
@@ -171,7 +91,7 @@ def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Arra
     return np.column_stack([np.where(inside[:, None], px, 0.0), confidence])
 
 
-def _mended_space(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> Files:
+def mended_space(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> Files:
     """Return the files of points in space that change."""
     options = dict(observations.options)
     R_file = axes_matrix(options.get("axes", "x,y,z")).T
@@ -206,34 +126,3 @@ def _rows(nearest: IntArray, row_frames: Array, person: MendedPoints) -> dict[in
         points[~person.replaced[frame]] = np.nan
         out[row] = points
     return out
-
-
-def _write(out: Path, contents: Files) -> dict[str, Path]:
-    """Write one file, or a folder of several; it appears whole or not at all.
-
-    Raises:
-        TrackerError: it exists, or cannot be written.
-    """
-    if out.is_dir() and len(contents) == 1:
-        out = out / Path(next(iter(contents))).name
-    if out.exists():
-        kind = "a folder" if out.is_dir() else "a file"
-        raise TrackerError(f"expected {out} not to exist, found {kind}", Remedy("another_file"))
-    temporary = out.with_name(f".{out.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        if len(contents) == 1:
-            ((path, data),) = contents.items()
-            temporary.write_bytes(data)
-            os.replace(temporary, out)
-            return {path: out}
-        for path, data in contents.items():
-            (temporary / path).parent.mkdir(parents=True, exist_ok=True)
-            (temporary / path).write_bytes(data)
-        os.replace(temporary, out)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise TrackerError(f"cannot write {out}: {reason}; choose a folder that you may write to, with room") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        temporary.unlink(missing_ok=True)
-    return {path: out / path for path in contents}
