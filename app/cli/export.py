@@ -129,7 +129,7 @@ def _export_dataset(arguments: ExportArguments) -> None:
     chosen = find_format(arguments.format, arguments.out)
     if chosen.name != "dataset":
         raise TrackerError(
-            f"expected one session without --split and --distinct-people for format {chosen.name}; say --format dataset, "
+            f"expected one session for format {chosen.name}, without --split and --distinct-people; say --format dataset, "
             "or export one after the other"
         )
     if arguments.frames is not None and len(sessions) > 1:
