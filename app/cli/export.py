@@ -129,8 +129,8 @@ def _export_dataset(arguments: ExportArguments) -> None:
     chosen = find_format(arguments.format, arguments.out)
     if chosen.name != "dataset":
         raise TrackerError(
-            f"expected one session for format {chosen.name}, without --split and --distinct-people; say --format dataset, "
-            "or export one after the other"
+            f"expected one session for format {chosen.name}, without --split and --distinct-people, found "
+            f"{len(sessions)}; say --format dataset, or export one after the other"
         )
     if arguments.frames is not None and len(sessions) > 1:
         raise TrackerError(f"expected --frames with one session, found {len(sessions)}: their frames differ")
