@@ -15,10 +15,10 @@ from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservedPoints
 from tracker.observations.triangulation import INLIER_M, Views
 
-_BLOCKS = 4
+STRETCHES = 4
 """Number of stretches of a recording that must all show a shift: by chance one of 256 does, at one shift of one view. A
 shift is less than this part of a recording, so that half of it can be compared at all shifts."""
-_SAMPLES = 240
+SAMPLES = 240
 """Largest number of frames that are compared: thirty in each stretch."""
 
 
@@ -37,9 +37,9 @@ def view_shifts(
         fps: frames per second.
         ahead: frames by which the picture of each camera is known to be later than its frame; 0 by default.
     """
-    margin = min(2 * round(fps), points.n_frames // _BLOCKS)
+    margin = min(2 * round(fps), points.n_frames // STRETCHES)
     frames = _moving_frames(points, margin)
-    if len(frames) < _BLOCKS or len(cameras) < 2:
+    if len(frames) < STRETCHES or len(cameras) < 2:
         return {}
     known = np.round(-np.asarray(ahead if ahead is not None else np.zeros(len(cameras)))).astype(np.int64)
     costs = _pair_costs(points, cameras, frames, margin)
@@ -52,7 +52,7 @@ def view_shifts(
 
 
 def _moving_frames(points: ObservedPoints, margin: int) -> IntArray:
-    """Return frames in which points move, at most `_SAMPLES`, that lie a margin from both ends.
+    """Return frames in which points move, at most `SAMPLES`, that lie a margin from both ends.
 
     Those are the frames whose median step in the pictures is at least half of that in the fastest tenth of all.
     """
@@ -65,13 +65,13 @@ def _moving_frames(points: ObservedPoints, margin: int) -> IntArray:
     if not len(inner) or not of_inner.any():
         return np.empty(0, np.int64)
     moving = inner[of_inner >= np.quantile(of_inner, 0.9) / 2]
-    return moving[np.unique(np.linspace(0, len(moving) - 1, _SAMPLES).astype(np.int64))]
+    return moving[np.unique(np.linspace(0, len(moving) - 1, SAMPLES).astype(np.int64))]
 
 
 def _pair_costs(
     points: ObservedPoints, cameras: Sequence[Camera], frames: IntArray, margin: int
 ) -> Mapping[tuple[int, int], Array]:
-    """Return the mean truncated squares of the distances of rays, by pair of views, (2 margin + 1, _BLOCKS).
+    """Return the mean truncated squares of the distances of rays, by pair of views, (2 margin + 1, STRETCHES).
 
     The row `margin + s` has the second view s frames later than the first.
     """
@@ -82,13 +82,13 @@ def _pair_costs(
         baseline = views.centers[b] - views.centers[a]
         first = rays[frames, a]
         across = np.cross(baseline, first)
-        found = np.empty((2 * margin + 1, _BLOCKS))
+        found = np.empty((2 * margin + 1, STRETCHES))
         for row in range(len(found)):
             gaps = _gaps(first, across, rays[frames + row - margin, b])
             with np.errstate(invalid="ignore"):
-                squares = np.minimum((gaps - _median(gaps)) / INLIER_M, 1.0)
+                squares = np.minimum((gaps - median_over_time(gaps)) / INLIER_M, 1.0)
                 squares = np.maximum(squares, -1.0) ** 2
-            found[row] = [_mean(block) for block in np.array_split(squares, _BLOCKS)]
+            found[row] = [_mean(block) for block in np.array_split(squares, STRETCHES)]
         costs[a, b] = found
     return costs
 
@@ -131,7 +131,7 @@ def _gaps(first: Array, across: Array, second: Array) -> Array:
     return by_pair[np.arange(len(best)), best]
 
 
-def _median(gaps: Array) -> Array:
+def median_over_time(gaps: Array) -> Array:
     """Return the median of each point over time, (n_points,); NaN where it is never known."""
     ordered = np.sort(gaps, axis=0)  # NaN last
     n = np.isfinite(gaps).sum(axis=0)
@@ -215,3 +215,16 @@ def _is_clear(
         if not (np.isfinite(gain).all() and (gain.mean(axis=1) > 0).all() and (gain.mean(axis=0) > 0).all()):
             return False
     return True
+
+
+def is_clear_minimum(costs: Array, shift: int, known: int) -> bool:
+    """Return whether costs are lower at a shift than at the known one and at twice the way, in each stretch.
+
+    Args:
+        costs: (2 margin + 1, STRETCHES), those of shift 0 in the middle.
+        shift: of the lowest row.
+        known: the one that is expected.
+    """
+    margin = len(costs) // 2
+    others = np.clip([known, 2 * shift - known], -margin, margin)
+    return bool((costs[others + margin] > costs[shift + margin]).all())

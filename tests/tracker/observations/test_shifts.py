@@ -13,6 +13,7 @@ from tracker.observations.observed import ObservedPoints
 from tracker.observations.request import ImportRequest
 from tracker.observations.shifts import view_shifts
 from tracker.observations.stored import load_observations
+from tracker.observations.stored_files import stored_pictures
 
 N, FPS = 48, 30.0
 NOISE_PX = 2.0
@@ -84,6 +85,11 @@ def test_of_two_views_and_of_several_people(tmp_path):
     assert shifts(session, late(points, 3, -4)) == {"cam3": -4}
 
 
+def test_the_first_of_three_views_is_late(tmp_path):
+    session = make_session(tmp_path / "s", N, n_views=3)
+    assert shifts(session, late(seen(session, [walking(N)], NOISE_PX), 0, 4)) == {"cam0": 4}
+
+
 def test_known_clocks_are_no_shift(session, points):
     """Footage that is known to be late by whole frames shows later instants, and so do its key points."""
     early = late(points, 1, -3)
@@ -120,6 +126,8 @@ def test_late_key_points_are_refused_until_the_user_decides(tmp_path, points):
     store_import(session, moved)
     found = load_observations(session, "mp")
     assert json.loads(dict(found.options)["offsets"]) == {"cam1": 3}
+    first = {s.camera: int(s.frames[0]) for s in stored_pictures(session, found)}
+    assert first == {"cam0": 0, "cam1": -3, "cam2": 0, "cam3": 0}
     done = export_like(session, found, tmp_path / "back")
     assert not done.changed
     assert len(done.paths) == 4 * N
