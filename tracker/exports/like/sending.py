@@ -3,12 +3,13 @@
 import os
 import secrets
 import shutil
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.like.mended_points import PoseChoice, mended_points
 from tracker.exports.like.patches import PATCHED, Files, mended_pictures, mended_space
+from tracker.observations.assignment import people_by_poses
 from tracker.observations.joints import observed_joints
 from tracker.observations.observed import ObservationSet
 from tracker.observations.readers import FORMATS
@@ -50,9 +51,13 @@ def export_like(
     """
     contents = _stored_contents(session, observations)
     cameras = [c.camera for c in session.cameras]
-    mended = mended_points(
-        session, observations, observed_joints(observations, cameras).joints_world, poses, learn_offsets
-    )
+    joints_world = observed_joints(observations, cameras).joints_world
+    if observations.points is not None:
+        columns = [(names[0], i) for i, names in enumerate(observations.counterparts.values()) if len(names) == 1]
+        names, at = [n for n, _ in columns], [i for _, i in columns]
+        people = people_by_poses(session, observations.people, names, joints_world[:, :, at])
+        observations = replace(observations, people=people)
+    mended = mended_points(session, observations, joints_world, poses, learn_offsets)
     frames = sorted({f for person in mended for f in person.bodies})
     if frames and observations.format not in PATCHED:
         listed = ", ".join(FORMATS[name].title for name in PATCHED)
