@@ -70,6 +70,8 @@ class ExportArguments:
     """with --like: replace the points that were edited by hand, which is the default, or those of all poses."""
     plain_joints: bool = False
     """with --like: place points at the joints of the body, not as far from them as the files usually do."""
+    exchange_sides: bool = False
+    """with --like: exchange left and right of key points where they were found exchanged; by default they stay."""
     skip_lost: bool = False
     """treat poses whose status is lost as missing."""
     provenance: bool = True
@@ -196,8 +198,10 @@ def _format_dataset(found: dict[str, Any]) -> str:
 
 
 def _refuse_without_like(arguments: ExportArguments) -> None:
-    if arguments.poses is not None or arguments.plain_joints:
-        raise TrackerError("expected --poses and --plain-joints with --like NAME, found no --like; add it")
+    if arguments.poses is not None or arguments.plain_joints or arguments.exchange_sides:
+        raise TrackerError(
+            "expected --poses, --plain-joints and --exchange-sides with --like NAME, found no --like; add it"
+        )
 
 
 def _send_back(arguments: ExportArguments) -> None:
@@ -223,7 +227,10 @@ def _send_back(arguments: ExportArguments) -> None:
         raise TrackerError(f"expected one session with --like, found {len(arguments.sessions)}; send each back alone")
     session = load_session(arguments.sessions[0])
     observations = load_observations(session, arguments.like or "")
-    done = export_like(session, observations, arguments.out, arguments.poses or "edited", not arguments.plain_joints)
+    done = export_like(
+        session, observations, arguments.out, arguments.poses or "edited", not arguments.plain_joints,
+        arguments.exchange_sides,
+    )  # fmt: skip
     found = {
         "like": observations.name,
         "format": observations.format,
@@ -231,6 +238,7 @@ def _send_back(arguments: ExportArguments) -> None:
         "files": len(done.paths),
         "changed": [str(path) for path in done.changed],
         "frames": list(done.frames),
+        "exchanged": [{"frame": frame, "person": person, "view": view} for frame, person, view in done.exchanged],
     }
     if arguments.json:
         print(format_json(found))
@@ -240,7 +248,11 @@ def _send_back(arguments: ExportArguments) -> None:
         print("all as imported")
         return
     frames, files = _count(len(done.frames), "frame"), _count(len(done.changed), "file")
-    print(f"points of {frames} were replaced, in {files}; all else is as imported")
+    said = [f"points of {frames} were replaced"] if done.frames else []
+    if done.exchanged:
+        of_sides = _count(len({frame for frame, _, _ in done.exchanged}), "frame")
+        said.append(f"left and right were exchanged in {_count(len(done.exchanged), 'view')} of {of_sides}")
+    print(f"{', '.join(said)}, in {files}; all else is as imported")
 
 
 def _count(n: int, noun: str) -> str:

@@ -5,4 +5,17 @@ Imports `geometry`, `body`, `formats`, `footage` and `session`. Callers use `obs
 `importing.store_import`, `joints.observed_joints` and `joints.triangulate_observations`.
 """
 
-__all__ = ["body_points", "importing", "joints", "observed", "placing", "readers", "request", "stored", "stored_files"]
+__all__ = [
+    "assignment",
+    "body_points",
+    "importing",
+    "joints",
+    "observed",
+    "placing",
+    "readers",
+    "request",
+    "shifts",
+    "stored",
+    "stored_files",
+    "triangulation",
+]

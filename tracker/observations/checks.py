@@ -11,7 +11,7 @@ from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservedPoints
-from tracker.observations.shifts import point_rays, view_shifts
+from tracker.observations.shifts import SAMPLES, evenly, point_rays, view_shifts
 from tracker.observations.triangulation import INLIER_M, Views
 
 _SIZES = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 4 / 3, 1.5, 2.0, 3.0, 4.0)
@@ -72,7 +72,7 @@ def agreement_m(points: ObservedPoints, cameras: Sequence[Camera], scale: float 
         scale: factor of the pixels, to try another size of the pictures.
     """
     views = Views(cameras)
-    frames = np.unique(np.linspace(0, points.n_frames - 1, _SAMPLES).astype(np.int64))
+    frames = evenly(points.n_frames, SAMPLES)
     chosen, known = points.points_px[frames] * scale, points.is_known[frames]
     rays = point_rays(views, chosen, known)
     gaps = []
@@ -87,10 +87,6 @@ def agreement_m(points: ObservedPoints, cameras: Sequence[Camera], scale: float 
         best = np.where(np.isfinite(medians), medians, np.inf).argmin(axis=1)
         gaps.append(by_pair[np.arange(len(best)), best].ravel())
     return _median(np.concatenate(gaps)) if gaps else np.nan
-
-
-_SAMPLES = 60
-"""Number of frames whose agreement is measured: the median of some thousand distances."""
 
 
 def _median(values: Array) -> float:

@@ -15,11 +15,8 @@ from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservedPoints
 from tracker.observations.triangulation import INLIER_M, Views
 
-STRETCHES = 4
-"""Number of stretches of a recording that must all show a shift: by chance one of 256 does, at one shift of one view. A
-shift is less than this part of a recording, so that half of it can be compared at all shifts."""
-SAMPLES = 240
-"""Largest number of frames that are compared: thirty in each stretch."""
+SAMPLES = 60
+"""Largest number of frames that are compared in a stretch, for a median of some thousand distances."""
 
 
 def view_shifts(
@@ -37,9 +34,9 @@ def view_shifts(
         fps: frames per second.
         ahead: frames by which the picture of each camera is known to be later than its frame; 0 by default.
     """
-    margin = min(2 * round(fps), points.n_frames // STRETCHES)
+    margin = min(2 * round(fps), points.n_frames // 4)  # half of the recording can be compared at all shifts
     frames = _moving_frames(points, margin)
-    if len(frames) < STRETCHES or len(cameras) < 2:
+    if len(frames) < n_stretches(margin) or len(cameras) < 2:
         return {}
     known = np.round(-np.asarray(ahead if ahead is not None else np.zeros(len(cameras)))).astype(np.int64)
     costs = _pair_costs(points, cameras, frames, margin)
@@ -51,8 +48,16 @@ def view_shifts(
     return {points.cameras[v]: int(late[v]) for v in moved}
 
 
+def n_stretches(margin: int) -> int:
+    """Return the number of stretches of a recording that must all show a shift.
+
+    Noise favours a shift in a stretch by chance one half, so that none of the shifts that are tried is favoured in all.
+    """
+    return max(2 * margin, 1).bit_length()
+
+
 def _moving_frames(points: ObservedPoints, margin: int) -> IntArray:
-    """Return frames in which points move, at most `SAMPLES`, that lie a margin from both ends.
+    """Return frames in which points move, at most `SAMPLES` in a stretch, that lie a margin from both ends.
 
     Those are the frames whose median step in the pictures is at least half of that in the fastest tenth of all.
     """
@@ -65,13 +70,18 @@ def _moving_frames(points: ObservedPoints, margin: int) -> IntArray:
     if not len(inner) or not of_inner.any():
         return np.empty(0, np.int64)
     moving = inner[of_inner >= np.quantile(of_inner, 0.9) / 2]
-    return moving[np.unique(np.linspace(0, len(moving) - 1, SAMPLES).astype(np.int64))]
+    return moving[evenly(len(moving), SAMPLES * n_stretches(margin))]
+
+
+def evenly(n: int, most: int) -> IntArray:
+    """Return indices of n items, evenly spaced, at most so many."""
+    return np.unique(np.linspace(0, n - 1, most).astype(np.int64))
 
 
 def _pair_costs(
     points: ObservedPoints, cameras: Sequence[Camera], frames: IntArray, margin: int
 ) -> Mapping[tuple[int, int], Array]:
-    """Return the mean truncated squares of the distances of rays, by pair of views, (2 margin + 1, STRETCHES).
+    """Return the mean truncated squares of the distances of rays, by pair of views, (2 margin + 1, n_stretches).
 
     The row `margin + s` has the second view s frames later than the first.
     """
@@ -82,13 +92,13 @@ def _pair_costs(
         baseline = views.centers[b] - views.centers[a]
         first = rays[frames, a]
         across = np.cross(baseline, first)
-        found = np.empty((2 * margin + 1, STRETCHES))
+        found = np.empty((2 * margin + 1, n_stretches(margin)))
         for row in range(len(found)):
             gaps = _gaps(first, across, rays[frames + row - margin, b])
             with np.errstate(invalid="ignore"):
                 squares = np.minimum((gaps - median_over_time(gaps)) / INLIER_M, 1.0)
                 squares = np.maximum(squares, -1.0) ** 2
-            found[row] = [_mean(block) for block in np.array_split(squares, STRETCHES)]
+            found[row] = [_mean(block) for block in np.array_split(squares, found.shape[1])]
         costs[a, b] = found
     return costs
 
@@ -221,7 +231,7 @@ def is_clear_minimum(costs: Array, shift: int, known: int) -> bool:
     """Return whether costs are lower at a shift than at the known one and at twice the way, in each stretch.
 
     Args:
-        costs: (2 margin + 1, STRETCHES), those of shift 0 in the middle.
+        costs: (2 margin + 1, n_stretches), those of shift 0 in the middle.
         shift: of the lowest row.
         known: the one that is expected.
     """

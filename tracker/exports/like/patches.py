@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,11 +15,12 @@ from tracker.formats.keypoints.coco_patching import patch_coco
 from tracker.formats.keypoints.deeplabcut import patch_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import patch_hdf5_apart
 from tracker.formats.keypoints.openpose import patch_openpose
+from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.points_csv import patch_points_csv
 from tracker.formats.trc import patch_trc
 from tracker.geometry.arrays import Array, IntArray
 from tracker.motion.velocity import velocity
-from tracker.observations.joints import triangulate_observations
+from tracker.observations.joints import side_pairs, triangulate_observations
 from tracker.observations.observed import ObservationSet
 from tracker.observations.placing import rescaled
 from tracker.observations.stored import source_path
@@ -33,10 +35,29 @@ PATCHED = ("openpose", "coco", "deeplabcut", "hdf5", "trc", "csv", "c3d")
 """Formats whose points can be replaced; of HDF5 all but NWB."""
 
 
-def mended_pictures(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> Files:
-    """Return the files of key points that change."""
+class ChangedPictures(NamedTuple):
+    """Files of key points that change."""
+
+    files: Files
+    exchanged: tuple[tuple[int, int, int], ...]
+    """Frame, person and view in which left and right were exchanged."""
+
+
+def mended_pictures(
+    session: Session, observations: ObservationSet, mended: Sequence[MendedPoints], exchange_sides: bool = False
+) -> ChangedPictures:
+    """Return the files of key points that change.
+
+    Args:
+        session: its cameras.
+        observations: whose files change.
+        mended: points of each person that are replaced.
+        exchange_sides: exchange left and right where they were found exchanged; points that are replaced stay so.
+    """
     cameras = [c.camera for c in session.cameras]
-    detections = triangulate_observations(observations, cameras).detections
+    triangulated, pairs = triangulate_observations(observations, cameras), side_pairs(observations)
+    detections, is_exchanged = triangulated.detections, triangulated.is_exchanged & exchange_sides
+    exchanged: list[tuple[int, int, int]] = []
     size, names = picture_size(observations), [c.name for c in cameras]
     by_path = {source_path(session, observations.name, s): s.path for s in observations.sources}
     found: list[tuple[StoredPictures, Changes]] = []
@@ -45,16 +66,37 @@ def mended_pictures(session: Session, observations: ObservationSet, mended: Sequ
         changes: Changes = {}
         for row, frame in enumerate(pictures.frames.tolist()):
             for k, person in enumerate(mended):
+                detection, values = int(detections[frame, k, view]) if 0 <= frame < len(detections) else -1, None
+                if detection >= 0 and is_exchanged[frame, k, view].any():
+                    exchanged.append((frame, k, view))
+                    of_sides = [
+                        pair for g, group in enumerate(pairs) if is_exchanged[frame, k, view, g] for pair in group
+                    ]
+                    values = _exchanged(pictures.table, row, detection, of_sides)
                 if frame in person.bodies:
-                    values = _seen(session, view, frame, person)
+                    placed = _seen(session, view, frame, person)
                     if size is not None:
-                        values[:, :2] = rescaled(values[:, :2], cameras[view].size, size)
-                    detection = int(detections[frame, k, view])
-                    if detection >= 0 or (values[:, 2] > 0).any():  # nobody is added who is not in the picture
-                        changes.setdefault(row, []).append((detection, values))
+                        placed[:, :2] = rescaled(placed[:, :2], cameras[view].size, size)
+                    if detection < 0 and not (placed[:, 2] > 0).any():
+                        continue  # nobody is added who is not in the picture
+                    values = placed if values is None else np.where(np.isnan(placed[:, 2:]), values, placed)
+                if values is not None:
+                    changes.setdefault(row, []).append((detection, values))
         if changes:
             found.append((pictures, changes))
-    return {by_path[path]: data for path, data in _patch_pictures(observations.format, found).items()}
+    files = {by_path[path]: data for path, data in _patch_pictures(observations.format, found).items()}
+    return ChangedPictures(files, tuple(exchanged))
+
+
+def _exchanged(table: PictureTable, row: int, detection: int, pairs: Sequence[tuple[int, int]]) -> Array:
+    """Return x, y, confidence of points whose sides are exchanged, (n_points, 3); NaN for all others."""
+    points, is_found = table.points[row, detection], table.is_found[row, detection]
+    sure = np.where(is_found, np.nan_to_num(points[:, 2], nan=1.0), 0.0)
+    known = np.column_stack([np.where(is_found[:, None], points[:, :2], 0.0), sure])
+    out = np.full(known.shape, np.nan)
+    for left, right in pairs:
+        out[left], out[right] = known[right], known[left]
+    return out
 
 
 def _patch_pictures(format_name: str, found: Sequence[tuple[StoredPictures, Changes]]) -> dict[Path, bytes]:

@@ -27,6 +27,8 @@ class LikeExport:
     """Files that differ from those that came."""
     frames: tuple[int, ...]
     """Frames whose points were replaced in some file."""
+    exchanged: tuple[tuple[int, str, str], ...] = ()
+    """Frame, person and camera in whose view left and right were exchanged."""
 
 
 def export_like(
@@ -35,6 +37,7 @@ def export_like(
     out: Path,
     poses: PoseChoice = "edited",
     learn_offsets: bool = True,
+    exchange_sides: bool = False,
 ) -> LikeExport:
     """Write the files of observations as they came, with the points of mended poses replaced.
 
@@ -44,11 +47,16 @@ def export_like(
         out: file to write, or the folder of several files; it must not exist.
         poses: replace the points that a person edited, or those of all poses.
         learn_offsets: place points as far from the joints as the files usually do.
+        exchange_sides: key points: exchange left and right in the views and frames in which they were found exchanged.
 
     Raises:
         TrackerError: a stored file was changed or is missing, its format cannot be changed in place, or `out` cannot be
             written.
     """
+    if exchange_sides and observations.points is None:
+        raise FormatError(
+            f"expected key points, in which sides can be exchanged, found the points in space '{observations.name}'"
+        )
     contents = _stored_contents(session, observations)
     cameras = [c.camera for c in session.cameras]
     joints_world = observed_joints(observations, cameras).joints_world
@@ -59,7 +67,7 @@ def export_like(
         observations = replace(observations, people=people)
     mended = mended_points(session, observations, joints_world, poses, learn_offsets)
     frames = sorted({f for person in mended for f in person.bodies})
-    if frames and observations.format not in PATCHED:
+    if (frames or exchange_sides) and observations.format not in PATCHED:
         listed = ", ".join(FORMATS[name].title for name in PATCHED)
         raise FormatError(
             f"expected observations of a format whose points can be replaced in place ({listed}), found "
@@ -67,12 +75,15 @@ def export_like(
             Remedy("export_other_format"),
         )
     changed: Files = {}
-    if frames:
-        of_pictures = observations.points is not None
-        changed = (mended_pictures if of_pictures else mended_space)(session, observations, mended)
-        changed = {path: data for path, data in changed.items() if data != contents[path]}
+    exchanged: tuple[tuple[int, int, int], ...] = ()
+    if observations.points is not None and (frames or exchange_sides):
+        changed, exchanged = mended_pictures(session, observations, mended, exchange_sides)
+    elif frames:
+        changed = mended_space(session, observations, mended)
+    changed = {path: data for path, data in changed.items() if data != contents[path]}
     paths = _write(out, contents | changed)
-    return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames))
+    named = tuple((f, observations.people[k], session.camera_names[view]) for f, k, view in exchanged)
+    return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames), named)
 
 
 def _stored_contents(session: Session, observations: ObservationSet) -> Files:
