@@ -1,5 +1,6 @@
 """Import files of other programs: read them, place them at the frames of a session, check them, store them."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_s
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import IntArray
-from tracker.observations.checks import agreement_problem, picture_problems
+from tracker.observations.checks import agreement_problem, picture_problems, timing_problems
 from tracker.observations.observed import ObservationSet, ObservedPoints, SourceFile
 from tracker.observations.placing import place_pictures, rescaled
 from tracker.observations.readers import PICTURE_FORMATS, find_files
@@ -89,11 +90,14 @@ def _plan_of_pictures(session: Session, request: ImportRequest, format_name: str
     if request.confidence is not None:
         tables = {name: _with_confidence(table, request.confidence) for name, table in tables.items()}
     problems += picture_problems(tables, cameras)
-    frames, wrong, notes = place_pictures(tables, session, request.first_frame)
+    frames, wrong, notes = place_pictures(tables, session, request.first_frame, request.offsets)
     problems += wrong
     point_names, joint_map, unknown = _skeleton(tables, request)
     problems += unknown
     points = _assemble(session, tables, frames, point_names)
+    if not problems:
+        wrong, found = timing_problems(points, session.cameras, session.fps, request.offsets)
+        problems, notes = problems + wrong, notes + found
     if not problems and (disagreement := agreement_problem(points, [c.camera for c in session.cameras])):
         problems.append(disagreement)
     notes += [f"{name}: {note}" for name, table in tables.items() for note in table.notes]
@@ -236,6 +240,7 @@ def _sources(groups: list[tuple[FileGroup, str]]) -> tuple[tuple[SourceFile, ...
 def _options(request: ImportRequest) -> tuple[tuple[str, str], ...]:
     found = {
         "first_frame": request.first_frame,
+        "offsets": json.dumps(dict(request.offsets)) if request.offsets else None,
         "clock": request.clock,
         "axes": request.axes if request.axes != "x,y,z" else None,
         "unit_m": request.unit_m,

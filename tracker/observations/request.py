@@ -23,6 +23,9 @@ class ImportRequest:
     """File or folder by camera, where names do not tell."""
     first_frame: int | None = None
     """Frame of the session of the first picture or row; None to go by the numbers of the file."""
+    offsets: Mapping[str, int] = field(default_factory=dict)
+    """Key points: frames by which those of a camera are late, taken off; of a camera that is named, even by 0, the
+    user has decided."""
     clock: Clock | None = None
     """Points in space: whether rows lie at their numbers or at their times; see `Placement`."""
     axes: str = "x,y,z"

@@ -47,6 +47,8 @@ class ImportArguments:
     """files or folder of a camera, where names do not tell."""
     first_frame: OptionalWhole = None
     """frame of the session at which the first picture or row lies; by the numbers of the files by default."""
+    offset: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=N ...", help_behavior_hint="")] = ()
+    """frames by which the key points of a camera are late, taken off; NAME=0 keeps them as they are."""
     clock: OptionalClock = None
     """points in space: whether each Frame# is a frame of the session, or rows lie at their Time."""
     axes: Annotated[str, tyro.conf.arg(metavar="X,Y,Z")] = "x,y,z"
@@ -85,6 +87,7 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
         arguments.joint_map,
         parse_pairs(arguments.cameras, "--cameras", Path),
         arguments.first_frame,
+        parse_pairs(arguments.offset, "--offset", int),
         arguments.clock,
         arguments.axes,
         METRES_BY_WORD[arguments.units] if arguments.units is not None else None,
