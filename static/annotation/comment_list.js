@@ -58,6 +58,7 @@ export function commentList({ store, send }, review, visits) {
     const found = all.filter((comment) => showsResolved || !comment.resolved);
     list.replaceChildren(...[...found].sort((a, b) => a.frame - b.frame).map(entry));
     list.hidden = found.length === 0;
+    line.offer(all.map((comment) => comment.text));
     resolved.hidden = !all.some((comment) => comment.resolved);
     resolved.setAttribute("aria-pressed", String(showsResolved));
     showPlace();

@@ -27,7 +27,7 @@ export function fold(title, hint, ...content) {
 }
 
 /**
- * Field for a line of text that Enter sends and Esc empties.
+ * Field for a line of text that Enter sends and Esc empties. It offers texts that were sent before.
  *
  * @param {string} name for screen readers
  * @param {string} action label of the button
@@ -38,7 +38,10 @@ export function lineForm(name, action, send) {
   const input = Object.assign(make("input", "query-field"), { type: "text", placeholder: name, autocomplete: "off", maxLength: 2000 });
   input.setAttribute("aria-label", name);
   const button = Object.assign(make("button", "", action), { type: "submit", title: `${action}: ${name}` });
-  form.append(input, button);
+  const offered = make("datalist", "");
+  offered.id = `offered-${action.toLowerCase()}`;
+  input.setAttribute("list", offered.id);
+  form.append(input, button, offered);
   const enable = () => {
     button.disabled = !input.value.trim();
   };
@@ -59,6 +62,11 @@ export function lineForm(name, action, send) {
     clear() {
       input.value = "";
       enable();
+    },
+    /** @param {string[]} texts earliest first; of equal ones the last one counts */
+    offer(texts) {
+      const latest = [...new Set(texts.filter(Boolean).reverse())];
+      offered.replaceChildren(...latest.map((text) => new Option(text)));
     },
   };
 }

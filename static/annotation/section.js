@@ -73,6 +73,7 @@ export function annotationSection(context, review, visits) {
     none.hidden = review.tasks.length > 0;
     buttons.hidden = !none.hidden;
     tasks.show();
+    reason.offer(review.tasks.map((task) => task.comment));
     comments.show();
     speed.show();
     click.show();

@@ -12,6 +12,17 @@ import { textButton } from "./rows.js";
  */
 
 /**
+ * Frames by camera, of a text such as "cam2=3; cam3=-1".
+ * @param {string} text
+ */
+function offsetsOf(text) {
+  const words = text.split(";").map((word) => word.trim()).filter((word) => word);
+  const pairs = words.map((word) => /^(.+?)\s*=\s*(-?\d+)$/.exec(word));
+  if (pairs.includes(null)) throw new Error(`Expected offsets such as cam2=3, found “${text}”.`);
+  return Object.fromEntries(pairs.map((pair) => [pair?.[1], Number(pair?.[2])]));
+}
+
+/**
  * @param {import("../model/store.js").Store} store
  * @param {PathFields} paths
  * @param {() => void} discard forgets what was read
@@ -25,6 +36,7 @@ export function importForm(store, paths, discard) {
   path.input.dataset.takes = "files";
   const name = field("name", "Name", "Name of the observations in the session");
   const first = field("first_frame", "First frame", "Frame of the session of the first picture or row; by the numbers of the files if empty");
+  const late = field("offsets", "Offsets", "Frames by which the key points of a camera are late, such as cam2=3; several are separated by semicolons");
   const size = field("picture_size", "Picture size", "Width x height of the pictures that points or masks are of, such as 1920x1080, if not the footage's; 1x1 for normalized points");
   const confidence = field("confidence", "Confidence", "Confidence of all points, 0 to 1, where the files have none");
   const people = Object.assign(document.createElement("label"), { className: "import-field", title: "Person of whom they are" });
@@ -39,7 +51,7 @@ export function importForm(store, paths, discard) {
   const result = Object.assign(document.createElement("div"), { className: "import-result" });
   result.setAttribute("role", "status");
   const further = document.createElement("details");
-  further.append(Object.assign(document.createElement("summary"), { textContent: "Where the files do not tell", title: "First frame, size of the pictures, confidence" }), first.label, size.label, confidence.label);
+  further.append(Object.assign(document.createElement("summary"), { textContent: "Where the files do not tell", title: "First frame, offsets, size of the pictures, confidence" }), first.label, late.label, size.label, confidence.label);
   form.append(path.label, name.label, people, further, buttons, result);
   fold.append(head, form);
   paths.completes(path.input);
@@ -94,6 +106,7 @@ export function importForm(store, paths, discard) {
           name: name.input.value.trim(),
           people: person.value ? [person.value] : every,
           first_frame: number ? Number(number) : null,
+          offsets: offsetsOf(late.input.value),
           confidence: sure ? Number(sure) : null,
           picture_size: pixels ? [Number(pixels[1]), Number(pixels[2])] : null,
         })

@@ -9,7 +9,7 @@ from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_s
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import IntArray
-from tracker.observations.checks import agreement_problem, picture_problems
+from tracker.observations.checks import agreement_problem, picture_problems, timing_problems
 from tracker.observations.masks import plan_masks
 from tracker.observations.observed import ObservationSet, ObservedPoints
 from tracker.observations.placing import place_pictures, rescaled
@@ -70,11 +70,14 @@ def _plan_of_pictures(session: Session, request: ImportRequest, format_name: str
     if request.confidence is not None:
         tables = {name: _with_confidence(table, request.confidence) for name, table in tables.items()}
     problems += picture_problems(tables, cameras)
-    frames, wrong, notes = place_pictures(tables, session, request.first_frame)
+    frames, wrong, notes = place_pictures(tables, session, request.first_frame, request.offsets)
     problems += wrong
     point_names, joint_map, unknown = _skeleton(tables, request)
     problems += unknown
     points = _assemble(session, tables, frames, point_names)
+    if not problems:
+        wrong, found = timing_problems(points, session.cameras, session.fps, request.offsets)
+        problems, notes = problems + wrong, notes + found
     if not problems and (disagreement := agreement_problem(points, [c.camera for c in session.cameras])):
         problems.append(disagreement)
     notes += [f"{name}: {note}" for name, table in tables.items() for note in table.notes]

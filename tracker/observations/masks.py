@@ -35,7 +35,7 @@ def plan_masks(session: Session, request: ImportRequest, format_name: str, files
     if not masks:
         raise problems[0]
     tables = {name: PictureTable((), m.numbers, np.empty((len(m.numbers), 0, 0, 3))) for name, m in masks.items()}
-    frames, wrong, notes = place_pictures(tables, session, request.first_frame, _ABSENT)
+    frames, wrong, notes = place_pictures(tables, session, request.first_frame, request.offsets, _ABSENT)
     surveys: dict[str, MaskSurvey] = {}
     for source in session.cameras:
         name = source.camera.name
@@ -72,7 +72,7 @@ def _pictures(session: Session, request: ImportRequest, frames: Mapping[str, Int
     out = {}
     for name, placed in frames.items():
         out[name] = placed + offsets[name]
-        if request.first_frame is not None:
+        if request.first_frame is not None or request.offsets.get(name):
             out[name][(placed < 0) | (placed >= session.n_frames)] = -1
     return out
 

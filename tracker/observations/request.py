@@ -1,5 +1,6 @@
 """What is to be imported, and how."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +24,9 @@ class ImportRequest:
     """File or folder by camera, where names do not tell."""
     first_frame: int | None = None
     """Frame of the session of the first picture or row; None to go by the numbers of the file."""
+    offsets: Mapping[str, int] = field(default_factory=dict)
+    """Key points and masks: frames by which those of a camera are late, taken off; of a camera that is named, even by
+    0, the user has decided."""
     clock: Clock | None = None
     """Points in space: whether rows lie at their numbers or at their times; see `Placement`."""
     axes: str = "x,y,z"
@@ -43,6 +47,7 @@ class ImportRequest:
         """Names and values of the choices by which the files are read, to be stored."""
         found = {
             "first_frame": self.first_frame,
+            "offsets": json.dumps(dict(self.offsets)) if self.offsets else None,
             "clock": self.clock,
             "axes": self.axes if self.axes != "x,y,z" else None,
             "unit_m": self.unit_m,

@@ -47,6 +47,8 @@ class ImportArguments:
     """files or folder of a camera, where names do not tell."""
     first_frame: OptionalWhole = None
     """frame of the session at which the first picture or row lies; by the numbers of the files by default."""
+    offset: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=N ...", help_behavior_hint="")] = ()
+    """frames by which the key points of a camera are late, taken off; NAME=0 keeps them as they are."""
     clock: OptionalClock = None
     """points in space: whether each Frame# is a frame of the session, or rows lie at their Time."""
     axes: Annotated[str, tyro.conf.arg(metavar="X,Y,Z")] = "x,y,z"
@@ -90,6 +92,7 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
         arguments.joint_map,
         parse_pairs(arguments.cameras, "--cameras", Path),
         arguments.first_frame,
+        parse_pairs(arguments.offset, "--offset", int),
         arguments.clock,
         arguments.axes,
         METRES_BY_WORD[arguments.units] if arguments.units is not None else None,
@@ -102,7 +105,7 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
     summary: dict[str, Any] = {**import_summary(session, plan, command_line_text), "stored": False}
     if not (plan.problems or arguments.dry_run):
         with SessionLock(session.folder):
-            store_import(session, plan)
+            store_import(load_session(session.folder), plan)  # which may have changed while files were read
         summary["stored"] = True
     print(format_json(summary) if arguments.json else _format(summary))
     if plan.problems:

@@ -62,6 +62,42 @@ def test_a_contradiction_is_shown_with_the_preview_and_nothing_is_stored(run, se
     assert run("import", session.folder, folder, "--as", "mp", "--first-frame", "0")[0] == 0
 
 
+def test_late_key_points_of_a_view_are_named_with_the_option(run, tmp_path):
+    session = make_session(tmp_path / "long", 48)
+    points = seen(session, [walking(48)])
+    points[:, 1] = np.roll(points[:, 1], 3, axis=0)
+    folder = write_openpose(tmp_path / "k", session.camera_names, points)
+    words = ("import", session.folder, folder, "--as", "mp")
+    status, _, err = run(*words)
+    assert status == 1
+    assert "camera 'cam1'" in err
+    assert "those of 3 frames later fit the other views best; say --offset cam1=3 to take that off, or cam1=0" in err
+    assert_refused(run(*words, "--offset", "cam1=x"), ["expected --offset as NAME=VALUE"])
+    assert not (session.folder / "observations").exists()
+    status, out, _ = run(*words, "--offset", "cam1=3")
+    assert (status, out.splitlines()[-1]) == (0, "stored as mp")
+    assert "  note: camera 'cam1': 3 frames were taken off, as chosen" in out
+
+
+def test_exchanged_sides_are_counted_when_they_go_back(run, session, tmp_path):
+    points = seen(session, [TRUTH])
+    for left, right in (("LHip", "RHip"), ("LKnee", "RKnee"), ("LAnkle", "RAnkle")):
+        pair = [BODY_25.points.index(left), BODY_25.points.index(right)]
+        points[3, 2][:, pair] = points[3, 2][:, pair[::-1]]
+    folder = write_openpose(tmp_path / "k", session.camera_names, points)
+    assert run("import", session.folder, folder, "--as", "mp")[0] == 0
+    words = ("export", session.folder, "--like", "mp", "--exchange-sides")
+    status, out, _ = run(*words, "--out", tmp_path / "back")
+    last = "left and right were exchanged in 1 view of 1 frame, in 1 file; all else is as imported"
+    assert (status, out.splitlines()[-1]) == (0, last)
+    status, out, _ = run(*words, "--out", tmp_path / "again", "--json")
+    assert json.loads(out)["exchanged"] == [{"frame": 3, "person": "ann", "view": "cam2"}]
+    assert_refused(
+        run("export", session.folder, "--out", tmp_path / "m.trc", "--exchange-sides"),
+        ["with --like NAME, found no --like"],
+    )
+
+
 def test_damaged_observations_are_listed_with_the_reason(run, session, keypoints):
     run("import", session.folder, keypoints, "--as", "mp")
     (session.folder / "observations" / "mp" / "points.npz").write_bytes(b"x")

@@ -131,6 +131,15 @@ async def test_comments_are_written_at_the_limb_gone_to_and_resolved(page, endpo
     await sent(endpoint, action="resolve", uid="a" * 32)
 
 
+async def test_reasons_and_comments_of_before_are_offered_latest_first(page, endpoint, section):
+    again = [task(24 + k, "rejected", "anna", text, "rita") for k, text in enumerate(("toes", "left elbow too high"))]
+    await opened(page, endpoint, PLAN | {"tasks": TASKS + again})
+    offered = "(field) => [...field.list.options].map((option) => option.value)"
+    reason = section.get_by_label("What is to be corrected", exact=True)
+    assert await reason.evaluate(offered) == ["left elbow too high", "toes"]
+    assert await section.get_by_label("Comment", exact=True).evaluate(offered) == ["hidden"]
+
+
 CLICK = {
     "frame": 36, "person": 0, "limb": "right arm", "cameras": [3, 0], "gain_mm": 2.97,
     "reason": "right arm, frames 34 to 38, seen best in LEFT: 90 mm expected, 12 mm after the correction",

@@ -113,7 +113,15 @@ async def test_problems_of_files_forbid_the_import(fresh_page, endpoint):
     check = section.get_by_role("button", name="Check", exact=True)
     await check.click()
     await section.get_by_text("FRONT: 40 rows, points in frames 0 to 39, median confidence 0.90").wait_for()
-    assert asked[0]["paths"] == "/a"
+    assert (asked[0]["paths"], asked[0]["offsets"]) == ("/a", {})
+    await section.get_by_text("Where the files do not tell").click()
+    await page.fill("#import-offsets", "FRONT")
+    await check.click()
+    await section.locator(".is-failed", has_text="Expected offsets such as cam2=3, found “FRONT”.").wait_for()
+    await page.fill("#import-offsets", "FRONT=3; LEFT = -1;")
+    await check.click()
+    await section.get_by_text("FRONT: 40 rows").wait_for()
+    assert asked[-1]["offsets"] == {"FRONT": 3, "LEFT": -1}
     assert await section.get_by_role("button", name="Import", exact=True).is_enabled()
     plan |= {"are_masks": True, "people": []}
     view |= {"confidence": None, "share": 0.062}

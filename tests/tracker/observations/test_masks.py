@@ -136,6 +136,14 @@ def test_a_first_frame_places_masks_and_leaves_out_others(session, tmp_path):
     assert sorted(p.name for p in found.cameras[1].masks.iterdir()) == ["000002.png", "000003.png"]
 
 
+def test_an_offset_takes_frames_off(session, tmp_path):
+    plan = planned(session, write_masks(tmp_path / "m", session.camera_names, MASKS), offsets={"cam1": 1})
+    assert "camera 'cam1': 1 pictures lie outside of the session and were left out" in plan.notes
+    found = store_import(session, plan)
+    assert [read_mask(found.cameras[1], k) is None for k in range(N)] == [False, False, False, True]
+    assert np.array_equal(read_mask(found.cameras[1], 0) > 0, MASKS[1, 1] > 0)
+
+
 def test_missing_masks_are_named_and_are_no_masks(session, tmp_path):
     folder = write_masks(tmp_path / "m", session.camera_names, MASKS)
     (folder / "cam1" / "cam1_000002.png").unlink()

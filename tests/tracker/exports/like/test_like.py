@@ -18,7 +18,7 @@ from observed_people import BODY_25, make_session, seen, write_openpose
 from tracker.body.model import PosedBody
 from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.keypoints import project_through_lens
-from tracker.exports.like import export_like
+from tracker.exports.like.sending import export_like
 from tracker.formats.c3d import read_c3d
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
