@@ -172,7 +172,7 @@ def test_export_like_refuses_options_of_formats(run, session, tmp_path):
     like = ["export", session.folder, "--out", tmp_path / "b.trc", "--like", "trc"]
     assert_refused(run(*like, "--units", "mm"), ["--like without --units: the files stay as they came; leave it out"])
     assert_refused(run(*like, "--keyframes-only"), ["--like without --keyframes-only"])
-    assert_refused(run(*like[:-2], "--poses", "all"), ["--poses and --plain-joints with --like NAME"])
+    assert_refused(run(*like[:-2], "--poses", "all"), ["--poses, --plain-joints and --exchange-sides with --like NAME"])
     assert_refused(run(*like[:-1], "no"), ["found 'no'; the session has trc"])
     assert run(*like)[0] == 0
     assert np.array_equal((tmp_path / "b.trc").read_bytes(), (tmp_path / "a.trc").read_bytes())
