@@ -32,7 +32,7 @@ Files = dict[str, bytes]
 Changes = dict[int, list[tuple[int, Array]]]
 """Number of a person in the file and x, y, confidence of the points, (n_points, 3), by row."""
 PATCHED = ("openpose", "coco", "deeplabcut", "hdf5", "trc", "csv", "c3d")
-"""Formats whose points can be replaced; of HDF5 all but NWB."""
+"""Formats whose points can be replaced."""
 
 
 class ChangedPictures(NamedTuple):
