@@ -5,7 +5,7 @@ Each SESSION has bodies and a start. It is named as a recording in `--data DIR`,
 limb of one frame by pins in two views and a fit, as *Fit* in the page does. The frame becomes a keyframe, and the
 stretches beside it are tracked again. He follows the proposals of `quadrille next`, the list of doubts, or corrects
 everything on keyframes at equal distances. It is counted how many actions it takes until the mean error is at most
-20 mm (30 for two people) and no frame is lost.
+20 mm (30 for two people) and no frame is lost. A folder NAME@plain is the session NAME, tracked without the audit.
 """
 
 import argparse
@@ -79,9 +79,10 @@ class Measured(NamedTuple):
 class Annotator:
     """The scripted annotator, at work on a copy of a session."""
 
-    def __init__(self, folder: Path, references: Sequence[Path], seed: int) -> None:
+    def __init__(self, folder: Path, references: Sequence[Path], seed: int, is_plain: bool) -> None:
         self.folder, self.references, self.rng = folder, references, np.random.default_rng(seed)
         self.session = load_session(folder)
+        self.settings = TrackSettings(audit=not is_plain)
         self.target_mm = TARGETS_MM[len(self.session.people) > 1]
         self.actions, self.curve = 0, list[Measured]()
 
@@ -149,7 +150,7 @@ class Annotator:
     def track(self, frames: range, people: tuple[int, ...]) -> None:
         """Track people again."""
         with open_stored_session(self.session) as opened:
-            opened.track(TrackPlan(frames, people, TrackSettings()), Silent())
+            opened.track(TrackPlan(frames, people, self.settings), Silent())
 
 
 class Silent:
@@ -231,14 +232,15 @@ def cells(curve: Sequence[Measured], target_mm: float, end: str = "") -> list[st
 
 def rows_of(folder: Path, references: list[Path], seed: int) -> dict[str, list[str]]:
     """Annotate copies of a session in all ways."""
-    out, name = {}, folder.name.replace("_", " ")
+    out, (name, *plain) = {}, folder.name.replace("_", " ").split("@")
+    name += ", without audit" * bool(plain)
     with tempfile.TemporaryDirectory() as scratch:
-        new = Annotator(Path(shutil.copytree(folder, Path(scratch) / "new")), references, seed)
+        new = Annotator(Path(shutil.copytree(folder, Path(scratch) / "new")), references, seed, bool(plain))
         new.track(range(new.session.n_frames), tuple(range(len(new.session.people))))  # by the program as it is now
 
         def begin(way: str) -> Annotator:
             at = Path(shutil.copytree(new.folder, Path(scratch) / way))
-            return Annotator(at, references, seed)
+            return Annotator(at, references, seed, bool(plain))
 
         at = begin("next")
         followed(at, proposed, True)
