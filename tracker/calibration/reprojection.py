@@ -20,7 +20,7 @@ from tracker.fitting.bundle import ArrowEquations, solve_bundle
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 
-_OUTLIER_SIGMAS = 4.0
+OUTLIER_SIGMAS = 4.0
 """The k of the robust errors, standard deviations: Gaussian errors then keep 96% of their information (the ratio of
 E[w + s w']^2 to E[w^2 s] / 2), and an error of 12 pulls as much as one of 1.2."""
 _MEDIAN_SQUARE = 2 * np.log(2.0)
@@ -190,7 +190,7 @@ class ReprojectionProblem(ABC):
             J, own, errors = (np.where(np.isfinite(rows), rows, 0.0) for rows in (J, own, errors))
         if located.by_own is not None:
             own = own @ located.by_own
-        cost = 0.5 * float(np.where(shown, s / (1 + s / _OUTLIER_SIGMAS**2), _OUTLIER_SIGMAS**2).sum())
+        cost = 0.5 * float(np.where(shown, s / (1 + s / OUTLIER_SIGMAS**2), OUTLIER_SIGMAS**2).sum())
         scale = scale[:, None, None]
         return J * scale, own * scale, errors[:, :, None] * scale, cost
 
@@ -294,7 +294,7 @@ class ReprojectionProblem(ABC):
     def group_costs(self, rig: Rig) -> Array:
         """Return the robust cost of the observations of each group, (G,)."""
         s = self._squares_px2(rig) / self.sigmas_px[self.observations.cameras] ** 2
-        robust = s / (1 + s / _OUTLIER_SIGMAS**2)
+        robust = s / (1 + s / OUTLIER_SIGMAS**2)
         return np.asarray(0.5 * np.bincount(self.observations.groups, robust, self.n_groups), dtype=np.float64)
 
     def with_sigmas(self, sigmas_px: Array) -> Self:
@@ -368,13 +368,13 @@ def _information(squares: Array, weights: Array, left: float) -> float:
         left: share of the squared errors that the fit has left.
     """
     s = np.where(np.isfinite(squares), squares, 0.0)
-    slopes = weights * (1 - 2 * s / (_OUTLIER_SIGMAS**2 + s))  # w + s dw/ds
+    slopes = weights * (1 - 2 * s / (OUTLIER_SIGMAS**2 + s))  # w + s dw/ds
     variance = np.mean(weights**2 * s) / 2 / left
     return float(np.mean(slopes) ** 2 / (variance * np.mean(weights)))
 
 
 def _weights(squares: Array) -> Array:
-    return np.asarray(1 / (1 + squares / _OUTLIER_SIGMAS**2) ** 2)
+    return np.asarray(1 / (1 + squares / OUTLIER_SIGMAS**2) ** 2)
 
 
 def _add(target: Array, groups: IntArray, values: Array) -> None:
