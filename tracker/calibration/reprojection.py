@@ -29,7 +29,7 @@ _ROUNDS = 12
 """Most fits with noise measured again in between. It settles to 1% within three to six."""
 _SETTLED = 0.01
 """Largest relative change of the noise at which it has settled: 1% of all intervals."""
-_STEPS, _ROUGH, _FINAL = 2, 1e-2, 1e-6
+_STEPS, _ROUGH, FINAL = 2, 1e-2, 1e-6
 """Most steps before the noise is measured again, and relative decreases of the cost at which a fit ends: before the
 noise has settled, and after."""
 _LARGE, _FALL = 0.95, 4.0
@@ -332,7 +332,7 @@ def fit_rig(problem: ReprojectionProblem, rig: Rig) -> RigFit:
             if is_settled:
                 break
             rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
-    rig = solve_bundle(problem, rig, tolerance=_FINAL).state
+    rig = solve_bundle(problem, rig, tolerance=FINAL).state
     return _result(problem, rig)
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.acquisition.segment_lengths import segment_lengths
+from tracker.acquisition.size_parameters import SizePriors
 from tracker.acquisition.typical_body import typical_body
 from tracker.errors import CalibrationError, TrackerError
 from tracker.formats.model_toml import load_model
@@ -19,6 +20,11 @@ _SEGMENTS = ("calf", "thigh", "trunk")
 _FEET = {"heels and toes": ("heel", "toe"), "ankles": ("ankle",)}
 """Points that a floor is found by, best first."""
 _BODY = "gavrila38"
+
+
+STATURE_SIGMA = 0.062
+"""Root mean square distance of adult statures from that of a typical adult (`DEFAULT_HEIGHT_M`), as a share of it: men
+of 1.756 +- 0.069 m and as many women of 1.629 +- 0.064 m (ANSUR II, Gordon et al. 2014)."""
 
 
 class Upright(NamedTuple):
@@ -54,6 +60,17 @@ def metres_per_unit(joints: Array, names: Sequence[str], stature_m: float) -> fl
             "person"
         ) from error
     return sum(expected.values()) / sum(found.values())
+
+
+def scale_sigma(stature_m: float | None) -> float:
+    """Return the standard deviation of `metres_per_unit` as a share of it; of a typical adult's stature without one.
+
+    Lengths of people of one stature differ by `SizePriors.length`, each in its own way.
+    """
+    body = load_model(_BODY)
+    lengths = np.array([*segment_lengths(body.named_points_world(body.neutral()), _SEGMENTS).values()])
+    of_proportions = SizePriors().length * float(np.linalg.norm(lengths) / lengths.sum())
+    return float(np.hypot(of_proportions, STATURE_SIGMA if stature_m is None else 0.0))
 
 
 def scaled_by(cameras: Sequence[Camera], factor: float) -> tuple[Camera, ...]:

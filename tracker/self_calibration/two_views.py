@@ -6,6 +6,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from tracker.boards.view_choice import MIN_CORNERS
 from tracker.calibration.camera_columns import ROTATION
 from tracker.calibration.reprojection import column_ends
 from tracker.geometry import rigid
@@ -13,9 +14,6 @@ from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, adjust_joints
 from tracker.self_calibration.seen_joints import SeenJoints
-
-_MIN_POINTS = 5
-"""Fewest joints that determine a relative pose (Nister 2004)."""
 
 
 class TwoViews(NamedTuple):
@@ -37,7 +35,7 @@ def relate(seen: SeenJoints, pair: tuple[int, int], a: Camera, b: Camera) -> Two
     rays = [c.rays(observations.px[part]) for c, part in zip((a, b), at, strict=True)]
     x, y = (r[:, :2] / r[:, 2:] for r in rays)
     valid = np.isfinite(x).all(axis=1) & np.isfinite(y).all(axis=1)
-    if valid.sum() <= _MIN_POINTS:
+    if valid.sum() < MIN_CORNERS:
         return None
     E, _ = cv2.findEssentialMat(x[valid], y[valid], np.eye(3), cv2.LMEDS)
     if E is None or E.shape != (3, 3):
