@@ -30,9 +30,7 @@ def chain_cameras(seen: SeenJoints, lenses: Sequence[Camera], stature_m: float) 
     Raises:
         CalibrationError: no two cameras show the person from different sides, or one shows too little of the person.
     """
-    pairs = [
-        relate(seen, (i, j), lenses[i], lenses[j]) for i, j in combinations(range(len(lenses)), 2)
-    ]
+    pairs = [relate(seen, (i, j), lenses[i], lenses[j]) for i, j in combinations(range(len(lenses)), 2)]
     found = [pair for pair in pairs if pair is not None]
     if not found:
         raise CalibrationError(
@@ -87,5 +85,6 @@ def _resected(seen: SeenJoints, index: int, lens: Camera, joints: Array, sigma_p
             f"expected camera '{lens.name}' to agree with the others on where the person is, found that it does not; "
             "check that its videos show the same instants"
         )
-    T_camera_world = rigid.transform(rigid.so3_exp(np.asarray(rotation).ravel()), np.asarray(shift).ravel())
+    w, t = (np.asarray(v, dtype=np.float64).ravel() for v in (rotation, shift))
+    T_camera_world = rigid.transform(rigid.so3_exp(w), t)
     return replace(lens, T_world_camera=rigid.inverse(T_camera_world))

@@ -58,7 +58,7 @@ class UnknownLenses(NamedTuple):
     means: tuple[Camera, ...]
     """Cameras with the means of what is known."""
     alike: tuple[tuple[int, ...], ...] = ()
-    """Cameras with lenses of one model, those with pictures of one size: joints hardly tell the focal length of each."""
+    """Cameras with lenses of one model: joints hardly tell the focal length of each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,10 @@ def _prior(cameras: Sequence[Camera], gauge: Gauge, lenses: UnknownLenses | None
         if lenses is not None:
             own[FOCAL] = UNKNOWN_LENS.focal
         sigmas.append(own)
-    means = tuple(replace(b, T_world_camera=c.T_world_camera) for b, c in zip(lenses.means if lenses else cameras, cameras, strict=True))
+    means = tuple(
+        replace(b, T_world_camera=c.T_world_camera)
+        for b, c in zip(lenses.means if lenses else cameras, cameras, strict=True)
+    )
     return Prior(means, tuple(sigmas))
 
 

@@ -25,7 +25,7 @@ from tracker.observations.triangulation import INLIER_M
 from tracker.self_calibration.camera_chain import chain_cameras
 from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses, adjust_joints, among
 from tracker.self_calibration.seen_joints import SeenJoints, lone_person, with_sides_mended
-from tracker.self_calibration.stature import Upright, metres_per_unit, scaled_by, scale_sigma, upright
+from tracker.self_calibration.stature import Upright, metres_per_unit, scale_sigma, scaled_by, upright
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +50,11 @@ class PersonCalibration:
     """Standard deviation of the scale, as a share of it."""
     notes: tuple[str, ...]
     """Sentences on quantities that the footage does not determine."""
+
+    def held_out_rms_px(self, camera: int | None = None) -> float:
+        """Return the root mean square error on the frames held out, of one camera or all; NaN without joints."""
+        px = self.held_out_px if camera is None else self.held_out_px[self.held_out_cameras == camera]
+        return float(np.sqrt(np.mean(px**2))) if len(px) else float("nan")
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -103,9 +108,7 @@ def calibrate_by_person(
     world = upright(scaled_by(adjusted.cameras, scale), scale * joints, seen.names, height_m)
     sigma = scale_sigma(stature_m)
     notes = (*_scale_notes(stature_m, sigma), *_lens_notes(adjusted, has_lenses), *_view_notes(world, n_crowded))
-    return PersonCalibration(
-        world, adjusted, seen, held_out, on_them.cameras, errors_px, volume, sigma, notes
-    )
+    return PersonCalibration(world, adjusted, seen, held_out, on_them.cameras, errors_px, volume, sigma, notes)
 
 
 def _spread(observations: ObservationSet) -> ObservationSet:
@@ -158,9 +161,7 @@ def _adjusted(
 
 
 def _in_metres(adjusted: AdjustedJoints, seen: SeenJoints, height_m: float) -> tuple[Camera, ...]:
-    return scaled_by(
-        adjusted.cameras, metres_per_unit(seen.by_joint(adjusted.points_world), seen.names, height_m)
-    )
+    return scaled_by(adjusted.cameras, metres_per_unit(seen.by_joint(adjusted.points_world), seen.names, height_m))
 
 
 def _held_out_errors(cameras: Sequence[Camera], seen: SeenJoints) -> tuple[Observations, Array]:

@@ -69,11 +69,10 @@ def lone_person(observations: ObservationSet) -> tuple[SeenJoints, int]:
 def with_sides_mended(observations: ObservationSet, seen: SeenJoints, cameras: Sequence[Camera]) -> SeenJoints:
     """Exchange left and right in pictures that contradict the others, by cameras that are about right."""
     found = triangulate_observations(observations, cameras)
-    px, is_seen = seen.px, seen.is_seen
+    values = np.concatenate([seen.px, seen.is_seen[..., None]], axis=-1)
     at = {name: i for i, name in enumerate(seen.names) if name}
     names = [points[0] if len(points) == 1 else "" for points in observations.counterparts.values()]
     for group, pairs in enumerate(side_pairs(observations)):
         own = [(at[names[left]], at[names[right]]) for left, right in pairs]
-        flags = found.is_exchanged[:, 0, :, group]
-        px, is_seen = with_sides_exchanged(px, own, flags), with_sides_exchanged(is_seen, own, flags)
-    return replace(seen, px=px, is_seen=np.asarray(is_seen, dtype=bool))
+        values = with_sides_exchanged(values, own, found.is_exchanged[:, 0, :, group])
+    return replace(seen, px=values[..., :2], is_seen=np.asarray(values[..., 2] > 0))
