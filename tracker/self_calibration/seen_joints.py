@@ -69,7 +69,7 @@ def lone_person(observations: ObservationSet) -> tuple[SeenJoints, int]:
 def with_sides_mended(observations: ObservationSet, seen: SeenJoints, cameras: Sequence[Camera]) -> SeenJoints:
     """Exchange left and right in pictures that contradict the others, by cameras that are about right."""
     found = triangulate_observations(observations, cameras)
-    values = np.concatenate([seen.px, seen.is_seen[..., None]], axis=-1)
+    values = np.concatenate([seen.px, seen.is_seen[..., None].astype(np.float64)], axis=-1)
     at = {name: i for i, name in enumerate(seen.names) if name}
     names = [points[0] if len(points) == 1 else "" for points in observations.counterparts.values()]
     for group, pairs in enumerate(side_pairs(observations)):
