@@ -13,18 +13,20 @@ from tracker.observations.observed import ObservationSet, ObservedPoints
 
 FOCAL_PX, SIZE = 500.0, (640, 480)
 STATURE_M = 1.70
+_LIVELY = {f"{side}_{part}": share for side in ("left", "right") for part, share in
+           (("shoulder", 1.0), ("elbow", 1.0), ("hip", 0.3), ("knee", 0.3))}  # fmt: skip
+"""Joints that move, and how much: the trunk stays upright."""
 NAMES = tuple(p for p in BODY_25.points if len(BODY_25.counterparts(BODY_25.points)[p]) == 1)
 
 
 def dancing(n_frames, seed=0, reach=1.0, bend=0.5, model: BodyModel | None = None):
-    """Points of a person over frames, (n_frames, n_points, 3), metres: feet on the ground, joints bent at random."""
+    """Points of a person over frames, (n_frames, n_points, 3), metres: feet on the ground, arms and legs bent at random."""
     model, random = model or load_model("gavrila38", STATURE_M), np.random.default_rng(seed)
     at = [model.point_names.index(BODY_25.counterparts(NAMES)[n][0]) for n in NAMES]
     out = []
     for k in range(n_frames):
         angle = 2 * np.pi * k / n_frames
-        step = bend * random.normal(size=model.n_dofs)
-        step[model.dof_joint == 0] = 0.0  # the trunk stays upright
+        step = bend * random.normal(size=model.n_dofs) * [_LIVELY.get(n.split(".")[0], 0.0) for n in model.dof_names]
         pose = model.retract(model.neutral(), step)
         points = model.points_world(pose)[at]
         c, s = np.cos(2 * angle), np.sin(2 * angle)

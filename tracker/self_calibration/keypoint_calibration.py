@@ -238,7 +238,11 @@ def _lens_notes(adjusted: AdjustedJoints, has_lenses: bool) -> tuple[str, ...]:
 
 
 def _view_notes(world: Upright, n_crowded: int) -> tuple[str, ...]:
-    out = [f"up is the direction from the ankles to the shoulders; the floor was found by the {world.floor_by}"]
+    lean = f"{np.degrees(world.lean_rad):.0f} degrees"
+    out = [
+        f"up is the direction from the ankles to the shoulders, from which single frames differ by {lean}: a person who "
+        f"leans tilts the floor; it was found by the {world.floor_by}"
+    ]
     if n_crowded:
         out.append(f"{n_crowded} pictures show several people and were left out")
     return tuple(out)

@@ -33,6 +33,8 @@ class Upright(NamedTuple):
     cameras: tuple[Camera, ...]
     joints_world: Array
     """(F, N, 3), metres."""
+    lean_rad: float
+    """Median angle between the vertical and the direction from the ankles to the shoulders on a frame."""
     floor_by: str
     """Points that the floor was found by."""
 
@@ -102,6 +104,7 @@ def upright(cameras: Sequence[Camera], joints: Array, names: Sequence[str], stat
         raise CalibrationError("expected ankles and shoulders in one frame, found none; film the whole person")
     up = np.median(spines / np.linalg.norm(spines, axis=1, keepdims=True), axis=0)
     up /= np.linalg.norm(up)
+    lean = float(np.median(np.arccos(np.clip(spines @ up / np.linalg.norm(spines, axis=1), -1.0, 1.0))))
     forward = cameras[0].T_world_camera[:3, 2] - up * float(up @ cameras[0].T_world_camera[:3, 2])
     if not np.linalg.norm(forward):  # it looks straight down
         forward = cameras[0].T_world_camera[:3, 1]
@@ -113,7 +116,7 @@ def upright(cameras: Sequence[Camera], joints: Array, names: Sequence[str], stat
     origin = np.array([middle[0], middle[1], below])
     world = rigid.transform(None, -origin) @ turn
     moved = tuple(replace(c, T_world_camera=world @ c.T_world_camera) for c in cameras)
-    return Upright(moved, turned - origin, floor_by)
+    return Upright(moved, turned - origin, lean, floor_by)
 
 
 def _middle(places: Mapping[str, Array], joint: str) -> Array:

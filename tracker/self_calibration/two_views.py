@@ -47,7 +47,9 @@ def relate(seen: SeenJoints, pair: tuple[int, int], a: Camera, b: Camera) -> Two
         replace(b, T_world_camera=rigid.inverse(T_b_a)),
     )
     adjusted = adjust_joints(cameras, observations, seen.n_joints, Gauge(0, 1))
-    return None if adjusted is None else TwoViews(pair, adjusted, _rotation_sigma(adjusted))
+    if adjusted is None or len(adjusted.observed.px) < len(observations.px) / 2:
+        return None  # rays to most joints are parallel
+    return TwoViews(pair, adjusted, _rotation_sigma(adjusted))
 
 
 def _rotation_sigma(adjusted: AdjustedJoints) -> float:
