@@ -1,13 +1,11 @@
 """A person who walks and dances before cameras, as key points with noise, gross errors, and a known truth."""
 
-from dataclasses import replace
-
 import numpy as np
 import rigs
 from observed_people import BODY_25
 
-from tracker.body.model import BodyModel
 from tracker.boards.lens_fit import blank_camera
+from tracker.body.model import BodyModel
 from tracker.formats.model_toml import load_model
 from tracker.observations.observed import ObservationSet, ObservedPoints
 
@@ -20,7 +18,7 @@ NAMES = tuple(p for p in BODY_25.points if len(BODY_25.counterparts(BODY_25.poin
 
 
 def dancing(n_frames, seed=0, reach=1.0, bend=0.5, model: BodyModel | None = None):
-    """Points of a person over frames, (n_frames, n_points, 3), metres: feet on the ground, arms and legs bent at random."""
+    """Points of a person who moves at random, feet on the ground, (n_frames, n_points, 3), metres."""
     model, random = model or load_model("gavrila38", STATURE_M), np.random.default_rng(seed)
     at = [model.point_names.index(BODY_25.counterparts(NAMES)[n][0]) for n in NAMES]
     out = []
@@ -48,7 +46,7 @@ def blanks(cameras):
 
 
 def observed(cameras, points, sigma_px=3.0, gross=0.05, seed=0, crowd=()):
-    """Key points of a person in all cameras; a share is grossly wrong. `crowd`: cameras that show somebody else, too."""
+    """Key points of a person in all cameras; a share is grossly wrong. Cameras of a `crowd` show somebody else, too."""
     random = np.random.default_rng((seed, 7))
     n_frames, n_points = points.shape[:2]
     px = np.stack([c.project(points.reshape(-1, 3)).reshape(n_frames, n_points, 2) for c in cameras], axis=1)

@@ -129,7 +129,7 @@ def among(observations: Observations, determined: Mask) -> Observations:
 
 
 def _prior(cameras: Sequence[Camera], gauge: Gauge, lenses: UnknownLenses | None) -> Prior:
-    sigmas = []
+    sigmas, sharing = [], {i: len(group) for group in (lenses.alike if lenses else ()) for i in group}
     for i, camera in enumerate(cameras):
         own = np.zeros(n_columns(camera))
         own[POSE] = 0.0 if i == gauge.held else np.inf
@@ -137,7 +137,8 @@ def _prior(cameras: Sequence[Camera], gauge: Gauge, lenses: UnknownLenses | None
             baseline = camera.T_camera_world[:3, :3] @ (camera.center_world - cameras[gauge.held].center_world)
             own[SHIFT.start + int(np.abs(baseline).argmax())] = 0.0
         if lenses is not None:
-            own[FOCAL] = UNKNOWN_LENS.focal
+            # Lenses of one model are one draw from what is known, not several.
+            own[FOCAL] = UNKNOWN_LENS.focal * np.sqrt(sharing.get(i, 1))
         sigmas.append(own)
     means = tuple(
         replace(b, T_world_camera=c.T_world_camera)

@@ -12,7 +12,7 @@ from tracker.boards.rig_fit import HELD_OUT_EVERY, PLAIN_PX
 from tracker.boards.view_choice import MAX_FRAMES, MAX_LENS_VIEWS
 from tracker.calibration.camera_columns import n_columns
 from tracker.calibration.lens_priors import UNKNOWN_LENS
-from tracker.calibration.point_adjustment import NEWS, PointProblem, triangulate_all
+from tracker.calibration.point_adjustment import NEWS, PointProblem, require_spread, triangulate_all
 from tracker.calibration.reprojection import FINAL, Observations, Prior, Rig
 from tracker.compute.progress import Report, stages, unreported
 from tracker.errors import CalibrationError
@@ -81,6 +81,17 @@ def calibrate_by_person(
     Raises:
         CalibrationError: the key points do not determine the cameras; the message says what is missing.
     """
+    try:
+        return _calibrated(observations, cameras, stature_m, has_lenses, report)
+    except np.linalg.LinAlgError as error:
+        raise CalibrationError(
+            f"expected key points that determine the cameras, found none that do; {_advice(len(cameras))}"
+        ) from error
+
+
+def _calibrated(
+    observations: ObservationSet, cameras: Sequence[Camera], stature_m: float | None, has_lenses: bool, report: Report
+) -> PersonCalibration:
     chaining, adjusting, checking = stages(report, "chain of cameras", "all cameras", "frames held out")
     height_m = DEFAULT_HEIGHT_M if stature_m is None else stature_m
     cameras = [replace(c, T_world_camera=np.eye(4)) for c in cameras]
@@ -157,6 +168,8 @@ def _adjusted(
             "expected joints that two cameras see from different sides, found none; film the person by cameras that "
             "stand at an angle to each other"
         )
+    numbers, groups = np.unique(found.observed.groups, return_inverse=True)
+    require_spread(Rig(found.cameras, found.points_world[numbers]), replace(found.observed, groups=groups))
     return found
 
 
@@ -189,7 +202,13 @@ def _volume(adjusted: AdjustedJoints, scale: float) -> VolumeError:
 
 
 def _require_determined(volume: VolumeError, adjusted: AdjustedJoints, seen: SeenJoints, scale: float) -> None:
-    """Refuse cameras by which a joint could be taken for another one."""
+    """Refuse unknown focal lengths, and cameras by which a joint could be taken for another one."""
+    for camera, sigma in zip(adjusted.cameras, adjusted.focal_sigmas, strict=True):
+        if sigma > NEWS * UNKNOWN_LENS.focal:
+            raise CalibrationError(
+                f"expected joints that show the focal length of camera '{camera.name}', found it not determined by this "
+                f"footage (+- {sigma:.0%}); {_advice(len(adjusted.cameras))}"
+            )
     if volume.expected_m < INLIER_M:
         return
     joints = scale * seen.by_joint(adjusted.points_world)
@@ -227,12 +246,7 @@ def _lens_notes(adjusted: AdjustedJoints, has_lenses: bool) -> tuple[str, ...]:
         return ()
     out = ["principal points in the middle, no distortion and one focal length for pictures of one size were assumed"]
     for camera, sigma in zip(adjusted.cameras, adjusted.focal_sigmas, strict=True):
-        if sigma > NEWS * UNKNOWN_LENS.focal:
-            out.append(
-                f"camera '{camera.name}': focal length not determined by this footage; that of an average lens was "
-                "assumed, so give the lenses or let the person move nearer and farther"
-            )
-        elif sigma > TOLD_FOCAL:
+        if sigma > TOLD_FOCAL:
             out.append(f"camera '{camera.name}': the joints do not tell its focal length better than to {sigma:.1%}")
     return tuple(out)
 

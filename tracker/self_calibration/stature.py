@@ -131,7 +131,7 @@ def _lowest(places: Mapping[str, Array], stature_m: float) -> tuple[float, str]:
     own = body.named_points_world(body.neutral())
     for title, points in _FEET.items():
         feet = [places[f"{side}_{p}"][:, 2] for side in ("left", "right") for p in points if f"{side}_{p}" in places]
-        heights = np.array(feet).reshape(len(feet), -1)
+        heights = np.array(feet or [[np.nan]])
         known = np.isfinite(heights).any(axis=0)
         if known.any():
             above = own["left_ankle"][2] - own["left_heel"][2] if points == ("ankle",) else 0.0

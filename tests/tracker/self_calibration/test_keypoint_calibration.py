@@ -44,10 +44,10 @@ def test_gross_errors_and_exchanged_sides_have_no_influence():
     observations = observed(cameras, points, gross=0.2)
     is_exchanged = np.zeros((15, 4), dtype=bool)
     is_exchanged[4:8, 1] = True
-    px, known = observations.points.points_px[:, :, 0], observations.points.confidence[:, :, 0]
+    px, known = observations.points.points_px[:, :, 0].copy(), observations.points.confidence[:, :, 0].copy()
     observations.points.points_px[:, :, 0] = with_sides_exchanged(px, SIDES, is_exchanged)
     observations.points.confidence[:, :, 0] = with_sides_exchanged(known, SIDES, is_exchanged)
-    found = calibrate_by_person(observations, [c for c in cameras], STATURE_M, has_lenses=True)
+    found = calibrate_by_person(observations, cameras, STATURE_M, has_lenses=True)
     assert np.median(joint_errors_m(found, points)[1]) < 0.035
     assert center_errors_m(found, cameras, points).max() < 0.1
     mended = np.linalg.norm(found.seen.px[4:8, 1] - px[4:8, 1], axis=-1)
