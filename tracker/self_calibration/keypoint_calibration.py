@@ -206,8 +206,8 @@ def _require_determined(volume: VolumeError, adjusted: AdjustedJoints, seen: See
     for camera, sigma in zip(adjusted.cameras, adjusted.focal_sigmas, strict=True):
         if sigma > NEWS * UNKNOWN_LENS.focal:
             raise CalibrationError(
-                f"expected joints that show the focal length of camera '{camera.name}', found it not determined by this "
-                f"footage (+- {sigma:.0%}); {_advice(len(adjusted.cameras))}"
+                f"expected joints that show the focal length of camera '{camera.name}', found it not determined by "
+                f"this footage (+- {sigma:.0%}); {_advice(len(adjusted.cameras))}"
             )
     if volume.expected_m < INLIER_M:
         return
@@ -254,8 +254,8 @@ def _lens_notes(adjusted: AdjustedJoints, has_lenses: bool) -> tuple[str, ...]:
 def _view_notes(world: Upright, n_crowded: int) -> tuple[str, ...]:
     lean = f"{np.degrees(world.lean_rad):.0f} degrees"
     out = [
-        f"up is the direction from the ankles to the shoulders, from which single frames differ by {lean}: a person who "
-        f"leans tilts the floor; it was found by the {world.floor_by}"
+        f"up is the direction from the ankles to the shoulders, from which single frames differ by {lean}: a person "
+        f"who leans tilts the floor; it was found by the {world.floor_by}"
     ]
     if n_crowded:
         out.append(f"{n_crowded} pictures show several people and were left out")

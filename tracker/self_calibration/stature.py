@@ -59,7 +59,7 @@ def metres_per_unit(joints: Array, names: Sequence[str], stature_m: float) -> fl
     except TrackerError as error:
         raise CalibrationError(
             "expected the shoulders, hips, knees and ankles of the person in two views, found too few; film the whole "
-            "person"
+            "person, who moves"
         ) from error
     return sum(expected.values()) / sum(found.values())
 

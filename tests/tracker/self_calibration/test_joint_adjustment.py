@@ -21,6 +21,7 @@ def seen(sigma_px=0.0, gross=0.0, n_frames=4):
     return lone_person(observed(CAMERAS, dancing(n_frames), sigma_px, gross))[0]
 
 
+@pytest.mark.slow
 def test_one_camera_and_one_coordinate_stay_where_they_were():
     joints = seen(1.0)
     found = adjust_joints(CAMERAS, joints.observations(), joints.n_joints, Gauge(0, 2))
@@ -32,6 +33,7 @@ def test_one_camera_and_one_coordinate_stay_where_they_were():
     assert found.focal_sigmas.tolist() == [0, 0, 0]
 
 
+@pytest.mark.slow
 def test_errors_that_repeat_on_all_frames_count_once():
     """A detector that places a joint beside the true one does so on each frame."""
     joints = seen(1.0, n_frames=8)
@@ -73,15 +75,11 @@ def test_lenses_of_one_model_pull_each_other():
     np.testing.assert_allclose(found.hessian @ at, found.gradient, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_focal_length_comes_from_the_joints_not_from_the_mean():
     joints = seen(0.5, n_frames=8)
-    found = adjust_joints(
-        CAMERAS,
-        joints.observations(),
-        joints.n_joints,
-        Gauge(0, 2),
-        UnknownLenses(tuple(blanks(CAMERAS)), ((0, 1, 2),)),
-    )
+    lenses = UnknownLenses(tuple(blanks(CAMERAS)), ((0, 1, 2),))
+    found = adjust_joints(CAMERAS, joints.observations(), joints.n_joints, Gauge(0, 2), lenses)
     assert [c.K[0, 0] for c in found.cameras] == pytest.approx([500] * 3, rel=0.03)
 
 
