@@ -1,6 +1,7 @@
 """`quadrille calibrate --people` on key points of a simulated person."""
 
 import json
+import shutil
 import sys
 
 import cv2
@@ -88,7 +89,8 @@ def test_wrong_words_are_refused(run, footage, tmp_path):
         run("--board", "b.toml", "--height", "1.7", "--out", out), ["expected --height together with --people"]
     )
     assert_refused(run(*words(footage, out, "--height", "175")), ["a height of 0.3 to 3 metres", "175"])
-    assert_refused(run(*words(footage, out, "--camera", f"other={footage / 'cam0'}")), ["none of other", "leave out"])
+    shutil.copytree(footage / "cam0", tmp_path / "other")
+    assert_refused(run(*words(footage, out, "--camera", f"other={tmp_path / 'other'}")), ["none of other", "leave out"])
     (tmp_path / "one.toml").write_text((footage / "lenses.toml").read_text().replace("cam1", "cam9"))
     assert_refused(run(*words(footage, out, "--lenses", tmp_path / "one.toml")), ["expected the lens of camera 'cam1'"])
     assert not out.exists()
