@@ -81,12 +81,13 @@ def recording_row(folder: Path, height_m: float | None, has_lenses: bool) -> lis
     joints, expected = (joints_of(keypoints.observations, c) for c in (found.cameras, given))
     known = np.isfinite(joints).all(axis=-1) & np.isfinite(expected).all(axis=-1)
     off = compared(found.cameras, given, joints[known], expected[known])
+    most = np.sort(off.joints_mm)[: int(TRIMMED * known.sum())]
     focal = [100 * np.log(a.K[0, 0] / b.K[0, 0]) for a, b in zip(found.cameras, given, strict=True)]
     return [
         f"{np.mean(off.centers_mm):.0f} (to {np.max(off.centers_mm):.0f})",
         f"{np.mean(off.rotations_deg):.1f} (to {np.max(off.rotations_deg):.1f})",
         "given" if has_lenses else f"{min(focal):+.0f} to {max(focal):+.0f}, said {_said(found)}",
-        f"{np.median(off.joints_mm):.1f} / {np.sqrt(np.mean(np.sort(off.joints_mm)[: int(TRIMMED * known.sum())] ** 2)):.1f}",
+        f"{np.median(off.joints_mm):.1f} / {np.sqrt(np.mean(most**2)):.1f}",
         f"{1000 * found.volume.expected_m:.1f} ({1000 * found.volume.low_m:.1f} to {1000 * found.volume.high_m:.1f})",
         f"{100 * (1 / off.scale - 1):+.0f}" if height_m is not None else "height unknown",
         f"{off.tilt_deg:.1f}",
