@@ -122,7 +122,7 @@ def adjust_joints(
 
 
 def among(observations: Observations, determined: Mask) -> Observations:
-    """Return the observations of determined points, which are numbered anew."""
+    """Return the observations of determined points, with groups from 0 on without gaps."""
     at = determined[observations.groups]
     numbers: IntArray = np.cumsum(determined) - 1
     return Observations(observations.cameras[at], numbers[observations.groups[at]], observations.px[at])
