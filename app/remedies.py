@@ -188,6 +188,10 @@ PHRASES = {
         "check that each folder is of the camera that it is named after, the size of the pictures, and --first-frame",
         "check that each folder is of the camera that it is named after, and the size of the pictures",
     ),
+    "shift_keypoints": Phrases(
+        "say --offset {camera}={frames} to take that off, or {camera}=0 to keep them if the footage is itself late",
+        "enter {camera}={frames} as Offsets to take that off, or {camera}=0 to keep them if the footage is itself late",
+    ),
     "say_unit": Phrases("say --units m, cm, mm, in or ft", "choose the unit"),
     "install_import": Phrases(
         "install it with: pip install 'quadrille[import]'", "install it with: pip install quadrille[import]"

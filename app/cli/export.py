@@ -1,13 +1,15 @@
 """`quadrille export`: write stored poses to files of other programs."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import OptionalName, SessionArg
-from app.cli.target import load_target
+from app.cli.arguments import Names, OptionalName
+from app.cli.target import Target, load_target
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import TrackerError
@@ -15,6 +17,7 @@ from tracker.exports.export_format import ExportFormat
 from tracker.exports.formats import FORMATS, OPTIONS, find_format
 
 if TYPE_CHECKING:
+    from tracker.exports.dataset_card import RecordingSummary
     from tracker.exports.motion import Checked, ExportedMotion
 
 _FORMATS_HELP = "; ".join(f"{f.name}: {f.title}" for f in FORMATS.values())
@@ -28,8 +31,10 @@ def _choice(words: str) -> Any:
 class ExportArguments:
     """Arguments of `quadrille export`."""
 
-    session: SessionArg
-    """session folder."""
+    sessions: Annotated[
+        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SESSION ...", help_behavior_hint="")
+    ]
+    """session folder; dataset: several, with a recording of each."""
     out: Path
     """file or folder to write, or a folder that exists, for one named after the session."""
     format: Annotated[OptionalName, tyro.conf.arg(help=f"{_FORMATS_HELP}. By default as --out ends.")] = None
@@ -55,12 +60,18 @@ class ExportArguments:
     """coco, dataset: the 17 keypoints of people, all points of the body, or both, which is the default."""
     pixels: Annotated[Literal["original", "undistorted"] | None, _choice("original|undistorted")] = None
     """openpose, masks, dataset: of the footage (default), or without distortion, with such pictures and cameras."""
+    split: Names = ()
+    """dataset: shares of train, validation and test, such as 70:15:15; NAME=test for a recording; by default train."""
+    distinct_people: bool = False
+    """dataset: people of one name in several recordings are different people; by default they are one."""
     like: OptionalName = None
     """send imported observations back in their own files; --out is a file, or the folder of several."""
     poses: Annotated[Literal["edited", "all"] | None, _choice("edited|all")] = None
     """with --like: replace the points that were edited by hand, which is the default, or those of all poses."""
     plain_joints: bool = False
     """with --like: place points at the joints of the body, not as far from them as the files usually do."""
+    exchange_sides: bool = False
+    """with --like: exchange left and right of key points where they were found exchanged; by default they stay."""
     skip_lost: bool = False
     """treat poses whose status is lost as missing."""
     provenance: bool = True
@@ -76,22 +87,25 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
 
     Ctrl+C stops it and leaves no file behind.
     """
+    if not arguments.sessions:
+        raise TrackerError("expected the folder of a session, found none; name it after the command")
     if arguments.like is not None:
         return _send_back(arguments)
     _refuse_without_like(arguments)
+    if len(arguments.sessions) > 1 or arguments.split or arguments.distinct_people:
+        return _export_dataset(arguments)
     from tracker.exports.export_files import check_options, export, for_format, n_ticks
     from tracker.exports.motion import read_motion
     from tracker.session.frame_list import parse_frame_list
 
-    at = load_target(arguments.session, arguments.person, several=True)
+    at = load_target(arguments.sessions[0], arguments.person, several=True)
     chosen = find_format(arguments.format, arguments.out)
     out = _file(arguments.out, chosen, at.session.folder.name)
     given = {name: getattr(arguments, name) for name in OPTIONS}
     options = replace(check_options(chosen, at.session, given), provenance=arguments.provenance)
     n_frames, text = at.session.n_frames, arguments.frames
     frames = None if text is None else parse_frame_list(text, n_frames, "--frames")
-    only: Checked | None = "keyframes" if arguments.keyframes_only else "reviewed" if arguments.reviewed_only else None
-    motion = for_format(chosen, read_motion(at.session, at.people, frames, arguments.skip_lost, only))
+    motion = for_format(chosen, read_motion(at.session, at.people, frames, arguments.skip_lost, _only(arguments)))
     with Reporter(silent=arguments.json).over(n_ticks(chosen, motion), "exporting") as tick:
         paths = export(chosen, motion, options, out, arguments.overwrite, tick)
     found = _summary(motion, chosen, paths, arguments.skip_lost) | {
@@ -100,23 +114,123 @@ def command(arguments: Annotated[ExportArguments, tyro.conf.arg(name="")]) -> No
     print(format_json(found) if arguments.json else _format(found))
 
 
+def _only(arguments: ExportArguments) -> "Checked | None":
+    return "keyframes" if arguments.keyframes_only else "reviewed" if arguments.reviewed_only else None
+
+
+def _export_dataset(arguments: ExportArguments) -> None:
+    """Write a dataset of several sessions, or of one with a split."""
+    from tracker.exports.dataset import export_dataset, plan_dataset
+    from tracker.exports.dataset_labels import DatasetRecording
+    from tracker.exports.dataset_splits import parse_splits, recording_names
+    from tracker.exports.export_files import check_options
+    from tracker.exports.motion import read_motion
+    from tracker.session.frame_list import parse_frame_list
+
+    sessions = arguments.sessions
+    chosen = find_format(arguments.format, arguments.out)
+    if chosen.name != "dataset":
+        raise TrackerError(
+            f"expected one session for format {chosen.name}, without --split and --distinct-people, found "
+            f"{len(sessions)}; say --format dataset, or export one after the other"
+        )
+    if arguments.frames is not None and len(sessions) > 1:
+        raise TrackerError(f"expected --frames with one session, found {len(sessions)}: their frames differ")
+    choice, names = parse_splits(arguments.split, "--split"), recording_names(sessions)
+    targets = [load_target(folder, arguments.person, several=True) for folder in sessions]
+    given = {name: getattr(arguments, name) for name in OPTIONS}
+    options = check_options(chosen, targets[0].session, given)
+
+    def read(at: Target) -> "ExportedMotion":
+        frames = parse_frame_list(arguments.frames, at.session.n_frames, "--frames") if arguments.frames else None
+        return read_motion(at.session, at.people, frames, arguments.skip_lost, _only(arguments))
+
+    recordings = [DatasetRecording(name, partial(read, at)) for name, at in zip(names, targets, strict=True)]
+    out = _file(arguments.out, chosen, "recordings" if len(sessions) > 1 else names[0])
+    plan = plan_dataset(recordings, options, choice, arguments.distinct_people)
+    with Reporter(silent=arguments.json).over(plan.labels.n_frames, "exporting") as tick:
+        summaries = export_dataset(plan, options, out, arguments.overwrite, tick)
+    found = _dataset_summary(out, sessions, summaries, plan.splits)
+    print(format_json(found) if arguments.json else _format_dataset(found))
+
+
+def _dataset_summary(
+    out: Path, sessions: Sequence[Path], summaries: "Sequence[RecordingSummary]", splits: Mapping[str, Sequence[str]]
+) -> dict[str, Any]:
+    from tracker.exports.dataset_card import shared_people
+
+    split_of = {name: split for split, names in splits.items() for name in names}
+    return {
+        "format": "dataset",
+        "files": [str(out)],
+        "recordings": [
+            {
+                "name": s.name, "session": str(folder), "split": split_of[s.name], "people": list(s.people),
+                "n_frames": s.n_frames, "pictures": s.labels.images, "annotations": s.labels.annotations,
+                "poses": s.n_poses, "missing": s.n_missing,
+            }
+            for folder, s in zip(sessions, summaries, strict=True)
+        ],
+        "splits": splits,
+        "shared_people": [
+            {"name": name, "recordings": found, "splits": list(dict.fromkeys(split_of[r] for r in found))}
+            for name, found in shared_people(summaries)
+        ],
+    }  # fmt: skip
+
+
+def _format_dataset(found: dict[str, Any]) -> str:
+    lines = [f"wrote {path}" for path in found["files"]]
+    for one in found["recordings"]:
+        missing = f", {_count(one['missing'], 'pose')} missing" if one["missing"] else ""
+        people = ", ".join(one["people"])
+        lines.append(f"{one['split']}: {one['name']}, {people}, {_count(one['n_frames'], 'frame')}{missing}")
+    if len(found["recordings"]) > 1 and not (found["splits"]["validation"] or found["splits"]["test"]):
+        lines.append("all recordings are in train; --split 70:15:15 or --split NAME=test divides them")
+    for person in found["shared_people"]:
+        where = f"{person['name']} is in {' and '.join(person['recordings'])}"
+        lines.append(f"{where}, taken as one person; --distinct-people takes them as several")
+        if len(person["splits"]) > 1:
+            lines.append(
+                f"{person['name']} is in {' and '.join(person['splits'])}; --split NAME=SPLIT moves a recording"
+            )
+    return "\n".join(lines)
+
+
 def _refuse_without_like(arguments: ExportArguments) -> None:
-    if arguments.poses is not None or arguments.plain_joints:
-        raise TrackerError("expected --poses and --plain-joints with --like NAME, found no --like; add it")
+    if arguments.poses is not None or arguments.plain_joints or arguments.exchange_sides:
+        raise TrackerError(
+            "expected --poses, --plain-joints and --exchange-sides with --like NAME, found no --like; add it"
+        )
 
 
 def _send_back(arguments: ExportArguments) -> None:
     """Write the files of observations, with the points of mended poses replaced."""
-    from tracker.exports.like import export_like
+    from tracker.exports.like.sending import export_like
     from tracker.observations.stored import load_observations
     from tracker.session.session import load_session
 
-    others = ("format", "person", "frames", "keyframes_only", "reviewed_only", "skip_lost", *OPTIONS)
-    if given := [name.replace("_", "-") for name in others if getattr(arguments, name) not in (None, False)]:
+    others = (
+        "format",
+        "person",
+        "frames",
+        "keyframes_only",
+        "reviewed_only",
+        "skip_lost",
+        "split",
+        "distinct_people",
+        *OPTIONS,
+    )
+    if given := [name.replace("_", "-") for name in others if getattr(arguments, name) not in (None, False, ())]:
         raise TrackerError(f"expected --like without --{given[0]}: the files stay as they came; leave it out")
-    session = load_session(arguments.session)
+    if len(arguments.sessions) > 1:
+        raise TrackerError(f"expected one session with --like, found {len(arguments.sessions)}; send each back alone")
+    session = load_session(arguments.sessions[0])
     observations = load_observations(session, arguments.like or "")
-    done = export_like(session, observations, arguments.out, arguments.poses or "edited", not arguments.plain_joints)
+    done = export_like(
+        session, observations, arguments.out, arguments.poses or "edited", not arguments.plain_joints,
+        arguments.exchange_sides,
+    )  # fmt: skip
     found = {
         "like": observations.name,
         "format": observations.format,
@@ -124,6 +238,7 @@ def _send_back(arguments: ExportArguments) -> None:
         "files": len(done.paths),
         "changed": [str(path) for path in done.changed],
         "frames": list(done.frames),
+        "exchanged": [{"frame": frame, "person": person, "view": view} for frame, person, view in done.exchanged],
     }
     if arguments.json:
         print(format_json(found))
@@ -133,7 +248,11 @@ def _send_back(arguments: ExportArguments) -> None:
         print("all as imported")
         return
     frames, files = _count(len(done.frames), "frame"), _count(len(done.changed), "file")
-    print(f"points of {frames} were replaced, in {files}; all else is as imported")
+    said = [f"points of {frames} were replaced"] if done.frames else []
+    if done.exchanged:
+        of_sides = _count(len({frame for frame, _, _ in done.exchanged}), "frame")
+        said.append(f"left and right were exchanged in {_count(len(done.exchanged), 'view')} of {of_sides}")
+    print(f"{', '.join(said)}, in {files}; all else is as imported")
 
 
 def _count(n: int, noun: str) -> str:

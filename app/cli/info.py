@@ -33,6 +33,7 @@ def command(session: SessionArg, /, check: bool = True, json: bool = False) -> N
 def summarize(session: "Session") -> dict[str, Any]:
     """Summarize the cameras, people and poses of a session."""
     from tracker.observations.stored import list_observations
+    from tracker.observations.stored_masks import list_masks
     from tracker.session.missing_files import missing_files
     from tracker.store.annotation_store import AnnotationStore
     from tracker.store.calibration_log import read_posed_revisions
@@ -79,6 +80,7 @@ def summarize(session: "Session") -> dict[str, Any]:
             for p in session.people
         ],
         "observations": [_observations(session, name) for name in list_observations(session)],
+        "masks": [_masks(session, name) for name in list_masks(session)],
     }
 
 
@@ -108,6 +110,23 @@ def _observations(session: "Session", name: str) -> dict[str, Any]:
     }
 
 
+def _masks(session: "Session", name: str) -> dict[str, Any]:
+    """Summarize imported masks; those that cannot be read are listed with the reason."""
+    from tracker.observations.stored_masks import load_masks
+
+    try:
+        found = load_masks(session, name)
+    except TrackerError as error:
+        return {"name": name, "error": str(error)}
+    return {
+        "name": name,
+        "format": found.format,
+        "pictures": dict(found.cameras),
+        "used_by": list(found.users),
+        "files": len(found.sources),
+    }
+
+
 def _format(summary: dict[str, Any]) -> str:
     head = f"{summary['name']}: {summary['frames']} frames at {summary['fps']:g} per second, up is {summary['up']}"
     lines = [head]
@@ -130,6 +149,13 @@ def _format(summary: dict[str, Any]) -> str:
         lines.append(
             f"  observations {o['name']}: {o['points']} {kind} of {people} in {o['frames']} frames, {o['format']}"
         )
+    for m in summary["masks"]:
+        if "error" in m:
+            lines.append(f"warning: masks {m['name']}: {m['error']}")
+            continue
+        users = f"used by {', '.join(m['used_by'])}" if m["used_by"] else "not used"
+        n = sum(m["pictures"].values())
+        lines.append(f"  masks {m['name']}: {n} pictures of {', '.join(m['pictures'])}, {m['format']}, {users}")
     if any(c["missing"] for c in summary["cameras"]):
         command = f"quadrille relink {summary['folder']} --search FOLDER"
         lines.append(f"warning: files are missing: put them back, or run {command}")

@@ -213,10 +213,10 @@ class FollowTracking(Command, frozen=True, tag="follow"):
 class EditFloor(Command, frozen=True, tag="floor"):
     """Set the floor from three points: start, go to the next point, remove the last mark, apply or cancel.
 
-    `revert` restores the floor before the last change.
+    `from_feet` sets it to the plane under the feet in all poses; `revert` restores the floor before the last change.
     """
 
-    action: Literal["begin", "next", "take_back", "apply", "cancel", "revert"]
+    action: Literal["begin", "next", "take_back", "apply", "cancel", "from_feet", "revert"]
 
 
 class MarkFloor(Command, frozen=True, tag="floor"):

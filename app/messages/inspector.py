@@ -221,6 +221,8 @@ class FloorInfo(Part, frozen=True):
     """Angle between its normal and that axis; null for the floor of the calibration."""
     height_m: float | None
     """Its height; null for the floor of the calibration."""
+    origin: str
+    """Source of the plane, for display; empty for the floor of the calibration, and after a restart."""
     has_former: bool
     """Whether the floor before the last change can be restored."""
 

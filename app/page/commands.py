@@ -135,6 +135,7 @@ def _floor(controller: Controller, _: int, message: wire.EditFloor) -> None:
         "take_back": floor.take_back,
         "apply": floor.apply,
         "cancel": floor.cancel,
+        "from_feet": floor.set_from_feet,
         "revert": floor.revert,
     }
     actions[message.action]()

@@ -159,7 +159,7 @@ class ExportRoutes:
         Raises:
             TrackerError: there are no such observations, or their points cannot be replaced.
         """
-        from tracker.exports.like import export_like
+        from tracker.exports.like.sending import export_like
         from tracker.observations.stored import load_observations
         from tracker.session.session import load_session
 

@@ -30,6 +30,8 @@ _Size = Annotated[int, Meta(ge=1, le=100_000, title="Picture size", description=
 _Confidence = Annotated[float, Meta(gt=0, le=1, title="Confidence", description="a confidence above 0 and at most 1")]
 _Frame = Annotated[int, Meta(ge=0, le=10_000_000, title="First frame", description="a frame of the session")]
 
+_Offset = Annotated[int, Meta(ge=-10_000_000, le=10_000_000, title="Offset", description="a number of frames")]
+
 
 class ImportForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Files to import, as a user names them."""
@@ -42,6 +44,8 @@ class ImportForm(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """People of the session of whom they are."""
     first_frame: _Frame | None = None
     """Frame of the first picture or row; null to go by the numbers of the files."""
+    offsets: dict[Name, _Offset] = {}
+    """Frames by which the key points of a camera are late, by its name."""
     confidence: _Confidence | None = None
     """Confidence of points in files without one."""
     picture_size: tuple[_Size, _Size] | None = None
@@ -84,11 +88,12 @@ class ObservationRoutes:
             raise TrackerError(f"expected people of {', '.join(known)}, found '{strange[0]}'; reload the page")
         request = ImportRequest(
             form.name, tuple(typed_paths(form.paths)), tuple(form.people), first_frame=form.first_frame,
-            confidence=form.confidence, picture_size=form.picture_size,
+            offsets=form.offsets, confidence=form.confidence, picture_size=form.picture_size,
         )  # fmt: skip
         found = import_summary(session, self._controller.observing.plan(request), page_text)
         for view in found["views"]:
-            view["confidence"] = view["confidence"] if math.isfinite(view["confidence"]) else None
+            for key in ("confidence", "share"):
+                view[key] = view[key] if math.isfinite(view[key]) else None
         return found
 
     async def _import(self, request: web.Request) -> web.Response:

@@ -51,6 +51,8 @@ class FloorState:
     """As set by the user; None for the plane through the world's origin."""
     picking: Picking | None = None
     """None while no floor is being set."""
+    origin: str = ""
+    """Source of the plane, for display; empty for that of the calibration, and after a restart."""
     former: bool = False
     """Whether a former floor can be restored."""
 

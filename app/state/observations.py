@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from tracker.judging.judge import Judgement
-from tracker.observations.importing import ImportPlan
 from tracker.observations.observed import ObservationSet
+from tracker.observations.plans import ImportPlan, MaskPlan
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class ObservationsState:
     sets: tuple[ObservedSet, ...] = ()
     shown: ObservationSet | None = None
     """The set that the views show; None for none."""
-    plan: ImportPlan | None = None
+    plan: ImportPlan | MaskPlan | None = None
     """An import that is previewed, and is not stored yet."""
     running: bool = False
     stage: str = ""
@@ -47,8 +47,8 @@ class ObservationsState:
 
     @property
     def drawn(self) -> ObservationSet | None:
-        """The set that the views draw: the previewed one, else the shown one."""
-        return self.shown if self.plan is None else self.plan.observations
+        """The set that the views draw: the previewed one, else the shown one; masks are not drawn."""
+        return self.plan.observations if isinstance(self.plan, ImportPlan) else self.shown
 
     @property
     def drawn_judgements(self) -> tuple[Judgement, ...]:

@@ -6,10 +6,21 @@ import { textButton } from "./rows.js";
 /**
  * @typedef {{completes: (input: HTMLInputElement) => void}} PathFields gives fields of paths completion and a picker
  * @typedef {{view: string, place: string | null, rows: number, frames: [number, number] | null, most_people: number,
- *   confidence: number | null}} View
- * @typedef {{name: string, format: string, people: string[], frames: number, views: View[], skeleton: string,
+ *   confidence: number | null, share: number | null}} View
+ * @typedef {{name: string, format: string, people: string[], are_masks: boolean, frames: number, views: View[], skeleton: string,
  *   points: Record<string, string[]>, matched: number, notes: string[], problems: string[]}} Plan
  */
+
+/**
+ * Frames by camera, of a text such as "cam2=3; cam3=-1".
+ * @param {string} text
+ */
+function offsetsOf(text) {
+  const words = text.split(";").map((word) => word.trim()).filter((word) => word);
+  const pairs = words.map((word) => /^(.+?)\s*=\s*(-?\d+)$/.exec(word));
+  if (pairs.includes(null)) throw new Error(`Expected offsets such as cam2=3, found “${text}”.`);
+  return Object.fromEntries(pairs.map((pair) => [pair?.[1], Number(pair?.[2])]));
+}
 
 /**
  * @param {import("../model/store.js").Store} store
@@ -19,13 +30,14 @@ import { textButton } from "./rows.js";
 export function importForm(store, paths, discard) {
   const fold = document.createElement("details");
   fold.className = "import-form";
-  const head = Object.assign(document.createElement("summary"), { textContent: "Import…", title: "Bring key points or joints of another program into the session" });
+  const head = Object.assign(document.createElement("summary"), { textContent: "Import…", title: "Bring key points, joints or masks of another program into the session" });
   const form = document.createElement("form");
   const path = field("paths", "Files or folder", "Folder or files on the machine of the program, of one format; several are separated by semicolons");
   path.input.dataset.takes = "files";
   const name = field("name", "Name", "Name of the observations in the session");
   const first = field("first_frame", "First frame", "Frame of the session of the first picture or row; by the numbers of the files if empty");
-  const size = field("picture_size", "Picture size", "Width x height of the pictures that the points are of, such as 1920x1080, if not the footage's; 1x1 for normalized points");
+  const late = field("offsets", "Offsets", "Frames by which the key points of a camera are late, such as cam2=3; several are separated by semicolons");
+  const size = field("picture_size", "Picture size", "Width x height of the pictures that points or masks are of, such as 1920x1080, if not the footage's; 1x1 for normalized points");
   const confidence = field("confidence", "Confidence", "Confidence of all points, 0 to 1, where the files have none");
   const people = Object.assign(document.createElement("label"), { className: "import-field", title: "Person of whom they are" });
   const person = Object.assign(document.createElement("select"), { name: "person" });
@@ -39,7 +51,7 @@ export function importForm(store, paths, discard) {
   const result = Object.assign(document.createElement("div"), { className: "import-result" });
   result.setAttribute("role", "status");
   const further = document.createElement("details");
-  further.append(Object.assign(document.createElement("summary"), { textContent: "Where the files do not tell", title: "First frame, size of the pictures, confidence" }), first.label, size.label, confidence.label);
+  further.append(Object.assign(document.createElement("summary"), { textContent: "Where the files do not tell", title: "First frame, offsets, size of the pictures, confidence" }), first.label, late.label, size.label, confidence.label);
   form.append(path.label, name.label, people, further, buttons, result);
   fold.append(head, form);
   paths.completes(path.input);
@@ -94,6 +106,7 @@ export function importForm(store, paths, discard) {
           name: name.input.value.trim(),
           people: person.value ? [person.value] : every,
           first_frame: number ? Number(number) : null,
+          offsets: offsetsOf(late.input.value),
           confidence: sure ? Number(sure) : null,
           picture_size: pixels ? [Number(pixels[1]), Number(pixels[2])] : null,
         })
@@ -147,20 +160,21 @@ function describe(plan) {
   const others = Object.entries(plan.points).filter(([, own]) => !own.length).map(([point]) => point); // prettier-ignore
   const list = document.createElement("ul");
   for (const view of plan.views) {
-    const frames = view.frames ? `points in frames ${view.frames[0]} to ${view.frames[1]}` : "no points";
-    const more = [view.most_people > 1 ? `up to ${view.most_people} people` : "", view.confidence === null ? "" : `median confidence ${view.confidence.toFixed(2)}`];
+    const what = plan.are_masks ? "people" : "points";
+    const frames = view.frames ? `${what} in frames ${view.frames[0]} to ${view.frames[1]}` : `no ${what}`;
+    const more = [view.share === null ? "" : `${(100 * view.share).toFixed(1)} % of the picture`, view.most_people > 1 ? `up to ${view.most_people} people` : "", view.confidence === null ? "" : `median confidence ${view.confidence.toFixed(2)}`];
     const words = view.place === null ? ["no files"] : [`${count(view.rows)} rows`, frames, ...more];
     list.append(Object.assign(document.createElement("li"), { textContent: `${view.view}: ${words.filter(Boolean).join(", ")}`, title: view.place ?? "" }));
   }
   const points = line(`${matched.length} points as ${plan.skeleton} names them${others.length ? `; without a joint of the body: ${others.join(", ")}` : ""}.`);
   points.title = matched.map(([point, own]) => `${point} = ${own.join(" and ")}`).join("\n");
   return [
-    line(`${plan.format}, of ${plan.people.join(", ")}:`),
+    line(`${plan.format}, of ${plan.people.join(", ") || "anyone"}:`),
     list,
-    points,
+    ...(plan.are_masks ? [] : [points]),
     ...plan.notes.map((text) => line(`Note: ${text}.`)),
     ...plan.problems.map((text) => line(`${capital(text.replace(/\.$/, ""))}.`, "is-failed")),
-    line(plan.problems.length ? "Nothing can be imported." : "The views show these points. Nothing was stored yet."),
+    line(plan.problems.length ? "Nothing can be imported." : plan.are_masks ? "The cameras will use these masks as silhouettes. Nothing was stored yet." : "The views show these points. Nothing was stored yet."),
   ];
 }
 

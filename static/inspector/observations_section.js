@@ -200,7 +200,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
   return {
     id: "observations",
     title: "Observations",
-    hint: "Key points and joints of other programs: import, judge, mend",
+    hint: "Key points, joints and masks of other programs: import, judge, mend",
     body,
     update(changed) {
       if (changed.has("observations") || changed.has("session")) showAll();
@@ -240,7 +240,7 @@ export function observationsSection({ store, send, notify, navigation, actions, 
         command("Track with the observations", "contours evidence find people", busy, startTrack),
         command("Send the observations back as they came", "export save file mended", noSet, () => void save(`export/like/${encodeURIComponent(current())}`, "The export")),
         command("Write the report of the judgement", "html save file", () => (found()?.judged ? null : "Nothing was judged. Judge the observations first."), () => void writeReport()),
-        command("Import observations…", "key points joints files openpose trc", () => null, form.open),
+        command("Import observations…", "key points joints masks files openpose trc", () => null, form.open),
       ];
     },
   };

@@ -91,6 +91,7 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
   const prediction = note();
   const floorText = note();
   const setFloor = textButton("Set floor…", "Click three points of the floor in the views (Shift+Y)", () => floor.toggle());
+  const fromFeet = textButton("From feet", "Set the floor to the plane under the feet in all poses", () => floor.setFromFeet());
   const formerFloor = textButton("Previous floor", "Restore the floor before the last change", () => floor.revert());
   const trails = sliderRow({
     label: "Trail length",
@@ -110,7 +111,7 @@ export function viewSection({ store, send, themes, layers: paneLayers }, { floor
   const [bodies, ...others] = layers.map(({ row }) => row.element);
   body.append(
     theme.element, link.element, ellipses.element, noErrors, heading("3-D view"), camera.element, bodies, colors.element, opacity.element, ...others, prediction, character.element,
-    heading("Floor"), floorText, buttons(setFloor, formerFloor),
+    heading("Floor"), floorText, buttons(setFloor, fromFeet, formerFloor),
     heading("Trails"), trails.element, points, buttons(noTrails),
   ); // prettier-ignore
   let built = "";
@@ -181,9 +182,9 @@ function pointChoice(name, change) {
 }
 
 /** @param {import("../model/protocol.js").FloorInfo} floor */
-function describe({ up, tilt_deg, height_m }) {
+function describe({ up, tilt_deg, height_m, origin }) {
   if (tilt_deg === null || height_m === null) return `From the calibration, ${up} is up`;
-  return `Set by hand: ${tilt_deg.toFixed(1)}° off ${up}, at ${(100 * height_m).toFixed(1)} cm`;
+  return `Set${origin && ` from ${origin}`}: ${tilt_deg.toFixed(1)}° off ${up}, at ${(100 * height_m).toFixed(1)} cm`;
 }
 
 /** @param {string} text */

@@ -108,7 +108,8 @@
  *   WriteComment
  * @typedef {{type: "annotation", action: "resolve" | "reopen", uid: string}} ResolveComment
  * @typedef {{type: "annotation", action: "next_click"}} AskNextClick
- * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "revert"}} EditFloor
+ * @typedef {{type: "floor", action: "begin" | "next" | "take_back" | "apply" | "cancel" | "from_feet" | "revert"}}
+ *   EditFloor
  * @typedef {{type: "floor", action: "mark", camera: number, u: number, v: number}} MarkFloor
  * @typedef {{type: "undo"}} Undo
  * @typedef {{type: "redo"}} Redo
@@ -194,7 +195,8 @@
  * @typedef {{bodies: boolean, colors: "parts" | "people", opacity: number, cameras: boolean, images: boolean, floor:
  *   boolean, gizmos: boolean, ghost: boolean, voxels: boolean, character: string, trail_points: string[], trail_frames:
  *   number}} View3d
- * @typedef {{up: string, tilt_deg: number | null, height_m: number | null, has_former: boolean}} FloorInfo
+ * @typedef {{up: string, tilt_deg: number | null, height_m: number | null, origin: string, has_former: boolean}}
+ *   FloorInfo
  * @typedef {{type: "view_3d", view: View3d, floor: FloorInfo, prediction: string, trail_points: string[], characters:
  *   string[]}} View3dMessage
  * @typedef {{name: string, length_m: number, half_depth_m: number, half_width_m: number}} PartSizes

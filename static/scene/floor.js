@@ -60,6 +60,11 @@ export class Floor {
     if (this.isOn) this.#send({ type: "floor", action: "take_back" });
   }
 
+  /** Set it to the plane under the feet of the people. */
+  setFromFeet() {
+    this.#send({ type: "floor", action: "from_feet" });
+  }
+
   /** Restore the floor before the last change. */
   revert() {
     this.#send({ type: "floor", action: "revert" });

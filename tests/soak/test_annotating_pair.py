@@ -1,11 +1,13 @@
 """An annotator and a reviewer make a verified dataset of two people, each in a browser: plan, drags, verdicts, export.
 
-Both see the true joints in the views, some pixels off, and nothing else. `QUADRILLE_SOAK=1` goes on with denser plans,
-up to every frame, for at most an hour: `QUADRILLE_SOAK=1 python -m pytest -m slow tests/soak/test_annotating_pair.py`.
+Both see the true joints in the views, some pixels off, and nothing else. `QUADRILLE_SOAK=1` goes on for an hour: with
+denser plans, up to every frame, and then with poses that the reviewer picks to be looked at again. Run it by
+`QUADRILLE_SOAK=1 python -m pytest -m slow tests/soak/test_annotating_pair.py`.
 """
 
 import asyncio
 import json
+import os
 import subprocess
 import sys
 import time
@@ -27,18 +29,25 @@ pytestmark = pytest.mark.slow
 
 PEOPLE = ("person1", "person2")
 HOUR_S = 3600.0
+LAST_ROUND_S = 300.0
+"""Left for a last round of poses that are looked at again."""
 EVERY = (20, 10, 5, 2, 1)
 """Frames between planned ones, plan after plan."""
 CORRECTED_PX, REJECTED_PX = 9.0, 18.0
 """The annotator drags a joint that seems farther off in a view, the reviewer rejects it: 3 and 6 times their noise."""
 OFF_MM = 100.0
 COUNTER = "document.querySelector('.plan-counter b')?.textContent"
+N_FRAMES = 60
+IS_OFF, LOOK_AGAIN = " is off", "look_again"
 APART_PX = 6.0
 """A joint nearer to another one cannot be grabbed for certain."""
 
 
 def quadrille(*words):
-    done = subprocess.run([sys.executable, "-m", "app", *map(str, words)], cwd=ROOT, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "app", *map(str, words)],
+        cwd=ROOT, capture_output=True, text=True, env={**os.environ, "QUADRILLE_ANNOTATOR": "Anna"},
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout) if "--json" in words else done.stdout
 
@@ -169,12 +178,27 @@ async def plan(page, every):
     await section.get_by_label("Of", exact=True).select_option(label="everybody")
     await section.get_by_role("button", name="Plan", exact=True).click()
     await page.evaluate("document.activeElement.blur()")
+    denser = EVERY[: EVERY.index(every) + 1]
+    n = len(PEOPLE) * sum(any(k % step == 0 for step in denser) for k in range(N_FRAMES))
+    await shows(page, f"quadrille.state.annotation?.tasks.length === {n}", 30)
 
 
 async def listed(page, kind):
     await page.locator("[data-section=annotation]").get_by_label("Tasks to list").select_option(kind)
     await page.evaluate("document.activeElement.blur()")
+    more = page.locator(".plan-tasks + button")
+    if await more.is_visible():
+        await more.click()
+        await page.evaluate("document.activeElement.blur()")
     return await page.locator(".plan-tasks button").count()
+
+
+async def state_at(page, frame, person):
+    """State and comment of the task of a pose, as a page shows it."""
+    return await page.evaluate(
+        f"(({{ state, comment }}) => [state, comment])(quadrille.state.annotation.tasks.find("
+        f"(task) => task.frame === {frame} && task.person === {person}))"
+    )
 
 
 async def annotate(eye, kinds):
@@ -183,8 +207,13 @@ async def annotate(eye, kinds):
         for _ in range(await listed(eye.page, kind)):
             await eye.page.keyboard.press("Alt+t")
             frame, person = await at_task(eye.page)
-            for joint, off in (await eye.off_px(frame, person)).items():
-                if worst_px(off) > CORRECTED_PX:
+            state, comment = await state_at(eye.page, frame, person)
+            seen = await eye.off_px(frame, person)
+            told = comment.removesuffix(IS_OFF).replace(" ", "_") if state == "rejected" else None
+            if told == LOOK_AGAIN:
+                told = max(seen, key=lambda joint: worst_px(seen[joint]))
+            for joint, off in seen.items():
+                if joint == told or worst_px(off) > CORRECTED_PX:
                     for view in await eye.free_views(joint, person):
                         now = (await eye.off_px(frame, person))[joint]
                         if view in now:
@@ -207,7 +236,7 @@ async def review(eye):
             await eye.page.keyboard.press("Alt+k")
         else:
             await eye.page.keyboard.press("Alt+r")
-            await eye.page.keyboard.type(f"{worst.replace('_', ' ')} is off")
+            await eye.page.keyboard.type(worst.replace("_", " ") + IS_OFF)
             await eye.page.keyboard.press("Enter")
         await shows(eye.page, f"document.querySelectorAll('.plan-tasks button').length === {left - 1}", 30)
         if left > 1:  # the same frame, perhaps, and another person
@@ -215,6 +244,24 @@ async def review(eye):
                 eye.page, f"[quadrille.state.state.frame, quadrille.state.state.person].join() !== '{frame},{person}'"
             )
     return n
+
+
+async def look_again(eye, n, rng):
+    """Reject poses that are picked from all, so that they are looked at once more."""
+    await listed(eye.page, "all")
+    for _ in range(n):
+        for _ in range(rng.integers(1, 9)):
+            await eye.page.keyboard.press("Alt+t")
+        frame, person = await at_task(eye.page)
+        await eye.page.keyboard.press("Alt+r")
+        await eye.page.keyboard.type(LOOK_AGAIN.replace("_", " "))
+        await eye.page.keyboard.press("Enter")
+        await shows(
+            eye.page,
+            f"quadrille.state.annotation.tasks.some((task) => task.frame === {frame} && task.person === {person} "
+            "&& task.state === 'rejected')",
+            30,
+        )
 
 
 async def exported(page, person, to):
@@ -230,6 +277,17 @@ async def exported(page, person, to):
     return read_trc(to)
 
 
+async def to_and_fro(anna, rita):
+    """Correct and review until no pose is left, a few times at most. Returns how often."""
+    n = 0
+    while n < 4:
+        n += 1
+        await annotate(anna, ("open",))
+        if not await review(rita):
+            break
+    return n
+
+
 async def test_a_pair_makes_a_verified_dataset(folder, truths, tmp_path, cases, report):
     session, errors, log = load_session(folder), [], tmp_path / "log.txt"
     before = {
@@ -237,7 +295,7 @@ async def test_a_pair_makes_a_verified_dataset(folder, truths, tmp_path, cases, 
         for p, t in truths.items()
     }
     program = Program(folder, "--annotator", "Anna", "--share", has_token=True, log=log)
-    begin, seconds, rounds = time.monotonic(), cases(HOUR_S), 0
+    begin, seconds, rounds, rng = time.monotonic(), cases(HOUR_S), 0, np.random.default_rng(3)
     try:
         await program.start()
         async with (
@@ -255,13 +313,12 @@ async def test_a_pair_makes_a_verified_dataset(folder, truths, tmp_path, cases, 
                 await one.keyboard.press("Alt+u")
             for every in EVERY:
                 await plan(page, every)
-                for _ in range(4):
-                    rounds += 1
-                    await annotate(anna, ("open",))
-                    if not await review(rita):
-                        break
+                rounds += await to_and_fro(anna, rita)
                 if time.monotonic() - begin > seconds:
                     break
+            while time.monotonic() - begin < seconds - LAST_ROUND_S:
+                await look_again(rita, 12, rng)
+                rounds += await to_and_fro(anna, rita)
             counter = await page.evaluate(COUNTER)
             files = {p: await exported(page, p, tmp_path / f"{p}.trc") for p in PEOPLE}
     finally:

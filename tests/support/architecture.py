@@ -43,6 +43,7 @@ ROOMS = [
     "tracker.posing",
     "tracker.evaluation",
     "tracker.exports",
+    "tracker.exports.like",
     "tracker.agreement",
     "tracker.simulate.people",
     "tracker.simulate.motion",

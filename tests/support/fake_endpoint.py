@@ -212,7 +212,7 @@ class FakeEndpoint:
         self.view_3d = {
             "type": "view_3d", "view": dict(VIEW_3D), "prediction": "", "trail_points": ["head", "l_wrist"],
             "characters": ["gavrila34", "knossow54"],
-            "floor": {"up": "y", "tilt_deg": None, "height_m": None, "has_former": False},
+            "floor": {"up": "y", "tilt_deg": None, "height_m": None, "origin": "", "has_former": False},
         }  # fmt: skip
         self.body_sizes = dict(BODY_SIZES)
 

@@ -40,11 +40,13 @@ def walking(n_frames, start=(-0.5, 0.0, 0.0), step=(0.03, 0.01, 0.0), names=BODY
     return out
 
 
-def make_session(folder, n_frames, n_views=4, people=("ann",), distortion=(-0.3, 0.1, 0.001, 0.0), offsets=()):
+def make_session(
+    folder, n_frames, n_views=4, people=("ann",), distortion=(-0.3, 0.1, 0.001, 0.0), offsets=(), size=(640, 480)
+):
     """A session whose footage does not exist."""
     sources = [
         CameraSource(c, folder.parent / f"{c.name}.mp4", offset=dict(offsets).get(c.name, 0))
-        for c in cameras(ring(n_views), distortion)
+        for c in cameras(ring(n_views), distortion, size)
     ]
     model = load_model("gavrila38", 1.7)
     persons = [Person(name, model, "#53a504") for name in people]

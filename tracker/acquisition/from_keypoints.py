@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.evidence.keypoints import PersonKeypoints
 from tracker.fitting.gauss_newton import (
     OTHER_BODY_M,
@@ -26,7 +27,6 @@ from tracker.geometry import rigid
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M, Camera
 from tracker.geometry.triangulation import sigma_px
-from tracker.images.background_model import MAD_TO_SIGMA
 from tracker.observations.body_points import BodyPoints
 
 _LEAST = 1e-3

@@ -14,8 +14,8 @@ from tracker.appearance.color_shares import log_density
 from tracker.appearance.region_cells import CellView
 from tracker.compute.jit import njit
 from tracker.compute.numba_options import NO_REFCOUNT
+from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.geometry.arrays import FloatArray, Image, Mask
-from tracker.images.background_model import MAD_TO_SIGMA
 from tracker.images.background_subtraction import MAX_HUE_SHIFT, MIN_SHADE, exposure_gain, has_usable_exposure
 from tracker.images.change import NOISE_SIGMAS
 from tracker.images.color_histogram import BINS, bin_of

@@ -6,8 +6,8 @@ import numpy as np
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
+from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.geometry.arrays import Array, IntArray
-from tracker.images.background_model import MAD_TO_SIGMA
 
 _QUARTILES = (25.0, 75.0)
 """Percentiles over the run between which half of the evidence lies. The upper one is usual: on runs that lost a limb

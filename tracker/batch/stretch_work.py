@@ -22,6 +22,7 @@ from tracker.formats.model_toml import format_model
 from tracker.initialization.first_pose import FirstPoses, find_first_poses
 from tracker.initialization.generators.start_generators import GENERATORS
 from tracker.observations.stored import FOLDER as OBSERVATIONS
+from tracker.observations.stored_masks import list_masks
 from tracker.pipeline.chain import ChainPlan, StoredSession, begin_chain, run_chain
 from tracker.pipeline.find_people import FindSettings, find_people, frames_to_try
 from tracker.pipeline.stored_run import TrackPlan
@@ -103,7 +104,12 @@ def _copy(session: Session, folder: Path) -> Session:
         shutil.copyfile(session.folder / CALIBRATION_FILE, temporary / CALIBRATION_FILE)
     copy_store(session.annotations_path, copy.annotations_path)
     if (session.folder / OBSERVATIONS).is_dir():
-        shutil.copytree(session.folder / OBSERVATIONS, temporary / OBSERVATIONS)
+        masks = {session.folder / OBSERVATIONS / name for name in list_masks(session)}  # used where they are
+        shutil.copytree(
+            session.folder / OBSERVATIONS,
+            temporary / OBSERVATIONS,
+            ignore=lambda at, names: names if Path(at) in masks else [],
+        )
     temporary.rename(folder)
     return open_session(folder)
 

@@ -5,6 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a normal distribution by its median absolute deviation."""
+
 
 def quantiles(values: NDArray[np.floating], shares: Sequence[float]) -> NDArray[np.float64]:
     """Compute quantiles along the first axis, interpolated like those of `numpy.quantile`.

@@ -2,7 +2,7 @@
 
 README.md                   the card
 splits.json                 recordings of training, validation and test
-provenance.json             of each pose
+provenance.json             names the file of each recording
 SHA256SUMS
 recordings/NAME/
   images/CAMERA/000012.jpg  picture 12 of the footage; or videos/CAMERA.mp4, the footage as it is
@@ -10,6 +10,7 @@ recordings/NAME/
   labels/openpose/CAMERA_json/CAMERA_000000000012_keypoints.json
   calibration/anipose.toml, opencv.yml
   poses.npz                 poses, joint centres and covariances in space
+  provenance.json           of each pose
 """
 
 import hashlib
@@ -17,115 +18,152 @@ import json
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
-
-import msgspec
 
 from tracker.calibrations.writing import write_layout
 from tracker.errors import FormatError, Remedy
 from tracker.exports.array_writers import write_npz
-from tracker.exports.dataset_card import TO_FILL_IN, LabelCounts, format_card
-from tracker.exports.frame_views import FrameViews
-from tracker.exports.label_writers import OpenPoseFiles, write_views
+from tracker.exports.dataset_card import LabelCounts, RecordingSummary, format_card, summarize
+from tracker.exports.dataset_labels import DatasetLabels, DatasetRecording, RecordingLabels, plan_labels
+from tracker.exports.dataset_splits import SplitChoice, divide
+from tracker.exports.export_files import FOLDER_PROVENANCE, is_export_folder, moved_at_end, refuse_existing, unwritable
+from tracker.exports.label_writers import write_views
 from tracker.exports.motion import ExportedMotion
 from tracker.exports.options import ExportOptions
 from tracker.exports.provenance import write_provenance
-from tracker.exports.views import IMAGES, Pictures, exported_cameras
-from tracker.exports.writers import coco_annotations, coco_categories
+from tracker.exports.views import Pictures, exported_cameras
 from tracker.files import write_text_atomic
 from tracker.formats.file_names import identifier
-from tracker.formats.keypoints.coco import CocoAnnotation, CocoImage, segmentation, write_coco
-from tracker.geometry.cameras import Camera
+from tracker.store.edit_tree import program_version
 
 CHECKSUMS = "SHA256SUMS"
 """Name of the file that `sha256sum -c` reads."""
 SUFFIXES = {"anipose": ".toml", "opencv": ".yml"}
 """Layouts of the calibration, with the ends of their files' names."""
+Tick = Callable[[], None]
+"""Called after each frame; it may raise to stop the export."""
 
 
-def write_dataset(
-    motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Callable[[], None]
-) -> None:
+@dataclass(frozen=True)
+class DatasetPlan:
+    """A dataset of several recordings that can be written: each has poses, and a split."""
+
+    recordings: Sequence[DatasetRecording]
+    labels: DatasetLabels
+    splits: dict[str, list[str]]
+    """The recordings of each split."""
+    choice: SplitChoice
+
+
+def plan_dataset(
+    recordings: Sequence[DatasetRecording], options: ExportOptions, choice: SplitChoice, distinct_people: bool = False
+) -> DatasetPlan:
+    """Divide recordings, and read each once to see that it can be exported.
+
+    Args:
+        recordings: of different names.
+        options: of the export.
+        choice: how they are divided.
+        distinct_people: whether people of one name in two recordings are two people.
+
+    Raises:
+        FormatError: the choice names another recording, the options exclude each other, or bodies of one name differ.
+        SessionError: a session has no poses that are exported.
+    """
+    _check(options)
+    splits = {str(split): names for split, names in divide([r.name for r in recordings], choice).items()}
+    return DatasetPlan(recordings, plan_labels(recordings, options, distinct_people), splits, choice)
+
+
+def export_dataset(
+    plan: DatasetPlan, options: ExportOptions, out: Path, overwrite: bool = False, tick: Tick = lambda: None
+) -> list[RecordingSummary]:
+    """Write a dataset; the folder appears complete or not at all.
+
+    Args:
+        plan: what to write.
+        options: of the export.
+        out: the folder.
+        overwrite: whether to replace a folder that an export has made.
+        tick: called `plan.labels.n_frames` times; it may raise to stop the export, which leaves nothing behind.
+
+    Returns:
+        A summary of each recording.
+
+    Raises:
+        TrackerError: the folder exists or cannot be written, or footage cannot be read.
+    """
+    refuse_existing([out], overwrite, is_export_folder)
+    try:
+        with moved_at_end([out]) as folder:
+            return _write(folder / out.name, plan, options, tick)
+    except OSError as error:
+        raise unwritable(out, error) from error
+
+
+def write_dataset(motion: ExportedMotion, options: ExportOptions, paths: Sequence[Path], tick: Tick) -> None:
     """Write a dataset of one recording.
 
     Raises:
         FormatError: videos are wanted in undistorted pixels.
         RecordingError: the footage cannot be read.
     """
+    recordings = [DatasetRecording(identifier(motion.session.folder.name), lambda: motion)]
+    _write(paths[0], plan_dataset(recordings, options, SplitChoice()), options, tick)
+
+
+def _check(options: ExportOptions) -> None:
     if options.pictures == "video" and options.pixels == "undistorted":
         raise FormatError(
             "expected images with undistorted pixels, found video: footage is copied as it is", Remedy("export_images")
         )
-    folder, cameras, name = paths[0], exported_cameras(motion, options), identifier(motion.session.folder.name)
-    recording = folder / "recordings" / name
-    labels = _Labels(motion, options, cameras, recording / "labels")
+
+
+def _write(folder: Path, plan: DatasetPlan, options: ExportOptions, tick: Tick) -> list[RecordingSummary]:
+    """Write all recordings and what is about them."""
+    summaries: list[RecordingSummary] = []
+    for recording in plan.recordings:
+        before = reduce(LabelCounts.plus, (s.labels for s in summaries), LabelCounts())
+        summaries.append(_write_recording(folder / "recordings", recording, plan.labels, before, options, tick))
+    write_text_atomic(folder / "splits.json", json.dumps(plan.splits, indent=1) + "\n")
+    own = {recording.name: f"recordings/{recording.name}/{FOLDER_PROVENANCE}" for recording in plan.recordings}
+    provenance = {
+        "content": "recordings of a dataset exported by Quadrille, with the provenance of their poses",
+        "version": 1,
+        "program": program_version(),
+        "recordings": own,
+    }
+    write_text_atomic(folder / FOLDER_PROVENANCE, json.dumps(provenance, indent=1) + "\n")
+    write_text_atomic(folder / "README.md", format_card(summaries, plan.splits, plan.choice.sentence, options))
+    _write_checksums(folder)
+    return summaries
+
+
+def _write_recording(
+    recordings: Path, recording: DatasetRecording, of_all: DatasetLabels, before: LabelCounts, options: ExportOptions,
+    tick: Tick,
+) -> RecordingSummary:  # fmt: skip
+    """Write the folder of a recording."""
+    motion, folder = recording.read(), recordings / recording.name
+    cameras = exported_cameras(motion, options)
+    labels = RecordingLabels(recording.name, motion, cameras, folder / "labels", of_all, before)
     with ExitStack() as stack:
         pictures = None
         if options.pictures == "images":
-            pictures = stack.enter_context(Pictures(motion, cameras, recording))
+            pictures = stack.enter_context(Pictures(motion, cameras, folder))
         else:
-            _copy_footage(motion, recording / "videos")
+            _copy_footage(motion, folder / "videos")
         write_views(motion, cameras, pictures, labels.write, tick)
     labels.finish()
-    (recording / "calibration").mkdir()
+    (folder / "calibration").mkdir()
     for layout, suffix in SUFFIXES.items():
-        write_layout(recording / "calibration" / f"{layout}{suffix}", layout, cameras)
-    write_npz(motion, options, [recording / "poses.npz"], lambda: None)
-    splits = {"train": [name], "validation": [], "test": []}
-    write_text_atomic(folder / "splits.json", json.dumps(splits, indent=1) + "\n")
-    write_provenance(folder / "provenance.json", motion, options)
-    card = format_card(motion, options, labels.counts)
-    write_text_atomic(folder / "README.md", card)
-    _write_checksums(folder)
-
-
-class _Labels:
-    """Writes the labels of a recording."""
-
-    def __init__(self, motion: ExportedMotion, options: ExportOptions, cameras: Sequence[Camera], folder: Path) -> None:
-        self._motion, self._cameras, self._folder = motion, cameras, folder
-        self._openpose = OpenPoseFiles(motion, cameras, folder / "openpose")
-        self._categories = coco_categories(motion, options)
-        self._images: list[CocoImage] = []
-        self._annotations: list[CocoAnnotation] = []
-        self._n_labelled = self._n_unlabelled = 0
-
-    def write(self, views: FrameViews, view: int, frame: int) -> None:
-        """Write the labels of a frame in a view."""
-        self._openpose.write(views, view, frame)
-        source, camera = self._motion.session.cameras[view], self._cameras[view]
-        at = frame + source.offset
-        path = f"{IMAGES}/{camera.name}/{at:06d}.jpg"
-        image = CocoImage(len(self._images) + 1, path, *camera.size, camera.name, frame, source.footage.name, at)
-        self._images.append(image)
-        people, _ = views.labels(view)
-        seen = views.seen(view)
-        shown = {int(i) for i in set(people[people >= 0].tolist())}
-        for person, body, keypoints in seen:
-            if person.index not in shown:
-                continue
-            mask = people == person.index
-            rows, columns = mask.any(axis=1).nonzero()[0], mask.any(axis=0).nonzero()[0]
-            left, top = int(columns[0]), int(rows[0])
-            box = (left, top, int(columns[-1]) + 1 - left, int(rows[-1]) + 1 - top)
-            n = len(self._annotations)
-            visible = {"segmentation": segmentation(mask), "bbox": box, "area": float(mask.sum())}
-            for one in coco_annotations(self._motion, self._categories, person, body, keypoints, image, n):
-                self._annotations.append(msgspec.structs.replace(one, **visible))
-        labelled = shown & {person.index for person, _, _ in seen}
-        self._n_labelled += len(labelled)
-        self._n_unlabelled += len(shown - labelled)
-
-    @property
-    def counts(self) -> LabelCounts:
-        """Return how much is labelled."""
-        return LabelCounts(len(self._images), len(self._annotations), self._n_labelled, self._n_unlabelled)
-
-    def finish(self) -> None:
-        """Write the labels of all pictures."""
-        name = f"{self._motion.session.name}, exported by Quadrille; licence: {TO_FILL_IN}"
-        revision = self._motion.calibrations.present
-        write_coco(self._folder / "coco.json", name, revision, self._categories, self._images, self._annotations)
+        write_layout(folder / "calibration" / f"{layout}{suffix}", layout, cameras)
+    write_npz(motion, options, [folder / "poses.npz"], lambda: None)
+    write_provenance(folder / FOLDER_PROVENANCE, motion, options)
+    people = {p.person.name: of_all.people[recording.name, p.person.name] for p in motion.exported}
+    return summarize(recording.name, motion, people, labels.counts)
 
 
 def _copy_footage(motion: ExportedMotion, folder: Path) -> None:

@@ -136,9 +136,14 @@ def export(
                 if (has_side_files or chosen.is_folder) and not (folder / files.side_file).exists():
                     write_provenance(folder / files.side_file, part, options)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise TrackerError(f"cannot write {out}: {reason}; choose a folder that you may write to, with room") from error
+        raise unwritable(out, error) from error
     return paths
+
+
+def unwritable(out: Path, error: OSError) -> TrackerError:
+    """Return the error of an export that cannot be written."""
+    reason = error.strerror or str(error)
+    return TrackerError(f"cannot write {out}: {reason}; choose a folder that you may write to, with room")
 
 
 def refuse_existing(paths: Sequence[Path], overwrite: bool, may_replace: Callable[[Path], bool] | None) -> None:

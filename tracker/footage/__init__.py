@@ -10,6 +10,7 @@ __all__ = [
     "frame_rates",
     "image_file",
     "image_folder",
+    "mask_image",
     "proxy",
     "recording",
     "sound",

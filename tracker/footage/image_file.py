@@ -20,7 +20,7 @@ A file of a hundred kilobytes can promise any size, and decoding it would take a
 """
 _MAX_BYTES = 8 * MAX_PIXELS
 """Largest size of an image file: four channels of 16 bits, not compressed."""
-_NO_HEADER = (OSError, ValueError, SyntaxError, LookupError, TypeError, OverflowError, struct.error)
+NO_HEADER = (OSError, ValueError, SyntaxError, LookupError, TypeError, OverflowError, struct.error)
 """The errors by which Pillow says that bytes are no image that it knows."""
 
 
@@ -42,7 +42,7 @@ def read_image_or_none(path: Path, where: str) -> Image | None:
     Raises:
         RecordingError: the file is missing or too large.
     """
-    image = decode_image(_read(path, where), f"{where}: {path}")
+    image = decode_image(read_bytes(path, where), f"{where}: {path}")
     return None if image is None else np.asarray(image, dtype=np.uint8)
 
 
@@ -52,7 +52,7 @@ def read_unchanged(path: Path, where: str) -> NDArray[np.generic] | None:
     Raises:
         RecordingError: the file is missing or too large.
     """
-    return decode_image(_read(path, where), f"{where}: {path}", cv2.IMREAD_UNCHANGED)
+    return decode_image(read_bytes(path, where), f"{where}: {path}", cv2.IMREAD_UNCHANGED)
 
 
 def decode_image(data: bytes, where: str, flags: int = cv2.IMREAD_COLOR_RGB) -> NDArray[np.generic] | None:
@@ -65,8 +65,8 @@ def decode_image(data: bytes, where: str, flags: int = cv2.IMREAD_COLOR_RGB) -> 
         with Pillow.open(BytesIO(data)) as header:
             size = header.size
     except Pillow.DecompressionBombError:
-        raise RecordingError(_too_large(where, "more than twice as many")) from None
-    except _NO_HEADER:
+        raise RecordingError(too_large(where, "more than twice as many")) from None
+    except NO_HEADER:
         return None
     check_pixels(size, where)
     try:
@@ -83,14 +83,20 @@ def check_pixels(size: tuple[int, int], where: str) -> None:
         RecordingError: it has more than `MAX_PIXELS`.
     """
     if size[0] * size[1] > MAX_PIXELS:
-        raise RecordingError(_too_large(where, f"{size[0]}x{size[1]}"))
+        raise RecordingError(too_large(where, f"{size[0]}x{size[1]}"))
 
 
-def _too_large(where: str, found: str) -> str:
+def too_large(where: str, found: str) -> str:
+    """Return that an image has too many pixels."""
     return f"{where}: expected at most {MAX_PIXELS // 10**6} million pixels, found {found}; reduce it"
 
 
-def _read(path: Path, where: str) -> bytes:
+def read_bytes(path: Path, where: str) -> bytes:
+    """Read the file of an image; `where` begins the message.
+
+    Raises:
+        RecordingError: it is missing, no file, or too large.
+    """
     try:
         if path.exists() and not path.is_file():  # a pipe or a device would be read for ever
             raise RecordingError(f"{where}: expected a file, found {path}, which is none; check the path")

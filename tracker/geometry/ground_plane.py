@@ -8,7 +8,7 @@ from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
 from tracker.geometry.rigid import so3_exp
 
-_MIN_HEIGHT_M = 0.2
+MIN_HEIGHT_M = 0.2
 """Three points whose triangle is flatter do not determine a plane: a click a few cm off would tilt it."""
 
 
@@ -49,7 +49,7 @@ def floor_through(points_world: Array, centers_world: Array) -> GroundPlane:
     sides = np.linalg.norm([b - a, c - b, a - c], axis=1)
     across = np.cross(b - a, c - a)
     height_m = float(np.linalg.norm(across) / max(sides.max(), 1e-9))
-    if height_m < _MIN_HEIGHT_M:
+    if height_m < MIN_HEIGHT_M:
         raise TrackerError(
             f"expected three points of the floor that span a wide triangle, found them within {100 * height_m:.0f} cm "
             "of a line; choose one farther to the side"

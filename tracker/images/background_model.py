@@ -5,10 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.geometry.arrays import FloatArray, Image
-
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal distribution by its median absolute deviation."""
 
 
 class BackgroundModel(NamedTuple):

@@ -1,15 +1,15 @@
 """The best poses that the footage shows near imported observations, tracked without a change of the session."""
 
-import shutil
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from tracker.evidence.observer import Observer
-from tracker.observations.stored import FOLDER
+from tracker.observations.stored import save_observations, source_path
 from tracker.pipeline.chain import ChainPlan, Sink, StoredSession, run_chain
 from tracker.pipeline.find_people import FindSettings
+from tracker.pipeline.keypoint_evidence import assigned_observations
 from tracker.pipeline.stored_run import TrackPlan
 from tracker.session.session import Session, create_session
 from tracker.store.annotation_store import AnnotationStore
@@ -44,7 +44,9 @@ def best_motion(
             n_frames=session.n_frames, up=session.up,
         )  # fmt: skip
         twin = replace(twin, floor=session.floor)
-        shutil.copytree(session.folder / FOLDER / name, twin.folder / FOLDER / name)
+        observations = assigned_observations(session, name)
+        files = {s.path: source_path(session, name, s) for s in observations.sources}
+        save_observations(twin, observations, files)
         plan = ChainPlan(
             TrackPlan(range(session.n_frames), people, settings, keypoints=name), FindSettings(keypoints=name), people
         )

@@ -14,6 +14,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array
 from tracker.judging import reasons
 from tracker.judging.best_motion import best_motion
+from tracker.judging.lags import lag_frames
 from tracker.judging.verdicts import LIMBS, probability_beyond, with_doubt
 from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.chain import Sink
@@ -70,6 +71,8 @@ class Judgement:
     """The joints."""
     tracked: Mapping[int, StoredPose]
     """The poses that they were compared with, by frame."""
+    lag_frames: int = 0
+    """Frames by which the joints lag behind the tracked ones throughout; 0 if no lag is clear."""
 
     @property
     def worst(self) -> list[Doubt]:
@@ -87,6 +90,9 @@ class Judgement:
     def sentences(self) -> list[str]:
         """Sentences on what is off throughout."""
         out = []
+        if self.lag_frames:
+            n, word = abs(self.lag_frames), "late" if self.lag_frames > 0 else "early"
+            out.append(f"all joints are {n} frame{'s' * (n != 1)} {word} throughout")
         for joint in (j for joints in LIMBS.values() for j in joints if j in self.offsets_m):
             offset = self.offsets_m[joint]
             length = float(np.linalg.norm(offset))
@@ -163,7 +169,10 @@ def judge_person(
                 verdicts[limb] = verdicts[limb]._replace(reason=reason)
         out[k] = verdicts
     offsets, spread = _constant(imported, tracked, frames, steps)
-    return Judgement(person, out, offsets, spread, imported, tracked)
+    points = [[tracked[k].body.model.point_names.index(n) for n in imported.names] for k in frames]
+    places = np.array([tracked[k].body.joint_centers_world[p] for k, p in zip(frames, points, strict=True)])
+    lag = lag_frames(imported.joints_world, places, np.array(frames)) if frames else 0
+    return Judgement(person, out, offsets, spread, imported, tracked, lag)
 
 
 def _steps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:

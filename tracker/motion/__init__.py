@@ -1,7 +1,17 @@
-"""Poses over time, without images: prediction, interpolation, smoothing, inconsistent frames.
+"""Poses over time, without images: prediction, interpolation, smoothing, inconsistent frames, the floor.
 
 Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose`,
-`smoothing.smooth_poses`, `consistency.inconsistent_frames`, `pose_path.PosePath` and `keyframe_doubts`.
+`smoothing.smooth_poses`, `consistency.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet` and
+`keyframe_doubts`.
 """
 
-__all__ = ["consistency", "interpolation", "keyframe_doubts", "pose_path", "prediction", "smoothing", "velocity"]
+__all__ = [
+    "consistency",
+    "floor_from_feet",
+    "interpolation",
+    "keyframe_doubts",
+    "pose_path",
+    "prediction",
+    "smoothing",
+    "velocity",
+]

@@ -1,8 +1,23 @@
-"""Key points and joints that other programs found: stored with a session, matched across views, triangulated.
+"""Key points, joints and masks that other programs found: stored with a session; points are matched and triangulated.
 
-Imports `geometry`, `body`, `formats`, `footage` and `session`. Callers use `observed.ObservedPoints`,
+Imports `geometry`, `body`, `formats`, `footage`, `session` and `store`. Callers use `observed.ObservedPoints`,
 `observed.ObservedJoints`, `stored.load_observations`, `stored.list_observations`, `importing.plan_import`,
-`importing.store_import`, `joints.observed_joints` and `joints.triangulate_observations`.
+`importing.store_import`, `stored_masks.list_masks`, `joints.observed_joints` and `joints.triangulate_observations`.
 """
 
-__all__ = ["body_points", "importing", "joints", "observed", "placing", "readers", "request", "stored", "stored_files"]
+__all__ = [
+    "assignment",
+    "body_points",
+    "importing",
+    "joints",
+    "observed",
+    "placing",
+    "plans",
+    "readers",
+    "request",
+    "shifts",
+    "stored",
+    "stored_files",
+    "stored_masks",
+    "triangulation",
+]

@@ -1,15 +1,17 @@
 """Check key points against the session: unit, size of the pictures, confidences, agreement of the views."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
+from tracker.footage.camera_source import CameraSource
 from tracker.formats.keypoints.picture_table import PictureTable
-from tracker.geometry.arrays import Array, Mask
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservedPoints
+from tracker.observations.shifts import SAMPLES, evenly, point_rays, view_shifts
 from tracker.observations.triangulation import INLIER_M, Views
 
 _SIZES = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 4 / 3, 1.5, 2.0, 3.0, 4.0)
@@ -70,9 +72,9 @@ def agreement_m(points: ObservedPoints, cameras: Sequence[Camera], scale: float 
         scale: factor of the pixels, to try another size of the pictures.
     """
     views = Views(cameras)
-    frames = np.unique(np.linspace(0, points.n_frames - 1, _SAMPLES).astype(np.int64))
+    frames = evenly(points.n_frames, SAMPLES)
     chosen, known = points.points_px[frames] * scale, points.is_known[frames]
-    rays = _rays(views, chosen, known)
+    rays = point_rays(views, chosen, known)
     gaps = []
     for a, b in combinations(range(len(cameras)), 2):
         across = np.cross(rays[:, a, :, None], rays[:, b, None])  # (frames, detections, detections, points, 3)
@@ -87,21 +89,9 @@ def agreement_m(points: ObservedPoints, cameras: Sequence[Camera], scale: float 
     return _median(np.concatenate(gaps)) if gaps else np.nan
 
 
-_SAMPLES = 60
-"""Number of frames whose agreement is measured: the median of some thousand distances."""
-
-
 def _median(values: Array) -> float:
     known = values[np.isfinite(values)]
     return float(np.median(known)) if len(known) else np.nan
-
-
-def _rays(views: Views, points_px: Array, known: Mask) -> Array:
-    out = np.full((*points_px.shape[:-1], 3), np.nan)
-    undistorted = views.undistorted(np.where(known[..., None], points_px, np.nan))
-    for v, camera in enumerate(views.cameras):
-        out[:, v] = camera.pinhole.rays(undistorted[:, v])
-    return out
 
 
 def agreement_problem(points: ObservedPoints, cameras: Sequence[Camera]) -> FormatError | None:
@@ -129,6 +119,32 @@ def agreement_problem(points: ObservedPoints, cameras: Sequence[Camera]) -> Form
         f"{100 * found:.0f} cm{hint}",
         Remedy("check_views"),
     )
+
+
+def timing_problems(
+    points: ObservedPoints, cameras: Sequence[CameraSource], fps: float, decided: Container[str]
+) -> tuple[list[FormatError], list[str]]:
+    """Return the views whose key points lie some frames from those of the others, as problems and as notes.
+
+    Args:
+        points: key points.
+        cameras: of the session, in its order.
+        fps: frames per second.
+        decided: cameras whose offset the user has given; a note suffices.
+    """
+    ahead = [c.clock.ahead(points.n_frames // 2) for c in cameras]
+    problems, notes = [], []
+    for name, n in view_shifts(points, [c.camera for c in cameras], fps, ahead).items():
+        later = f"{abs(n)} frame{'s' * (abs(n) != 1)} {'later' if n > 0 else 'earlier'}"
+        found = f"those of {later} fit the other views best"
+        if name in decided:
+            notes.append(f"camera '{name}': of its key points, {found}")
+        else:
+            expected = (
+                f"camera '{name}': expected key points that fit the other views on the same frame, found that {found}"
+            )
+            problems.append(FormatError(expected, Remedy("shift_keypoints", camera=name, frames=str(n))))
+    return problems, notes
 
 
 def _exchanged(points: ObservedPoints, a: int, b: int) -> ObservedPoints:

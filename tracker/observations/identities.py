@@ -11,7 +11,7 @@ import numpy as np
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.observations.triangulation import INLIER_M, Views, triangulate_points
 
-_SAME_PERSON_M = 0.4
+SAME_PERSON_M = 0.4
 """Largest median distance, metres, of a detection's points from a person's a frame before: a person is as wide."""
 
 
@@ -70,7 +70,7 @@ def _follow(
             [[_distance(views, v, t.last_world, points_px[v, d], confidence[v, d]) for d in detections] for t in tracks]
         )
         for row, i in zip(*linear_sum_assignment(distances), strict=True):
-            if distances[row, i] < _SAME_PERSON_M:
+            if distances[row, i] < SAME_PERSON_M:
                 taken.setdefault(int(row), {})[v] = detections[i]
                 left.discard((v, detections[i]))
     for group in _groups(views, points_px, confidence, sorted(left)):

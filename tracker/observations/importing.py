@@ -1,8 +1,6 @@
 """Import files of other programs: read them, place them at the frames of a session, check them, store them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -11,48 +9,21 @@ from tracker.formats.joint_maps import JointMap, guess_joint_map, joint_map_of_s
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import IntArray
-from tracker.observations.checks import agreement_problem, picture_problems
-from tracker.observations.observed import ObservationSet, ObservedPoints, SourceFile
+from tracker.observations.checks import agreement_problem, picture_problems, timing_problems
+from tracker.observations.masks import plan_masks
+from tracker.observations.observed import ObservationSet, ObservedPoints
 from tracker.observations.placing import place_pictures, rescaled
-from tracker.observations.readers import PICTURE_FORMATS, find_files
+from tracker.observations.plans import ImportPlan, MaskPlan, ViewPreview
+from tracker.observations.readers import MASK_FORMATS, PICTURE_FORMATS, find_files
 from tracker.observations.request import ImportRequest
-from tracker.observations.sources import FileGroup, Found, match_cameras
+from tracker.observations.sources import FileGroup, Found, match_cameras, no_camera, source_files
 from tracker.observations.space import read_space
-from tracker.observations.stored import checksum, save_observations
+from tracker.observations.stored import save_observations
+from tracker.observations.stored_masks import store_masks
 from tracker.session.session import Session
 
 
-@dataclass(frozen=True)
-class ViewPreview:
-    """The part of an import that is of one camera, or of one file of points in space."""
-
-    camera: str
-    """Name of the camera; the person for points in space."""
-    place: Path | None
-    """The file or folder; None for a camera without one."""
-    n_rows: int = 0
-    """Number of pictures or rows."""
-    frames: tuple[int, int] | None = None
-    """First and last frame of the session with points; None without points."""
-    n_people: int = 0
-    """Most people in a picture."""
-    confidence: float = np.nan
-    """Median confidence of the points found; NaN if unknown."""
-
-
-@dataclass(frozen=True, eq=False)
-class ImportPlan:
-    """An import that has been read and checked, and is not yet stored."""
-
-    observations: ObservationSet
-    files: Mapping[str, Path]
-    """The file of each source, by its path within the observations."""
-    views: tuple[ViewPreview, ...]
-    problems: tuple[FormatError, ...]
-    """Contradictions to the session; with any, it cannot be stored."""
-
-
-def plan_import(session: Session, request: ImportRequest, calibrated: bool = True) -> ImportPlan:
+def plan_import(session: Session, request: ImportRequest, calibrated: bool = True) -> ImportPlan | MaskPlan:
     """Read files and check them against a session; nothing is written.
 
     Args:
@@ -63,22 +34,32 @@ def plan_import(session: Session, request: ImportRequest, calibrated: bool = Tru
     Raises:
         FormatError: a file is missing or malformed, of an unknown format, or of no camera of the session.
     """
-    format_name, files = find_files(request.paths)
+    format_name, files = find_files(request.paths, request.masks)
+    if format_name in MASK_FORMATS:
+        return plan_masks(session, request, format_name, files)
+    if request.values:
+        raise FormatError("expected masks, whose values tell people apart, found key points or joints; give no values")
     if format_name not in PICTURE_FORMATS:
         return _plan_of_space(session, request, format_name, files)
     return _plan_of_pictures(session, request, format_name, files, calibrated)
 
 
-def store_import(session: Session, plan: ImportPlan) -> None:
+def store_import(session: Session, plan: ImportPlan | MaskPlan) -> Session:
     """Store an import with its session.
 
+    Returns:
+        The session; its cameras use masks that were imported.
+
     Raises:
-        FormatError: the first of the plan's problems.
+        TrackerError: the first of the plan's problems.
         SessionError: it cannot be written.
     """
+    if isinstance(plan, MaskPlan):
+        return store_masks(session, plan)
     if plan.problems:
         raise plan.problems[0]
     save_observations(session, plan.observations, plan.files)
+    return session
 
 
 def _plan_of_pictures(
@@ -87,7 +68,7 @@ def _plan_of_pictures(
     groups = PICTURE_FORMATS[format_name].read(files)
     names = match_cameras([(g.labels, g.place) for g, _ in groups], session.camera_names, request.cameras)
     unmatched = [g for (g, _), name in zip(groups, names, strict=True) if not name]
-    problems = [_no_camera(session, g) for g in unmatched]
+    problems = [no_camera(session.camera_names, g) for g in unmatched]
     chosen = {name: pair for pair, name in zip(groups, names, strict=True) if name}
     if not chosen:
         raise problems[0]
@@ -96,31 +77,26 @@ def _plan_of_pictures(
     if request.confidence is not None:
         tables = {name: _with_confidence(table, request.confidence) for name, table in tables.items()}
     problems += picture_problems(tables, cameras)
-    frames, wrong, notes = place_pictures(tables, session, request.first_frame)
+    frames, wrong, notes = place_pictures(tables, session, request.first_frame, request.offsets)
     problems += wrong
     point_names, joint_map, unknown = _skeleton(tables, request)
     problems += unknown
     points = _assemble(session, tables, frames, point_names)
+    if calibrated and not problems:
+        wrong, found = timing_problems(points, session.cameras, session.fps, request.offsets)
+        problems, notes = problems + wrong, notes + found
     if calibrated and not problems and (disagreement := agreement_problem(points, [c.camera for c in session.cameras])):
         problems.append(disagreement)
     notes += [f"{name}: {note}" for name, table in tables.items() for note in table.notes]
     notes += _notes(tables)
-    sources, by_path = _sources([(g, name) for (g, _), name in zip(groups, names, strict=True)])
+    sources, by_path = source_files([(g, name) for (g, _), name in zip(groups, names, strict=True)])
     rows = np.unique(np.concatenate([f for f in frames.values()])).astype(np.float64)
     observations = ObservationSet(
         request.name, format_name, request.people, joint_map, points, None, rows, sources, tuple(notes),
-        _options(request),
+        request.options,
     )  # fmt: skip
     views = tuple(_preview(name, chosen, tables, points, v) for v, name in enumerate(session.camera_names))
     return ImportPlan(observations, by_path, views, tuple(problems))
-
-
-def _no_camera(session: Session, group: FileGroup) -> FormatError:
-    return FormatError(
-        f"expected the name of a camera ({', '.join(session.camera_names)}) in {group.place}, found "
-        f"{', '.join(dict.fromkeys(filter(None, group.labels)))}",
-        Remedy("name_observed_camera", camera=session.camera_names[0]),
-    )
 
 
 def _scaled(table: PictureTable, size: tuple[int, int], given: tuple[int, int] | None) -> PictureTable:
@@ -216,42 +192,6 @@ def _notes(tables: Mapping[str, PictureTable]) -> list[str]:
     return [f"{above} confidences are above 1 and were taken as 1"] if above else []
 
 
-def _sources(groups: list[tuple[FileGroup, str]]) -> tuple[tuple[SourceFile, ...], dict[str, Path]]:
-    """Return the files with their checksums, and the file of each path.
-
-    Raises:
-        FormatError: a file cannot be read, or two would have one path.
-    """
-    sources: dict[str, SourceFile] = {}
-    by_path: dict[str, Path] = {}
-    for group, camera in groups:
-        for file in group.files:
-            path = file.relative_to(group.root).as_posix()
-            if by_path.get(path, file) != file:
-                path = f"{file.parent.name}/{path}"
-            if by_path.get(path, file) != file:
-                raise FormatError(f"expected files of different names, found two named {path}; rename one")
-            try:
-                found = SourceFile(path, checksum(file.read_bytes()), camera)
-            except OSError as error:
-                raise FormatError(f"{file} cannot be read: {error}; check that you may read it") from error
-            sources[path] = SourceFile(path, found.sha256, "") if path in sources else found
-            by_path[path] = file
-    return tuple(sources.values()), by_path
-
-
-def _options(request: ImportRequest) -> tuple[tuple[str, str], ...]:
-    found = {
-        "first_frame": request.first_frame,
-        "clock": request.clock,
-        "axes": request.axes if request.axes != "x,y,z" else None,
-        "unit_m": request.unit_m,
-        "confidence": request.confidence,
-        "picture_size": "x".join(map(str, request.picture_size)) if request.picture_size else None,
-    }
-    return tuple((key, str(value)) for key, value in found.items() if value is not None)
-
-
 def _preview(
     name: str,
     chosen: Mapping[str, tuple[FileGroup, PictureTable]],
@@ -279,10 +219,10 @@ def _plan_of_space(session: Session, request: ImportRequest, format_name: str, f
         )
     placed, problems, notes = read_space(session, request, format_name, [path for path, _ in files])
     groups = [(FileGroup((path,), (path.stem,), root), "") for path, root in files]
-    sources, by_path = _sources(groups)
+    sources, by_path = source_files(groups)
     observations = ObservationSet(
         request.name, format_name, request.people, placed.joint_map, None, placed.joints, placed.row_frames, sources,
-        tuple(notes), _options(request),
+        tuple(notes), request.options,
     )  # fmt: skip
     views = []
     for k, ((path, _), person) in enumerate(zip(files, request.people, strict=True)):

@@ -1,5 +1,6 @@
 """Points of people that another program found: in the pictures of the cameras, or in space."""
 
+import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -64,6 +65,11 @@ class ObservedJoints:
     def n_frames(self) -> int:
         """Number of frames of the session."""
         return len(self.joints_world)
+
+
+def checksum(data: bytes) -> str:
+    """Return the SHA-256 of the bytes of a file, 64 hexadecimal digits."""
+    return hashlib.sha256(data).hexdigest()
 
 
 @dataclass(frozen=True, eq=False)

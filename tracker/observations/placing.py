@@ -13,7 +13,11 @@ from tracker.session.session import Session
 
 
 def place_pictures(
-    tables: Mapping[str, PictureTable], session: Session, first_frame: int | None
+    tables: Mapping[str, PictureTable],
+    session: Session,
+    first_frame: int | None,
+    late: Mapping[str, int],
+    absent: str = "the points are absent there",
 ) -> tuple[dict[str, IntArray], list[FormatError], list[str]]:
     """Return the frame of the session of each picture by camera, what contradicts the session, and notes.
 
@@ -21,10 +25,18 @@ def place_pictures(
     `first_frame`, the lowest number of all cameras is that frame of the session, and equal numbers are one instant.
 
     Args:
-        tables: key points by camera.
+        tables: key points by camera, or pictures without any.
         session: its cameras and number of frames.
         first_frame: the user's choice; None for none.
+        late: frames by which the key points of a camera are late, by name; the user's choice.
+        absent: consequence of a picture that is missing, for the note.
+
+    Raises:
+        FormatError: `late` names another camera.
     """
+    if unknown := [name for name in late if name not in session.camera_names]:
+        known = ", ".join(session.camera_names)
+        raise FormatError(f"expected offsets of the cameras {known}, found one of '{unknown[0]}'; correct the name")
     offsets = {c.camera.name: c.offset for c in session.cameras}
     lowest = min((int(t.numbers[0]) for t in tables.values() if len(t.numbers)), default=0)
     problems: list[FormatError] = []
@@ -47,13 +59,15 @@ def place_pictures(
             notes.append("the files count pictures from 1: number 1 is the first picture of the footage")
         frames = {name: table.numbers - base - offsets[name] for name, table in tables.items()}
         problems += _wrong_lengths(tables, session, base)
+    frames = {name: placed - late.get(name, 0) for name, placed in frames.items()}
+    notes += [f"camera '{name}': {n} frames were taken off, as chosen" for name, n in late.items() if n]
     for name, placed in frames.items():
         inside = (placed >= 0) & (placed < session.n_frames)
         span = np.setdiff1d(np.arange(placed[0], placed[-1] + 1), placed) if len(placed) else placed
         missing = span[(span >= 0) & (span < session.n_frames)]
         if len(missing):
-            notes.append(f"camera '{name}': no picture for frames {short_list(missing)}; the points are absent there")
-        if first_frame is not None and not inside.all():
+            notes.append(f"camera '{name}': no picture for frames {short_list(missing)}; {absent}")
+        if (first_frame is not None or late.get(name)) and not inside.all():
             notes.append(f"camera '{name}': {(~inside).sum()} pictures lie outside of the session and were left out")
         if not inside.any():
             problems.append(

@@ -1,25 +1,29 @@
-"""Read the files of other programs, by format: key points in pictures, or points in space."""
+"""Read the files of other programs, by format: key points in pictures, masks, or points in space."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import msgspec
+import numpy as np
 
 from tracker.errors import FormatError
-from tracker.files import read_regular
+from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import read_c3d
-from tracker.formats.keypoints.coco_reading import is_coco, read_coco
+from tracker.formats.keypoints.coco_reading import holds, is_coco, read_coco
+from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, read_segmentations
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut, read_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import read_hdf5_apart
 from tracker.formats.keypoints.openpose import numbered_name, read_openpose_pictures
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.points_csv import read_points_csv
 from tracker.formats.trc import MarkerTable, read_trc
+from tracker.observations.mask_files import MaskFiles, check_mask_size
 from tracker.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
-from tracker.text_files import TABLE_BYTES
+from tracker.text_files import TABLE_BYTES, TextKind, read_json
 
+_JSON = TextKind("JSON file", TABLE_BYTES, FormatError)
 Groups = list[tuple[FileGroup, PictureTable]]
 
 
@@ -40,6 +44,15 @@ class SpaceFormat:
     read: Callable[[Path, float | None, float], MarkerTable]
     """Reads a file. Lengths without a unit in the file have the given one, metres, or are refused; rows without times
     have the given rate, 1/s."""
+
+
+@dataclass(frozen=True)
+class MaskFormat:
+    """A format of masks."""
+
+    title: str
+    read: Callable[[Sequence[Found]], list[MaskFiles]]
+    """Reads where masks are, each file with the folder it is relative to."""
 
 
 def _read_openpose(files: Sequence[Found]) -> Groups:
@@ -71,6 +84,38 @@ def _read_hdf5(files: Sequence[Found]) -> Groups:
     return out
 
 
+def _read_png(files: Sequence[Found]) -> list[MaskFiles]:
+    return [_png_masks(group) for group in numbered_groups(files)]
+
+
+def _png_masks(group: FileGroup) -> MaskFiles:
+    def read(i: int, size: tuple[int, int]) -> LabelImage:
+        image = read_label_image(group.files[i], "mask")
+        check_mask_size(image.labels, size, f"mask {group.files[i]}")
+        return image
+
+    named = [numbered_name(path.name) for path in group.files]
+    return MaskFiles(group, np.array([n for _, n in filter(None, named)], dtype=np.int64), read)
+
+
+def _read_coco_masks(files: Sequence[Found]) -> list[MaskFiles]:
+    return [
+        _coco_masks(found, FileGroup((path,), (*found.labels, *folder_labels(path, root)), root))
+        for path, root in files
+        for found in read_segmentations(path)
+    ]
+
+
+def _coco_masks(found: SegmentedPictures, group: FileGroup) -> MaskFiles:
+    numbers = sorted(found.images)
+    return MaskFiles(
+        group,
+        np.array(numbers, dtype=np.int64),
+        lambda i, size: LabelImage(found.labels_of(numbers[i], size)),
+        found.notes,
+    )
+
+
 PICTURE_FORMATS = {
     "openpose": PictureFormat("OpenPose JSON", _read_openpose),
     "coco": PictureFormat("COCO", _read_coco),
@@ -83,24 +128,41 @@ SPACE_FORMATS = {
     "bvh": SpaceFormat("BVH", lambda path, unit_m, rate: read_bvh(path, unit_m)),
     "csv": SpaceFormat("CSV", read_points_csv),
 }
-FORMATS: Mapping[str, PictureFormat | SpaceFormat] = {**PICTURE_FORMATS, **SPACE_FORMATS}
+MASK_FORMATS = {
+    "masks": MaskFormat("masks in PNG", _read_png),
+    "coco masks": MaskFormat("COCO segmentation", _read_coco_masks),
+}
+FORMATS: Mapping[str, PictureFormat | SpaceFormat | MaskFormat] = {**PICTURE_FORMATS, **SPACE_FORMATS, **MASK_FORMATS}
 """The formats by name."""
 _BY_SUFFIX = {".slp": "hdf5", ".nwb": "hdf5", ".h5": "hdf5", ".trc": "trc", ".c3d": "c3d", ".bvh": "bvh"}
-SUFFIXES = (".json", ".csv", *_BY_SUFFIX)
+_MASK_SUFFIX = ".png"
+SUFFIXES = (".json", ".csv", *_BY_SUFFIX, _MASK_SUFFIX)
 
 
-def find_files(paths: Sequence[Path]) -> tuple[str, list[Found]]:
+def find_files(paths: Sequence[Path], masks: bool = False) -> tuple[str, list[Found]]:
     """Return the name of the format of some files and folders, and the files, each with the folder it is relative to.
+
+    Args:
+        paths: of the files and folders.
+        masks: whether masks are taken where there are key points too; else pictures beside other files are none.
 
     Raises:
         FormatError: there are none, they have several formats, or none that is known.
     """
     files = list_files(paths, SUFFIXES)
-    formats = {_format_of(path): path for path, _ in _samples(files)}
+    pictures = [f for f in files if f[0].suffix.lower() == _MASK_SUFFIX]
+    if len(pictures) < len(files):
+        files = pictures if masks and pictures else [f for f in files if f[0].suffix.lower() != _MASK_SUFFIX]
+    formats = {_format_of(path, masks): path for path, _ in _samples(files)}
     if len(formats) > 1:
         listed = " and ".join(f"{path.name} ({FORMATS[name].title})" for name, path in list(formats.items())[:2])
         raise FormatError(f"expected files of one format, found {listed}; import them one after the other")
-    return next(iter(formats)), files
+    name = next(iter(formats))
+    if masks and name not in MASK_FORMATS:
+        raise FormatError(
+            f"expected masks among the files, found {FORMATS[name].title}; export PNG files or COCO segmentations"
+        )
+    return name, files
 
 
 def _samples(files: Sequence[Found]) -> list[Found]:
@@ -111,27 +173,32 @@ def _samples(files: Sequence[Found]) -> list[Found]:
     return list(first.values())
 
 
-def _format_of(path: Path) -> str:
+def _format_of(path: Path, masks: bool) -> str:
     """Return the name of the format of a file, by its suffix and content.
 
     Raises:
         FormatError: it is none that is known, or cannot be read.
     """
     suffix = path.suffix.lower()
+    if suffix == _MASK_SUFFIX:
+        return "masks"
     if suffix in _BY_SUFFIX:
         return _BY_SUFFIX[suffix]
     if suffix == ".csv":
         return "deeplabcut" if is_deeplabcut(path) else "csv"
     if suffix == ".json":
-        return "openpose" if numbered_name(path.name) is not None and not _is_dataset(path) else "coco"
+        data = _decoded(path)
+        if numbered_name(path.name) is not None and not is_coco(data):
+            return "openpose"
+        return "coco masks" if masks or (holds(data, "segmentation") and not holds(data, "keypoints")) else "coco"
     raise FormatError(
         f"expected a file that ends in {', '.join(SUFFIXES)}, found {path}; export it in one of these formats"
     )
 
 
-def _is_dataset(path: Path) -> bool:
-    """Return whether a JSON file holds the people of many pictures, not of one; False for a file that is no JSON."""
+def _decoded(path: Path) -> Any:
+    """Return plain data of a JSON file; None if it is none, which its reader explains."""
     try:
-        return is_coco(msgspec.json.decode(read_regular(path, TABLE_BYTES)))
-    except (OSError, msgspec.DecodeError, RecursionError):
-        return False  # its reader explains it
+        return read_json(path, _JSON)
+    except FormatError:
+        return None

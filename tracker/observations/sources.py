@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.keypoints.openpose import numbered_name
+from tracker.observations.observed import SourceFile, checksum
 from tracker.session.matching import check_names
 from tracker.validation import same_form
 
@@ -123,6 +124,39 @@ def match_cameras(
                 Remedy("name_observed_camera", camera=name),
             )
     return found
+
+
+def no_camera(cameras: Sequence[str], group: FileGroup) -> FormatError:
+    """Return that files are named after none of the cameras of the session."""
+    return FormatError(
+        f"expected the name of a camera ({', '.join(cameras)}) in {group.place}, found "
+        f"{', '.join(dict.fromkeys(filter(None, group.labels)))}",
+        Remedy("name_observed_camera", camera=cameras[0]),
+    )
+
+
+def source_files(groups: Sequence[tuple[FileGroup, str]]) -> tuple[tuple[SourceFile, ...], dict[str, Path]]:
+    """Return the files with their checksums, and the file of each path.
+
+    Raises:
+        FormatError: a file cannot be read, or two would have one path.
+    """
+    sources: dict[str, SourceFile] = {}
+    by_path: dict[str, Path] = {}
+    for group, camera in groups:
+        for file in group.files:
+            path = file.relative_to(group.root).as_posix()
+            if by_path.get(path, file) != file:
+                path = f"{file.parent.name}/{path}"
+            if by_path.get(path, file) != file:
+                raise FormatError(f"expected files of different names, found two named {path}; rename one")
+            try:
+                found = SourceFile(path, checksum(file.read_bytes()), camera)
+            except OSError as error:
+                raise FormatError(f"{file} cannot be read: {error}; check that you may read it") from error
+            sources[path] = SourceFile(path, found.sha256, "") if path in sources else found
+            by_path[path] = file
+    return tuple(sources.values()), by_path
 
 
 def _lies_at(place: Path, path: Path) -> bool:

@@ -8,12 +8,12 @@
 A folder appears complete or not at all.
 """
 
-import hashlib
 import io
 import secrets
 import shutil
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Any
 
@@ -26,19 +26,21 @@ from tracker.files import refuse_links, sync_folder, write_text_atomic
 from tracker.formats.joint_maps import format_joint_map, parse_joint_map
 from tracker.formats.number_rows import MAX_NAMES, MAX_VALUES
 from tracker.geometry.arrays import DAMAGED_ARRAYS, Array
-from tracker.observations.observed import ObservationSet, ObservedJoints, ObservedPoints, SourceFile
+from tracker.observations.observed import ObservationSet, ObservedJoints, ObservedPoints, SourceFile, checksum
 from tracker.session.session import Session
 from tracker.text_files import TABLE_BYTES, TextKind, read_toml
 from tracker.validation import FileStem, Name, check, check_version, quoted
 
 FOLDER = "observations"
 _FILE, _POINTS, _FILES = "observations.toml", "points.npz", "files"
-_VERSION = 1
-"""Newest version of the file that this program writes and reads."""
-_KIND = TextKind("observations", TABLE_BYTES, SessionError)
+VERSION = 1
+"""Newest version of the files that this program writes and reads."""
+KIND = TextKind("observations", TABLE_BYTES, SessionError)
 
 
-class _SourceRow(msgspec.Struct, forbid_unknown_fields=True):
+class SourceRow(msgspec.Struct, forbid_unknown_fields=True):
+    """A file that was imported."""
+
     path: Annotated[str, msgspec.Meta(min_length=1, max_length=1000, description="the path of a file")]
     sha256: Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}\Z", description="64 hexadecimal digits")]
     camera: str = ""
@@ -53,11 +55,11 @@ class _Content(msgspec.Struct, forbid_unknown_fields=True):
     ]
     skeleton: Name
     joint_map: dict[str, Any]
-    version: int = _VERSION
+    version: int = VERSION
     cameras: tuple[Name, ...] = ()
     notes: tuple[str, ...] = ()
     options: dict[str, str] = {}
-    sources: tuple[_SourceRow, ...] = ()
+    sources: tuple[SourceRow, ...] = ()
 
 
 def list_observations(session: Session) -> list[str]:
@@ -76,11 +78,6 @@ def source_path(session: Session, name: str, source: SourceFile) -> Path:
     return files_folder(session, name) / source.path
 
 
-def checksum(data: bytes) -> str:
-    """Return the SHA-256 of the bytes of a file, 64 hexadecimal digits."""
-    return hashlib.sha256(data).hexdigest()
-
-
 def save_observations(session: Session, observations: ObservationSet, files: Mapping[str, Path]) -> None:
     """Store observations with a session.
 
@@ -93,19 +90,30 @@ def save_observations(session: Session, observations: ObservationSet, files: Map
         SessionError: there are observations of this name, a file changed since it was read, or the folder cannot be
             written.
     """
-    check(observations.name, FileStem, "the name of the observations", SessionError)
-    folder = session.folder / FOLDER / observations.name
-    refuse_links(session.folder, f"{FOLDER}/{observations.name}")
-    if folder.exists():
-        raise SessionError(f"{folder} exists already; choose another name, or remove that folder")
-    temporary = folder.with_name(f".{observations.name}.{secrets.token_hex(4)}.tmp")
-    try:
-        temporary.mkdir(parents=True)
+    with appearing_folder(session, observations.name) as temporary:
         for source in observations.sources:
             _copy(files[source.path], temporary / _FILES / source.path, source.sha256)
         with (temporary / _POINTS).open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **_arrays(observations))
         write_text_atomic(temporary / _FILE, tomli_w.dumps(_content(observations)))
+
+
+@contextmanager
+def appearing_folder(session: Session, name: str) -> Generator[Path, None, None]:
+    """Yield a folder beside that of observations of a name, which it becomes at the end of the `with` block.
+
+    Raises:
+        SessionError: there are observations of this name, or the folder cannot be written.
+    """
+    check(name, FileStem, "the name of the observations", SessionError)
+    folder = session.folder / FOLDER / name
+    refuse_links(session.folder, f"{FOLDER}/{name}")
+    if folder.exists():
+        raise SessionError(f"{folder} exists already; choose another name, or remove that folder")
+    temporary = folder.with_name(f".{name}.{secrets.token_hex(4)}.tmp")
+    try:
+        temporary.mkdir(parents=True)
+        yield temporary
         temporary.rename(folder)
         sync_folder(folder.parent)
     except OSError as error:
@@ -127,8 +135,8 @@ def load_observations(session: Session, name: str) -> ObservationSet:
             f"expected the name of imported observations, found '{name}'; the session has {listed}: import some"
         )
     where = f"observations {folder / _FILE}"
-    data = read_toml(folder / _FILE, _KIND)
-    check_version(data, _VERSION, where, SessionError)
+    data = read_toml(folder / _FILE, KIND)
+    check_version(data, VERSION, where, SessionError)
     row = check(data, _Content, where, SessionError)
     unknown = [p for p in row.people if p not in {person.name for person in session.people}]
     if unknown:
@@ -156,7 +164,7 @@ def load_observations(session: Session, name: str) -> ObservationSet:
 def _content(observations: ObservationSet) -> dict[str, Any]:
     points = observations.points
     data = {
-        "version": _VERSION,
+        "version": VERSION,
         "name": observations.name,
         "format": observations.format,
         "people": list(observations.people),

@@ -1,5 +1,6 @@
 """The imported files of stored key points, read again: where each frame and person stands in them."""
 
+import json
 from pathlib import Path
 from typing import NamedTuple
 
@@ -40,8 +41,9 @@ def stored_pictures(session: Session, observations: ObservationSet) -> list[Stor
     matched = match_cameras([(n, g.place) for n, (g, _) in zip(labels, groups, strict=True)], session.camera_names, {})
     cameras = [of_path[g.files[0]].camera or name for (g, _), name in zip(groups, matched, strict=True)]
     tables = {name: table for name, (_, table) in zip(cameras, groups, strict=True) if name}
-    first = dict(observations.options).get("first_frame")
-    frames, _, _ = place_pictures(tables, session, None if first is None else int(first))
+    options = dict(observations.options)
+    first, late = options.get("first_frame"), json.loads(options.get("offsets", "{}"))
+    frames, _, _ = place_pictures(tables, session, None if first is None else int(first), late)
     first_files = [group.files[0] for group, _ in groups]
     return [
         StoredPictures(name, group.files, table, frames[name], first_files[:i].count(group.files[0]))

@@ -4,6 +4,7 @@ How a detector sees each person is learnt before a run and stored, so that one t
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,9 @@ from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model, has_preset_sizes
 from tracker.initialization.first_pose import FirstPose, FirstPoses
+from tracker.observations.assignment import people_by_poses
 from tracker.observations.body_points import BodyPoints, body_points
+from tracker.observations.observed import ObservationSet
 from tracker.observations.stored import load_observations
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
@@ -43,9 +46,31 @@ def read_points(session: Session, name: str) -> dict[int, BodyPoints]:
     Raises:
         TrackerError: there are no such observations, or they are of nobody in the session.
     """
+    _, found = _assigned(session, name)
+    return {i: found[p.name].known_to(p.model) for i, p in enumerate(session.people) if p.name in found}
+
+
+def assigned_observations(session: Session, name: str) -> ObservationSet:
+    """Return observations with the people in the order in which they are observed.
+
+    Stored poses of the session decide who is who in key points of several people. Points in space keep the order in
+    which their files were given.
+
+    Raises:
+        TrackerError: there are no such observations.
+    """
+    return _assigned(session, name)[0]
+
+
+def _assigned(session: Session, name: str) -> tuple[ObservationSet, dict[str, BodyPoints]]:
     observations = load_observations(session, name)
     found = body_points(observations, [c.camera for c in session.cameras])
-    return {i: found[p.name].known_to(p.model) for i, p in enumerate(session.people) if p.name in found}
+    before = observations.people
+    if observations.points is None or not found or not set(before) <= {p.name for p in session.people}:
+        return observations, found
+    joints = np.stack([found[p].joints_world for p in before], axis=1)
+    people = people_by_poses(session, before, found[before[0]].names, joints)
+    return replace(observations, people=people), {n: found[o] for n, o in zip(people, before, strict=True)}
 
 
 def find_by_keypoints(session: Session, people: Sequence[int], frames: Sequence[int], name: str) -> FirstPoses:

@@ -16,6 +16,7 @@ from tracker.footage.video import open_footage
 from tracker.geometry.cameras import Camera
 from tracker.observations.importing import plan_import
 from tracker.observations.observed import ObservationSet
+from tracker.observations.plans import MaskPlan
 from tracker.observations.request import ImportRequest
 from tracker.self_calibration.keypoint_calibration import PersonCalibration, calibrate_by_person
 from tracker.session.matching import common_length
@@ -117,11 +118,15 @@ def read_keypoints(
     # Nothing of a session is written: it states which cameras and frames there are.
     session = Session(files.parent, files.name, max(rates, default=1.0), n_frames, sources, ())
     plan = plan_import(session, ImportRequest(_PERSON, (files,), (_PERSON,)), calibrated=False)
+    if isinstance(plan, MaskPlan):
+        raise CalibrationError(
+            f"expected key points in pictures, found masks in {files}; name the files that a pose detector wrote"
+        )
     if plan.problems:
         raise CalibrationError(f"{plan.problems[0]}; correct the files of key points")
     if plan.observations.points is None:
         raise CalibrationError(
-            f"expected key points in pictures, found points in space in {files}; name the files that a detector wrote"
+            f"expected key points in pictures, found points in space in {files}; name the files that a pose detector wrote"
         )
     _require_files({v.camera for v in plan.views if v.place is None}, files)
     return KeyPoints(plan.observations, blanks)

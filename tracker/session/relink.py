@@ -16,7 +16,7 @@ from tracker.footage.frame_rates import same_rate
 from tracker.footage.recording import check_size, read_background
 from tracker.footage.video import open_footage
 from tracker.session.assemble import check_side_files, find_background, find_masks
-from tracker.session.matching import check_names
+from tracker.session.matching import check_names, find_entry
 from tracker.session.missing_files import Kind, MissingFile, missing_files
 from tracker.session.session import Session, save_cameras
 from tracker.validation import same_form
@@ -27,7 +27,8 @@ class Relinked(NamedTuple):
 
     camera: str
     kind: Kind
-    old: Path
+    old: Path | None
+    """None for masks of a camera that used none."""
     new: Path
 
 
@@ -42,7 +43,7 @@ class Places:
     background: Path | None = None
     """Folder of CAM.png or CAM.mp4 of the empty scene."""
     masks: Path | None = None
-    """Folder of CAM/%06d.png."""
+    """Folder of CAM/%06d.png; where no camera has masks, those get them that have a folder in it."""
 
 
 def require_files(session: Session) -> None:
@@ -94,13 +95,29 @@ def relink(session: Session, places: Places) -> tuple[Session, tuple[Relinked, .
     return save_cameras(session, cameras), tuple(found)
 
 
+def leave_masks(session: Session) -> Session:
+    """Let no camera use masks, so that its background counts again. The files of the masks stay.
+
+    Raises:
+        SessionError: session.toml cannot be written.
+    """
+    return save_cameras(session, [replace(c, masks=None) for c in session.cameras])
+
+
+def _masked(session: Session, folder: Path) -> list[str]:
+    """Return the cameras whose masks a folder must have: those with masks, else those with a folder in it."""
+    names = [c.camera.name for c in session.cameras]
+    with_masks = [c.camera.name for c in session.cameras if c.masks is not None]
+    return with_masks or [n for n in names if find_entry(folder, n).is_dir()] or names
+
+
 def _given(session: Session, places: Places) -> list[Relinked]:
     """Check the places that a user has given."""
-    for given_kind, noun in (("background", "a background"), ("masks", "masks")):
-        if getattr(places, given_kind) is not None and all(getattr(c, given_kind) is None for c in session.cameras):
-            raise SessionError(
-                f"no camera of {session.folder} has {noun} to relink", Remedy("relink_nothing", kind=given_kind)
-            )
+    if places.background is not None and all(c.background is None for c in session.cameras):
+        raise SessionError(
+            f"no camera of {session.folder} has a background to relink", Remedy("relink_nothing", kind="background")
+        )
+    masked = _masked(session, places.masks) if places.masks is not None else ()
     by_name = {same_form(name): path for name, path in places.camera_paths.items()}
     found = []
     for source in session.cameras:
@@ -110,7 +127,7 @@ def _given(session: Session, places: Places) -> list[Relinked]:
             given["footage"] = own
         if places.background is not None and source.background is not None:
             given["background"] = find_background(places.background, name)
-        if places.masks is not None and source.masks is not None:
+        if places.masks is not None and name in masked:
             given["masks"] = find_masks(places.masks, name)
         for kind, path in given.items():
             path = Path(os.path.abspath(path))

@@ -1,4 +1,4 @@
-"""`quadrille import`: bring key points and joints of other programs into a session."""
+"""`quadrille import`: bring key points, joints and masks of other programs into a session."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,6 +47,8 @@ class ImportArguments:
     """files or folder of a camera, where names do not tell."""
     first_frame: OptionalWhole = None
     """frame of the session at which the first picture or row lies; by the numbers of the files by default."""
+    offset: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=N ...", help_behavior_hint="")] = ()
+    """frames by which the key points of a camera are late, taken off; NAME=0 keeps them as they are."""
     clock: OptionalClock = None
     """points in space: whether each Frame# is a frame of the session, or rows lie at their Time."""
     axes: Annotated[str, tyro.conf.arg(metavar="X,Y,Z")] = "x,y,z"
@@ -56,7 +58,11 @@ class ImportArguments:
     confidence: OptionalNumber = None
     """confidence of all points, 0 to 1, where the files have none."""
     picture_size: OptionalName = None
-    """WIDTHxHEIGHT of the pictures that the points are of, if not the footage's; 1x1 for normalized points."""
+    """WIDTHxHEIGHT of the pictures that points or masks are of, if not the footage's; 1x1 for normalized points."""
+    masks: bool = False
+    """take masks where the files hold key points too: segmentations of COCO, and PNG beside other files."""
+    values: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PERSON=VALUE ...", help_behavior_hint="")] = ()
+    """masks: value of the pixels of a person; without it nobody is told from others."""
     dry_run: bool = False
     """show what would be imported, and store nothing."""
     json: bool = False
@@ -64,9 +70,10 @@ class ImportArguments:
 
 
 def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> None:
-    """Import key points or joints of another program. docs/observations.md describes formats and checks.
+    """Import key points, joints or masks of another program. docs/observations.md describes formats and checks.
 
-    It shows which view, frames and points were found. Files that contradict the session are refused.
+    It shows which view, frames and points were found. Files that contradict the session are refused. The cameras use
+    imported masks as silhouettes; quadrille relink SESSION --no-masks goes back to their backgrounds.
     """
     from app.session.import_summary import import_summary
     from tracker.formats.trc import METRES_BY_WORD
@@ -85,17 +92,20 @@ def command(arguments: Annotated[ImportArguments, tyro.conf.arg(name="")]) -> No
         arguments.joint_map,
         parse_pairs(arguments.cameras, "--cameras", Path),
         arguments.first_frame,
+        parse_pairs(arguments.offset, "--offset", int),
         arguments.clock,
         arguments.axes,
         METRES_BY_WORD[arguments.units] if arguments.units is not None else None,
         _confidence(arguments.confidence),
         _size(arguments.picture_size),
+        arguments.masks,
+        parse_pairs(arguments.values, "--values", int),
     )
     plan = plan_import(session, request)
     summary: dict[str, Any] = {**import_summary(session, plan, command_line_text), "stored": False}
     if not (plan.problems or arguments.dry_run):
         with SessionLock(session.folder):
-            store_import(session, plan)
+            store_import(load_session(session.folder), plan)  # which may have changed while files were read
         summary["stored"] = True
     print(format_json(summary) if arguments.json else _format(summary))
     if plan.problems:
@@ -128,25 +138,32 @@ def _size(text: str | None) -> tuple[int, int] | None:
 
 
 def _format(summary: dict[str, Any]) -> str:
-    lines = [f"{summary['name']}: {summary['format']}, of {', '.join(summary['people'])}"]
+    lines = [f"{summary['name']}: {summary['format']}, of {', '.join(summary['people']) or 'anyone'}"]
     for v in summary["views"]:
         if v["place"] is None:
             lines.append(f"  {v['view']}: no files")
             continue
-        frames = "no points" if v["frames"] is None else f"points in frames {v['frames'][0]} to {v['frames'][1]}"
+        what = "people" if summary["are_masks"] else "points"
+        frames = f"no {what}" if v["frames"] is None else f"{what} in frames {v['frames'][0]} to {v['frames'][1]}"
+        share = f", {v['share']:.1%} of the picture" if v["share"] == v["share"] else ""
         people = f", up to {v['most_people']} people" if v["most_people"] > 1 else ""
         confidence = f", median confidence {v['confidence']:.2f}" if v["confidence"] == v["confidence"] else ""
-        lines.append(f"  {v['view']}: {v['place']}, {v['rows']} rows, {frames}{people}{confidence}")
-    named = {name: " and ".join(points) for name, points in summary["points"].items()}
-    matched = ", ".join(f"{name} = {points}" for name, points in named.items() if points)
-    others = ", ".join(name for name, points in named.items() if not points)
-    lines.append(f"  points as {summary['skeleton']} names them: {matched or 'none'}")
-    if others:
-        lines.append(f"  points without a joint of the body: {others}")
+        lines.append(f"  {v['view']}: {v['place']}, {v['rows']} rows, {frames}{people}{confidence}{share}")
+    if not summary["are_masks"]:
+        lines += _point_lines(summary)
     lines += [f"  note: {note}" for note in summary["notes"]]
     lines += [f"  problem: {problem}" for problem in summary["problems"][1:]]
     if summary["stored"]:
-        lines.append(f"stored as {summary['name']}")
+        used = "; the cameras use these masks as silhouettes" if summary["are_masks"] else ""
+        lines.append(f"stored as {summary['name']}{used}")
     elif not summary["problems"]:
         lines.append("nothing was stored")
     return "\n".join(lines)
+
+
+def _point_lines(summary: dict[str, Any]) -> list[str]:
+    named = {name: " and ".join(points) for name, points in summary["points"].items()}
+    matched = ", ".join(f"{name} = {points}" for name, points in named.items() if points)
+    others = ", ".join(name for name, points in named.items() if not points)
+    lines = [f"  points as {summary['skeleton']} names them: {matched or 'none'}"]
+    return lines + ([f"  points without a joint of the body: {others}"] if others else [])

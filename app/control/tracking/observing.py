@@ -17,8 +17,9 @@ from tracker.compute.progress import Report
 from tracker.errors import TrackerError
 from tracker.initialization.first_pose import FirstPoses
 from tracker.judging.judge import judge
-from tracker.observations.importing import ImportPlan, plan_import, store_import
+from tracker.observations.importing import plan_import, store_import
 from tracker.observations.observed import ObservationSet
+from tracker.observations.plans import ImportPlan, MaskPlan
 from tracker.observations.request import ImportRequest
 from tracker.observations.stored import list_observations, load_observations
 from tracker.pipeline.chain import unplaced
@@ -99,7 +100,7 @@ class Observing:
         if self._thread is not None:
             self._thread.join(30)
 
-    def plan(self, request: ImportRequest) -> ImportPlan:
+    def plan(self, request: ImportRequest) -> ImportPlan | MaskPlan:
         """Read and check files, and show their points in the views. Nothing is stored.
 
         Raises:
@@ -123,9 +124,21 @@ class Observing:
         plan = self._session_state.state.observations.plan
         if plan is None:
             raise TrackerError("expected files that have been read, found none; check the files first")
+        if isinstance(plan, MaskPlan):
+            self._store_masks(plan)
+            return
         store_import(self._session_state.session, plan)
         self._list()
         self._set(plan=None, shown=plan.observations, message=f"Imported {plan.observations.name}.", failed=False)
+
+    def _store_masks(self, plan: MaskPlan) -> None:
+        """Store masks, and continue with cameras that use them; evidence without them is dropped."""
+        with self._activities.editing(alone=True):
+            session_state = self._session_state
+            session_state.set_cameras(store_import(session_state.session, plan))
+            session_state.saver.follow_session(session_state.session)
+            self._set(plan=None, message=f"The cameras use the masks of {plan.name} as silhouettes.", failed=False)
+            session_state.show_frame(session_state.state.frame)
 
     def _list(self) -> None:
         session = self._session_state.session

@@ -1,4 +1,7 @@
-"""Set the floor from three clicked points; it is stored in session.toml, and the former floor can be restored."""
+"""Set the floor from three clicked points, or from the feet of the people.
+
+It is stored in session.toml, and the former floor can be restored.
+"""
 
 from dataclasses import replace
 from typing import Any
@@ -11,8 +14,10 @@ from app.state.floor_picking import FloorState, Picking, with_mark, with_next, w
 from tracker.errors import TrackerError
 from tracker.geometry.cameras import Camera
 from tracker.geometry.ground_plane import GroundPlane, nearest_axis
+from tracker.motion.floor_from_feet import floor_from_feet
 from tracker.session.session import save_floor
 from tracker.session.session_file import UPS
+from tracker.store.stored_poses import read_stored_poses
 
 _KEY = "former_floor"
 """Setting of the session: the floor before the one that is set."""
@@ -84,7 +89,21 @@ class FloorEditing:
                 return
             if picking.plane is None:
                 raise TrackerError(picking.why or "expected three points of the floor; click each in two views or more")
-            self._change(nearest_axis(picking.plane.normal), picking.plane)
+            self._change(nearest_axis(picking.plane.normal), picking.plane, "three points")
+
+    def set_from_feet(self) -> None:
+        """Set the floor to the plane under the feet in all stored poses; it is on disk when this returns.
+
+        Raises:
+            TrackerError: the poses show no plane, or it cannot be written.
+        """
+        with self._activities.editing():
+            session = self._session_state.session
+            stored = [read_stored_poses(session.annotations_path, p.name, p.model) for p in session.people]
+            found = floor_from_feet([{k: pose.body for k, pose in own.items()} for own in stored])
+            words = f"feet at {found.n_places} places, within {1000 * found.spread_m:.0f} mm"
+            origin = f"{words}, tilt known to {found.tilt_deg:.1f}°"
+            self._change(nearest_axis(found.plane.normal), found.plane, origin)
 
     def revert(self) -> None:
         """Restore the floor before the last change; twice restores the present one.
@@ -98,12 +117,12 @@ class FloorEditing:
                 raise TrackerError("there is no former floor to go back to: this one is the calibration's")
             self._change(*former)
 
-    def _change(self, up: str, plane: GroundPlane | None) -> None:
+    def _change(self, up: str, plane: GroundPlane | None, origin: str = "") -> None:
         before = self._session_state.state.floor
         self._session_state.session = save_floor(self._session_state.session, up, plane)
         self._session_state.saver.store_setting(_KEY, _plane_setting(before.up, before.plane))
         self._session_state.frame_poses.place(self._session_state.session)
-        self._session_state.set(floor=FloorState(up, plane, former=True))
+        self._session_state.set(floor=FloorState(up, plane, origin=origin, former=True))
 
     def _pick(self, picking: Picking | None) -> None:
         with self._session_state.lock:

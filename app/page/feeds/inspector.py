@@ -393,6 +393,7 @@ def _column(cells: Array, i: int) -> tuple[float | None, ...]:
 
 def _floor(floor: FloorState) -> wire.FloorInfo:
     if floor.plane is None:
-        return wire.FloorInfo(floor.up, None, None, floor.former)
+        return wire.FloorInfo(floor.up, None, None, "", floor.former)
     cosine = np.clip(np.abs(floor.plane.normal).max(), -1, 1)
-    return wire.FloorInfo(floor.up, float(np.degrees(np.arccos(cosine))), floor.plane.offset_m, floor.former)
+    tilt_deg = float(np.degrees(np.arccos(cosine)))
+    return wire.FloorInfo(floor.up, tilt_deg, floor.plane.offset_m, floor.origin, floor.former)

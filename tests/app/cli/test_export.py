@@ -65,6 +65,54 @@ def test_a_folder_takes_the_name_of_the_session(run, couple, tmp_path):
     assert len((tmp_path / "s.csv").read_text().splitlines()) == 1 + 2 * 2
 
 
+@pytest.fixture
+def lab(tmp_path):
+    """Two sessions in folders of one name, of ann and of ann and bob, with files as videos."""
+    places = [tmp_path / name / "session" for name in ("walk", "run")]
+    for i, place in enumerate(places):
+        place.parent.mkdir()
+        store_motion(place, [MODELS["gavrila22"]] * (1 + i), n_frames=1 + i, seed=i, gaps={(1, 0)})
+        for camera in load_session(place).cameras:
+            camera.footage.write_bytes(b"a video")
+    return places
+
+
+def test_a_dataset_of_several_sessions(run, lab, tmp_path):
+    out = tmp_path / "d"
+    words = ("export", *lab, "--format", "dataset", "--pictures", "video", "--out", out)
+    assert_refused(run(*words, "--split", "sit=test"), ["expected splits of the recordings", "sit"])
+    assert_refused(run(*words, "--frames", "0:1"), ["expected --frames with one session", "2"])
+    assert_refused(run(*words, "--person", "bob"), ["expected --person", "bob"])
+    assert_refused(run("export", *lab, "--out", tmp_path / "m.trc"), ["expected one session", "trc", "dataset"])
+    assert_refused(run("export", *lab, "--like", "op", "--out", out), ["expected one session with --like"])
+    assert_refused(run("export", "--out", out), ["expected the folder of a session"])
+    assert not out.exists()
+    status, text, _ = run(*words)
+    assert (status, text.splitlines()) == (
+        0,
+        [
+            f"wrote {out}",
+            "train: walk_session, ann, 1 frame",
+            "train: run_session, ann, bob, 2 frames, 1 pose missing",
+            "all recordings are in train; --split 70:15:15 or --split NAME=test divides them",
+            "ann is in walk_session and run_session, taken as one person; --distinct-people takes them as several",
+        ],
+    )
+    assert (out / "recordings" / "run_session" / "videos" / "cam0.mp4").read_bytes() == b"a video"
+
+
+@pytest.mark.slow
+def test_splits_of_several_sessions(run, lab, tmp_path):
+    words = ("export", *lab, "--format", "dataset", "--pictures", "video", "--out", tmp_path / "d")
+    split = ("--split", "1:0:1", "run_session=test", "walk_session=train")
+    assert "ann is in train and test; --split NAME=SPLIT moves a recording" in run(*words, *split)[1]
+    status, text, _ = run(*words, *split, "--overwrite", "--distinct-people", "--json")
+    found = json.loads(text)
+    assert (status, found["shared_people"]) == (0, [])
+    assert found["splits"] == {"train": ["walk_session"], "validation": [], "test": ["run_session"]}
+    assert [(r["split"], r["missing"]) for r in found["recordings"]] == [("train", 0), ("test", 1)]
+
+
 def test_a_file_is_replaced_only_on_request(run, couple, tmp_path):
     path = tmp_path / "m.trc"
     path.write_text("mine")

@@ -92,9 +92,10 @@ async def test_the_worst_are_gone_through_by_click_and_key(page, endpoint, secti
 async def test_problems_of_files_forbid_the_import(fresh_page, endpoint):
     page, section = fresh_page, fresh_page.locator("[data-section=observations]")
     await opened(page, endpoint, EMPTY)
-    view = {"view": "FRONT", "place": "/a", "rows": 40, "frames": [0, 39], "most_people": 1, "confidence": 0.9}
+    view = {"view": "FRONT", "place": "/a", "rows": 40, "frames": [0, 39], "most_people": 1, "confidence": 0.9,
+        "share": None}  # fmt: skip
     plan = {
-        "name": "new", "format": "openpose", "people": ["person"], "frames": 40, "views": [view],
+        "name": "new", "format": "openpose", "are_masks": False, "people": ["person"], "frames": 40, "views": [view],
         "skeleton": "BODY_25", "points": {"LWrist": ["l_wrist"], "Nose": []}, "matched": 1, "notes": [],
         "problems": [],
     }  # fmt: skip
@@ -112,8 +113,21 @@ async def test_problems_of_files_forbid_the_import(fresh_page, endpoint):
     check = section.get_by_role("button", name="Check", exact=True)
     await check.click()
     await section.get_by_text("FRONT: 40 rows, points in frames 0 to 39, median confidence 0.90").wait_for()
-    assert asked[0]["paths"] == "/a"
+    assert (asked[0]["paths"], asked[0]["offsets"]) == ("/a", {})
+    await section.get_by_text("Where the files do not tell").click()
+    await page.fill("#import-offsets", "FRONT")
+    await check.click()
+    await section.locator(".is-failed", has_text="Expected offsets such as cam2=3, found “FRONT”.").wait_for()
+    await page.fill("#import-offsets", "FRONT=3; LEFT = -1;")
+    await check.click()
+    await section.get_by_text("FRONT: 40 rows").wait_for()
+    assert asked[-1]["offsets"] == {"FRONT": 3, "LEFT": -1}
     assert await section.get_by_role("button", name="Import", exact=True).is_enabled()
+    plan |= {"are_masks": True, "people": []}
+    view |= {"confidence": None, "share": 0.062}
+    await check.click()
+    await section.get_by_text("FRONT: 40 rows, people in frames 0 to 39, 6.2 % of the picture").wait_for()
+    await section.get_by_text("The cameras will use these masks as silhouettes.").wait_for()
     plan["problems"] = ["Expected 40 pictures, found 30."]
     await check.click()
     await section.locator(".is-failed", has_text="found 30").wait_for()

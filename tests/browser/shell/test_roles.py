@@ -94,3 +94,14 @@ async def test_the_list_of_a_host_who_is_alone_opens_below_its_button(page):
     assert below["y"] >= above["y"] + above["height"]
     await page.keyboard.press("Escape")
     await shows(page, "document.querySelector('#show-participants').hidden")
+
+
+@pytest.mark.slow
+async def test_the_note_in_place_of_the_3d_view_covers_nothing(page, endpoint):
+    endpoint.role = "review"
+    await page.reload()
+    await shows(page, "!document.querySelector('#scene-note').hidden")
+    await page.keyboard.press("Alt+u")
+    await expect(page.locator("[data-section=annotation]")).to_be_visible()
+    note, column = [await page.locator(one).bounding_box() for one in ("#scene-note", "#inspector")]
+    assert note["x"] + note["width"] <= column["x"]

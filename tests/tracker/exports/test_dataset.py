@@ -98,7 +98,7 @@ def test_checksums_splits_and_a_card_with_fields_to_fill_in(tmp_path, couple):
     assert "| people | 2 |" in card
     assert "| labelled pictures | 12 |" in card
     assert "| keyframes | 2 |" in card
-    assert [p["frame"] for p in json.loads((folder / "provenance.json").read_text())["people"]["ann"]] == [0, 1, 3]
+    assert [p["frame"] for p in json.loads((recording / "provenance.json").read_text())["people"]["ann"]] == [0, 1, 3]
     assert (recording / "images" / "cam1" / "000008.jpg").is_file()
 
 

@@ -14,6 +14,7 @@ from tracker.footage import image_file, video_decoder
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.image_file import decode_image, read_image, read_image_or_none, read_unchanged
 from tracker.footage.image_folder import ImageFolder
+from tracker.footage.mask_image import read_label_image
 from tracker.footage.proxy import Proxy
 from tracker.footage.recording import read_background, read_mask
 from tracker.footage.video import VideoFile
@@ -49,7 +50,7 @@ def test_an_image_bomb_is_refused_by_its_header(tmp_path, never_decoded, size):
     camera = CameraSource(Camera("cam", size, K, np.zeros(0), np.eye(4)), tmp_path, background=path, masks=tmp_path)
     for read in (
         lambda: read_image(path, "here"), lambda: read_unchanged(path, "here"), lambda: ImageFolder(tmp_path, "cam"),
-        lambda: read_background(camera), lambda: read_mask(camera, 0),
+        lambda: read_background(camera), lambda: read_mask(camera, 0), lambda: read_label_image(path, "here"),
     ):  # fmt: skip
         with pytest.raises(RecordingError, match="expected at most 80 million pixels, found"):
             read()

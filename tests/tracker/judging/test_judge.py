@@ -43,7 +43,9 @@ def joints(tracked):
 
 
 def judged(joints, tracked):
-    points = BodyPoints(NAMES, joints, np.empty((N, 0, len(NAMES), 2)), np.empty((N, 0, len(NAMES))))
+    points = BodyPoints(
+        NAMES, joints, np.empty((len(joints), 0, len(NAMES), 2)), np.empty((len(joints), 0, len(NAMES)))
+    )
     return judge_person("ann", points, tracked, None)
 
 
@@ -63,6 +65,31 @@ def test_an_offset_throughout_is_a_sentence_and_no_doubt(joints, tracked):
     assert len(found.sentences) == 2
     assert "left hip off by 4 cm throughout: 4 cm down" in found.sentences
     assert found.spread_m["left_hip"] < 0.03
+
+
+@pytest.mark.parametrize("lag", [-3, 2, 5])
+def test_joints_that_lag_throughout_are_a_sentence(lag):
+    """A person whose limbs swing: a slow motion lags by less than its errors."""
+    model, n = MODEL, 60
+    rng = np.random.default_rng(4)
+    swing = np.where(model.dof_is_length, 0.0, 0.6 * rng.normal(size=model.n_dofs))
+    poses = [
+        model.clip(model.retract(model.neutral(), np.sin(0.25 * k + np.arange(len(swing))) * swing)) for k in range(n)
+    ]
+    bodies = [PosedBody(model, p) for p in poses]
+    records = [PoseRecord(p, ("tracked",) * len(p), 1) for p in poses]
+    tracked = {k: StoredPose(b, r) for k, (b, r) in enumerate(zip(bodies, records, strict=True))}
+    true = np.array([b.joint_centers_world[POINTS] for b in bodies])
+    found = true + rng.normal(0.0, 0.03, true.shape)
+    late = np.full_like(found, np.nan)
+    rows = np.arange(n) - lag
+    inside = (rows >= 0) & (rows < n)
+    late[inside] = found[rows[inside]] + 0.05
+    assert judged(found, tracked).lag_frames == 0
+    judgement = judged(late, tracked)
+    assert judgement.lag_frames == lag
+    word = f"{abs(lag)} frames {'late' if lag > 0 else 'early'}"
+    assert judgement.sentences[0] == f"all joints are {word} throughout"
 
 
 def test_exchanged_legs_are_named(joints, tracked):

@@ -11,6 +11,7 @@ import warnings
 
 import numpy as np
 import pytest
+from mask_files import SIZE, person_masks, write_coco_masks, write_masks
 from mutation import json_bytes, mutate_bytes, mutate_tree, toml_bytes
 from observed_files import (
     write_c3d,
@@ -22,6 +23,7 @@ from observed_files import (
 from observed_people import BODY_25, make_session, seen, walking, write_openpose
 
 from tracker.errors import TrackerError
+from tracker.footage.recording import read_mask
 from tracker.formats.bvh import BvhFrame, write_bvh
 from tracker.formats.keypoints import hdf5, hdf5_process
 from tracker.formats.trc import write_trc
@@ -30,6 +32,7 @@ from tracker.observations.importing import plan_import, store_import
 from tracker.observations.joints import observed_joints
 from tracker.observations.request import ImportRequest
 from tracker.observations.stored import load_observations
+from tracker.observations.stored_masks import load_masks
 
 N = 4
 TRUTH = walking(N)
@@ -45,10 +48,16 @@ KINDS = {
     "csv": ("a.csv", None),
     "bvh": ("a.bvh", None),
     "c3d": ("a.c3d", "ezc3d"),
+    "masks": ("m/cam1/cam1_000002.png", None),
+    "coco polygon": ("c.json", None),
+    "coco runs": ("c.json", None),
+    "coco text": ("c.json", "pycocotools"),
+    "stored masks": ("masks.toml", None),
     "stored text": ("observations.toml", None),
     "stored numbers": ("points.npz", None),
 }
 """For each kind: the file that is mutated, and the package that it needs."""
+OF_MASKS = ("masks", "coco polygon", "coco runs", "coco text", "stored masks")
 APART = ("h5py", "sleap_io")
 """Packages that read in a process of their own."""
 SECONDS = 10.0
@@ -57,6 +66,10 @@ SECONDS = 10.0
 
 def write(kind, session, folder):
     """Write the files of a kind; return the path to import."""
+    if kind in ("masks", "stored masks"):
+        return write_masks(folder / "m", session.camera_names, person_masks(N, 4))
+    if kind in OF_MASKS:
+        return write_coco_masks(folder / "c.json", session.camera_names, person_masks(N, 4), kind.split()[1])
     points = seen(session, [TRUTH])
     if kind == "openpose":
         write_openpose(folder / "k", session.camera_names, points)
@@ -90,11 +103,20 @@ def mutated(rng, name, data):
 
 def read(kind, session, path, case):
     """Import, or load what was imported; return whether it was refused."""
+    if kind == "stored masks":
+        load_masks(session, "mp")
+        return False
     if kind.startswith("stored"):
         found = load_observations(session, "mp")
         observed_joints(found, [c.camera for c in session.cameras])
         return False
     plan = plan_import(session, ImportRequest(f"m{case}", (path,), ("ann",), unit_m=0.01))
+    if kind in OF_MASKS:
+        if not plan.problems and case % 10 == 0:
+            used = store_import(session, plan)
+            for source in used.cameras:
+                read_mask(source, 2)
+        return bool(plan.problems)
     observed_joints(plan.observations, [c.camera for c in session.cameras])
     if not plan.problems and case % 10 == 0:
         store_import(session, plan)
@@ -125,10 +147,10 @@ def test_mutated_observations_are_imported_or_refused(kind, n, tmp_path, monkeyp
     name, package = KINDS[kind]
     if package is not None:
         pytest.importorskip(package)
-    session = make_session(tmp_path / "session", N)
+    session = make_session(tmp_path / "session", N, size=SIZE if kind in OF_MASKS else (640, 480))
     folder = tmp_path / "files"
     folder.mkdir()
-    path = write("openpose" if kind.startswith("stored") else kind, session, folder)
+    path = write("openpose" if kind in ("stored text", "stored numbers") else kind, session, folder)
     if package in APART:
         assert not read(kind, session, path, 1)  # by a process of its own
         hdf5_process.read_hdf5(folder / name)  # loads the libraries

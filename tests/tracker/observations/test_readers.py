@@ -104,6 +104,25 @@ def test_sleap_and_nwb(session, tmp_path, suffix):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("step", [1.0, 1 / 30])
+def test_pictures_without_a_point_shift_no_others_in_nwb(tmp_path, step):
+    """sleap-io numbers the pictures by their order, and times may be rounded to milliseconds."""
+    h5py = pytest.importorskip("h5py")
+    pytest.importorskip("sleap_io")
+    points = np.full((7, 1, 3, 3), 50.0)
+    points[[1, 2, 5]] = np.nan
+    write_sleap(tmp_path / "a.nwb", ("hip", "knee", "ankle"), points)
+    with h5py.File(tmp_path / "a.nwb", "r+") as file:
+        found = []
+        file.visititems(lambda name, item: found.append(item) if name.endswith("/timestamps") else None)
+        for times in found:
+            times[:] = np.round(times[:] * step, 3)
+    ((_, table),) = read_hdf5_apart(tmp_path / "a.nwb")
+    assert table.names == ("hip", "knee", "ankle")
+    assert table.numbers.tolist() == [0, 3, 4, 6]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["a.slp", "a.h5", "a.nwb"])
 def test_damaged_hdf5(tmp_path, name):
     pytest.importorskip("sleap_io")

@@ -142,8 +142,14 @@ def test_side_files_are_given_by_folder(room):
     )
     assert missing_files(session) == ()
     bare = replace(session, cameras=tuple(replace(c, masks=None) for c in session.cameras))
-    with pytest.raises(SessionError, match=r"no camera of .* has masks to relink"):
-        relink(bare, Places(masks=take / "masks"))
+    masked, found = relink(bare, Places(masks=take / "masks"))
+    assert [(f.camera, f.kind, f.old) for f in found] == [("a", "masks", None), ("b", "masks", None)]
+    assert [c.masks for c in masked.cameras] == [take / "masks" / "a", take / "masks" / "b"]
+    with pytest.raises(RecordingError, match="camera 'a': no masks in"):
+        relink(bare, Places(masks=take / "empty"))
+    bare = replace(session, cameras=tuple(replace(c, background=None) for c in session.cameras))
+    with pytest.raises(SessionError, match=r"no camera of .* has a background to relink"):
+        relink(bare, Places(background=take / "empty"))
 
 
 def test_a_search_needs_a_folder(room):

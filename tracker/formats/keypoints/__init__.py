@@ -1,7 +1,16 @@
-"""Files of key points in pictures: one module each.
+"""Files of key points in pictures, and of masks beside them: one module each.
 
 Imports `geometry` and `body`; knows no session. Callers use `picture_table.PictureTable` and the modules: `openpose`,
 `coco`, `deeplabcut`, `sleap_files`.
 """
 
-__all__ = ["coco", "coco_patching", "coco_reading", "deeplabcut", "hdf5", "openpose", "picture_table"]
+__all__ = [
+    "coco",
+    "coco_patching",
+    "coco_reading",
+    "coco_segmentation",
+    "deeplabcut",
+    "hdf5",
+    "openpose",
+    "picture_table",
+]

@@ -6,7 +6,7 @@ person. Images are matched to cameras by `camera`, as this program writes it, or
 
 from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -24,7 +24,9 @@ _FrameNumber = Annotated[int, msgspec.Meta(ge=0, le=MAX_FRAMES, description=f"a 
 _Side = Annotated[int, msgspec.Meta(ge=0, le=MAX_SIDE_PX, description="a size in pixels")]
 
 
-class _Image(msgspec.Struct):
+class CocoPicture(msgspec.Struct):
+    """An image of a dataset."""
+
     id: _FrameNumber
     file_name: str = ""
     width: _Side = 0
@@ -35,6 +37,8 @@ class _Image(msgspec.Struct):
 
 class _Category(msgspec.Struct):
     id: int = 1
+    name: str = ""
+    supercategory: str = ""
     keypoints: Annotated[
         tuple[Name, ...], msgspec.Meta(max_length=MAX_NAMES, description="the names of the key points")
     ] = ()
@@ -45,10 +49,11 @@ class _Annotation(msgspec.Struct):
     category_id: int = 1
     keypoints: list[Number] = []
     score: Number | None = None
+    segmentation: Any = None
 
 
 class _Dataset(msgspec.Struct):
-    images: list[_Image]
+    images: list[CocoPicture]
     annotations: list[_Annotation]
     categories: list[_Category] = []
 
@@ -56,6 +61,20 @@ class _Dataset(msgspec.Struct):
 def is_coco(data: Any) -> bool:
     """Return whether plain data of a JSON file looks like COCO."""
     return isinstance(data, list) or (isinstance(data, dict) and "annotations" in data)
+
+
+def holds(data: Any, key: Literal["keypoints", "segmentation"]) -> bool:
+    """Return whether an annotation in plain data of a COCO file has key points or a segmentation."""
+    annotations = data.get("annotations") if isinstance(data, dict) else data
+    return isinstance(annotations, list) and any(isinstance(a, dict) and a.get(key) for a in annotations)
+
+
+class PictureDataset(NamedTuple):
+    """The content of a file, by picture."""
+
+    dataset: _Dataset
+    images: Mapping[tuple[str, ...], Mapping[int, CocoPicture]]
+    """The images of each camera by their numbers. The key has the names that it may have, best first."""
 
 
 class KeypointDataset(NamedTuple):
@@ -66,7 +85,7 @@ class KeypointDataset(NamedTuple):
     """The category of the people."""
     names: tuple[str, ...]
     """Names of their points; empty if the file has none."""
-    images: Mapping[tuple[str, ...], Mapping[int, _Image]]
+    images: Mapping[tuple[str, ...], Mapping[int, CocoPicture]]
     """The images of each camera by their numbers. The key has the names that it may have, best first."""
     notes: tuple[str, ...]
 
@@ -81,21 +100,20 @@ class KeypointDataset(NamedTuple):
         return all(v in (0, 1, 2) for a in self.annotations for v in a.keypoints[2::3])
 
 
-def read_dataset(path: Path) -> KeypointDataset:
-    """Read a dataset or a list of results, without arrays.
+def read_pictures(path: Path) -> PictureDataset:
+    """Read a dataset or a list of results, of key points or segmentations.
 
     Raises:
-        FormatError: the file is malformed, or has no key points.
+        FormatError: the file is malformed.
     """
     where = f"COCO file {path}"
     data = read_json(path, _KIND)
     if isinstance(data, list):
         annotations = check(data, list[_Annotation], where, FormatError)
-        dataset = _Dataset([_Image(i) for i in sorted({a.image_id for a in annotations})], annotations)
+        dataset = _Dataset([CocoPicture(i) for i in sorted({a.image_id for a in annotations})], annotations)
     else:
         dataset = check(data, _Dataset, where, FormatError)
-    category, names, notes = _category(dataset, where)
-    by_camera: dict[tuple[str, ...], dict[int, _Image]] = {}
+    by_camera: dict[tuple[str, ...], dict[int, CocoPicture]] = {}
     for image in dataset.images:
         labels, number = _place(image)
         taken = by_camera.setdefault(labels, {})
@@ -105,7 +123,20 @@ def read_dataset(path: Path) -> KeypointDataset:
                 "; give the images numbers or folders of their cameras"
             )
         taken[number] = image
-    return KeypointDataset(dataset, category, names, by_camera, notes)
+    return PictureDataset(dataset, by_camera)
+
+
+def read_dataset(path: Path) -> KeypointDataset:
+    """Read key points of a dataset or a list of results, without arrays.
+
+    Raises:
+        FormatError: the file is malformed, or has no key points.
+    """
+    dataset, images = read_pictures(path)
+    category, names, notes = _category(dataset, f"COCO file {path}")
+    if any(a.segmentation for a in dataset.annotations):
+        notes = (*notes, "key points were taken, and segmentations of the file left out")
+    return KeypointDataset(dataset, category, names, images, notes)
 
 
 def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
@@ -135,12 +166,12 @@ def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
     return out
 
 
-def quoted_images(one: _Image, other: _Image) -> str:
+def quoted_images(one: CocoPicture, other: CocoPicture) -> str:
     """Return the names of two images for a message."""
     return f"'{one.file_name[-60:]}' and '{other.file_name[-60:]}'"
 
 
-def _place(image: _Image) -> tuple[tuple[str, ...], int]:
+def _place(image: CocoPicture) -> tuple[tuple[str, ...], int]:
     """Return the names that the camera of an image may have, best first, and the number of the picture."""
     path = PurePosixPath(image.file_name.replace("\\", "/"))
     named = numbered_name(f"{path.stem}.json") if path.stem else None

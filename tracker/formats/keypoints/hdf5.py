@@ -1,4 +1,4 @@
-"""Read HDF5 files (SLEAP, NWB, DeepLabCut) in a process of their own, and replace points in SLEAP's and DeepLabCut's.
+"""Read HDF5 files (SLEAP, NWB, DeepLabCut) in a process of their own, and replace points in them.
 
 The HDF5 library hangs on some damaged files, or ends the process that reads them. So another process reads a file,
 within a time limit, and hands back plain arrays.

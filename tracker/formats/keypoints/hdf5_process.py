@@ -13,6 +13,7 @@ import numpy as np
 from tracker.errors import FormatError, Remedy, TrackerError
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut_hdf5, patch_deeplabcut_hdf5, read_deeplabcut_hdf5
 from tracker.formats.keypoints.hdf5 import CHANGES, PATCHED, ReadAnswer, VideoHead
+from tracker.formats.keypoints.nwb_files import patch_nwb, read_nwb
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.keypoints.sleap_files import read_sleap
 from tracker.formats.keypoints.sleap_patching import is_analysis, patch_analysis, patch_project
@@ -35,6 +36,8 @@ def read_hdf5(path: Path) -> Tables:
             warnings.simplefilter("ignore")
             if path.suffix.lower() == ".h5" and is_deeplabcut_hdf5(path):
                 return [(path, read_deeplabcut_hdf5(path))]
+            if path.suffix.lower() == ".nwb":
+                return read_nwb(path)
             return read_sleap(path)
     except (TrackerError, ImportError):
         raise
@@ -65,6 +68,8 @@ def _change(path: Path, folder: Path) -> None:
         return
     elif suffix == ".h5" and is_analysis(path):
         patch_analysis(copy, changes[0])
+    elif suffix == ".nwb":
+        patch_nwb(copy, changes)
     else:
         raise FormatError(
             "expected a project or an analysis of SLEAP, or a table of DeepLabCut, to replace points in, found another "

@@ -21,7 +21,9 @@ from tracker.text_files import TABLE_BYTES, TextKind, read_json
 from tracker.validation import MAX_FRAMES, Number, check
 
 _KIND = TextKind("OpenPose file", TABLE_BYTES, FormatError, "export it again")
-_NUMBERED = re.compile(r"(?P<stem>.*?)[_.-]?(?P<number>\d{1,20})(?:_keypoints)?\.json", re.IGNORECASE | re.DOTALL)
+_NUMBERED = re.compile(
+    r"(?P<stem>.*?)[_.-]?(?P<number>\d{1,20})(?:(?:_keypoints)?\.json|\D*\.png)", re.IGNORECASE | re.DOTALL
+)
 MAX_PEOPLE = 100
 """Largest number of people in a picture: OpenPose finds 127 at most; arrays have room for the most of any."""
 
@@ -35,7 +37,7 @@ class _Picture(msgspec.Struct):
 
 
 def numbered_name(name: str) -> tuple[str, int] | None:
-    """Return the stem and the number of the name of a file; None for another kind of name."""
+    """Return the stem and the number of the name of a file, of a mask the last one; None for another kind of name."""
     match = _NUMBERED.fullmatch(name)
     if match is None or len(match["number"].lstrip("0")) > len(str(MAX_FRAMES)):
         return None

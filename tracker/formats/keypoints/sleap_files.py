@@ -1,4 +1,4 @@
-"""Files that sleap-io reads: SLEAP's projects and analyses, and key points in NWB (ndx-pose).
+"""Files that sleap-io reads: SLEAP's projects and analyses.
 
 sleap-io is an optional package. A file may have several videos, one for each camera.
 """

@@ -5,6 +5,7 @@ import threading
 import numpy as np
 import pytest
 from gestures import drag, wait_for
+from mask_files import write_masks
 from observed_people import BODY_25, seen, walking, write_openpose
 
 from app.control.tracking import observing
@@ -15,6 +16,7 @@ from tracker.judging.judge import Judgement, LimbVerdict
 from tracker.observations.request import ImportRequest
 from tracker.pipeline import chain
 from tracker.pipeline.keypoint_evidence import read_points
+from tracker.session.session import load_session
 
 VIEW = View(frozenset(("imported",)), (1, 1, 1, 1))
 
@@ -86,6 +88,29 @@ def test_a_set_that_cannot_be_read_is_listed_with_the_reason(imported):
     assert found.problem
     with pytest.raises(TrackerError):
         imported.observing.show("openpose")
+
+
+def covered(controller):
+    """Share of the regions of evidence that silhouettes cover, at least, of all views."""
+    evidence = controller._session_state.frames.evidence(controller.state.frame)
+    return min(view.silhouette.inside.mean() for view in evidence)
+
+
+def test_masks_are_used_at_once_in_place_of_the_background(controller, tmp_path):
+    session = controller.session
+    assert 0.001 < covered(controller) < 0.2
+    width, height = session.cameras[0].camera.size
+    masks = np.zeros((session.n_frames, len(session.cameras), height, width), np.uint8)
+    masks[..., height // 10 :, width // 10 :] = 1
+    folder = write_masks(tmp_path / "m", session.camera_names, masks)
+    controller.observing.plan(ImportRequest("net", (folder,), ()))
+    assert kinds(controller, "imported") == {}
+    controller.observing.store()
+    assert controller.state.observations.message == "The cameras use the masks of net as silhouettes."
+    assert controller.session.cameras[0].masks == session.folder / "observations" / "net" / "masks" / "FRONT"
+    assert all(c.masks is not None for c in load_session(session.folder).cameras)
+    assert covered(controller) > 0.6
+    assert controller._session_state.saver._session is controller.session  # else it would write the old cameras
 
 
 def judged(controller):

@@ -3,14 +3,17 @@
 import numpy as np
 import pytest
 
+from app.control.view import floor as floor_editing
 from app.drawing.floor_lines import floor_lines
 from app.messages.client import EditFloor, MarkFloor
 from app.messages.encoding import state as state_message
 from app.messages.parsing import MessageError
 from app.page.commands import dispatch
+from app.page.feeds.inspector import view_3d
 from tracker.errors import TrackerError
 from tracker.geometry import rigid
 from tracker.geometry.ground_plane import UP_ROTATIONS, GroundPlane, nearest_axis, up_rotation
+from tracker.motion.floor_from_feet import FeetFloor
 from tracker.session.session import load_session
 
 TILT = rigid.so3_exp(np.array([0.05, -0.03, 0.0]))
@@ -86,6 +89,21 @@ def test_applied_it_is_kept_turns_who_stands_and_can_be_gone_back_from(opened, s
     assert opened().state.floor.plane is None
     do(opened(), "revert")
     assert load_session(session).floor.offset_m == pytest.approx(HEIGHT_M, abs=1e-6)
+
+
+def test_it_is_set_from_the_feet_and_says_so(opened, monkeypatch):
+    controller = opened()
+    with pytest.raises(TrackerError, match="expected poses whose feet show the floor, found none"):
+        do(controller, "from_feet")
+    found = FeetFloor(GroundPlane(TILT[:, 2], HEIGHT_M), 0.004, 0.31, 12)
+    monkeypatch.setattr(floor_editing, "floor_from_feet", lambda people: found)
+    do(controller, "from_feet")
+    assert load_session(controller.session.folder).floor.offset_m == pytest.approx(HEIGHT_M, abs=1e-6)
+    told = view_3d(controller, controller.state).floor
+    assert told.origin == "feet at 12 places, within 4 mm, tilt known to 0.3°"
+    assert told.tilt_deg == pytest.approx(3.34, abs=0.01)
+    do(controller, "revert")
+    assert controller.state.floor.plane is None
 
 
 def test_taking_back_goes_through_all_marks(opened):

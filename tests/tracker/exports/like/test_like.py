@@ -18,7 +18,7 @@ from observed_people import BODY_25, make_session, seen, write_openpose
 from tracker.body.model import PosedBody
 from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.keypoints import project_through_lens
-from tracker.exports.like import export_like
+from tracker.exports.like.sending import export_like
 from tracker.formats.c3d import read_c3d
 from tracker.formats.keypoints.coco_reading import read_coco
 from tracker.formats.keypoints.deeplabcut import read_deeplabcut_csv
@@ -115,6 +115,10 @@ def write_kind(kind, session, folder, truth):
         for v, name in enumerate(session.camera_names):
             write_sleap(folder / "sl" / f"{name}.slp", BODY_25.points, points[:, v])
         return folder / "sl", {}
+    if kind == "nwb":
+        for v, name in enumerate(session.camera_names):
+            write_sleap(folder / "nwb" / f"{name}.nwb", BODY_25.points, points[:, v])
+        return folder / "nwb", {}
     if kind == "trc":
         write_trc(folder / "a.trc", BODY_25.points, truth, 30.0, units="mm")
         return folder / "a.trc", {}
@@ -131,9 +135,10 @@ def write_kind(kind, session, folder, truth):
 
 KINDS = [
     *("openpose", "coco", "dlc csv", "dlc multi", "trc", "trc utf-16", "csv", "c3d"),
-    *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("dlc h5", "sleap")),
+    *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("dlc h5", "sleap", "nwb")),
 ]
-NEEDS = {"dlc h5": "h5py", "sleap": "sleap_io", "c3d": "ezc3d"}
+NEEDS = {"dlc h5": "h5py", "sleap": "sleap_io", "nwb": "sleap_io", "c3d": "ezc3d"}
+SUFFIXES = {"dlc h5": ".h5", "sleap": ".slp", "nwb": ".nwb"}
 
 
 def read_space(path):
@@ -260,7 +265,7 @@ def numbers_of(path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["dlc h5", "sleap"])
+@pytest.mark.parametrize("kind", [*SUFFIXES])
 def test_mended_points_of_hdf5_alone_differ(session, tmp_path, kind):
     pytest.importorskip(NEEDS[kind])
     bodies = poses(session)
@@ -270,7 +275,7 @@ def test_mended_points_of_hdf5_alone_differ(session, tmp_path, kind):
     done = export_like(session, imported(session, path), tmp_path / "back")
     assert done.frames == (EDITED,)
     assert len(done.changed) == len(session.cameras)
-    names, knee, suffix = BODY_25.points, BODY_25.points.index("LKnee"), ".slp" if kind == "sleap" else ".h5"
+    names, knee, suffix = BODY_25.points, BODY_25.points.index("LKnee"), SUFFIXES[kind]
     for source in session.cameras:
         ((_, before),), ((_, after),) = (
             read_hdf5_apart(folder / f"{source.camera.name}{suffix}") for folder in (path, tmp_path / "back")
@@ -307,7 +312,7 @@ def changed_points(path, changes):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("suffix", "version"), [(".slp", None), (".slp", 1.0), (".h5", None)])
+@pytest.mark.parametrize(("suffix", "version"), [(".slp", None), (".slp", 1.0), (".h5", None), (".nwb", None)])
 def test_mended_points_of_sleap_alone_differ(tmp_path, suffix, version):
     pytest.importorskip("sleap_io")
     write_sleap(tmp_path / f"a{suffix}", SOME, sleap_people(1))
@@ -345,6 +350,22 @@ def test_an_analysis_has_no_track_for_one_more_person(tmp_path):
     write_sleap(tmp_path / "a.h5", SOME, sleap_people(1))
     with pytest.raises(FormatError, match="expected a track for a person who was not found on frame 1, found none"):
         patch_hdf5_apart(tmp_path / "a.h5", {0: {1: [(0, MENDED), (-1, MENDED)]}})
+
+
+@pytest.mark.slow
+def test_nwb_gets_a_point_that_was_not_found_and_stays_valid(tmp_path):
+    pytest.importorskip("sleap_io")
+    pynwb = pytest.importorskip("pynwb")
+    write_sleap(tmp_path / "a.nwb", SOME, sleap_people(1))
+    knee = np.array([[np.nan] * 3, [33.0, 44.0, 1.0], [np.nan] * 3])
+    before, after = changed_points(tmp_path / "a.nwb", {1: [(0, knee)]})
+    assert np.isnan(before[1, 0, 1, :2]).all()
+    assert after[1, 0, 1].tolist() == [33.0, 44.0, 1.0]
+    after[1, 0, 1] = before[1, 0, 1]
+    assert np.array_equal(before, after, equal_nan=True)
+    assert pynwb.validate(path=str(tmp_path / "new.nwb")) == []
+    with pytest.raises(FormatError, match="expected a free person for one who was not found in picture 1, found none"):
+        patch_hdf5_apart(tmp_path / "a.nwb", {0: {1: [(0, MENDED), (-1, MENDED)]}})
 
 
 @pytest.mark.slow

@@ -1,0 +1,135 @@
+"""Send imported files back in their own format: what was mended is replaced, all other bytes stay."""
+
+import os
+import secrets
+import shutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tracker.errors import FormatError, Remedy, SessionError, TrackerError
+from tracker.exports.like.mended_points import PoseChoice, mended_points
+from tracker.exports.like.patches import PATCHED, Files, mended_pictures, mended_space
+from tracker.observations.assignment import people_by_poses
+from tracker.observations.joints import observed_joints
+from tracker.observations.observed import ObservationSet
+from tracker.observations.readers import FORMATS
+from tracker.observations.stored import checksum, source_path
+from tracker.session.session import Session
+
+
+@dataclass(frozen=True)
+class LikeExport:
+    """Files that were sent back."""
+
+    paths: tuple[Path, ...]
+    """The files."""
+    changed: tuple[Path, ...]
+    """Files that differ from those that came."""
+    frames: tuple[int, ...]
+    """Frames whose points were replaced in some file."""
+    exchanged: tuple[tuple[int, str, str], ...] = ()
+    """Frame, person and camera in whose view left and right were exchanged."""
+
+
+def export_like(
+    session: Session,
+    observations: ObservationSet,
+    out: Path,
+    poses: PoseChoice = "edited",
+    learn_offsets: bool = True,
+    exchange_sides: bool = False,
+) -> LikeExport:
+    """Write the files of observations as they came, with the points of mended poses replaced.
+
+    Args:
+        session: its stored poses.
+        observations: imported ones.
+        out: file to write, or the folder of several files; it must not exist.
+        poses: replace the points that a person edited, or those of all poses.
+        learn_offsets: place points as far from the joints as the files usually do.
+        exchange_sides: key points: exchange left and right in the views and frames in which they were found exchanged.
+
+    Raises:
+        TrackerError: a stored file was changed or is missing, its format cannot be changed in place, or `out` cannot be
+            written.
+    """
+    if exchange_sides and observations.points is None:
+        raise FormatError(
+            f"expected key points, in which sides can be exchanged, found the points in space '{observations.name}'"
+        )
+    contents = _stored_contents(session, observations)
+    cameras = [c.camera for c in session.cameras]
+    joints_world = observed_joints(observations, cameras).joints_world
+    if observations.points is not None:
+        columns = [(names[0], i) for i, names in enumerate(observations.counterparts.values()) if len(names) == 1]
+        names, at = [n for n, _ in columns], [i for _, i in columns]
+        people = people_by_poses(session, observations.people, names, joints_world[:, :, at])
+        observations = replace(observations, people=people)
+    mended = mended_points(session, observations, joints_world, poses, learn_offsets)
+    frames = sorted({f for person in mended for f in person.bodies})
+    if (frames or exchange_sides) and observations.format not in PATCHED:
+        listed = ", ".join(FORMATS[name].title for name in PATCHED)
+        raise FormatError(
+            f"expected observations of a format whose points can be replaced in place ({listed}), found "
+            f"{FORMATS[observations.format].title}",
+            Remedy("export_other_format"),
+        )
+    changed: Files = {}
+    exchanged: tuple[tuple[int, int, int], ...] = ()
+    if observations.points is not None and (frames or exchange_sides):
+        changed, exchanged = mended_pictures(session, observations, mended, exchange_sides)
+    elif frames:
+        changed = mended_space(session, observations, mended)
+    changed = {path: data for path, data in changed.items() if data != contents[path]}
+    paths = _write(out, contents | changed)
+    named = tuple((f, observations.people[k], session.camera_names[view]) for f, k, view in exchanged)
+    return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames), named)
+
+
+def _stored_contents(session: Session, observations: ObservationSet) -> Files:
+    """Return the imported files.
+
+    Raises:
+        SessionError: one is missing or changed.
+    """
+    found: Files = {}
+    for source in observations.sources:
+        path = source_path(session, observations.name, source)
+        try:
+            found[source.path] = path.read_bytes()
+        except OSError as error:
+            raise SessionError(f"cannot read the imported file {path}: {error}; import it again") from error
+        if checksum(found[source.path]) != source.sha256:
+            raise SessionError(f"{path} is not as it was imported; import it again")
+    return found
+
+
+def _write(out: Path, contents: Files) -> dict[str, Path]:
+    """Write one file, or a folder of several; it appears whole or not at all.
+
+    Raises:
+        TrackerError: it exists, or cannot be written.
+    """
+    if out.is_dir() and len(contents) == 1:
+        out = out / Path(next(iter(contents))).name
+    if out.exists():
+        kind = "a folder" if out.is_dir() else "a file"
+        raise TrackerError(f"expected {out} not to exist, found {kind}", Remedy("another_file"))
+    temporary = out.with_name(f".{out.name}.{secrets.token_hex(4)}.tmp")
+    try:
+        if len(contents) == 1:
+            ((path, data),) = contents.items()
+            temporary.write_bytes(data)
+            os.replace(temporary, out)
+            return {path: out}
+        for path, data in contents.items():
+            (temporary / path).parent.mkdir(parents=True, exist_ok=True)
+            (temporary / path).write_bytes(data)
+        os.replace(temporary, out)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise TrackerError(f"cannot write {out}: {reason}; choose a folder that you may write to, with room") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        temporary.unlink(missing_ok=True)
+    return {path: out / path for path in contents}

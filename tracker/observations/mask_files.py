@@ -1,0 +1,112 @@
+"""Masks of one camera, as the files of another program have them, and how their values are read."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.errors import FormatError, Remedy
+from tracker.footage.mask_image import LabelImage
+from tracker.geometry.arrays import Array, IntArray, Mask
+from tracker.observations.sources import FileGroup
+
+ANYONE = np.iinfo(np.uint8).max
+"""Value of a person who is not told from others, as `tracker.footage.recording.read_mask` has it."""
+
+
+@dataclass(frozen=True, eq=False)
+class MaskFiles:
+    """The masks of one camera."""
+
+    group: FileGroup
+    numbers: IntArray
+    """Number of each picture in the files, (n,), ascending."""
+    read: Callable[[int, tuple[int, int]], LabelImage]
+    """Reads the mask of a picture, by its place in `numbers`, of a width and height. Raises TrackerError where it is
+    damaged, malformed or of another size."""
+    notes: tuple[str, ...] = ()
+    """Sentences on what is odd about the files."""
+
+
+@dataclass(frozen=True)
+class MaskRules:
+    """How values become people. All masks of an import have the same rules."""
+
+    is_matte: bool = False
+    """Whether values are opacities, of which the upper half is a person; else each value but 0 is one."""
+    people: Mapping[int, int] | None = None
+    """Number of a person in the session, from 1, by value; None if nobody is told from others."""
+
+    def apply(self, labels: NDArray[Any]) -> NDArray[np.uint8]:
+        """Return a mask as footage has it, (H, W): 0 background, 255 anyone, k person k."""
+        out = np.where(_is_opaque(labels) if self.is_matte else labels > 0, ANYONE, 0).astype(np.uint8)
+        for value, number in (self.people or {}).items():
+            out[labels == value] = number
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class MaskSurvey:
+    """The content of all masks of a camera."""
+
+    shares: Array
+    """Share of each picture that is not 0, (n,)."""
+    opaque_shares: Array
+    """Share of each picture that is in the upper half of its values, (n,)."""
+    values: frozenset[int]
+    """All values but 0."""
+    is_alpha: Mask
+    """Whether each mask is the opacity of a picture, (n,)."""
+
+    def shares_by(self, rules: MaskRules) -> Array:
+        """Return the share of each picture that people cover, (n,)."""
+        return self.opaque_shares if rules.is_matte else self.shares
+
+
+class _Picture(NamedTuple):
+    share: float
+    opaque_share: float
+    values: tuple[int, ...]
+    is_alpha: bool
+
+
+def survey(masks: MaskFiles, size: tuple[int, int]) -> MaskSurvey:
+    """Read all masks of a camera; `size` is the width and height that they must have, px.
+
+    Raises:
+        TrackerError: one is damaged, malformed or of another size.
+    """
+    found = [_picture(masks.read(i, size)) for i in range(len(masks.numbers))]
+    return MaskSurvey(
+        np.array([p.share for p in found]),
+        np.array([p.opaque_share for p in found]),
+        frozenset(value for p in found for value in p.values),
+        np.array([p.is_alpha for p in found]),
+    )
+
+
+def check_mask_size(labels: NDArray[Any], size: tuple[int, int], where: str) -> None:
+    """Check the size of a mask, (H, W); `where` begins the message.
+
+    Raises:
+        FormatError: it has another one.
+    """
+    height, width = labels.shape
+    if (width, height) != size:
+        raise FormatError(
+            f"{where}: expected a mask of {size[0]}x{size[1]} pixels, found {width}x{height}",
+            Remedy("give_picture_size", size=f"{width}x{height}"),
+        )
+
+
+def _picture(image: LabelImage) -> _Picture:
+    labels = image.labels
+    values = np.flatnonzero(np.bincount(labels.ravel()))
+    shares = (labels > 0).mean(), _is_opaque(labels).mean()
+    return _Picture(float(shares[0]), float(shares[1]), tuple(values[values > 0].tolist()), image.is_alpha)
+
+
+def _is_opaque(labels: NDArray[Any]) -> Mask:
+    return np.asarray(labels > np.iinfo(labels.dtype).max // 2)

@@ -1,0 +1,143 @@
+"""Masks of other programs in the folder of a session, in the form in which footage has masks.
+
+    observations/NAME/
+      masks.toml           format, cameras, notes, the files that were imported, with their checksums
+      masks/CAM/000012.png by picture of the footage: 0 background, 255 anyone, k person k
+
+The folder appears complete or not at all. session.toml names the masks that its cameras use.
+"""
+
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import msgspec
+import numpy as np
+import tomli_w
+
+from tracker.errors import SessionError, TrackerError
+from tracker.files import write_text_atomic
+from tracker.observations.observed import SourceFile, checksum
+from tracker.observations.plans import MaskPlan
+from tracker.observations.stored import FOLDER, KIND, VERSION, SourceRow, appearing_folder
+from tracker.session.session import Session, save_cameras
+from tracker.text_files import read_toml
+from tracker.validation import FileStem, Name, check, check_version
+
+MASKS_FILE, _MASKS = "masks.toml", "masks"
+
+
+class _Content(msgspec.Struct, forbid_unknown_fields=True):
+    name: FileStem
+    format: Name
+    cameras: dict[FileStem, int]
+    version: int = VERSION
+    notes: tuple[str, ...] = ()
+    options: dict[str, str] = {}
+    sources: tuple[SourceRow, ...] = ()
+
+
+@dataclass(frozen=True)
+class StoredMasks:
+    """Masks that were imported."""
+
+    name: str
+    format: str
+    """Name of the format of the files, one of `tracker.observations.readers.FORMATS`."""
+    cameras: Mapping[str, int]
+    """Number of masks by camera."""
+    notes: tuple[str, ...]
+    sources: tuple[SourceFile, ...]
+    """The files that were imported."""
+    users: tuple[str, ...]
+    """Cameras of the session that use them."""
+
+
+def masks_folder(session: Session, name: str) -> Path:
+    """Return the folder of imported masks, which has a folder for each camera."""
+    return session.folder / FOLDER / name / _MASKS
+
+
+def list_masks(session: Session) -> list[str]:
+    """Return the names of the masks that were imported into a session, in order."""
+    found = (session.folder / FOLDER).glob(f"*/{MASKS_FILE}")
+    return sorted(p.parent.name for p in found if not p.parent.name.startswith("."))
+
+
+def load_masks(session: Session, name: str) -> StoredMasks:
+    """Read what masks were imported under a name.
+
+    Raises:
+        SessionError: the file is missing, damaged or newer.
+    """
+    path = session.folder / FOLDER / name / MASKS_FILE
+    where = f"masks {path}"
+    data = read_toml(path, KIND)
+    check_version(data, VERSION, where, SessionError)
+    row = check(data, _Content, where, SessionError)
+    folder = masks_folder(session, name)
+    users = tuple(c.camera.name for c in session.cameras if c.masks is not None and c.masks.parent == folder)
+    sources = tuple(SourceFile(s.path, s.sha256, s.camera) for s in row.sources)
+    return StoredMasks(row.name, row.format, row.cameras, row.notes, sources, users)
+
+
+def store_masks(session: Session, plan: MaskPlan) -> Session:
+    """Store masks with a session, whose cameras then use them.
+
+    Returns:
+        The session with these cameras.
+
+    Raises:
+        TrackerError: the first of the plan's problems, or a file changed since it was read.
+        SessionError: there are observations of this name, or the folder cannot be written.
+    """
+    if plan.problems:
+        raise plan.problems[0]
+    with appearing_folder(session, plan.name) as temporary:
+        for source in plan.sources:
+            if checksum(plan.files[source.path].read_bytes()) != source.sha256:
+                raise SessionError(f"{plan.files[source.path]} has changed since it was read; import it again")
+        sizes = {c.camera.name: c.camera.size for c in session.cameras}
+        for camera in plan.masks:
+            _write_masks(plan, camera, sizes[camera], temporary / _MASKS / camera)
+        write_text_atomic(temporary / MASKS_FILE, tomli_w.dumps(_content(plan)))
+    folder = masks_folder(session, plan.name)
+    try:
+        return save_cameras(
+            session,
+            [replace(c, masks=folder / c.camera.name) if c.camera.name in plan.masks else c for c in session.cameras],
+        )
+    except TrackerError:
+        shutil.rmtree(folder.parent, ignore_errors=True)
+        raise
+
+
+def _write_masks(plan: MaskPlan, camera: str, size: tuple[int, int], folder: Path) -> None:
+    folder.mkdir(parents=True)
+    given = dict(plan.options).get("picture_size")
+    width, height = map(int, given.split("x")) if given is not None else size
+    masks = plan.masks[camera]
+    for i, picture in enumerate(plan.pictures[camera].tolist()):
+        if picture < 0:
+            continue
+        mask = plan.rules.apply(masks.read(i, (width, height)).labels)
+        if (width, height) != size:
+            mask = np.asarray(cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST_EXACT), dtype=np.uint8)
+        (folder / f"{picture:06d}.png").write_bytes(cv2.imencode(".png", mask)[1].tobytes())
+
+
+def _content(plan: MaskPlan) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "version": VERSION,
+        "name": plan.name,
+        "format": plan.format,
+        "cameras": {name: int((own >= 0).sum()) for name, own in plan.pictures.items()},
+        "notes": list(plan.notes),
+        "options": dict(plan.options),
+        "sources": [{"path": s.path, "sha256": s.sha256, "camera": s.camera} for s in plan.sources],
+    }
+    check(data, _Content, f"masks {plan.name}", SessionError)
+    return data
