@@ -35,7 +35,8 @@ HEIGHTS_M = {"walk": None, "fast_arms": 1.55, "balance_real": None}
 """Heights that the recordings state."""
 TRIMMED = 0.95
 """Share of the joints that the similarity is fitted to: joints of gross errors depend on the choice of views."""
-FIRST_SEED, N_RIGS = 100, 20
+FIRST_SEED = 100
+COMMAND = "python tests/benchmarks/person_calibration.py --data DIR --write docs/calibration.md"
 
 
 class Compared(NamedTuple):
@@ -99,10 +100,10 @@ def _said(found: PersonCalibration) -> str:
     return f"± {100 * np.mean(found.adjusted.focal_sigmas):.0f}"
 
 
-def simulated_row(n_cameras: int, arc: float, has_lenses: bool) -> list[str]:
+def simulated_row(n_rigs: int, n_cameras: int, arc: float, has_lenses: bool) -> list[str]:
     """Calibrate simulated rigs, and return a row of the table."""
     inside, ratios, true_mm, refused = [], [], [], 0
-    for seed in range(FIRST_SEED, FIRST_SEED + N_RIGS):
+    for seed in range(FIRST_SEED, FIRST_SEED + n_rigs):
         cameras, points = rig(n_cameras, arc), dancing(20, seed)
         lenses = cameras if has_lenses else blanks(cameras)
         try:
@@ -132,17 +133,24 @@ def _scaled(T_world_camera: Array, scale: float) -> Array:
 def main():
     """Measure and print, or write the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
+    parser.add_argument("--data", type=Path, help="folder of the recordings; without it, simulated people only")
+    parser.add_argument("--rigs", type=int, default=20, help="number of simulated rigs of each kind")
     add_write_option(parser)
     arguments = parser.parse_args()
     check_places(arguments.write, TABLES)
+    if arguments.data is not None:
+        measure_recordings(arguments.data, arguments.write)
+    measure_simulated(arguments.rigs, arguments.write)
+
+
+def measure_recordings(data: Path, write: Sequence[Path]):
+    """Write the table of recordings."""
     lens_names = {False: "unknown lenses", True: "given lenses"}
     cells = {
-        f"`{name}`, {lens_names[lenses]}": recording_row(arguments.data / name, height_m, lenses)
+        f"`{name}`, {lens_names[lenses]}": recording_row(data / name, height_m, lenses)
         for name, height_m in HEIGHTS_M.items()
         for lenses in (False, True)
     }
-    command = "python tests/benchmarks/person_calibration.py --data DIR --write docs/calibration.md"
     conditions = Conditions(
         "`walk` (60 frames), `fast_arms` (50) and `balance_real` (100) with the key points of MediaPipe Pose 0.10.21, "
         "four cameras each",
@@ -151,13 +159,17 @@ def main():
         "defaults",
         "cameras with pictures of one size have one focal length, after `fast_arms` had shown that each alone is not "
         "determined; nothing else",
-        command,
+        COMMAND,
     )
     heads = (
         "centres, mm", "rotations, degrees", "focal lengths, %", "joints, median / rms, mm", "expected, mm",
         "scale, %", "up, degrees", "held out, median / rms, px",
     )  # fmt: skip
-    show(arguments.write, TABLES[0], conditions, table(heads, cells, "recording"))
+    show(write, TABLES[0], conditions, table(heads, cells, "recording"))
+
+
+def measure_simulated(n_rigs: int, write: Sequence[Path]):
+    """Write the table of simulated people."""
     rigs = {
         "4 cameras around, unknown lenses": (4, 2 * np.pi, False),
         "4 cameras around, given lenses": (4, 2 * np.pi, True),
@@ -165,17 +177,17 @@ def main():
         "2 cameras at 70 degrees, unknown lenses": (2, 1.2, False),
         "2 cameras at 70 degrees, given lenses": (2, 1.2, True),
     }
-    cells = {name: simulated_row(*each) for name, each in rigs.items()}
+    cells = {name: simulated_row(n_rigs, *each) for name, each in rigs.items()}
     conditions = Conditions(
-        f"{N_RIGS} simulated people of each kind, 20 frames, noise of 3 px, 5% gross errors, independent of each other",
+        f"{n_rigs} simulated people of each kind, 20 frames, noise of 3 px, 5% gross errors, independent of each other",
         "`gavrila38` of 1.70 m",
         "nothing, or the true lenses",
         "defaults",
         "none",
-        command,
+        COMMAND,
     )
     heads = ("refused", "true error, median, mm", "true / expected", "within 90%")
-    show(arguments.write, TABLES[1], conditions, table(heads, cells, "cameras"))
+    show(write, TABLES[1], conditions, table(heads, cells, "cameras"))
 
 
 if __name__ == "__main__":

@@ -5,4 +5,4 @@ Imports `observations`, `calibration`, `boards` and the rooms below. Callers use
 `keypoint_calibration.calibrate_by_person` for key points.
 """
 
-__all__ = ["keypoint_files"]
+__all__ = ["keypoint_calibration", "keypoint_files"]

@@ -126,7 +126,7 @@ def read_keypoints(
         raise CalibrationError(f"{plan.problems[0]}; correct the files of key points")
     if plan.observations.points is None:
         raise CalibrationError(
-            f"expected key points in pictures, found points in space in {files}; name the files that a pose detector wrote"
+            f"expected key points in pictures, found points in space in {files}; name the files of a pose detector"
         )
     _require_files({v.camera for v in plan.views if v.place is None}, files)
     return KeyPoints(plan.observations, blanks)
