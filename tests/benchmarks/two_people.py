@@ -2,11 +2,13 @@
 
 Run by hand, on a quiet machine: `python tests/benchmarks/two_people.py`. Two people have joined the sample session with
 a page each. One drags a wrist, some 30 moves a second, while the other rests and while they play, in turns: with plain
-sockets, which leaves the share of the program, then in two Chromium without the 3-D view. A word measures one of them.
+sockets, which leaves the share of the program; in two Chromium without the 3-D view, which draw on the same cores; and
+in two Chromium of which the other has a core to itself, as on a machine of its own. A word measures one of them.
 """
 
 import asyncio
 import json
+import os
 import shutil
 import struct
 import sys
@@ -26,6 +28,7 @@ from program import READY, WITHOUT_3D, Program  # isort: skip
 
 ROUNDS, MOVES, INTERVAL_S = 4, 150, 1 / 30
 FPS = 25
+CORES = sorted(os.sched_getaffinity(0))
 SIZE = {"width": 1280, "height": 720}
 
 
@@ -54,14 +57,22 @@ async def dragged(page: Page) -> list[float]:
     return found
 
 
-async def in_browsers(address: str) -> tuple[list[float], list[float]]:
-    """Latencies while the other page rests, and while it plays, ms."""
+async def apart(address: str) -> tuple[list[float], list[float]]:
+    """As `in_browsers`; the last core is the other browser's alone. The program was started on the other ones."""
+    with tempfile.TemporaryDirectory() as folder:
+        wrapper = Path(folder) / "chromium"
+        wrapper.write_text(f'#!/bin/sh\nexec taskset -c {CORES[-1]} "{chromium_path()}" "$@"\n')
+        wrapper.chmod(0o755)
+        return await in_browsers(address, str(wrapper))
+
+
+async def in_browsers(address: str, of_other: str | None = None) -> tuple[list[float], list[float]]:
+    """Latencies while the other page rests, and while it plays, ms; the other's browser may be another program."""
     alone, beside = [], []
     async with async_playwright() as playwright, AsyncExitStack() as stack:
         # A process for each, as two people have.
-        browsers = [
-            await playwright.chromium.launch(executable_path=chromium_path(), args=FLAGS) for _ in ("anna", "ben")
-        ]
+        paths = (chromium_path(), of_other or chromium_path())
+        browsers = [await playwright.chromium.launch(executable_path=path, args=FLAGS) for path in paths]
         for browser in browsers:
             stack.push_async_callback(browser.close)
         anna, ben = await opened(browsers[0], address, ""), await opened(browsers[1], address, "ben")
@@ -171,9 +182,11 @@ async def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary) / "session"
         shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", folder)
-        for name, measure in (("sockets", by_sockets), ("browsers", in_browsers)):
+        for name, measure in (("sockets", by_sockets), ("browsers", in_browsers), ("apart", apart)):
             if sys.argv[1:] and name not in sys.argv[1:]:
                 continue
+            if measure is apart:
+                os.sched_setaffinity(0, CORES[:-1])
             program = Program(folder, "--annotator", "anna")
             await program.start()
             alone, beside = await measure(program.address)
