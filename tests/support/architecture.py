@@ -37,6 +37,7 @@ ROOMS = [
     "tracker.acquisition",
     "tracker.calibration",
     "tracker.boards",
+    "tracker.self_calibration",
     "tracker.initialization.generators",
     "tracker.initialization",
     "tracker.posing",

@@ -15,4 +15,5 @@ __all__ = [
     "size_parameters",
     "size_report",
     "two_views",
+    "typical_body",
 ]

@@ -1,6 +1,6 @@
 """Lengths between the limb joints of a person in any pose, as a survey or a rig states them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -23,16 +23,17 @@ SEGMENTS: Mapping[str, Sequence[tuple[Sequence[str], Sequence[str]]]] = {
 """Pairs of ends, the middles of some joints, whose distance is a length; left and right are one."""
 
 
-def segment_lengths(places: Mapping[str, Array]) -> dict[str, float]:
-    """Return the median length of each of `SEGMENTS` over frames and sides, metres.
+def segment_lengths(places: Mapping[str, Array], names: Collection[str] = tuple(SEGMENTS)) -> dict[str, float]:
+    """Return the median length of some of `SEGMENTS` over frames and sides, metres.
 
     Args:
         places: position of each limb joint, (3,) or (T, 3), metres; NaN where unknown.
+        names: of the segments, by default all.
 
     Raises:
         TrackerError: a joint is missing, or both ends of a segment are known on no frame.
     """
-    return {name: _length(places, name, pairs) for name, pairs in SEGMENTS.items()}
+    return {name: _length(places, name, SEGMENTS[name]) for name in names}
 
 
 def _length(places: Mapping[str, Array], name: str, pairs: Sequence[tuple[Sequence[str], Sequence[str]]]) -> float:

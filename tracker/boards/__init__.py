@@ -4,4 +4,12 @@ Imports `calibration`, `footage` and `formats`; knows no session. Callers use `b
 `board_footage.read_corners` and `board_calibration.calibrate_rig`.
 """
 
-__all__ = ["board_description", "footage_calibration"]
+__all__ = [
+    "board_description",
+    "camera_graph",
+    "expected_error",
+    "footage_calibration",
+    "lens_fit",
+    "rig_fit",
+    "view_choice",
+]

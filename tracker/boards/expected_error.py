@@ -42,7 +42,9 @@ def in_pictures(cameras: Sequence[Camera], points_world: Array) -> Mask:
     return np.array(out)
 
 
-def expected_error(cameras: Sequence[Camera], covariance: Array, points_world: Array) -> VolumeError:
+def expected_error(
+    cameras: Sequence[Camera], covariance: Array, points_world: Array, with_scale: bool = True
+) -> VolumeError:
     """Propagate the covariance of cameras to points that they triangulate: the points nearest to their rays.
 
     Where a camera is off by c, its ray passes a point at -A^+ B c, with A and B the derivatives of the picture by point
@@ -53,6 +55,7 @@ def expected_error(cameras: Sequence[Camera], covariance: Array, points_world: A
         cameras: the calibrated cameras.
         covariance: of the corrections of all cameras, (n, n).
         points_world: points in the volume, (P, 3), metres; those in fewer than two pictures are left out.
+        with_scale: whether a wrong scale is an error; otherwise the best scale is taken off, too.
     """
     shown = in_pictures(cameras, points_world)
     shown, points = shown[:, shown.sum(axis=0) >= 2], points_world[shown.sum(axis=0) >= 2]
@@ -69,6 +72,8 @@ def expected_error(cameras: Sequence[Camera], covariance: Array, points_world: A
     field = np.asarray(np.linalg.solve(normal, moves), dtype=np.float64).reshape(3 * len(points), -1)
     middle = points - points.mean(axis=0)
     rigid_moves = np.concatenate([np.tile(np.eye(3), (len(points), 1)), -rigid.skew(middle).reshape(-1, 3)], axis=1)
+    if not with_scale:
+        rigid_moves = np.column_stack([rigid_moves, middle.ravel()])
     basis, _ = np.linalg.qr(rigid_moves)
     field -= basis @ (basis.T @ field)
     # The mean square is a sum of squared Gaussian numbers whose variances are these eigenvalues.

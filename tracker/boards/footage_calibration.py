@@ -67,7 +67,7 @@ def calibrate_footage(filmed: FilmedBoard, report: Report) -> FilmedCalibration:
     Raises:
         TrackerError: footage cannot be read or does not fit together, or shows too little of the board.
     """
-    paths = _paths(filmed)
+    paths = footage_paths(filmed.videos, filmed.camera_paths, filmed.offsets, filmed.fisheye)
     with ExitStack() as stack:
         footage: dict[str, Footage] = {}
         for name, path in paths.items():
@@ -95,19 +95,24 @@ def calibrate_footage(filmed: FilmedBoard, report: Report) -> FilmedCalibration:
     return FilmedCalibration(cameras, found, views)
 
 
-def _paths(filmed: FilmedBoard) -> dict[str, Path]:
-    """Return the footage by camera name.
+def footage_paths(
+    videos: Sequence[Path],
+    camera_paths: Mapping[str, Path],
+    offsets: Mapping[str, int],
+    fisheye: Collection[str] = (),
+) -> dict[str, Path]:
+    """Return the footage by camera name; the arguments are the fields of a `FilmedBoard`.
 
     Raises:
         TrackerError: two videos of one camera, fewer than two cameras, or an option for a camera without footage.
     """
-    names = list(dict.fromkeys([*(camera_name(v) for v in filmed.videos), *filmed.camera_paths]))
-    paths = match_footage(names, filmed.videos, filmed.camera_paths) if names else {}
+    names = list(dict.fromkeys([*(camera_name(v) for v in videos), *camera_paths]))
+    paths = match_footage(names, videos, camera_paths) if names else {}
     if len(paths) < 2:
         raise CalibrationError(
             f"expected footage of at least two cameras, found {len(paths) or 'none'}; name a video of each camera"
         )
-    for option, given in (("a fisheye lens", filmed.fisheye), ("an offset", filmed.offsets)):
+    for option, given in (("a fisheye lens", fisheye), ("an offset", offsets)):
         if unknown := [name for name in given if name not in paths]:
             raise CalibrationError(
                 f"expected {option} for one of {', '.join(paths)}, found '{unknown[0]}'; correct the name"

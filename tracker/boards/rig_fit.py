@@ -11,15 +11,15 @@ from tracker.boards.board_problem import BoardProblem, SeenCorners
 from tracker.boards.expected_error import MAX_POINTS, VolumeError, expected_error
 from tracker.boards.pose_choice import Poses, best_poses, posed_frames
 from tracker.calibration.lens_priors import UNKNOWN_LENS, prior_sigmas
-from tracker.calibration.reprojection import Prior, Rig, RigFit, fit_rig
+from tracker.calibration.reprojection import FINAL, Prior, Rig, RigFit, fit_rig
 from tracker.fitting.bundle import solve_bundle
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 
 HELD_OUT_EVERY = 5
 """One frame in so many is held out: a fifth, as in fivefold cross-validation."""
-_PLAIN_PX, _PLAIN_GAIN = 1000.0, 1e-6
-"""Noise beside which no error is gross, px, and the relative decrease of the cost at which such a fit ends."""
+PLAIN_PX = 1000.0
+"""Noise beside which no error is gross, px."""
 
 
 class RigCalibration(NamedTuple):
@@ -87,6 +87,6 @@ def held_out_errors(
     held = tuple(np.zeros_like(prior_sigmas(c, UNKNOWN_LENS)) for c in cameras)
     problem = BoardProblem(board, seen, frames, Prior(tuple(cameras), held), sigmas_px)
     # Plain squares, as others report them: with so large a noise no error is gross.
-    plain = problem.with_sigmas(np.full(len(cameras), _PLAIN_PX))
+    plain = problem.with_sigmas(np.full(len(cameras), PLAIN_PX))
     rig = Rig(tuple(cameras), best_poses(problem, cameras, poses))
-    return seen, plain.errors_px(solve_bundle(plain, rig, tolerance=_PLAIN_GAIN).state)
+    return seen, plain.errors_px(solve_bundle(plain, rig, tolerance=FINAL).state)

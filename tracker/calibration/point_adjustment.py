@@ -100,7 +100,7 @@ def adjust_points(
         observations.cameras[observed], numbers[observations.groups[observed]], observations.px[observed]
     )
     rig = Rig(tuple(cameras), points[determined])
-    _require_spread(rig, seen)
+    require_spread(rig, seen)
     fit, held = _fitted(rig, seen, np.full(len(cameras), intrinsics))
     scaled = _scaled(fit.rig, numbers, determined, lengths)
     out = np.full(points.shape, np.nan)
@@ -108,7 +108,7 @@ def adjust_points(
     return AdjustedPoints(scaled.cameras, out, fit, observed, held)
 
 
-def _require_spread(rig: Rig, seen: Observations) -> None:
+def require_spread(rig: Rig, seen: Observations) -> None:
     """Check that the points do not lie on a line, about which a camera could turn with all that it sees.
 
     They do if most observations are nearer to the line than a pixel, or than their own reprojection error.

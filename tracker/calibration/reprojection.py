@@ -20,7 +20,7 @@ from tracker.fitting.bundle import ArrowEquations, solve_bundle
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 
-_OUTLIER_SIGMAS = 4.0
+OUTLIER_SIGMAS = 4.0
 """The k of the robust errors, standard deviations: Gaussian errors then keep 96% of their information (the ratio of
 E[w + s w']^2 to E[w^2 s] / 2), and an error of 12 pulls as much as one of 1.2."""
 _MEDIAN_SQUARE = 2 * np.log(2.0)
@@ -29,7 +29,7 @@ _ROUNDS = 12
 """Most fits with noise measured again in between. It settles to 1% within three to six."""
 _SETTLED = 0.01
 """Largest relative change of the noise at which it has settled: 1% of all intervals."""
-_STEPS, _ROUGH, _FINAL = 2, 1e-2, 1e-6
+_STEPS, _ROUGH, FINAL = 2, 1e-2, 1e-6
 """Most steps before the noise is measured again, and relative decreases of the cost at which a fit ends: before the
 noise has settled, and after."""
 _LARGE, _FALL = 0.95, 4.0
@@ -190,7 +190,7 @@ class ReprojectionProblem(ABC):
             J, own, errors = (np.where(np.isfinite(rows), rows, 0.0) for rows in (J, own, errors))
         if located.by_own is not None:
             own = own @ located.by_own
-        cost = 0.5 * float(np.where(shown, s / (1 + s / _OUTLIER_SIGMAS**2), _OUTLIER_SIGMAS**2).sum())
+        cost = 0.5 * float(np.where(shown, s / (1 + s / OUTLIER_SIGMAS**2), OUTLIER_SIGMAS**2).sum())
         scale = scale[:, None, None]
         return J * scale, own * scale, errors[:, :, None] * scale, cost
 
@@ -294,7 +294,7 @@ class ReprojectionProblem(ABC):
     def group_costs(self, rig: Rig) -> Array:
         """Return the robust cost of the observations of each group, (G,)."""
         s = self._squares_px2(rig) / self.sigmas_px[self.observations.cameras] ** 2
-        robust = s / (1 + s / _OUTLIER_SIGMAS**2)
+        robust = s / (1 + s / OUTLIER_SIGMAS**2)
         return np.asarray(0.5 * np.bincount(self.observations.groups, robust, self.n_groups), dtype=np.float64)
 
     def with_sigmas(self, sigmas_px: Array) -> Self:
@@ -332,7 +332,7 @@ def fit_rig(problem: ReprojectionProblem, rig: Rig) -> RigFit:
             if is_settled:
                 break
             rig = solve_bundle(problem, rig, _STEPS, _ROUGH).state
-    rig = solve_bundle(problem, rig, tolerance=_FINAL).state
+    rig = solve_bundle(problem, rig, tolerance=FINAL).state
     return _result(problem, rig)
 
 
@@ -368,13 +368,13 @@ def _information(squares: Array, weights: Array, left: float) -> float:
         left: share of the squared errors that the fit has left.
     """
     s = np.where(np.isfinite(squares), squares, 0.0)
-    slopes = weights * (1 - 2 * s / (_OUTLIER_SIGMAS**2 + s))  # w + s dw/ds
+    slopes = weights * (1 - 2 * s / (OUTLIER_SIGMAS**2 + s))  # w + s dw/ds
     variance = np.mean(weights**2 * s) / 2 / left
     return float(np.mean(slopes) ** 2 / (variance * np.mean(weights)))
 
 
 def _weights(squares: Array) -> Array:
-    return np.asarray(1 / (1 + squares / _OUTLIER_SIGMAS**2) ** 2)
+    return np.asarray(1 / (1 + squares / OUTLIER_SIGMAS**2) ** 2)
 
 
 def _add(target: Array, groups: IntArray, values: Array) -> None:

@@ -16,6 +16,7 @@ __all__ = [
     "readers",
     "request",
     "shifts",
+    "sides",
     "stored",
     "stored_files",
     "stored_masks",

@@ -23,8 +23,13 @@ from tracker.observations.stored_masks import store_masks
 from tracker.session.session import Session
 
 
-def plan_import(session: Session, request: ImportRequest) -> ImportPlan | MaskPlan:
+def plan_import(session: Session, request: ImportRequest, calibrated: bool = True) -> ImportPlan | MaskPlan:
     """Read files and check them against a session; nothing is written.
+
+    Args:
+        session: its cameras, frames and people.
+        request: the files.
+        calibrated: whether key points must agree with the cameras; not if they are there to calibrate them.
 
     Raises:
         FormatError: a file is missing or malformed, of an unknown format, or of no camera of the session.
@@ -36,7 +41,7 @@ def plan_import(session: Session, request: ImportRequest) -> ImportPlan | MaskPl
         raise FormatError("expected masks, whose values tell people apart, found key points or joints; give no values")
     if format_name not in PICTURE_FORMATS:
         return _plan_of_space(session, request, format_name, files)
-    return _plan_of_pictures(session, request, format_name, files)
+    return _plan_of_pictures(session, request, format_name, files, calibrated)
 
 
 def store_import(session: Session, plan: ImportPlan | MaskPlan) -> Session:
@@ -57,7 +62,9 @@ def store_import(session: Session, plan: ImportPlan | MaskPlan) -> Session:
     return session
 
 
-def _plan_of_pictures(session: Session, request: ImportRequest, format_name: str, files: list[Found]) -> ImportPlan:
+def _plan_of_pictures(
+    session: Session, request: ImportRequest, format_name: str, files: list[Found], calibrated: bool
+) -> ImportPlan:
     groups = PICTURE_FORMATS[format_name].read(files)
     names = match_cameras([(g.labels, g.place) for g, _ in groups], session.camera_names, request.cameras)
     unmatched = [g for (g, _), name in zip(groups, names, strict=True) if not name]
@@ -75,10 +82,10 @@ def _plan_of_pictures(session: Session, request: ImportRequest, format_name: str
     point_names, joint_map, unknown = _skeleton(tables, request)
     problems += unknown
     points = _assemble(session, tables, frames, point_names)
-    if not problems:
+    if calibrated and not problems:
         wrong, found = timing_problems(points, session.cameras, session.fps, request.offsets)
         problems, notes = problems + wrong, notes + found
-    if not problems and (disagreement := agreement_problem(points, [c.camera for c in session.cameras])):
+    if calibrated and not problems and (disagreement := agreement_problem(points, [c.camera for c in session.cameras])):
         problems.append(disagreement)
     notes += [f"{name}: {note}" for name, table in tables.items() for note in table.notes]
     notes += _notes(tables)

@@ -1,4 +1,4 @@
-"""`quadrille calibrate`: calibrate cameras by footage of a board."""
+"""`quadrille calibrate`: calibrate cameras by footage of a board, or of a person."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,13 +6,25 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from app.cli.arguments import NamedPaths, NamedValues, Names, OptionalPath, OptionalWhole, Paths, parse_pairs
+from app.cli.arguments import (
+    NamedPaths,
+    NamedValues,
+    Names,
+    OptionalNumber,
+    OptionalPath,
+    OptionalWhole,
+    Paths,
+    parse_pairs,
+)
 from app.runtime.json_output import format_json
 from app.runtime.progress import Reporter
 from tracker.errors import Remedy, TrackerError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from tracker.boards.footage_calibration import FilmedCalibration
+    from tracker.geometry.cameras import Camera
 
 
 @dataclass(frozen=True)
@@ -24,6 +36,12 @@ class CalibrateArguments:
     board: OptionalPath = None
     """.toml file of the board: Caliscope's charuco.toml, anipose's config.toml, or a few lines as in
     docs/calibration.md."""
+    people: OptionalPath = None
+    """instead of a board: file or folder of the key points of one person, in a format that `quadrille import` reads."""
+    height: OptionalNumber = None
+    """with --people: height of the person, metres, which is the scale of the world."""
+    lenses: OptionalPath = None
+    """with --people: a calibration of which the lenses are taken; by default focal lengths are estimated."""
     videos: Paths = ()
     """video files or image folders, each named after its camera; frame k of all is of one instant."""
     camera: NamedPaths = ()
@@ -48,17 +66,23 @@ class CalibrateArguments:
 
 
 def command(arguments: Annotated[CalibrateArguments, tyro.conf.arg(name="")]) -> None:
-    """Calibrate cameras by footage of a board.
+    """Calibrate cameras by footage of a board, or by key points of a person.
 
     The board may be a ChArUco board, also partly visible, or a checkerboard. Ctrl+C stops it and writes nothing.
     """
+    _check(arguments)
+    if arguments.people is not None:
+        _by_person(arguments, arguments.people)
+    elif arguments.board is not None:
+        _by_board(arguments, arguments.board)
+
+
+def _by_board(arguments: CalibrateArguments, board: Path) -> None:
     from tracker.boards.board_description import read_board
     from tracker.boards.footage_calibration import FilmedBoard, calibrate_footage
 
-    _check(arguments)
-    assert arguments.board is not None
     filmed = FilmedBoard(
-        read_board(arguments.board),
+        read_board(board),
         arguments.videos,
         parse_pairs(arguments.camera, "--camera", Path),
         arguments.fisheye,
@@ -69,15 +93,45 @@ def command(arguments: Annotated[CalibrateArguments, tyro.conf.arg(name="")]) ->
     )
     with Reporter(silent=arguments.json).share("calibrating") as advance:
         found = calibrate_footage(filmed, lambda stage, share, text="", /: advance(share))
-    _write(arguments, found)
+    _write(arguments, found.cameras)
     record = _record(arguments, found)
     print(format_json(record) if arguments.json else _format(record, arguments))
 
 
+def _by_person(arguments: CalibrateArguments, keypoints: Path) -> None:
+    from app.cli.calibration.person_report import format_record, record_of
+    from tracker.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
+
+    filmed = FilmedPerson(
+        keypoints,
+        arguments.videos,
+        parse_pairs(arguments.camera, "--camera", Path),
+        parse_pairs(arguments.offset, "--offset", int),
+        arguments.common_frames,
+        arguments.height,
+        arguments.lenses,
+    )
+    with Reporter(silent=arguments.json).share("calibrating") as advance:
+        found = calibrate_filmed_person(filmed, lambda stage, share, text="", /: advance(share))
+    _write(arguments, found.cameras)
+    record = {"out": str(arguments.out), "layout": arguments.layout, **record_of(found)}
+    print(format_json(record) if arguments.json else format_record(record))
+
+
 def _check(arguments: CalibrateArguments) -> None:
     """Check what can be checked before the footage is read."""
-    if arguments.board is None:
-        raise TrackerError("expected --board FILE, found none; docs/calibration.md shows how to describe a board")
+    if (arguments.board is None) == (arguments.people is None):
+        raise TrackerError(
+            f"expected --board FILE or --people KEYPOINTS, found {'none' if arguments.board is None else 'both'}; "
+            "docs/calibration.md shows how to describe a board, and how to calibrate without one"
+        )
+    of_board = {"--fisheye": arguments.fisheye, "--every": arguments.every, "--floor-frame": arguments.floor_frame}
+    of_people = {"--height": arguments.height, "--lenses": arguments.lenses}
+    for given, source in ((of_board, "--board"), (of_people, "--people")):
+        is_used = arguments.board is not None if source == "--board" else arguments.people is not None
+        for option, value in given.items():
+            if not is_used and value not in (None, ()):
+                raise TrackerError(f"expected {option} together with {source}, found it without; leave it out")
     if arguments.every is not None and arguments.every < 1:
         raise TrackerError(f"expected --every of at least 1, found {arguments.every}; correct it")
     out = arguments.out
@@ -89,15 +143,15 @@ def _check(arguments: CalibrateArguments) -> None:
         raise TrackerError(f"expected --out in a folder that exists, found none at {out.parent}; make it first")
 
 
-def _write(arguments: CalibrateArguments, found: "FilmedCalibration") -> None:
+def _write(arguments: CalibrateArguments, cameras: "Sequence[Camera]") -> None:
     from tracker.calibrations.writing import write_layout
     from tracker.formats.anipose import write_calibration
 
     try:
         if arguments.layout == "quadrille":
-            write_calibration(arguments.out, found.cameras)
+            write_calibration(arguments.out, cameras)
         else:
-            write_layout(arguments.out, arguments.layout, found.cameras)
+            write_layout(arguments.out, arguments.layout, cameras)
     except OSError as error:
         reason = error.strerror or str(error)
         raise TrackerError(f"cannot write {arguments.out}: {reason}; choose a folder that you may write to") from error

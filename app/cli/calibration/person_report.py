@@ -1,0 +1,62 @@
+"""The report of `quadrille calibrate --people`."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from tracker.self_calibration.keypoint_calibration import PersonCalibration
+
+
+def record_of(found: "PersonCalibration") -> dict[str, Any]:
+    """Return the result as plain data; docs/calibration.md lists its keys."""
+    adjusted = found.adjusted
+    joints = found.world.joints_world[np.isfinite(found.world.joints_world).all(axis=-1)]
+    cameras = [
+        {
+            "name": c.name,
+            "size": list(c.size),
+            "focal_px": [float(c.K[0, 0]), float(c.K[1, 1])],
+            "focal_sigma_percent": 100 * float(adjusted.focal_sigmas[i]),
+            "joints": int(found.seen.is_seen[:, i].sum()),
+            "held_out_px": found.held_out_rms_px(i),
+        }
+        for i, c in enumerate(found.cameras)
+    ]
+    return {
+        "frames": len(found.seen.px),
+        "joints": len(joints),
+        "cameras": cameras,
+        "noise_px": adjusted.sigma_px,
+        "held_out_frames": len(found.held_out),
+        "held_out_px": found.held_out_rms_px(),
+        "held_out_median_px": float(np.median(found.held_out_px)) if len(found.held_out_px) else None,
+        "volume_m": np.ptp(joints, axis=0).tolist(),
+        "expected_error_mm": 1000 * found.volume.expected_m,
+        "interval_mm": [1000 * found.volume.low_m, 1000 * found.volume.high_m],
+        "scale_sigma_percent": 100 * found.scale_sigma,
+        "notes": list(found.notes),
+    }
+
+
+def format_record(record: dict[str, Any]) -> str:
+    """Return the same for people."""
+    lines = [
+        f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['joints']} joints of a person in "
+        f"{record['frames']} frames"
+    ]
+    width = max(len(c["name"]) for c in record["cameras"])
+    for c in record["cameras"]:
+        sigma = f" +- {c['focal_sigma_percent']:.1f}%" if c["focal_sigma_percent"] else ", as given"
+        off = "  no joint held out" if c["held_out_px"] != c["held_out_px"] else f"{c['held_out_px']:6.2f} px held out"
+        lines.append(
+            f"  {c['name']:{width}}  {c['joints']:5} joints, focal length {c['focal_px'][0]:7.1f} px{sigma}, {off}"
+        )
+    size, (low, high) = " x ".join(f"{side:.1f}" for side in record["volume_m"]), record["interval_mm"]
+    lines.append(
+        f"expected error in the volume of the person ({size} m), without that of the scale and of the detector: "
+        f"{record['expected_error_mm']:.1f} mm, with 90% between {low:.1f} and {high:.1f} mm"
+    )
+    lines += [f"note: {note}" for note in record["notes"]]
+    lines.append("the world has z up and its origin on the floor below the person")
+    return "\n".join(lines)

@@ -1,0 +1,96 @@
+"""`quadrille calibrate --people` on key points of a simulated person."""
+
+import json
+import shutil
+import sys
+
+import cv2
+import numpy as np
+import pytest
+from command_line import assert_refused
+from filmed_people import FOCAL_PX, NAMES, SIZE, STATURE_M, dancing, observed, rig
+from observed_people import BODY_25, write_openpose
+
+from app.__main__ import main
+from tracker.formats.anipose import read_calibration, write_calibration
+
+N_FRAMES = 10
+CAMERAS = rig(3)
+
+
+@pytest.fixture(scope="module")
+def footage(tmp_path_factory):
+    """Folders of black images, the key points in the layout of OpenPose, and the lenses."""
+    folder = tmp_path_factory.mktemp("person")
+    for camera in CAMERAS:
+        (folder / camera.name).mkdir()
+        for k in range(N_FRAMES):
+            cv2.imwrite(str(folder / camera.name / f"{k:04d}.png"), np.zeros((SIZE[1], SIZE[0]), np.uint8))
+    points = observed(CAMERAS, dancing(N_FRAMES)).points
+    rows = np.zeros((N_FRAMES, len(CAMERAS), 1, len(BODY_25.points), 3))
+    at = [BODY_25.points.index(name) for name in NAMES]
+    rows[:, :, :, at] = np.nan_to_num(np.concatenate([points.points_px, points.confidence[..., None]], axis=-1))
+    write_openpose(folder / "keypoints", [c.name for c in CAMERAS], rows)
+    write_calibration(folder / "lenses.toml", CAMERAS)
+    return folder
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    def run(*words):
+        monkeypatch.setattr(sys, "argv", ["quadrille", "calibrate", *map(str, words)])
+        try:
+            main()
+            status = 0
+        except SystemExit as end:
+            status = end.code
+        out, err = capsys.readouterr()
+        return status, out, err
+
+    return run
+
+
+def words(footage, out, *more):
+    return ("--people", footage / "keypoints", "--videos", *(footage / c.name for c in CAMERAS), "--out", out, *more)
+
+
+@pytest.mark.slow
+def test_a_calibration_is_written_and_reported(run, footage, tmp_path):
+    out = tmp_path / "c.toml"
+    status, text, _ = run(*words(footage, out, "--height", STATURE_M, "--json"))
+    assert status == 0
+    record, cameras = json.loads(text), read_calibration(out)
+    assert [c.name for c in cameras] == [c["name"] for c in record["cameras"]] == ["cam0", "cam1", "cam2"]
+    assert cameras[0].K[0, 0] == pytest.approx(FOCAL_PX, rel=0.05)
+    apart = np.linalg.norm(cameras[0].center_world - cameras[1].center_world)
+    assert apart == pytest.approx(np.linalg.norm(CAMERAS[0].center_world - CAMERAS[1].center_world), rel=0.05)
+    assert record["frames"] == N_FRAMES
+    assert record["interval_mm"][0] < record["expected_error_mm"] < record["interval_mm"][1] < 30
+    assert record["held_out_frames"] == 2
+    assert 2 < record["scale_sigma_percent"] < 4
+
+
+@pytest.mark.slow
+def test_lenses_are_taken_and_a_lacking_height_is_said(run, footage, tmp_path):
+    out = tmp_path / "c.toml"
+    status, text, _ = run(*words(footage, out, "--lenses", footage / "lenses.toml"))
+    assert status == 0
+    assert read_calibration(out)[2].K[0, 0] == FOCAL_PX
+    assert "focal length   500.0 px, as given" in text
+    assert "no height was given: the scale is that of a person of 1.75 m and may be off by 7%" in text
+    assert "the world has z up" in text
+
+
+def test_wrong_words_are_refused(run, footage, tmp_path):
+    out = tmp_path / "c.toml"
+    assert_refused(run(*words(footage, out, "--board", footage / "lenses.toml")), ["found both"])
+    assert_refused(run(*words(footage, out, "--floor-frame", "3")), ["expected --floor-frame together with --board"])
+    assert_refused(
+        run("--board", "b.toml", "--height", "1.7", "--out", out), ["expected --height together with --people"]
+    )
+    assert_refused(run(*words(footage, out, "--height", "175")), ["a height of 0.3 to 3 metres", "175"])
+    shutil.copytree(footage / "cam0", tmp_path / "other")
+    assert_refused(run(*words(footage, out, "--camera", f"other={tmp_path / 'other'}")), ["none of other", "leave out"])
+    (tmp_path / "one.toml").write_text((footage / "lenses.toml").read_text().replace("cam1", "cam9"))
+    assert_refused(run(*words(footage, out, "--lenses", tmp_path / "one.toml")), ["expected the lens of camera 'cam1'"])
+    assert not out.exists()

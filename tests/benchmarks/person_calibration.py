@@ -1,0 +1,194 @@
+"""Calibrate cameras by key points of a person and compare: `python tests/benchmarks/person_calibration.py --data DIR`.
+
+Recordings have key points of a detector (`detector/keypoints`) and a calibration. The found cameras are compared with
+the given ones after the best similarity of all joints, because neither shares a world or a scale. Simulated people have
+noise of 3 px and gross errors (`tests/support/filmed_people.py`).
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+sys.path[:0] = [str(Path(__file__).resolve().parents[1] / "support")]
+
+from board_rigs import rms_error_m
+from doc_tables import Conditions, add_write_option, check_places, show, table
+from filmed_people import aligned, blanks, dancing, observed, rig
+
+from tracker.calibrations.reading import read_cameras
+from tracker.errors import CalibrationError
+from tracker.geometry import rigid
+from tracker.geometry.arrays import Array
+from tracker.geometry.cameras import Camera
+from tracker.observations.joints import triangulate_observations
+from tracker.observations.observed import ObservationSet
+from tracker.self_calibration.keypoint_calibration import PersonCalibration, calibrate_by_person
+from tracker.self_calibration.keypoint_files import read_keypoints
+
+TABLES = ("person_calibration recordings", "person_calibration simulated")
+HEIGHTS_M = {"walk": None, "fast_arms": 1.55, "balance_real": None}
+"""Heights that the recordings state."""
+TRIMMED = 0.95
+"""Share of the joints that the similarity is fitted to: joints of gross errors depend on the choice of views."""
+FIRST_SEED = 100
+COMMAND = "python tests/benchmarks/person_calibration.py --data DIR --write docs/calibration.md"
+
+
+class Compared(NamedTuple):
+    """Found cameras against given ones."""
+
+    centers_mm: Array
+    rotations_deg: Array
+    joints_mm: Array
+    scale: float
+    tilt_deg: float
+
+
+def compared(found: Sequence[Camera], given: Sequence[Camera], joints: Array, expected: Array) -> Compared:
+    """Compare cameras after the similarity that leads joints, (n, 3), to expected ones."""
+    chosen = np.arange(len(joints))
+    for _ in range(4):
+        scale, R, t = aligned(joints[chosen], expected[chosen])
+        errors = np.linalg.norm(scale * joints @ R.T + t - expected, axis=1)
+        chosen = np.argsort(errors)[: int(TRIMMED * len(errors))]
+    centers = [
+        np.linalg.norm(scale * R @ a.center_world + t - b.center_world) for a, b in zip(found, given, strict=True)
+    ]
+    turns = [b.T_world_camera[:3, :3].T @ R @ a.T_world_camera[:3, :3] for a, b in zip(found, given, strict=True)]
+    angles = [np.degrees(np.linalg.norm(rigid.so3_log(turn))) for turn in turns]
+    tilt = np.degrees(np.arccos(np.clip(R[2, 2], -1, 1)))
+    return Compared(1000 * np.array(centers), np.array(angles), 1000 * errors, scale, float(tilt))
+
+
+def joints_of(observations: ObservationSet, cameras: Sequence[Camera]) -> Array:
+    """Triangulate the joints of the person, (F, N, 3)."""
+    return triangulate_observations(observations, cameras).joints.joints_world[:, 0]
+
+
+def recording_row(folder: Path, height_m: float | None, has_lenses: bool) -> list[str]:
+    """Calibrate the cameras of a recording, and return a row of the table."""
+    entries = {e.name: e.camera() for e in read_cameras(folder / "Calib.toml").entries}
+    paths = {p.stem: p for p in sorted(folder.glob("*.mp4"))}
+    keypoints = read_keypoints(folder / "detector/keypoints", paths, {}, common_frames=False)
+    given = [entries[name] for name in paths]
+    found = calibrate_by_person(
+        keypoints.observations, given if has_lenses else keypoints.blanks, height_m, has_lenses=has_lenses
+    )
+    joints, expected = (joints_of(keypoints.observations, c) for c in (found.cameras, given))
+    known = np.isfinite(joints).all(axis=-1) & np.isfinite(expected).all(axis=-1)
+    off = compared(found.cameras, given, joints[known], expected[known])
+    most = np.sort(off.joints_mm)[: int(TRIMMED * known.sum())]
+    focal = [100 * np.log(a.K[0, 0] / b.K[0, 0]) for a, b in zip(found.cameras, given, strict=True)]
+    return [
+        f"{np.mean(off.centers_mm):.0f} (to {np.max(off.centers_mm):.0f})",
+        f"{np.mean(off.rotations_deg):.1f} (to {np.max(off.rotations_deg):.1f})",
+        "given" if has_lenses else f"{min(focal):+.0f} to {max(focal):+.0f}, said {_said(found)}",
+        f"{np.median(off.joints_mm):.1f} / {np.sqrt(np.mean(most**2)):.1f}",
+        f"{1000 * found.volume.expected_m:.1f} ({1000 * found.volume.low_m:.1f} to {1000 * found.volume.high_m:.1f})",
+        f"{100 * (1 / off.scale - 1):+.0f}" if height_m is not None else "height unknown",
+        f"{off.tilt_deg:.1f}",
+        f"{np.median(found.held_out_px):.1f} / {found.held_out_rms_px():.1f}",
+    ]
+
+
+def _said(found: PersonCalibration) -> str:
+    return f"± {100 * np.mean(found.adjusted.focal_sigmas):.0f}"
+
+
+def simulated_row(n_rigs: int, n_cameras: int, arc: float, has_lenses: bool) -> list[str]:
+    """Calibrate simulated rigs, and return a row of the table."""
+    inside, ratios, true_mm, refused = [], [], [], 0
+    for seed in range(FIRST_SEED, FIRST_SEED + n_rigs):
+        cameras, points = rig(n_cameras, arc), dancing(20, seed)
+        lenses = cameras if has_lenses else blanks(cameras)
+        try:
+            found = calibrate_by_person(observed(cameras, points, seed=seed), lenses, has_lenses=has_lenses)
+        except CalibrationError:
+            refused += 1
+            continue
+        joints = found.world.joints_world
+        known = np.isfinite(joints).all(axis=-1)
+        scale = compared(found.cameras, cameras, joints[known], points[known]).scale
+        scaled = [replace(c, T_world_camera=_scaled(c.T_world_camera, scale)) for c in found.cameras]
+        true = rms_error_m(cameras, scaled, points.reshape(-1, 3)[::7])
+        inside.append(scale * found.volume.low_m <= true <= scale * found.volume.high_m)
+        ratios.append(true / scale / found.volume.expected_m)
+        true_mm.append(1000 * true)
+        print(n_cameras, has_lenses, seed, f"{true_mm[-1]:.1f} {ratios[-1]:.2f} {inside[-1]}", flush=True)
+    if not inside:
+        return [f"{refused}", "-", "-", "-"]
+    return [f"{refused}", f"{np.median(true_mm):.1f} (to {np.max(true_mm):.1f})", f"{np.median(ratios):.2f}",
+            f"{np.mean(inside):.0%}"]  # fmt: skip
+
+
+def _scaled(T_world_camera: Array, scale: float) -> Array:
+    return rigid.transform(T_world_camera[:3, :3], scale * T_world_camera[:3, 3])
+
+
+def main():
+    """Measure and print, or write the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, help="folder of the recordings; without it, simulated people only")
+    parser.add_argument("--rigs", type=int, default=20, help="number of simulated rigs of each kind")
+    add_write_option(parser)
+    arguments = parser.parse_args()
+    check_places(arguments.write, TABLES)
+    if arguments.data is not None:
+        measure_recordings(arguments.data, arguments.write)
+    measure_simulated(arguments.rigs, arguments.write)
+
+
+def measure_recordings(data: Path, write: Sequence[Path]):
+    """Write the table of recordings."""
+    lens_names = {False: "unknown lenses", True: "given lenses"}
+    cells = {
+        f"`{name}`, {lens_names[lenses]}": recording_row(data / name, height_m, lenses)
+        for name, height_m in HEIGHTS_M.items()
+        for lenses in (False, True)
+    }
+    conditions = Conditions(
+        "`walk` (60 frames), `fast_arms` (50) and `balance_real` (100) with the key points of MediaPipe Pose 0.10.21, "
+        "four cameras each",
+        "one person; only `fast_arms` has a stated height, 1.55 m",
+        "nothing, or the lenses of the given calibration",
+        "defaults",
+        "cameras with pictures of one size have one focal length, after `fast_arms` had shown that each alone is not "
+        "determined; nothing else",
+        COMMAND,
+    )
+    heads = (
+        "centres, mm", "rotations, degrees", "focal lengths, %", "joints, median / rms, mm", "expected, mm",
+        "scale, %", "up, degrees", "held out, median / rms, px",
+    )  # fmt: skip
+    show(write, TABLES[0], conditions, table(heads, cells, "recording"))
+
+
+def measure_simulated(n_rigs: int, write: Sequence[Path]):
+    """Write the table of simulated people."""
+    rigs = {
+        "4 cameras around, unknown lenses": (4, 2 * np.pi, False),
+        "4 cameras around, given lenses": (4, 2 * np.pi, True),
+        "3 cameras over 140 degrees, unknown lenses": (3, 2.5, False),
+        "2 cameras at 70 degrees, unknown lenses": (2, 1.2, False),
+        "2 cameras at 70 degrees, given lenses": (2, 1.2, True),
+    }
+    cells = {name: simulated_row(n_rigs, *each) for name, each in rigs.items()}
+    conditions = Conditions(
+        f"{n_rigs} simulated people of each kind, 20 frames, noise of 3 px, 5% gross errors, independent of each other",
+        "`gavrila38` of 1.70 m",
+        "nothing, or the true lenses",
+        "defaults",
+        "none",
+        COMMAND,
+    )
+    heads = ("refused", "true error, median, mm", "true / expected", "within 90%")
+    show(write, TABLES[1], conditions, table(heads, cells, "cameras"))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""Cameras from key points of a simulated person, with noise of 3 px and gross errors, against the true ones."""
+
+import numpy as np
+import pytest
+from filmed_people import FOCAL_PX, NAMES, STATURE_M, blanks, dancing, joint_errors_m, observed, rig
+
+from tracker.errors import CalibrationError
+from tracker.observations.sides import with_sides_exchanged
+from tracker.self_calibration.keypoint_calibration import calibrate_by_person
+from tracker.self_calibration.seen_joints import lone_person
+
+SIDES = [(NAMES.index(n), NAMES.index("L" + n[1:])) for n in NAMES if n[0] == "R" and "L" + n[1:] in NAMES]
+
+
+def center_errors_m(found, true, points):
+    """Distances of the camera centres from the true ones, in the world of the joints."""
+    scale, _, R = joint_errors_m(found, points)
+    a = np.array([c.center_world for c in found.cameras]) @ R.T * scale
+    b = np.array([c.center_world for c in true])
+    return np.linalg.norm(a - a.mean(axis=0) - (b - b.mean(axis=0)), axis=1)
+
+
+@pytest.mark.slow
+def test_cameras_and_focal_lengths_are_found_from_nothing():
+    cameras, points = rig(), dancing(12)
+    found = calibrate_by_person(observed(cameras, points), blanks(cameras), STATURE_M)
+    scale, errors, R = joint_errors_m(found, points)
+    assert scale == pytest.approx(1.0, abs=0.03)
+    assert np.median(errors) < 0.035  # 3 px are 24 mm at 4 m
+    assert center_errors_m(found, cameras, points).max() < 0.15
+    focal = np.array([c.K[0, 0] for c in found.cameras])
+    assert np.all(np.abs(np.log(focal / FOCAL_PX)) < 3 * found.adjusted.focal_sigmas)
+    assert np.degrees(np.arccos(R[2, 2])) < 6
+    assert found.world.joints_world[..., 2][np.isfinite(found.world.joints_world[..., 2])].min() > -0.25
+    assert found.adjusted.sigma_px == pytest.approx(3.0, rel=0.15)
+    assert 0.001 < found.volume.low_m < found.volume.expected_m < found.volume.high_m < 0.02
+    assert 2 < np.median(found.held_out_px) < 4
+    assert any("one focal length for pictures of one size" in note for note in found.notes)
+
+
+@pytest.mark.slow
+def test_gross_errors_and_exchanged_sides_have_no_influence():
+    cameras, points = rig(), dancing(15, seed=3)
+    observations = observed(cameras, points, gross=0.2)
+    is_exchanged = np.zeros((15, 4), dtype=bool)
+    is_exchanged[4:8, 1] = True
+    px, known = observations.points.points_px[:, :, 0].copy(), observations.points.confidence[:, :, 0].copy()
+    observations.points.points_px[:, :, 0] = with_sides_exchanged(px, SIDES, is_exchanged)
+    observations.points.confidence[:, :, 0] = with_sides_exchanged(known, SIDES, is_exchanged)
+    found = calibrate_by_person(observations, cameras, STATURE_M, has_lenses=True)
+    assert np.median(joint_errors_m(found, points)[1]) < 0.035
+    assert center_errors_m(found, cameras, points).max() < 0.1
+    mended = np.linalg.norm(found.seen.px[4:8, 1] - px[4:8, 1], axis=-1)
+    assert np.nanmean(mended < 1) > 0.8
+
+
+@pytest.mark.slow
+def test_two_cameras_with_lenses_suffice_and_without_are_refused():
+    cameras, points = rig(2, arc=1.2), dancing(12)
+    found = calibrate_by_person(observed(cameras, points), cameras, None, has_lenses=True)
+    assert found.cameras[0].K[0, 0] == FOCAL_PX
+    assert joint_errors_m(found, points)[0] == pytest.approx(1.70 / 1.75, abs=0.03)
+    assert found.notes[0].startswith("no height was given: the scale is that of a person of 1.75 m")
+    with pytest.raises(CalibrationError, match="two alone hardly tell their focal lengths"):
+        calibrate_by_person(observed(cameras, points), blanks(cameras), STATURE_M)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("has_lenses", "message"),
+    [
+        (False, "focal length of camera 'cam0', found it not determined by this footage"),
+        (True, "expected key points that determine the cameras to 100 mm, found an error of"),
+    ],
+)
+def test_joints_on_one_line_are_refused(has_lenses, message):
+    cameras, points = rig(), np.zeros((4, len(NAMES), 3))
+    points[..., 2] = np.linspace(0.1, 1.7, len(NAMES))
+    with pytest.raises(CalibrationError, match=message):
+        calibrate_by_person(observed(cameras, points), cameras if has_lenses else blanks(cameras), 1.7, has_lenses)
+
+
+@pytest.mark.slow
+def test_cameras_side_by_side_are_refused():
+    cameras = rig(2, arc=0.01)
+    with pytest.raises(CalibrationError, match="two cameras see from different sides, found none; film the person by"):
+        calibrate_by_person(observed(cameras, dancing(5)), cameras, STATURE_M, has_lenses=True)
+
+
+def test_too_few_frames_are_refused():
+    cameras = rig(2, arc=1.2)
+    with pytest.raises(CalibrationError, match="in two cameras on at least 3 frames, found 2; film the person where"):
+        calibrate_by_person(observed(cameras, dancing(2)), cameras, STATURE_M)
+
+
+def test_pictures_of_several_people_do_not_count():
+    cameras, points = rig(3), dancing(5)
+    crowded = observed(cameras, points, crowd=(1,))
+    seen, n_crowded = lone_person(crowded)
+    assert n_crowded == 5
+    assert not seen.is_seen[:, 1].any()
+    assert seen.is_seen[:, 2].any()
+    with pytest.raises(CalibrationError, match=r"one person in camera 'cam1'.*found 0; 5 pictures show several people"):
+        calibrate_by_person(crowded, cameras, STATURE_M)
+
+
+def test_doubtful_joints_and_means_of_joints_do_not_count():
+    observations = observed(rig(2, arc=1.2), dancing(3))
+    observations.points.confidence[:, 0, 0, 2] = 0.4
+    seen, _ = lone_person(observations)
+    assert not seen.is_seen[:, 0, 2].any()
+    assert np.isnan(seen.px[:, 0, 2]).all()
+    assert seen.is_seen[:, 1, 2].all()
+    assert np.all(np.isin([0, 1], seen.observations().cameras))
+    assert 2 not in seen.observations().groups % seen.n_joints

@@ -1,0 +1,140 @@
+"""From footage and files of key points to calibrated cameras."""
+
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from tracker.boards.footage_calibration import footage_paths
+from tracker.boards.lens_fit import blank_camera
+from tracker.calibrations.reading import read_cameras
+from tracker.compute.progress import Report
+from tracker.errors import CalibrationError
+from tracker.footage.camera_source import CameraSource
+from tracker.footage.video import open_footage
+from tracker.geometry.cameras import Camera
+from tracker.observations.importing import plan_import
+from tracker.observations.observed import ObservationSet
+from tracker.observations.plans import MaskPlan
+from tracker.observations.request import ImportRequest
+from tracker.self_calibration.keypoint_calibration import PersonCalibration, calibrate_by_person
+from tracker.session.matching import common_length
+from tracker.session.session import Session
+
+_PERSON = "person"
+
+
+@dataclass(frozen=True)
+class FilmedPerson:
+    """Footage of one person, and the key points that a detector found in it."""
+
+    keypoints: Path
+    """File or folder of key points."""
+    videos: Sequence[Path] = ()
+    """Video files or folders of images, each named after its camera."""
+    camera_paths: Mapping[str, Path] = field(default_factory=dict)
+    """Footage by camera name, under any file name."""
+    offsets: Mapping[str, int] = field(default_factory=dict)
+    """Frame k of all is frame k + offset of a camera."""
+    common_frames: bool = False
+    """Whether to leave out frames at the end that some cameras lack."""
+    stature_m: float | None = None
+    """Height of the person, metres; None if unknown."""
+    lenses: Path | None = None
+    """Calibration of which the lenses are taken; None if they are unknown."""
+
+
+class KeyPoints(NamedTuple):
+    """Key points of a person in footage."""
+
+    observations: ObservationSet
+    blanks: tuple[Camera, ...]
+    """Cameras at the origin with a lens as unknown lenses are on average."""
+
+
+def calibrate_filmed_person(filmed: FilmedPerson, report: Report) -> PersonCalibration:
+    """Calibrate the cameras that have filmed a person.
+
+    Args:
+        filmed: the footage and its key points.
+        report: receives the progress; it may raise to end the work.
+
+    Raises:
+        TrackerError: files cannot be read or do not fit together, or show too little of one person.
+    """
+    paths = footage_paths(filmed.videos, filmed.camera_paths, filmed.offsets)
+    found = read_keypoints(filmed.keypoints, paths, filmed.offsets, filmed.common_frames)
+    cameras = found.blanks if filmed.lenses is None else _with_lenses(found.blanks, filmed.lenses)
+    return calibrate_by_person(found.observations, cameras, filmed.stature_m, filmed.lenses is not None, report)
+
+
+def _with_lenses(blanks: Sequence[Camera], path: Path) -> tuple[Camera, ...]:
+    """Return cameras with the lenses of a calibration.
+
+    Raises:
+        CalibrationError: it cannot be read, lacks a camera, or is of pictures of another size.
+    """
+    entries = {e.name: e for e in read_cameras(path, footage=[b.name for b in blanks]).entries}
+    out = []
+    for blank in blanks:
+        if blank.name not in entries:
+            raise CalibrationError(
+                f"expected the lens of camera '{blank.name}' in {path}, found those of {', '.join(entries)}; add it"
+            )
+        camera = entries[blank.name].camera(blank.size)
+        if camera.size != blank.size:
+            raise CalibrationError(
+                f"camera '{blank.name}': expected the lens for pictures of {blank.size[0]}x{blank.size[1]}, found "
+                f"{camera.size[0]}x{camera.size[1]} in {path}; calibrate it at the size of the footage"
+            )
+        out.append(camera)
+    return tuple(out)
+
+
+def read_keypoints(
+    files: Path, paths: Mapping[str, Path], offsets: Mapping[str, int], common_frames: bool
+) -> KeyPoints:
+    """Read key points and the sizes of the pictures that they lie in.
+
+    Args:
+        files: file or folder of key points.
+        paths: footage by camera name.
+        offsets: frame k of all is frame k + offset of a camera.
+        common_frames: whether to leave out frames at the end that some cameras lack.
+
+    Raises:
+        TrackerError: files cannot be read, or do not fit the footage.
+    """
+    with ExitStack() as stack:
+        footage = {name: stack.enter_context(closing(open_footage(path, name))) for name, path in paths.items()}
+        n_frames = common_length(footage, offsets, common_frames)
+        blanks = tuple(blank_camera(name, f.size) for name, f in footage.items())
+        sources = tuple(
+            CameraSource(c, paths[c.name], offset=offsets.get(c.name, 0), footage_frames=footage[c.name].n_frames)
+            for c in blanks
+        )
+        rates = [f.fps for f in footage.values() if f.fps is not None]
+    # Nothing of a session is written: it states which cameras and frames there are.
+    session = Session(files.parent, files.name, max(rates, default=1.0), n_frames, sources, ())
+    plan = plan_import(session, ImportRequest(_PERSON, (files,), (_PERSON,)), calibrated=False)
+    if isinstance(plan, MaskPlan):
+        raise CalibrationError(
+            f"expected key points in pictures, found masks in {files}; name the files that a pose detector wrote"
+        )
+    if plan.problems:
+        raise CalibrationError(f"{plan.problems[0]}; correct the files of key points")
+    if plan.observations.points is None:
+        raise CalibrationError(
+            f"expected key points in pictures, found points in space in {files}; name the files of a pose detector"
+        )
+    _require_files({v.camera for v in plan.views if v.place is None}, files)
+    return KeyPoints(plan.observations, blanks)
+
+
+def _require_files(without: Collection[str], files: Path) -> None:
+    if without:
+        raise CalibrationError(
+            f"expected key points of each camera, found none of {', '.join(sorted(without))} in {files}; add them, or "
+            "leave out that footage"
+        )
