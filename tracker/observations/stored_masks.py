@@ -11,7 +11,7 @@ import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import msgspec
@@ -21,11 +21,13 @@ import tomli_w
 from tracker.errors import SessionError, TrackerError
 from tracker.files import write_text_atomic
 from tracker.observations.observed import SourceFile, checksum
-from tracker.observations.plans import MaskPlan
 from tracker.observations.stored import FOLDER, KIND, VERSION, SourceRow, appearing_folder
 from tracker.session.session import Session, save_cameras
 from tracker.text_files import read_toml
 from tracker.validation import FileStem, Name, check, check_version
+
+if TYPE_CHECKING:  # it decodes videos
+    from tracker.observations.plans import MaskPlan
 
 MASKS_FILE, _MASKS = "masks.toml", "masks"
 
@@ -84,7 +86,7 @@ def load_masks(session: Session, name: str) -> StoredMasks:
     return StoredMasks(row.name, row.format, row.cameras, row.notes, sources, users)
 
 
-def store_masks(session: Session, plan: MaskPlan) -> Session:
+def store_masks(session: Session, plan: "MaskPlan") -> Session:
     """Store masks with a session, whose cameras then use them.
 
     Returns:
@@ -115,7 +117,7 @@ def store_masks(session: Session, plan: MaskPlan) -> Session:
         raise
 
 
-def _write_masks(plan: MaskPlan, camera: str, size: tuple[int, int], folder: Path) -> None:
+def _write_masks(plan: "MaskPlan", camera: str, size: tuple[int, int], folder: Path) -> None:
     folder.mkdir(parents=True)
     given = dict(plan.options).get("picture_size")
     width, height = map(int, given.split("x")) if given is not None else size
@@ -129,7 +131,7 @@ def _write_masks(plan: MaskPlan, camera: str, size: tuple[int, int], folder: Pat
         (folder / f"{picture:06d}.png").write_bytes(cv2.imencode(".png", mask)[1].tobytes())
 
 
-def _content(plan: MaskPlan) -> dict[str, Any]:
+def _content(plan: "MaskPlan") -> dict[str, Any]:
     data: dict[str, Any] = {
         "version": VERSION,
         "name": plan.name,
