@@ -45,7 +45,7 @@ class LabelCounts(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RecordingSummary:
-    """What a dataset has of one recording."""
+    """Content of a dataset that comes from one recording."""
 
     name: str
     """Of its folder."""
