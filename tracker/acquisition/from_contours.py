@@ -23,6 +23,7 @@ from tracker.acquisition.size_parameters import SizeParameters, SizePriors
 from tracker.acquisition.typical_body import typical_body
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.progress import Report, stages, unreported
+from tracker.compute.sampling import spread_indices
 from tracker.contours import occluding_contours
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
@@ -202,8 +203,7 @@ def cost_px(views: Sequence[ViewEvidence], bodies: Sequence[PosedBody]) -> float
 
 def _spread(frames: Sequence[int], n: int, keep: Sequence[int]) -> list[int]:
     """Return frames evenly spread over all, with those to keep."""
-    at = np.unique(np.linspace(0, len(frames) - 1, min(n, len(frames))).round().astype(int))
-    return sorted({frames[i] for i in at} | (set(keep) & set(frames)))
+    return sorted({frames[i] for i in spread_indices(len(frames), n)} | (set(keep) & set(frames)))
 
 
 def own_views(views: Sequence[ViewEvidence], bodies: tuple[PosedBody, ...], person: int) -> Sequence[ViewEvidence]:

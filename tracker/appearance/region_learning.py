@@ -21,6 +21,7 @@ from tracker.appearance.region_kernels import (
 )
 from tracker.appearance.region_model import OCCUPIED_M, REACH_M, RegionModel, background_of, sample_share
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.sampling import spread_indices
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
 from tracker.geometry.cameras import Camera
@@ -65,7 +66,7 @@ class _Shown(NamedTuple):
 
 def learning_frames(frames: Sequence[int]) -> list[int]:
     """Return the frames to learn from, spread evenly over those of a run, ascending."""
-    at = np.unique(np.linspace(0, len(frames) - 1, N_LEARNING).round().astype(int))
+    at = spread_indices(len(frames), N_LEARNING)
     return [frames[i] for i in at]
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tracker.boards.board_description import DICTIONARIES, Board
 from tracker.boards.corner_detection import CornerDetector
+from tracker.compute.sampling import spread_indices
 
 _N_DESCRIBED = 4
 """Corners in a picture from which on another description counts: fewer may be found by chance."""
@@ -31,7 +32,7 @@ def found_instead(board: Board, samples: Sequence[NDArray[np.uint8]]) -> str:
         board: as described; it was not found.
         samples: pictures, (H, W) gray.
     """
-    samples = [samples[i] for i in np.unique(np.linspace(0, len(samples) - 1, _MAX_SAMPLES).round().astype(int))]
+    samples = [samples[i] for i in spread_indices(len(samples), _MAX_SAMPLES)]
     n_tried, best, most = 0, board, 0
     for other in _others(board, samples):
         n_tried += 1

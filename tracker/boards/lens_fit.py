@@ -12,6 +12,7 @@ from tracker.boards.pose_choice import best_poses, board_poses
 from tracker.calibration.camera_columns import FOCAL
 from tracker.calibration.lens_priors import UNKNOWN_LENS, prior_sigmas
 from tracker.calibration.reprojection import Prior, Rig, RigFit, fit_rig
+from tracker.compute.sampling import spread_indices
 from tracker.fitting.bundle import solve_bundle
 from tracker.geometry.arrays import IntArray
 from tracker.geometry.cameras import Camera
@@ -76,7 +77,7 @@ def fit_lens(board: Board, seen: SeenCorners, blank: Camera, frames: IntArray) -
     """
     chosen = seen.in_frames(frames)
     prior = Prior((blank,), (prior_sigmas(blank, UNKNOWN_LENS, pose=False),))
-    few = frames[np.unique(np.linspace(0, len(frames) - 1, min(_TRIAL_VIEWS, len(frames))).round().astype(int))]
+    few = frames[spread_indices(len(frames), _TRIAL_VIEWS)]
     problem = BoardProblem(board, chosen, frames, prior, np.array([_START_SIGMA_PX]))
     trials = BoardProblem(board, chosen.in_frames(few), few, prior, problem.sigmas_px)
     found = []

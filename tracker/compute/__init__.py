@@ -1,8 +1,9 @@
-"""Numba options, the kernel cache, thread pools, quantiles of small arrays, and reports of progress.
+"""Numba options, the kernel cache, thread pools, quantiles of small arrays, spread samples, and reports of progress.
 
 It imports no other room.
 
-Public: `numba_options`, `threads`, `quantiles`, `progress`, and of `kernel_cache` which kernels are compiled.
+Public: `numba_options`, `threads`, `quantiles`, `sampling`, `progress`, and of `kernel_cache` which kernels are
+compiled.
 """
 
 __all__ = [
@@ -14,5 +15,6 @@ __all__ = [
     "numba_options",
     "progress",
     "quantiles",
+    "sampling",
     "threads",
 ]

@@ -98,8 +98,8 @@ def _plane_through(points: Array, up: Array) -> GroundPlane:
 
 def _apart(points: Array, distance_m: float) -> Array:
     """Return points that lie at least a distance apart, the first of each crowd."""
-    kept: list[Array] = []
-    for p in points:
-        if all(np.linalg.norm(p - q) >= distance_m for q in kept):
-            kept.append(p)
-    return np.array(kept)
+    kept = points[:1]
+    for p in points[1:]:
+        if np.linalg.norm(kept - p, axis=1).min() >= distance_m:
+            kept = np.vstack([kept, p])
+    return kept

@@ -7,13 +7,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.errors import FormatError, Remedy
 from tracker.footage.mask_image import LabelImage
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.observations.sources import FileGroup
 
 ANYONE = np.iinfo(np.uint8).max
-"""Value of a person who is not told from others, as `tracker.footage.recording.read_mask` has it."""
+"""Label of a pixel of any person, as `tracker.footage.recording.read_mask` has it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class MaskRules:
     is_matte: bool = False
     """Whether values are opacities, of which the upper half is a person; else each value but 0 is one."""
     people: Mapping[int, int] | None = None
-    """Number of a person in the session, from 1, by value; None if nobody is told from others."""
+    """Number of a person in the session, from 1, by label in the files; None if no label is assigned to a person."""
 
     def apply(self, labels: NDArray[Any]) -> NDArray[np.uint8]:
         """Return a mask as footage has it, (H, W): 0 background, 255 anyone, k person k."""
@@ -85,20 +84,6 @@ def survey(masks: MaskFiles, size: tuple[int, int]) -> MaskSurvey:
         frozenset(value for p in found for value in p.values),
         np.array([p.is_alpha for p in found]),
     )
-
-
-def check_mask_size(labels: NDArray[Any], size: tuple[int, int], where: str) -> None:
-    """Check the size of a mask, (H, W); `where` begins the message.
-
-    Raises:
-        FormatError: it has another one.
-    """
-    height, width = labels.shape
-    if (width, height) != size:
-        raise FormatError(
-            f"{where}: expected a mask of {size[0]}x{size[1]} pixels, found {width}x{height}",
-            Remedy("give_picture_size", size=f"{width}x{height}"),
-        )
 
 
 def _picture(image: LabelImage) -> _Picture:

@@ -12,14 +12,14 @@ from tracker.footage.mask_image import LabelImage, read_label_image
 from tracker.formats.bvh_reading import read_bvh
 from tracker.formats.c3d import read_c3d
 from tracker.formats.keypoints.coco_reading import holds, is_coco, read_coco
-from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, read_segmentations
+from tracker.formats.keypoints.coco_segmentation import SegmentedPictures, check_mask_size, read_segmentations
 from tracker.formats.keypoints.deeplabcut import is_deeplabcut, read_deeplabcut_csv
 from tracker.formats.keypoints.hdf5 import read_hdf5_apart
 from tracker.formats.keypoints.openpose import numbered_name, read_openpose_pictures
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.points_csv import read_points_csv
 from tracker.formats.trc import MarkerTable, read_trc
-from tracker.observations.mask_files import MaskFiles, check_mask_size
+from tracker.observations.mask_files import MaskFiles
 from tracker.observations.sources import FileGroup, Found, folder_labels, list_files, numbered_groups
 from tracker.text_files import TABLE_BYTES, TextKind, read_json
 
@@ -91,7 +91,8 @@ def _read_png(files: Sequence[Found]) -> list[MaskFiles]:
 def _png_masks(group: FileGroup) -> MaskFiles:
     def read(i: int, size: tuple[int, int]) -> LabelImage:
         image = read_label_image(group.files[i], "mask")
-        check_mask_size(image.labels, size, f"mask {group.files[i]}")
+        height, width = image.labels.shape
+        check_mask_size((width, height), size, f"mask {group.files[i]}")
         return image
 
     named = [numbered_name(path.name) for path in group.files]

@@ -10,6 +10,7 @@ from tracker.acquisition.from_contours import learn_static_edges
 from tracker.body.model import BodyModel, PosedBody
 from tracker.calibration.viewed_frames import ViewedFrame, spread_poses
 from tracker.compute.progress import Report, unreported
+from tracker.compute.sampling import spread_indices
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.hypothesis import SAME_POSE_M
@@ -114,5 +115,5 @@ class PosedRecording:
     @cached_property
     def _static_edges(self) -> list[StaticEdgeModel] | None:
         frames = self.credible_frames()
-        few = [frames[i] for i in np.unique(np.linspace(0, len(frames) - 1, N_FRAMES).round().astype(int))]
+        few = [frames[i] for i in spread_indices(len(frames), N_FRAMES)]
         return learn_static_edges(self.observer, {k: tuple(own[k] for own in self.poses) for k in few})

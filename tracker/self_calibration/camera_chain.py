@@ -13,7 +13,7 @@ from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.self_calibration.joint_adjustment import Gauge, adjust_joints
+from tracker.self_calibration.joint_adjustment import Gauge, adjust_joints, no_common_view
 from tracker.self_calibration.seen_joints import SeenJoints
 from tracker.self_calibration.stature import metres_per_unit, scaled_by
 from tracker.self_calibration.two_views import TwoViews, relate
@@ -33,10 +33,7 @@ def chain_cameras(seen: SeenJoints, lenses: Sequence[Camera], stature_m: float) 
     pairs = [relate(seen, (i, j), lenses[i], lenses[j]) for i, j in combinations(range(len(lenses)), 2)]
     found = [pair for pair in pairs if pair is not None]
     if not found:
-        raise CalibrationError(
-            "expected joints that two cameras see from different sides, found none; film the person by cameras that "
-            "stand at an angle to each other"
-        )
+        raise no_common_view()
     best = min(found, key=lambda pair: pair.rotation_sigma)
     return _completed(seen, lenses, best, stature_m), Gauge(*best.pair)
 

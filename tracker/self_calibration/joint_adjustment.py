@@ -10,6 +10,7 @@ from tracker.calibration.camera_columns import FOCAL, POSE, SHIFT, camera_differ
 from tracker.calibration.lens_priors import CALIBRATED, UNKNOWN_LENS
 from tracker.calibration.point_adjustment import PointProblem, triangulate_all
 from tracker.calibration.reprojection import Observations, Prior, Rig, RigFit, column_ends, fit_rig
+from tracker.errors import CalibrationError
 from tracker.fitting.bundle import ArrowEquations
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
@@ -119,6 +120,14 @@ def adjust_joints(
     out[numbers] = fit.rig.own
     observed = replace(seen, groups=numbers[seen.groups])
     return AdjustedJoints(fit.rig.cameras, out, observed, fit, share)
+
+
+def no_common_view() -> CalibrationError:
+    """Return the error where no two cameras see a joint from different sides."""
+    return CalibrationError(
+        "expected joints that two cameras see from different sides, found none; film the person by cameras that stand "
+        "at an angle to each other"
+    )
 
 
 def among(observations: Observations, determined: Mask) -> Observations:

@@ -15,6 +15,7 @@ from tracker.calibration.lens_priors import UNKNOWN_LENS
 from tracker.calibration.point_adjustment import NEWS, PointProblem, require_spread, triangulate_all
 from tracker.calibration.reprojection import FINAL, Observations, Prior, Rig
 from tracker.compute.progress import Report, stages, unreported
+from tracker.compute.sampling import spread_indices
 from tracker.errors import CalibrationError
 from tracker.fitting.bundle import solve_bundle
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
@@ -23,7 +24,14 @@ from tracker.geometry.cameras import Camera
 from tracker.observations.observed import ObservationSet
 from tracker.observations.triangulation import INLIER_M
 from tracker.self_calibration.camera_chain import chain_cameras
-from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses, adjust_joints, among
+from tracker.self_calibration.joint_adjustment import (
+    AdjustedJoints,
+    Gauge,
+    UnknownLenses,
+    adjust_joints,
+    among,
+    no_common_view,
+)
 from tracker.self_calibration.seen_joints import SeenJoints, lone_person, with_sides_mended
 from tracker.self_calibration.stature import Upright, metres_per_unit, scale_sigma, scaled_by, upright
 
@@ -98,7 +106,7 @@ def _calibrated(
     observations = _spread(observations)
     seen, n_crowded = lone_person(observations)
     _require_shared(seen, cameras, n_crowded)
-    few = seen.on_frames(_spaced(len(seen.px), MAX_LENS_VIEWS))
+    few = seen.on_frames(spread_indices(len(seen.px), MAX_LENS_VIEWS))
     placed, gauge = chain_cameras(few, cameras, height_m)
     chaining(1.0)
     lenses = None if has_lenses else UnknownLenses(tuple(cameras), _of_one_size(cameras))
@@ -132,13 +140,9 @@ def _spread(observations: ObservationSet) -> ObservationSet:
             f"expected a person in two cameras on at least {MIN_SHARED} frames, found {len(frames)}; film the person "
             "where the cameras see the same place"
         )
-    chosen = frames[_spaced(len(frames), MAX_FRAMES)]
+    chosen = frames[spread_indices(len(frames), MAX_FRAMES)]
     few = replace(points, points_px=points.points_px[chosen], confidence=points.confidence[chosen])
     return replace(observations, points=few, row_frames=chosen.astype(np.float64))
-
-
-def _spaced(n: int, most: int) -> IntArray:
-    return np.unique(np.linspace(0, n - 1, min(most, n)).round().astype(np.int64))
 
 
 def _require_shared(seen: SeenJoints, cameras: Sequence[Camera], n_crowded: int) -> None:
@@ -164,10 +168,7 @@ def _adjusted(
 ) -> AdjustedJoints:
     found = adjust_joints(cameras, seen.observations(), seen.n_joints, gauge, lenses)
     if found is None:
-        raise CalibrationError(
-            "expected joints that two cameras see from different sides, found none; film the person by cameras that "
-            "stand at an angle to each other"
-        )
+        raise no_common_view()
     numbers, groups = np.unique(found.observed.groups, return_inverse=True)
     require_spread(Rig(found.cameras, found.points_world[numbers]), replace(found.observed, groups=groups))
     return found
@@ -196,7 +197,7 @@ def _held_out_errors(cameras: Sequence[Camera], seen: SeenJoints) -> tuple[Obser
 def _volume(adjusted: AdjustedJoints, scale: float) -> VolumeError:
     """Return the expected error of joints, metres; the scale has an error of its own."""
     points = adjusted.points_world[np.isfinite(adjusted.points_world).all(axis=1)]
-    few = points[_spaced(len(points), MAX_POINTS)]
+    few = points[spread_indices(len(points), MAX_POINTS)]
     error = expected_error(adjusted.cameras, adjusted.fit.covariance, few, with_scale=False)
     return VolumeError(*(scale * e for e in error))
 

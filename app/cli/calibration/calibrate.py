@@ -24,7 +24,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from tracker.boards.footage_calibration import FilmedCalibration
+    from tracker.compute.progress import Report
     from tracker.geometry.cameras import Camera
+
+    _Calibrated = tuple[Sequence[Camera], dict[str, Any], str]
+    """The cameras, and the report as plain data and as text."""
 
 
 @dataclass(frozen=True)
@@ -71,18 +75,20 @@ def command(arguments: Annotated[CalibrateArguments, tyro.conf.arg(name="")]) ->
     The board may be a ChArUco board, also partly visible, or a checkerboard. Ctrl+C stops it and writes nothing.
     """
     _check(arguments)
-    if arguments.people is not None:
-        _by_person(arguments, arguments.people)
-    elif arguments.board is not None:
-        _by_board(arguments, arguments.board)
+    calibrate = _by_board if arguments.board is not None else _by_person
+    with Reporter(silent=arguments.json).share("calibrating") as advance:
+        cameras, record, text = calibrate(arguments, lambda stage, share, text="", /: advance(share))
+    _write(arguments, cameras)
+    print(format_json(record) if arguments.json else text)
 
 
-def _by_board(arguments: CalibrateArguments, board: Path) -> None:
+def _by_board(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
     from tracker.boards.board_description import read_board
     from tracker.boards.footage_calibration import FilmedBoard, calibrate_footage
 
+    assert arguments.board is not None
     filmed = FilmedBoard(
-        read_board(board),
+        read_board(arguments.board),
         arguments.videos,
         parse_pairs(arguments.camera, "--camera", Path),
         arguments.fisheye,
@@ -91,19 +97,18 @@ def _by_board(arguments: CalibrateArguments, board: Path) -> None:
         arguments.every,
         arguments.floor_frame,
     )
-    with Reporter(silent=arguments.json).share("calibrating") as advance:
-        found = calibrate_footage(filmed, lambda stage, share, text="", /: advance(share))
-    _write(arguments, found.cameras)
+    found = calibrate_footage(filmed, report)
     record = _record(arguments, found)
-    print(format_json(record) if arguments.json else _format(record, arguments))
+    return found.cameras, record, _format(record, arguments)
 
 
-def _by_person(arguments: CalibrateArguments, keypoints: Path) -> None:
+def _by_person(arguments: CalibrateArguments, report: "Report") -> "_Calibrated":
     from app.cli.calibration.person_report import format_record, record_of
     from tracker.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
 
+    assert arguments.people is not None
     filmed = FilmedPerson(
-        keypoints,
+        arguments.people,
         arguments.videos,
         parse_pairs(arguments.camera, "--camera", Path),
         parse_pairs(arguments.offset, "--offset", int),
@@ -111,11 +116,9 @@ def _by_person(arguments: CalibrateArguments, keypoints: Path) -> None:
         arguments.height,
         arguments.lenses,
     )
-    with Reporter(silent=arguments.json).share("calibrating") as advance:
-        found = calibrate_filmed_person(filmed, lambda stage, share, text="", /: advance(share))
-    _write(arguments, found.cameras)
+    found = calibrate_filmed_person(filmed, report)
     record = {"out": str(arguments.out), "layout": arguments.layout, **record_of(found)}
-    print(format_json(record) if arguments.json else format_record(record))
+    return found.cameras, record, format_record(record)
 
 
 def _check(arguments: CalibrateArguments) -> None:
@@ -127,11 +130,10 @@ def _check(arguments: CalibrateArguments) -> None:
         )
     of_board = {"--fisheye": arguments.fisheye, "--every": arguments.every, "--floor-frame": arguments.floor_frame}
     of_people = {"--height": arguments.height, "--lenses": arguments.lenses}
-    for given, source in ((of_board, "--board"), (of_people, "--people")):
-        is_used = arguments.board is not None if source == "--board" else arguments.people is not None
-        for option, value in given.items():
-            if not is_used and value not in (None, ()):
-                raise TrackerError(f"expected {option} together with {source}, found it without; leave it out")
+    source, unused = ("--people", of_people) if arguments.people is None else ("--board", of_board)
+    for option, value in unused.items():
+        if value not in (None, ()):
+            raise TrackerError(f"expected {option} together with {source}, found it without; leave it out")
     if arguments.every is not None and arguments.every < 1:
         raise TrackerError(f"expected --every of at least 1, found {arguments.every}; correct it")
     out = arguments.out

@@ -62,7 +62,7 @@ class ImportArguments:
     masks: bool = False
     """take masks where the files hold key points too: segmentations of COCO, and PNG beside other files."""
     values: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PERSON=VALUE ...", help_behavior_hint="")] = ()
-    """masks: value of the pixels of a person; without it nobody is told from others."""
+    """masks: label of the pixels of a person; without it all labels are anyone."""
     dry_run: bool = False
     """show what would be imported, and store nothing."""
     json: bool = False

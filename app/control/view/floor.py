@@ -97,11 +97,11 @@ class FloorEditing:
         Raises:
             TrackerError: the poses show no plane, or it cannot be written.
         """
-        with self._activities.editing():
-            session = self._session_state.session
-            stored = [read_stored_poses(session.annotations_path, p.name, p.model) for p in session.people]
-            found = floor_from_feet([{k: pose.body for k, pose in own.items()} for own in stored])
-            words = f"feet at {found.n_places} places, within {1000 * found.spread_m:.0f} mm"
+        session = self._session_state.session
+        stored = [read_stored_poses(session.annotations_path, p.name, p.model) for p in session.people]
+        found = floor_from_feet([{k: pose.body for k, pose in own.items()} for own in stored])
+        words = f"feet at {found.n_places} places, within {1000 * found.spread_m:.0f} mm"
+        with self._activities.editing():  # not before: others work meanwhile
             origin = f"{words}, tilt known to {found.tilt_deg:.1f}°"
             self._change(nearest_axis(found.plane.normal), found.plane, origin)
 

@@ -1,14 +1,12 @@
 """`quadrille calibrate` on drawn pictures of a board."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
 from command_line import assert_refused
 from drawn_boards import arc, carried, facing, filmed_folders
 
-from app.__main__ import main
 from tracker.boards.board_description import Board
 from tracker.calibrations.reading import read_cameras
 from tracker.formats.anipose import read_calibration
@@ -31,24 +29,9 @@ def footage(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def run(monkeypatch, capsys):
-    def run(*words):
-        monkeypatch.setattr(sys, "argv", ["quadrille", "calibrate", *map(str, words)])
-        try:
-            main()
-            status = 0
-        except SystemExit as end:
-            status = end.code
-        out, err = capsys.readouterr()
-        return status, out, err
-
-    return run
-
-
 def words(footage, out, *more, board="board.toml"):
     videos = [footage / c.name for c in CAMERAS]
-    return ("--board", footage / board, "--videos", *videos, "--out", out, "--json", *more)
+    return ("calibrate", "--board", footage / board, "--videos", *videos, "--out", out, "--json", *more)
 
 
 @pytest.mark.slow
@@ -102,8 +85,10 @@ def test_the_right_description_is_named_where_none_is_found(run, footage, tmp_pa
 
 def test_wrong_words_are_refused_before_footage_is_read(run, footage, tmp_path):
     out = tmp_path / "c.toml"
-    assert_refused(run("--out", out), ["expected --board FILE or --people KEYPOINTS, found none"])
-    assert_refused(run("--board", footage / "board.toml", "--out", out), ["at least two cameras, found none"])
+    assert_refused(run("calibrate", "--out", out), ["expected --board FILE or --people KEYPOINTS, found none"])
+    assert_refused(
+        run("calibrate", "--board", footage / "board.toml", "--out", out), ["at least two cameras, found none"]
+    )
     assert_refused(run(*words(footage, tmp_path / "none" / "c.toml")), ["in a folder that exists, found none"])
     assert_refused(run(*words(footage, tmp_path)), ["not to exist, found a folder"])
     assert_refused(run(*words(footage, out, "--every", "0")), ["expected --every of at least 1, found 0"])

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import sys
 
 import cv2
 import numpy as np
@@ -11,7 +10,6 @@ from command_line import assert_refused
 from filmed_people import FOCAL_PX, NAMES, SIZE, STATURE_M, dancing, observed, rig
 from observed_people import BODY_25, write_openpose
 
-from app.__main__ import main
 from tracker.formats.anipose import read_calibration, write_calibration
 
 N_FRAMES = 10
@@ -35,23 +33,9 @@ def footage(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def run(monkeypatch, capsys):
-    def run(*words):
-        monkeypatch.setattr(sys, "argv", ["quadrille", "calibrate", *map(str, words)])
-        try:
-            main()
-            status = 0
-        except SystemExit as end:
-            status = end.code
-        out, err = capsys.readouterr()
-        return status, out, err
-
-    return run
-
-
 def words(footage, out, *more):
-    return ("--people", footage / "keypoints", "--videos", *(footage / c.name for c in CAMERAS), "--out", out, *more)
+    videos = [footage / c.name for c in CAMERAS]
+    return ("calibrate", "--people", footage / "keypoints", "--videos", *videos, "--out", out, *more)
 
 
 @pytest.mark.slow
@@ -86,7 +70,8 @@ def test_wrong_words_are_refused(run, footage, tmp_path):
     assert_refused(run(*words(footage, out, "--board", footage / "lenses.toml")), ["found both"])
     assert_refused(run(*words(footage, out, "--floor-frame", "3")), ["expected --floor-frame together with --board"])
     assert_refused(
-        run("--board", "b.toml", "--height", "1.7", "--out", out), ["expected --height together with --people"]
+        run("calibrate", "--board", "b.toml", "--height", "1.7", "--out", out),
+        ["expected --height together with --people"],
     )
     assert_refused(run(*words(footage, out, "--height", "175")), ["a height of 0.3 to 3 metres", "175"])
     shutil.copytree(footage / "cam0", tmp_path / "other")

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tracker.errors import FormatError, Remedy, SessionError, TrackerError
+from tracker.exports.export_files import unwritable
 from tracker.exports.like.mended_points import PoseChoice, mended_points
 from tracker.exports.like.patches import PATCHED, Files, mended_pictures, mended_space
 from tracker.observations.assignment import people_by_poses
@@ -127,8 +128,7 @@ def _write(out: Path, contents: Files) -> dict[str, Path]:
             (temporary / path).write_bytes(data)
         os.replace(temporary, out)
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise TrackerError(f"cannot write {out}: {reason}; choose a folder that you may write to, with room") from error
+        raise unwritable(out, error) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
         temporary.unlink(missing_ok=True)

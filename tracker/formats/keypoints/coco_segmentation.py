@@ -56,7 +56,7 @@ class SegmentedPictures(NamedTuple):
         image = self.images[number]
         where = f"{self.where}, image {image.id}"
         if image.width and image.height:
-            _check_size((image.width, image.height), size, where)
+            check_mask_size((image.width, image.height), size, where)
         out = np.zeros(size[::-1], np.uint8)
         for segmentation in self.people.get(image.id, []):
             if isinstance(segmentation, dict):
@@ -97,7 +97,12 @@ def read_segmentations(path: Path) -> list[SegmentedPictures]:
     return [SegmentedPictures(labels, images, people, notes, where) for labels, images in by_camera.items()]
 
 
-def _check_size(found: tuple[int, int], size: tuple[int, int], where: str) -> None:
+def check_mask_size(found: tuple[int, int], size: tuple[int, int], where: str) -> None:
+    """Check the width and height of a mask; `where` begins the message.
+
+    Raises:
+        FormatError: it has another size.
+    """
     if found != size:
         raise FormatError(
             f"{where}: expected a mask of {size[0]}x{size[1]} pixels, found {found[0]}x{found[1]}",
@@ -120,7 +125,7 @@ def _decoded(found: _RunLengths, size: tuple[int, int], where: str) -> NDArray[n
     Raises:
         FormatError: it has another size, or its runs do not fill it.
     """
-    _check_size((found.size[1], found.size[0]), size, where)
+    check_mask_size((found.size[1], found.size[0]), size, where)
     counts = _counts(found.counts) if isinstance(found.counts, str) else found.counts
     width, height = size
     if min(counts, default=-1) < 0 or sum(counts) != width * height:

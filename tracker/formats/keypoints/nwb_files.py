@@ -5,7 +5,7 @@ needs h5py, and runs in the process that reads HDF5 files. sleap-io numbers the 
 so that pictures without a point would shift all later ones; here the numbers follow from the times.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -84,7 +84,7 @@ def patch_nwb(path: Path, changes: Mapping[int, Changes]) -> None:
 def _videos(file: Any, path: Path) -> list[_Video]:
     """Return the videos of a file, in the order of the file."""
     by_video: dict[str, list[Any]] = {}
-    for group in _groups(file, _ESTIMATION):
+    for group in _estimations(file):
         by_video.setdefault(_video_of(group) or str(path), []).append(group)
     if not by_video:
         raise FormatError(f"file {path}: expected key points of ndx-pose, found none; export it again")
@@ -110,11 +110,11 @@ def _video_of(group: Any) -> str:
     return _text(images[0]["external_file"][0]) if images and "external_file" in images[0] else ""
 
 
-def _groups(file: Any, kind: str) -> Iterator[Any]:
-    """Yield the groups of a kind, in the order of their names."""
+def _estimations(file: Any) -> list[Any]:
+    """Return the groups of people in videos, in the order of their names."""
     found: list[Any] = []
-    file.visititems(lambda _, item: found.append(item) if _text(item.attrs.get(_TYPE, "")) == kind else None)
-    yield from found
+    file.visititems(lambda _, item: found.append(item) if _text(item.attrs.get(_TYPE, "")) == _ESTIMATION else None)
+    return found
 
 
 def _nodes(group: Any) -> tuple[str, ...]:
