@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.errors import DamagedStoreError
+from tracker.evaluation.metrics import LOST_M
 from tracker.fitting.consensus import Consensus, agreement, consensus
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.fitting.hypothesis import limbs_elsewhere
@@ -178,7 +179,7 @@ class TrackedRows:
         if frame in self._other_poses:
             others.append(self._other_poses[frame][1])
             apart = limbs_elsewhere(PosedBody(model, pose.values), PosedBody(model, others[-1]))
-            trust.append(np.array([limb.name not in apart for limb in limbs(model)], dtype=np.float64))
+            trust.append(trust[0] * [limb.name not in apart for limb in limbs(model)])  # alike: the mean of both
         return consensus(model, pose.values, np.array(others), np.array(trust), active).pose
 
     def _seams(self, model: BodyModel, keyframes: Mapping[int, Array]) -> dict[int, Seam]:
@@ -250,6 +251,7 @@ class TrackedRows:
             np.array([np.zeros((n, n)) if f in keyframes else _unpacked(self._covariances[f], n) for f in at]),
             np.array([f in keyframes for f in at]),
             np.array([np.ones(n, dtype=bool) if f in keyframes else _trusted(model, rows[f]) for f in at]),
+            LOST_M**2 * np.array([_lost(model, rows.get(f)) for f in at]),
         )
         out = []
         for frame, pose in zip(at, smooth_poses(track), strict=True):
@@ -291,6 +293,12 @@ def _unpacked(packed: NDArray[np.float32], n: int) -> Array:
     rows, columns = np.triu_indices(n)
     out[rows, columns] = out[columns, rows] = packed
     return out
+
+
+def _lost(model: BodyModel, row: PoseRecord | None) -> Array:
+    """Return the probability that each limb of a pose is lost, (n_limbs,)."""
+    n_limbs = len(limbs(model))
+    return np.array(row.limbs_lost) if row is not None and len(row.limbs_lost) == n_limbs else np.zeros(n_limbs)
 
 
 def _trusted(model: BodyModel, row: PoseRecord) -> NDArray[np.bool_]:

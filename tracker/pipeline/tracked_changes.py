@@ -92,6 +92,26 @@ def keyframes_of(
     return found
 
 
+def former_poses(
+    store: AnnotationStore, people: Sequence[Person], frames: Collection[int], tracked: Collection[int]
+) -> dict[int, dict[int, Array]]:
+    """Return the stored poses that a run replaces, by frame and index of the person.
+
+    Args:
+        store: annotations of the session.
+        people: of the session.
+        frames: of the run.
+        tracked: indices of the people who are tracked.
+    """
+    found: dict[int, dict[int, Array]] = {}
+    for index in tracked:
+        n_values = len(people[index].model.value_names)
+        for frame, record in store.poses(people[index].name, range(min(frames), max(frames) + 1)).items():
+            if frame in frames and not record.keyframe and len(record.values) == n_values:
+                found.setdefault(frame, {})[index] = record.values
+    return found
+
+
 def settings_record(settings: TrackerSettings) -> dict[str, Any]:
     """Return a tracker's settings and method as the store keeps them: values that JSON can hold."""
     return {"method": settings.method, **asdict(settings)}
