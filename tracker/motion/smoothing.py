@@ -16,7 +16,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
 from tracker.motion.prediction import MAX_ORDER, unwrapped
@@ -62,15 +61,12 @@ class PoseTrack:
     """Whether a pose is exact, (T,): a keyframe."""
     trusted: NDArray[np.bool_]
     """Whether a degree of freedom is measured, (T, n_dofs): not in a lost limb. All of a fixed pose are."""
-    off_m2: Array | None = None
-    """Expected square of the error of each limb where it was found, (T, n_limbs), square metres. A limb that is not
-    trusted is measured all the same where its motion says less. None: no such limb is measured."""
 
 
 def smooth_poses(track: PoseTrack) -> Array:
     """Return the smoothed poses within the joint limits, (T, n_values); fixed poses are returned as they are.
 
-    A limb that is not trusted follows its motion before and after, if that predicts it better. Frames of which nothing is trusted are interpolated
+    A limb that is not trusted follows its motion before and after. Frames of which nothing is trusted are interpolated
     where trusted ones lie on both sides; before the first and after the last trusted frame they stay as they are.
     """
     known = np.flatnonzero(track.trusted.any(axis=1) | track.fixed)
@@ -83,7 +79,6 @@ def smooth_poses(track: PoseTrack) -> Array:
         stop = min(end, start + _BLOCK_FRAMES)
         used = slice(max(first, start - _OVERLAP_FRAMES), min(end, stop + _OVERLAP_FRAMES))
         smoother = _Smoother(track, used)
-        smoother.trust_unpredictable(q)
         steps = smoother.smooth(q) - smoother.measured
         for t in range(start, stop):
             if not track.fixed[t]:
@@ -98,45 +93,15 @@ class _Smoother:
         poses, model = track.poses[used], track.model
         self.measured = unwrapped_path(model, poses)
         """Measured degrees of freedom, (T, n_dofs)."""
-        self._model, self._poses = model, poses
-        self._fixed, self._trusted = track.fixed[used], track.trusted[used]
-        self._known = self._trusted.any(axis=1) | self._fixed
-        self._off_m2 = None if track.off_m2 is None else track.off_m2[used]
+        self._fixed = track.fixed[used]
+        self._known = track.trusted[used].any(axis=1) | self._fixed
         self._steps_s = np.diff(track.times_s[used])
-        self._covariances = _within_linear_range(track.covariances[used])
-        self._R = self._noise()
+        eye = np.eye(model.n_dofs)
+        scale = np.where(track.trusted[used], 1.0, _UNTRUSTED)
+        self._R = _within_linear_range(track.covariances[used]) * scale[:, :, None] * scale[:, None, :]
+        self._R[self._fixed] = _FLOOR_VARIANCE * eye
         self._inertia = np.array([_inertia(model, p) for p in poses])
         self._inverse_inertia = np.linalg.inv(self._inertia)
-
-    def _noise(self) -> Array:
-        """Return the covariance of each measurement, (T, n_dofs, n_dofs)."""
-        scale = np.where(self._trusted, 1.0, _UNTRUSTED)
-        out = np.asarray(self._covariances * scale[:, :, None] * scale[:, None, :])
-        out[self._fixed] = _FLOOR_VARIANCE * np.eye(self._model.n_dofs)
-        return out
-
-    def trust_unpredictable(self, q: float) -> None:
-        """Trust the limbs whose motion before and after says less about them than where they were found.
-
-        Args:
-            q: spectral density of the points' acceleration, m^2/s^3.
-        """
-        doubted = self._known & ~self._fixed & ~self._trusted.all(axis=1)
-        if self._off_m2 is None or not doubted.any():
-            return
-        spreads: dict[int, Array] = {t: np.empty(0) for t in np.flatnonzero(doubted).tolist()}
-        self._pass(q, spreads=spreads)
-        trusted, model = np.array(self._trusted), self._model
-        for t, covariance in spreads.items():
-            kinematics = model.kinematics(self._poses[t])
-            points = model.points_at(kinematics, np.arange(len(model.point_names)))
-            J = model.point_jacobian(kinematics, model.point_parts, points)
-            variances_m2 = np.einsum("pij,jk,pik->p", J, covariance, J)
-            for limb, off_m2 in zip(limbs(model), self._off_m2[t], strict=True):
-                if variances_m2[np.isin(model.point_parts, limb.parts)].max() > off_m2:
-                    trusted[t, limb.dofs] = True
-        self._trusted = trusted
-        self._R = self._noise()
 
     def estimate_noise(self) -> float:
         """Return the spectral density q of the points' acceleration, m^2/s^3."""
@@ -152,14 +117,13 @@ class _Smoother:
         """Return the smoothed degrees of freedom, (T, n_dofs), for a spectral density."""
         return self._pass(q)
 
-    def _pass(self, q: float, energies: list[float] | None = None, spreads: dict[int, Array] | None = None) -> Array:
+    def _pass(self, q: float, energies: list[float] | None = None) -> Array:
         """Filter and smooth.
 
         Args:
             q: spectral density of the points' acceleration.
             energies: receives the expected squared process noise of each step between tracked poses, in units in which
                 its mean is the new `q`; None for none.
-            spreads: receives the covariance of the smoothed degrees of freedom of the frames that it holds.
 
         Returns:
             Smoothed degrees of freedom, (T, n_dofs).
@@ -168,8 +132,6 @@ class _Smoother:
         n_frames, n = self.measured.shape
         x, P = filtered[-1]
         out = [x[:n]]
-        if spreads is not None and n_frames - 1 in spreads:
-            spreads[n_frames - 1] = P[:n, :n]
         for t in range(n_frames - 2, -1, -1):
             dt = float(self._steps_s[t])
             (x_ahead, P_ahead), (x_own, P_own) = predicted[t + 1], filtered[t]
@@ -180,8 +142,6 @@ class _Smoother:
                 error, cross = x_next - _advance(x, dt), _times_transition(P_next @ G.T, dt)
                 spread = P_next - cross - cross.T + _predict(P, dt) + np.outer(error, error)
                 energies.append(_energy(spread, self._inertia[t + 1], dt))
-            if spreads is not None and t in spreads:
-                spreads[t] = P[:n, :n]
             out.append(x[:n])
         return np.array(out[::-1])
 

@@ -307,7 +307,7 @@ class _PathSelection:
         )
 
     def _observe(self, i: int) -> tuple[ViewEvidence, ...]:
-        """Return the evidence of a frame around the poses of both passes and the former one; all candidates are compared on it."""
+        """Return the evidence of a frame around the passes and the former pose; all candidates are compared on it."""
         passes = [e.poses[self._person] for e in (self._forward[i], *self._backward[i : i + 1])]
         guesses = [self._bodies(i, pose) for pose in (*passes, *self._former[i])]
         return common_evidence(self._observer, self._forward[i].frame, guesses, self._settings)
