@@ -92,7 +92,7 @@ def keyframes_of(
     return found
 
 
-def former_poses(
+def poses_to_replace(
     store: AnnotationStore, people: Sequence[Person], frames: Collection[int], tracked: Collection[int]
 ) -> dict[int, dict[int, Array]]:
     """Return the stored poses that a run replaces, by frame and index of the person.

@@ -188,7 +188,8 @@ class Tracking:
     def _subjects(self, people: tuple[int, ...], frames: Sequence[int]) -> Subjects:
         session_state, models = self._session_state, self._session_state.present
         active = [session_state.active_dofs(person) for person in range(len(models))]
-        return Subjects.of(models, people, active, session_state.saver.keyframes(frames))
+        saver = session_state.saver
+        return Subjects.of(models, people, active, saver.keyframes(frames), saver.poses_to_replace(frames, people))
 
     def _clock_and_floor(self) -> tuple[float, GroundPlane | None]:
         session = self._session_state.session

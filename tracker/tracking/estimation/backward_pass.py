@@ -126,8 +126,9 @@ def track_backward(
     for person in subjects.tracked:
         for interval in _changed_intervals(known, person, subjects):
             better = _PathSelection(run, known, interval, (), settings).better()
-            for i, frame in enumerate(known):
-                known[i] = next((TrackedFrame.of(e) for e in better if e.frame == frame.frame), frame)
+            at = {known[i].frame: i for i in interval.frames}
+            for estimate in better:
+                known[at[estimate.frame]] = TrackedFrame.of(estimate)
             yield BackwardStep(known[interval.frames.start].frame, person, total, total, better)
 
 
