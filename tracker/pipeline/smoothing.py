@@ -234,9 +234,10 @@ class TrackedRows:
     def smoothed(self, subjects: Subjects, person: int, fps: float) -> tuple[list[PoseChange], dict[int, Array]]:
         """Return the rows with smoothed poses, in the order of time, and the poses with doubted limbs by motion alone.
 
-        Everything else stays. Nothing of a lost frame is a measurement if no limb is known to be lost. A doubted limb
-        is one, for most are right; how far it lies from its motion before and after tells about it. Locked degrees of
-        freedom keep their values. The arguments are those of `finished`.
+        Everything else stays. A limb that is lost by the tracks without a view each is not a measurement. One that its
+        own frame alone calls lost is: most of these are right, and the steps to their motion before and after tell more
+        about them. Nothing of a lost frame is a measurement if no limb is known to be lost. Locked degrees of freedom
+        keep their values. The arguments are those of `finished`.
         """
         model, active = subjects.models[person], subjects.active_dofs[person]
         keyframes = {f: of_people[person] for f, of_people in subjects.keyframes.items() if person in of_people}
@@ -252,7 +253,7 @@ class TrackedRows:
             np.array([keyframes[f] if f in keyframes else rows[f].values for f in at]),
             np.array([np.zeros((n, n)) if f in keyframes else _unpacked(self._covariances[f], n) for f in at]),
             np.array([f in keyframes for f in at]),
-            np.where(measured.any(axis=1, keepdims=True), True, measured),
+            np.array([m if f in self.tracks else m | m.any() for f, m in zip(at, measured, strict=True)]),
         )
         found = smooth_poses(track)
         by_motion = found if (track.trusted == measured).all() else smooth_poses(replace(track, trusted=measured))
