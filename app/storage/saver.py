@@ -40,6 +40,7 @@ from tracker.store.records import (
     PoseChange,
     PoseRecord,
 )
+from tracker.tracking.tracker import TrackerSettings
 
 T = TypeVar("T")
 
@@ -227,9 +228,17 @@ class Saver:
         now = {frame: {p: self.pose_now(p, frame) for p in people} for frame, people in found.items()}
         return {frame: {p: v for p, v in people.items() if v is not None} for frame, people in now.items()}
 
-    def poses_to_replace(self, frames: Collection[int], people: Collection[int]) -> dict[int, dict[int, Array]]:
-        """Return the stored poses that a run of some people replaces, (n_values,), by frame and person."""
-        return poses_to_replace(self._store, self._session.people, frames, people)
+    def poses_to_replace(
+        self, frames: Collection[int], people: Collection[int], settings: TrackerSettings
+    ) -> dict[int, dict[int, Array]]:
+        """Return the poses that a run of some people with the same settings replaces, (n_values,), by frame and person.
+
+        Args:
+            frames: of the run.
+            people: indices of the people who are tracked.
+            settings: of the run.
+        """
+        return poses_to_replace(self._store, self._session.people, frames, people, settings)
 
     def pose_rows(self, person: int, frames: Sequence[int]) -> list[FramePose]:
         """Return the stored poses of some frames, ascending. Needs no lock."""

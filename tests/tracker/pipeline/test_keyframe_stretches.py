@@ -122,8 +122,10 @@ def test_a_run_knows_the_poses_that_it_replaces(session, store):
         assert sorted(run.subjects.former) == [3, 4, 6, 7, 8]  # no keyframe
         for frame, poses in run.subjects.former.items():
             np.testing.assert_array_equal(poses[0], stored[frame].values)
-    with stored_run(session, store, None, TrackPlan(range(9, 12), (), SETTINGS)) as run:
-        assert run.subjects.former == {}
+    other = replace(SETTINGS, max_iterations=SETTINGS.max_iterations + 1)
+    for plan in (TrackPlan(range(3, 9), (), SETTINGS), TrackPlan(range(3, 9), (0,), other)):
+        with stored_run(session, store, None, plan) as run:
+            assert run.subjects.former == {}
 
 
 def test_frames_with_a_gap_are_tracked_as_legs_of_their_own():

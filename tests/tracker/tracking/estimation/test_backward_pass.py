@@ -252,9 +252,9 @@ def test_locked_degrees_of_freedom_of_a_former_pose_do_not_come_back(scene):
     free = np.array([n != "right_elbow.extension" for n in model.dof_names])
     former = {k: {0: v + 0.2 * ~free} for k, v in enumerate(truth)}
     found = tracked(first, ())
-    better = list(
-        track_back(Shown(views), [model], found, TrackSettings(), former=former, active_dofs=[free])
-    )[-1].better
+    better = list(track_back(Shown(views), [model], found, TrackSettings(), former=former, active_dofs=[free]))[
+        -1
+    ].better
     assert [e.frame for e in better] == list(LOST)
     for estimate in better:
         np.testing.assert_array_equal(estimate.poses[0][~free], first[estimate.frame, ~free])
