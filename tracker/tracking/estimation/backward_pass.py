@@ -8,8 +8,8 @@ interval is selected (`pose_paths`).
 Between two keyframes of a person, all frames are tracked backward from the second one. The path through both passes
 changes from one to the other where they agree best. Their disagreement on a frame is its *seam*.
 
-Poses that were stored before stay candidates of all paths that a run selects anew. A pose is then replaced by one that
-the frames and the motion around support more.
+Stored poses by the same settings stay candidates of the path, also beyond the last keyframe. A run then replaces a pose
+only where frames and motion speak for the new pose.
 """
 
 from collections.abc import Callable, Iterator, Sequence
