@@ -7,9 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tracker.formats.model_toml import format_model
 from tracker.geometry.arrays import Array
 from tracker.session.session import Person
 from tracker.store.annotation_store import AnnotationStore
+from tracker.store.calibration_log import present_revision, revisions_of_poses
 from tracker.store.records import Alternative, PoseChange, PoseRecord
 from tracker.tracking.confidence import PoseQuality
 from tracker.tracking.estimate import PoseEstimate
@@ -97,9 +99,10 @@ def poses_to_replace(
     store: AnnotationStore, people: Sequence[Person], frames: Collection[int], tracked: Collection[int],
     settings: TrackerSettings,
 ) -> dict[int, dict[int, Array]]:  # fmt: skip
-    """Return the stored poses that a run replaces, by frame and index of the person.
+    """Return the stored poses that a run of the same kind replaces, by frame and index of the person.
 
-    Poses by other settings are left out: a run with new ones is compared with them, and owes nothing to them.
+    Poses by other settings, of other sizes or of another calibration are left out: a run with new ones owes nothing to
+    them.
 
     Args:
         store: annotations of the session.
@@ -110,11 +113,15 @@ def poses_to_replace(
     """
     found: dict[int, dict[int, Array]] = {}
     same = json.loads(json.dumps(settings_record(settings)))
+    calibration = present_revision(store)
     for index in tracked:
-        n_values = len(people[index].model.value_names)
-        for frame, record in store.poses(people[index].name, range(min(frames), max(frames) + 1)).items():
-            is_same = all(record.settings.get(name) == value for name, value in same.items())
-            if frame in frames and not record.keyframe and len(record.values) == n_values and is_same:
+        name, text = people[index].name, format_model(people[index].model)
+        bodies = {body.id for body in store.model_revisions(name) if body.toml == text}
+        calibrations = revisions_of_poses(store, name)
+        for frame, record in store.poses(name, range(min(frames), max(frames) + 1)).items():
+            is_same = all(record.settings.get(key) == value for key, value in same.items())
+            is_same &= record.model_revision in bodies and calibrations.get(frame, calibration) == calibration
+            if frame in frames and not record.keyframe and is_same:
                 found.setdefault(frame, {})[index] = record.values
     return found
 
