@@ -110,7 +110,7 @@ class TaperedSuperquadric:
         """
         eta = np.linspace(-np.pi / 2, np.pi / 2, n_rings + 2)[1:-1]
         omega = np.arange(n_sectors, dtype=np.float64) * (2 * np.pi / n_sectors) + np.pi / n_sectors
-        return self.surface(*np.meshgrid(eta, omega, indexing="ij"))
+        return self.surface(*np.meshgrid(eta, omega, indexing="ij", sparse=True))
 
     def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
         """Return a closed surface in the shape's frame."""
