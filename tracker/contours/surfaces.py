@@ -101,20 +101,6 @@ def resized_surfaces(
     return out
 
 
-def stretched_surfaces(models: tuple[BodyModel, ...], similar: Surfaces) -> Surfaces:
-    """Return the arrays of the shapes of some bodies, which in unit coordinates are those of the same bodies at other
-    sizes; quicker than `resized_surfaces`."""
-    shapes = [s for m in models for s in m.shapes]
-    half_axes, (points, normals) = np.array([s.half_axes for s in shapes]), _grids(shapes)
-    return similar._replace(
-        half_axes=half_axes,
-        centers=np.concatenate([m.centers_part for m in models]),
-        radii=np.linalg.norm(points, axis=1).max(axis=-1),
-        normals=np.asarray(normals * half_axes[..., None], np.float32),
-        offsets=np.sum(points * normals, axis=1).astype(np.float32),
-    )
-
-
 def _surfaces(
     models: tuple[BodyModel, ...], shapes: Sequence[Shape], centers: Array, profiles: Sequence[Profile | None]
 ) -> Surfaces:

@@ -25,7 +25,7 @@ from tracker.compute.float32 import FAR
 from tracker.compute.jit import njit
 from tracker.contours import occluding_contours
 from tracker.contours.static_cache import StaticContours, static_contours_buffer
-from tracker.contours.surfaces import Surfaces, resized_surfaces, stretched_surfaces, surfaces_of
+from tracker.contours.surfaces import Surfaces, resized_surfaces, surfaces_of
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_arrays import (
     ContourMotion,
@@ -202,9 +202,6 @@ class ContourResiduals:
     def resized(self, model: BodyModel) -> Surfaces:
         """Return the shapes of all bodies, the person's at other sizes, for `piece_sums`."""
         models = tuple(model if i == self._person else m for i, m in enumerate(self._models))
-        forms, own_forms = ([(p.taper, p.exponents) for p in m.parts] for m in (model, self._model))
-        if forms == own_forms:
-            return stretched_surfaces(models, self._term.surfaces)
         return resized_surfaces(models, self._term.surfaces)
 
     def with_information(self, factor: float) -> "ContourResiduals":
