@@ -241,7 +241,7 @@ class _Problem:
         ]
         return self._free, np.array(own).reshape(equations.own_gradients.shape)
 
-    def linearize(self, state: _State) -> ArrowEquations:
+    def linearize(self, state: _State, below: float = np.inf) -> ArrowEquations:
         """See `BundleProblem`."""
         sizes, poses = state
         body, by_sizes = self._parameters.body(sizes), self._parameters.derivatives(sizes)

@@ -147,21 +147,25 @@ class RigProblem:
             out[: model.n_dofs] = ~pressed_against_limit(model, pose, gradient[: model.n_dofs])
         return shared, own
 
-    def linearize(self, state: RigState) -> ArrowEquations:
+    def linearize(self, state: RigState, below: float = np.inf) -> ArrowEquations:
         """See `BundleProblem`."""
-        resized = [self._resized(i, sizes) for i, sizes in enumerate(state.sizes)]
+        resized, groups = [self._resized(i, sizes) for i, sizes in enumerate(state.sizes)], range(len(self._seen))
+        residuals = map_parallel(lambda g: self._residuals(g, state, resized[self._seen[g].person]), groups)
+        priors = self._shared_priors(state)
+        cost = sum(r.cost for r in residuals)
+        cost += sum(0.5 * float(np.sum((deviations / sigmas) ** 2)) for _, deviations, sigmas in priors)
+        out = ArrowEquations.zeros(self.n_shared, len(self._seen), self._n_own)._replace(cost=cost)
+        if cost >= below:
+            return out
         found = map_parallel(
-            lambda group: self._linearize_group(group, state, resized[self._seen[group].person]), range(len(self._seen))
+            lambda g: self._summed(g, state, resized[self._seen[g].person], residuals[g]), groups
         )
-        out = ArrowEquations.zeros(self.n_shared, len(self._seen), self._n_own)
-        cost = sum(f.cost for f in found)
         for group, (seen, own) in enumerate(zip(self._seen, found, strict=True)):
             self._enter(out, group, seen.person, own)
-        for at, deviations, sigmas in self._shared_priors(state):
-            cost += 0.5 * float(np.sum((deviations / sigmas) ** 2))
+        for at, deviations, sigmas in priors:
             out.gradient[at] += deviations / sigmas**2
             out.hessian[at, at] += np.diag(1 / sigmas**2)
-        return out._replace(cost=cost)
+        return out
 
     def _shared_priors(self, state: RigState) -> list[tuple[slice, Array, Array]]:
         rows = [(slice(0, self._sigmas.size), state.corrections.ravel(), self._sigmas.ravel())]
@@ -186,34 +190,41 @@ class RigProblem:
         rest = np.arange(m, self._n_own)
         out.own_hessians[group, rest, rest] = 1.0
 
-    def _linearize_group(self, group: int, state: RigState, resized: "_Resized") -> NormalEquations:
-        """Return the normal equations of a person on a frame: by all corrections, the sizes, and the pose."""
-        body, by_sizes, surfaces, half_axes = resized
-        seen, pose = self._seen[group], state.poses[group]
-        kinematics = body.kinematics(pose)
+    def _residuals(self, group: int, state: RigState, resized: "_Resized") -> "_GroupResiduals":
+        """Return the residuals of a person on a frame."""
+        body, seen, pose = resized.body, self._seen[group], state.poses[group]
+        kinematics, views = body.kinematics(pose), []
         prior = self._priors[seen.person].linearize(body, pose, kinematics)
-        n_sizes, n_cameras = by_sizes.joints.shape[-1], self._sigmas.size
+        cost, moments = prior.cost, dict[float, Kinematics]()
+        for camera, evidence, residuals in self._views[group]:
+            delay_s = float(seen.ahead_s[camera] + later_s(state.corrections[camera], seen.time_s))
+            if delay_s not in moments:
+                then = body.kinematics(body.retract(pose, seen.path.step(delay_s))) if delay_s else kinematics
+                moments[delay_s] = then
+            shown_by = corrected(evidence.camera, state.corrections[camera])
+            own_cost, pieces = residuals.piece_sums(moments[delay_s], resized.surfaces, shown_by)
+            cost += own_cost
+            views.append(_SeenPieces(camera, shown_by, delay_s, pieces))
+        return _GroupResiduals(cost, prior, moments, views)
+
+    def _summed(self, group: int, state: RigState, resized: "_Resized", found: "_GroupResiduals") -> NormalEquations:
+        """Return the normal equations of a person on a frame: by all corrections, the sizes, and the pose."""
+        body, by_sizes, _, half_axes = resized
+        seen, n_sizes, n_cameras = self._seen[group], by_sizes.joints.shape[-1], self._sigmas.size
         sums = GroupSums.zeros(n_cameras, n_sizes + body.n_dofs, len(body.parts))
-        cost = prior.cost
-        for delay, views in itertools.groupby(
-            self._views[group],
-            lambda v: float(seen.ahead_s[v.camera] + later_s(state.corrections[v.camera], seen.time_s)),
-        ):
-            then = body.kinematics(body.retract(pose, seen.path.step(delay))) if delay else kinematics
-            J = part_motions(body, then, by_sizes)
-            moving, of_views = J[:, :, n_sizes:] @ seen.path.velocity(delay), PartSums.zeros(len(body.parts))
-            for view in views:
-                correction = state.corrections[view.camera]
-                camera = corrected(view.evidence.camera, correction)
-                own_cost, pieces = view.residuals.piece_sums(then, surfaces, camera)
-                cost += own_cost
-                of_view = sums_of_pieces(pieces, body, then, camera, half_axes)
-                sums.add_camera(view.camera, of_view, camera, correction, moving, seen.time_s)
-                of_views.add(of_view)
+        for delay_s, kinematics in found.moments.items():
+            J = part_motions(body, kinematics, by_sizes)
+            moving, of_views = J[:, :, n_sizes:] @ seen.path.velocity(delay_s), PartSums.zeros(len(body.parts))
+            for view in found.views:
+                if view.delay_s == delay_s:
+                    of_view = sums_of_pieces(view.pieces, body, kinematics, view.shown_by, half_axes)
+                    correction = state.corrections[view.camera]
+                    sums.add_camera(view.camera, of_view, view.shown_by, correction, moving, seen.time_s)
+                    of_views.add(of_view)
             sums.add_body(of_views, J)
-        out = sums.equations(cost)
-        out.gradient[n_cameras + n_sizes :] += prior.gradient
-        out.hessian[n_cameras + n_sizes :, n_cameras + n_sizes :] += prior.hessian
+        out = sums.equations(found.cost)
+        out.gradient[n_cameras + n_sizes :] += found.prior.gradient
+        out.hessian[n_cameras + n_sizes :, n_cameras + n_sizes :] += found.prior.hessian
         return out
 
     def _resized(self, person: int, sizes: Array) -> "_Resized":
@@ -245,6 +256,29 @@ class _Resized(NamedTuple):
     """Its shapes, and those of other people; None where no view shows it."""
     half_axes: Array
     """Of each shape, (n_parts, 3), metres."""
+
+
+class _SeenPieces(NamedTuple):
+    """Residuals of a person in one view."""
+
+    camera: int
+    shown_by: Camera
+    """With its correction."""
+    delay_s: float
+    """Time by which the picture was taken later than the frame, seconds."""
+    pieces: PieceSums
+
+
+class _GroupResiduals(NamedTuple):
+    """Residuals of a person on a frame."""
+
+    cost: float
+    """With that of the prior."""
+    prior: NormalEquations
+    """Of the pose."""
+    moments: dict[float, Kinematics]
+    """The person at each time at which a picture was taken, by how much later than the frame it is, seconds."""
+    views: list[_SeenPieces]
 
 
 class PartSums(NamedTuple):
