@@ -123,7 +123,7 @@ def decoded(name: str, at: Path, folder: Path) -> Footage:
 
 
 def rendered(person: str, folder: Path, played: tuple[str, int] | None = None, n_frames: int = N_FRAMES) -> Footage:
-    """Render a simulated person at a multiple of the usual rate; `played` are scene and seed, else those of `PLAYED`."""
+    """Render a simulated person, who plays a scene by a seed, at a multiple of the usual rate."""
     (scene, seed), at = played or PLAYED[person], folder / f"{person} scene"
     n = int(DENSE_FPS / 30 * (n_frames + 2 * max(SHIFTS)))
     simulate(at, Simulation(scene, n_frames=n, seed=seed, person=person, fps=DENSE_FPS))

@@ -12,9 +12,11 @@ from tracker.compute.jit import njit
 from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import NEAR_PLANE_M
 
-OF_CAMERA, OF_PART = slice(0, 7), slice(1, 10)
-"""Columns of a piece: the logarithm of the focal length, the rotation and the translation of its part in the world, and
-its half-axes. The camera moves by the former, the part by the latter."""
+OF_CAMERA = slice(TIME)
+"""Columns of a piece by which its camera moves: the logarithm of the focal length, then the rotation and the
+translation of its part in the world."""
+OF_PART = slice(1, 10)
+"""Those by which its part moves: the same rotation and translation, and its half-axes."""
 N_COLUMNS, N_PART = OF_PART.stop, OF_PART.stop - OF_PART.start
 """Numbers of all columns, and of those of a part."""
 

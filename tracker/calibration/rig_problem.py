@@ -9,7 +9,6 @@ import itertools
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -157,9 +156,7 @@ class RigProblem:
         out = ArrowEquations.zeros(self.n_shared, len(self._seen), self._n_own)._replace(cost=cost)
         if cost >= below:
             return out
-        found = map_parallel(
-            lambda g: self._summed(g, state, resized[self._seen[g].person], residuals[g]), groups
-        )
+        found = map_parallel(lambda g: self._summed(g, state, resized[self._seen[g].person], residuals[g]), groups)
         for group, (seen, own) in enumerate(zip(self._seen, found, strict=True)):
             self._enter(out, group, seen.person, own)
         for at, deviations, sigmas in priors:

@@ -109,7 +109,7 @@ class BundleProblem(Protocol[S]):
     """A problem for `solve_bundle`; its state holds all unknowns."""
 
     def linearize(self, state: S, below: float = ..., /) -> ArrowEquations:
-        """Return the normal equations at a state. Where the cost is not below a bound, no more than it is asked for."""
+        """Return the normal equations at a state; where the cost is not below a bound, the rest of them may be 0."""
         ...
 
     def moved(self, state: S, shared: Array, own: Array, /) -> S:

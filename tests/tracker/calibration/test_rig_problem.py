@@ -92,9 +92,7 @@ def test_the_gradient_by_a_correction_is_the_slope_of_the_cost(column):
 def test_where_the_cost_is_not_low_enough_it_is_all_that_is_found():
     frames = viewed({}, [0])
     parameters = [SizeParameters(frames[0].bodies[0].model)]
-    state = RigState(
-        np.zeros((4, N_CORRECTIONS)), (np.zeros(len(parameters[0].names)),), (frames[0].bodies[0].values,)
-    )
+    state = RigState(np.zeros((4, N_CORRECTIONS)), (np.zeros(len(parameters[0].names)),), (frames[0].bodies[0].values,))
     problem = RigProblem(seen_people(frames), parameters, prior_sigmas(30.0), state.corrections)
     whole = problem.linearize(state)
     dear, cheap = (problem.linearize(state, below) for below in (whole.cost, whole.cost + 1e-6))
