@@ -108,14 +108,15 @@ def sum_of_camera(
     own = _camera_motions(T_camera_world, turn)
     n, first = OF_CAMERA.stop, OF_PART.start
     for p in range(len(M)):
-        rows = own @ M[p, :n]
-        hessian[:TIME, :TIME] += rows[:, :n] @ own.T
-        gradient[:TIME] += own @ b[p, :n]
-        moved = M[p, first:, first:] @ moving[p]
+        rows, of_part = own @ np.ascontiguousarray(M[p, :n]), np.ascontiguousarray(M[p, first:, first:])
+        to_part, velocity = np.ascontiguousarray(rows[:, first:]), np.ascontiguousarray(moving[p])
+        hessian[:TIME, :TIME] += np.ascontiguousarray(rows[:, :n]) @ own.T
+        gradient[:TIME] += own @ np.ascontiguousarray(b[p, :n])
+        moved = of_part @ velocity
         parts = by_parts[:, p * N_PART : (p + 1) * N_PART]
-        parts[:TIME], parts[TIME], parts[DRIFT] = rows[:, first:], moved, time_s * moved
-        by_time = rows[:, first:] @ moving[p]
-        slope, curvature = b[p, first:] @ moving[p], moved @ moving[p]
+        parts[:TIME], parts[TIME], parts[DRIFT] = to_part, moved, time_s * moved
+        by_time = to_part @ velocity
+        slope, curvature = np.ascontiguousarray(b[p, first:]) @ velocity, moved @ velocity
         for i, share in ((TIME, 1.0), (DRIFT, time_s)):
             gradient[i] += share * slope
             hessian[i, :TIME] += share * by_time
