@@ -239,6 +239,7 @@ def _send_back(arguments: ExportArguments) -> None:
         "changed": [str(path) for path in done.changed],
         "frames": list(done.frames),
         "exchanged": [{"frame": frame, "person": person, "view": view} for frame, person, view in done.exchanged],
+        "farthest_mm": 1000 * done.farthest_m,
     }
     if arguments.json:
         print(format_json(found))
@@ -253,6 +254,8 @@ def _send_back(arguments: ExportArguments) -> None:
         of_sides = _count(len({frame for frame, _, _ in done.exchanged}), "frame")
         said.append(f"left and right were exchanged in {_count(len(done.exchanged), 'view')} of {of_sides}")
     print(f"{', '.join(said)}, in {files}; all else is as imported")
+    if farthest_mm := round(1000 * done.farthest_m, 1):
+        print(f"points are up to {farthest_mm} mm from their places: the file has constant lengths")
 
 
 def _count(n: int, noun: str) -> str:

@@ -1,15 +1,19 @@
-"""Draw imported points over the pictures, and limbs of them that are off."""
+"""Draw imported points over the pictures, limbs of them that are off, and the outlines of masks to import."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import pairwise
 
+import cv2
 import numpy as np
 
+from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
 from tracker.judging.judge import DOUBTED, Judgement
 from tracker.judging.verdicts import LIMBS
 from tracker.observations.observed import ObservationSet
+from tracker.observations.plans import MaskPlan
 
 _CROSS = 0.004
 """Half the size of the cross of a point, as a share of the longer side of the picture."""
@@ -35,6 +39,25 @@ def observed_segments(found: ObservationSet, camera: Camera, view: int, frame: i
         px = camera.pinhole.project(joints.reshape(-1, 3)).reshape(*joints.shape[:2], 2)
     columns = {names[0]: i for i, names in enumerate(found.counterparts.values()) if len(names) == 1}
     return _joined([{n: own[i] for n, i in columns.items()} for own in px], list(px), camera)
+
+
+def mask_outlines(plan: MaskPlan, camera: Camera, picture: int) -> FloatArray:
+    """Return the outlines of people in a mask that is previewed, (N, 4), undistorted px; none where it cannot be read.
+
+    Args:
+        plan: the import.
+        camera: of the view.
+        picture: number of the picture in the footage.
+    """
+    places = np.flatnonzero(plan.pictures.get(camera.name, np.empty(0)) == picture)
+    lines = [np.empty((0, 4))]
+    if len(places):
+        with suppress(TrackerError):
+            mask = plan.mask(camera.name, int(places[0]), camera.size)
+            outlines, _ = cv2.findContours((mask > 0).astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
+            ends = [camera.undistort_points(outline[:, 0].astype(np.float64)) for outline in outlines]
+            lines += [np.hstack([px, np.roll(px, -1, axis=0)]) for px in ends]
+    return np.concatenate(lines).astype(np.float32)
 
 
 def limbs_off(judgements: Sequence[Judgement], camera: Camera, frame: int) -> FloatArray:

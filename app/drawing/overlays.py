@@ -9,7 +9,7 @@ import numpy as np
 
 from app.drawing.facing import facing_arrow
 from app.drawing.joint_handles import SIDES, Side, dragged_place, side_of
-from app.drawing.observed_points import limbs_off, observed_segments
+from app.drawing.observed_points import limbs_off, mask_outlines, observed_segments
 from app.drawing.overlay_colors import KIND_COLORS
 from app.drawing.seen_bodies import at_one_time, bodies_in, picture_times
 from app.state.calibration import CorrectedFrame
@@ -25,6 +25,7 @@ from tracker.fitting.retarget import retarget_pose
 from tracker.geometry.arrays import Array, FloatArray, IntArray, Mask
 from tracker.geometry.cameras import Camera, epipolar_segment
 from tracker.images.edge_segments import accept_segments
+from tracker.observations.plans import MaskPlan
 from tracker.session.session import Person, Session
 from tracker.tracking.contour.fit_steps import residual_segments
 
@@ -317,9 +318,15 @@ def _segments(bodies: Sequence[PosedBody], view: ViewEvidence, index: int, shown
 
 
 def _imported(session: Session, state: State, view: View, index: int) -> list[Path]:
-    """Draw the imported points of the shown frame, and above them the limbs that are off."""
-    found, camera = state.observations, session.cameras[index].camera
-    if found.drawn is None or "imported" not in view.layers:
+    """Draw the imported points of the shown frame, and above them the limbs that are off; or masks to import."""
+    found, source = state.observations, session.cameras[index]
+    camera = source.camera
+    if "imported" not in view.layers:
+        return []
+    if isinstance(found.plan, MaskPlan):
+        outlines = mask_outlines(found.plan, camera, state.frame + source.offset)
+        return [Path(index, 0, "imported", KIND_COLORS["imported"], outlines)]
+    if found.drawn is None:
         return []
     lines: tuple[tuple[PathKind, FloatArray], ...] = (
         ("imported", observed_segments(found.drawn, camera, index, state.frame)),

@@ -148,7 +148,7 @@ def recent_tables(state_folder: Path) -> list[dict[str, Any]]:
 
 
 def refusal(host_is_private: bool, has_token: bool) -> str | None:
-    """Return why the page of a server may not choose sessions; None if it may.
+    """Return why the page of a server may not name files of this machine; None if it may.
 
     Args:
         host_is_private: whether the server listens on loopback and under no other name.
@@ -158,6 +158,6 @@ def refusal(host_is_private: bool, has_token: bool) -> str | None:
         return None
     found = "one without a token" if host_is_private else "one that other machines can reach"
     return (
-        f"expected a page that only its user can open, found {found}; open other sessions on the command line, "
-        "with 'quadrille SESSION'"
+        f"expected a page that only its user can open, found {found}; use the command line: 'quadrille SESSION' opens "
+        "another session, 'quadrille import' brings observations"
     )

@@ -47,7 +47,7 @@ class ObservationsState:
 
     @property
     def drawn(self) -> ObservationSet | None:
-        """The set that the views draw: the previewed one, else the shown one; masks are not drawn."""
+        """The set that the views draw: the previewed one, else the shown one; beside masks to import, none is drawn."""
         return self.plan.observations if isinstance(self.plan, ImportPlan) else self.shown
 
     @property

@@ -163,7 +163,7 @@ function describe(plan) {
     const what = plan.are_masks ? "people" : "points";
     const frames = view.frames ? `${what} in frames ${view.frames[0]} to ${view.frames[1]}` : `no ${what}`;
     const more = [view.share === null ? "" : `${(100 * view.share).toFixed(1)} % of the picture`, view.most_people > 1 ? `up to ${view.most_people} people` : "", view.confidence === null ? "" : `median confidence ${view.confidence.toFixed(2)}`];
-    const words = view.place === null ? ["no files"] : [`${count(view.rows)} rows`, frames, ...more];
+    const words = view.place === null ? ["no files"] : [`${count(view.rows)} ${plan.are_masks ? "masks" : "rows"}`, frames, ...more];
     list.append(Object.assign(document.createElement("li"), { textContent: `${view.view}: ${words.filter(Boolean).join(", ")}`, title: view.place ?? "" }));
   }
   const points = line(`${matched.length} points as ${plan.skeleton} names them${others.length ? `; without a joint of the body: ${others.join(", ")}` : ""}.`);
@@ -174,7 +174,7 @@ function describe(plan) {
     ...(plan.are_masks ? [] : [points]),
     ...plan.notes.map((text) => line(`Note: ${text}.`)),
     ...plan.problems.map((text) => line(`${capital(text.replace(/\.$/, ""))}.`, "is-failed")),
-    line(plan.problems.length ? "Nothing can be imported." : plan.are_masks ? "The cameras will use these masks as silhouettes. Nothing was stored yet." : "The views show these points. Nothing was stored yet."),
+    line(plan.problems.length ? "Nothing can be imported." : plan.are_masks ? "The views show their outlines; the cameras will use them as silhouettes. Nothing was stored yet." : "The views show these points. Nothing was stored yet."),
   ];
 }
 

@@ -181,7 +181,7 @@ def _rows_of(
     for found in final:
         for change in tracked_changes([found], stored, [person], subjects.keyframes, settings):
             kept.add(change, found.covariances[person], found.qualities[person])
-    features = kept.run_features(model, kept.smoothed(subjects, person, footage.fps))
+    features = kept.run_features(model, kept.smoothed(subjects, person, footage.fps)[1])
     joints = {int(f): dict(zip(truth.names, p, strict=True)) for f, p in zip(truth.frames, truth.points, strict=True)}
     for found in final:
         if found.qualities[person] is not None and found.frame in joints:

@@ -197,10 +197,10 @@ def most_doubtful(at: Annotator) -> Action | None:
     return out
 
 
-def followed(at: Annotator, choose: Callable[[Annotator], Action | None], goes_on: bool) -> None:
-    """Correct what is chosen until the recording is good, or until nothing is chosen."""
+def followed(at: Annotator, choose: Callable[[Annotator], Action | None], most: int, goes_on: bool) -> None:
+    """Correct what is chosen until the recording is good, until nothing is chosen, or at most so often."""
     at.measure()
-    while at.actions < MAX_ACTIONS and (goes_on or not at.is_good):
+    while at.actions < most and (goes_on or not at.is_good):
         action = choose(at)
         if action is None:
             break
@@ -230,7 +230,7 @@ def cells(curve: Sequence[Measured], target_mm: float, end: str = "") -> list[st
     return [str(good[0]) if good else f"> {curve[-1].actions}", *of_shown, end]
 
 
-def rows_of(folder: Path, references: list[Path], seed: int) -> dict[str, list[str]]:
+def rows_of(folder: Path, references: list[Path], seed: int, most: int) -> dict[str, list[str]]:
     """Annotate copies of a session in all ways."""
     out, (name, *plain) = {}, folder.name.replace("_", " ").split("@")
     name += ", without audit" * bool(plain)
@@ -243,7 +243,7 @@ def rows_of(folder: Path, references: list[Path], seed: int) -> dict[str, list[s
             return Annotator(at, references, seed, bool(plain))
 
         at = begin("next")
-        followed(at, proposed, True)
+        followed(at, proposed, most, True)
         found, last = at.proposals(), at.curve[-1]
         low, high = found.interval_mm
         end = f"{last.actions}, {last.mean_mm:.1f}; expected {found.error_mm:.1f} ({low:.1f} to {high:.1f})"
@@ -251,20 +251,21 @@ def rows_of(folder: Path, references: list[Path], seed: int) -> dict[str, list[s
         print(f"{name}: next: {at.curve}", flush=True)
         start = at.curve[0]
         at = begin("doubts")
-        followed(at, most_doubtful, False)
+        followed(at, most_doubtful, most, False)
         end = f"{at.curve[-1].actions}, {at.curve[-1].mean_mm:.1f}"
         out[f"{name}: doubts"] = cells(at.curve, at.target_mm, end)
         print(f"{name}: doubts: {at.curve}", flush=True)
         curve = [start]
-        for n in EQUAL:
+        for n in EQUAL if most == MAX_ACTIONS else ():
             if curve[-1].mean_mm <= at.target_mm and curve[-1].n_lost == 0:
                 break
             at = begin(f"equal-{n}")
             spread(at, n)
             curve += at.curve
         end = f"{curve[-1].actions}, {curve[-1].mean_mm:.1f}"
-        out[f"{name}: equal distances"] = cells(curve, at.target_mm, end)
-        print(f"{name}: equal distances: {curve}", flush=True)
+        if most == MAX_ACTIONS:
+            out[f"{name}: equal distances"] = cells(curve, at.target_mm, end)
+            print(f"{name}: equal distances: {curve}", flush=True)
     return out
 
 
@@ -274,13 +275,15 @@ def main() -> None:
     parser.add_argument("sessions", type=Path, nargs="+")
     parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
     parser.add_argument("--scenes", type=Path, help="folder of the simulated recordings")
+    parser.add_argument("--most", type=int, default=MAX_ACTIONS, help="actions; with fewer, no equal distances")
+    parser.add_argument("--seed", type=int, default=0, help="of the hand that corrects the first session")
     add_write_option(parser)
     given = parser.parse_args()
     check_places(given.write, TABLES)
     rows: dict[str, list[str]] = {}
-    for seed, folder in enumerate(given.sessions):
+    for seed, folder in enumerate(given.sessions, given.seed):
         references = references_of(folder.name, given.data, given.scenes)
-        rows |= rows_of(folder, references, seed)
+        rows |= rows_of(folder, references, seed, given.most)
     show(given.write, TABLES[0], CONDITIONS, table(HEADS, rows, "recording"))
 
 

@@ -7,6 +7,7 @@ Imports `geometry` and `body`; knows no session. Callers use the modules: `anipo
 __all__ = [
     "anipose",
     "bvh",
+    "bvh_patching",
     "bvh_reading",
     "c3d",
     "camera_section",

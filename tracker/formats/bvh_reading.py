@@ -1,6 +1,6 @@
-"""Read the joint centres of a BVH file (Biovision hierarchy): its skeleton with the rotations of each frame."""
+"""Read a BVH file (Biovision hierarchy): a skeleton, and its rotations in each frame."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ _KIND = TextKind("BVH file", TABLE_BYTES, FormatError, "export it again")
 _CHANNELS = tuple(f"{axis}{what}" for what in ("position", "rotation") for axis in "XYZ")
 
 
-class _Joint(NamedTuple):
+class BvhJoint(NamedTuple):
     """A joint of the hierarchy, or the end of a chain."""
 
     name: str
@@ -26,6 +26,28 @@ class _Joint(NamedTuple):
     offset: tuple[float, ...]
     """From its parent, (3,), units of the file."""
     channels: tuple[str, ...]
+
+
+class BvhMotion(NamedTuple):
+    """A skeleton that moves."""
+
+    joints: list[BvhJoint]
+    """In the order of the file: parents first. Offsets in metres."""
+    values: Array
+    """Of all channels, (n_frames, n_channels), metres and radians."""
+    units: Array
+    """Metres or radians per unit of each channel in the file, (n_channels,)."""
+    rate: float
+    """Frames per second."""
+
+
+class BvhPose(NamedTuple):
+    """Where a skeleton is, in each of n frames."""
+
+    positions: Array
+    """Of the joints, (n, n_joints, 3), metres."""
+    axes: Array
+    """Of the channels: along which they move or about which they turn, (n, n_channels, 3), in the axes of the file."""
 
 
 def read_bvh(path: Path, unit_m: float | None) -> MarkerTable:
@@ -38,6 +60,14 @@ def read_bvh(path: Path, unit_m: float | None) -> MarkerTable:
     Raises:
         FormatError: the file is malformed, or the unit is not given.
     """
+    motion = read_bvh_motion(path, unit_m)
+    names, frames = tuple(j.name for j in motion.joints), np.arange(len(motion.values))
+    points = posed(motion.joints, motion.values).positions
+    return MarkerTable(names, frames, frames / motion.rate, points, motion.rate)
+
+
+def read_bvh_motion(path: Path, unit_m: float | None) -> BvhMotion:
+    """Read a skeleton and its motion; see `read_bvh`."""
     where = f"BVH file {path}"
     lines = ((n, line.split()) for n, line in enumerate(read_lines(path, _KIND), 1))
     words = ((n, some) for n, some in lines if some)
@@ -45,26 +75,26 @@ def read_bvh(path: Path, unit_m: float | None) -> MarkerTable:
     n_promised, seconds = _read_motion_head(words, where)
     if unit_m is None:
         raise FormatError(f"{where}: expected the unit of its lengths, which BVH never states", Remedy("say_unit"))
-    n_channels = sum(len(j.channels) for j in joints)
-    rows = NumberRows(where, " ", 1 + n_channels, n_required=1 + n_channels)
+    units = np.array([unit_m if c.endswith("position") else np.radians(1) for j in joints for c in j.channels])
+    rows = NumberRows(where, " ", 1 + len(units), n_required=1 + len(units))
     for k, (line, some) in enumerate(words):
         rows.add(" ".join([str(k), *some]), line)
     frames, values = rows.table(MAX_NUMBER)
     if len(frames) < n_promised:
         raise FormatError(f"{where}: expected {n_promised} frames, found {len(frames)}; copy or export it again")
     check_size((len(frames), len(joints), 12), where)
-    points = unit_m * _positions(joints, values)
     rate = float(check(1 / seconds, FrameRate, f"{where}, Frame Time", FormatError))
-    return MarkerTable(tuple(j.name for j in joints), frames, frames / rate, points, rate)
+    joints = [j._replace(offset=tuple(unit_m * x for x in j.offset)) for j in joints]
+    return BvhMotion(joints, values * units, units, rate)
 
 
-def _read_hierarchy(words: Iterator[tuple[int, list[str]]], where: str) -> list[_Joint]:
+def _read_hierarchy(words: Iterator[tuple[int, list[str]]], where: str) -> list[BvhJoint]:
     """Return the joints in the order of the file, from HIERARCHY to MOTION.
 
     Raises:
         FormatError: a line is not as expected; the message has its number.
     """
-    joints: list[_Joint] = []
+    joints: list[BvhJoint] = []
     open_joints: list[int] = []
     named = ("", "")
     for n, some in words:
@@ -77,7 +107,7 @@ def _read_hierarchy(words: Iterator[tuple[int, list[str]]], where: str) -> list[
         elif key == "END" and open_joints:
             named = (key, f"{joints[open_joints[-1]].name}_end")
         elif key == "{" and named[0] and len(joints) < MAX_NAMES:
-            joints.append(_Joint(named[1], open_joints[-1] if open_joints else -1, (), ()))
+            joints.append(BvhJoint(named[1], open_joints[-1] if open_joints else -1, (), ()))
             open_joints.append(len(joints) - 1)
             named = ("", "")
         elif key == "OFFSET" and open_joints:
@@ -92,7 +122,7 @@ def _read_hierarchy(words: Iterator[tuple[int, list[str]]], where: str) -> list[
     raise FormatError(f"{where}: expected HIERARCHY, joints and MOTION, found the end of the file; export it again")
 
 
-def _check_names(joints: list[_Joint], where: str) -> None:
+def _check_names(joints: list[BvhJoint], where: str) -> None:
     names = [j.name for j in joints]
     if len(set(names)) < len(names):
         twice = next(n for n in names if names.count(n) > 1)
@@ -135,26 +165,27 @@ def _read_motion_head(words: Iterator[tuple[int, list[str]]], where: str) -> tup
     return n_frames, seconds
 
 
-def _positions(joints: list[_Joint], values: Array) -> Array:
-    """Return the positions of the joints, (n_frames, n_joints, 3), in units of the file."""
-    n_frames = len(values)
-    R, t = np.empty((len(joints), n_frames, 3, 3)), np.empty((len(joints), n_frames, 3))
+def posed(joints: Sequence[BvhJoint], values: Array) -> BvhPose:
+    """Return where a skeleton is with some values of its channels, (n, n_channels), metres and radians."""
+    n = len(values)
+    R, t = np.empty((len(joints), n, 3, 3)), np.empty((len(joints), n, 3))
+    axes = np.empty((n, values.shape[1], 3))
     column = 0
     for i, joint in enumerate(joints):
-        own, at = np.broadcast_to(np.eye(3), (n_frames, 3, 3)), np.tile(np.array(joint.offset), (n_frames, 1))
+        above = np.broadcast_to(np.eye(3), (n, 3, 3)) if joint.parent < 0 else R[joint.parent]
+        own, at = above, np.tile(np.array(joint.offset), (n, 1))
         for channel in joint.channels:
             axis, cell = "XYZ".index(channel[0]), values[:, column]
-            column += 1
             if channel.endswith("position"):
                 at[:, axis] = cell  # positions replace the offset, as common readers have it
+                axes[:, column] = above[:, :, axis]
             else:
-                own = own @ _turns(axis, np.radians(cell))
-        if joint.parent < 0:
-            R[i], t[i] = own, at
-        else:
-            R[i] = R[joint.parent] @ own
-            t[i] = t[joint.parent] + np.einsum("nij,nj->ni", R[joint.parent], at)
-    return np.swapaxes(t, 0, 1)
+                axes[:, column] = own[:, :, axis]
+                own = own @ _turns(axis, cell)
+            column += 1
+        R[i] = own
+        t[i] = np.einsum("nij,nj->ni", above, at) + (0.0 if joint.parent < 0 else t[joint.parent])
+    return BvhPose(np.swapaxes(t, 0, 1), axes)
 
 
 def _turns(axis: int, angles: Array) -> Array:

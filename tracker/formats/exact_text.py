@@ -44,8 +44,7 @@ def replace_cells(text: str, separator: str, n_rows: int, new: Mapping[int, Mapp
         new: numbers by row and column, both from 0; NaN leaves a cell empty.
         digits: fewest decimals.
     """
-    lines = re.split("(\r\n|\n|\r)", text)
-    rows = [i for i in range(0, len(lines), 2) if lines[i].strip()][-n_rows:]
+    lines, rows = _table_rows(text, n_rows)
     for number, cells in new.items():
         row = _cells(lines[rows[number]], separator)
         row += [""] * (max(cells) + 1 - len(row))
@@ -54,6 +53,29 @@ def replace_cells(text: str, separator: str, n_rows: int, new: Mapping[int, Mapp
             row[column] = number_like(value, row[column] if "." in row[column] else usual, digits)
         lines[rows[number]] = separator.join(row)
     return "".join(lines)
+
+
+def replace_words(text: str, n_rows: int, new: Mapping[int, Mapping[int, float]], digits: int) -> str:
+    """Return a table whose columns are apart by blanks with some numbers replaced, as `replace_cells` does.
+
+    A number that is written as before stays byte for byte.
+    """
+    lines, rows = _table_rows(text, n_rows)
+    for number, cells in new.items():
+        parts = re.split(r"(\s+)", lines[rows[number]])
+        words = [i for i, part in enumerate(parts) if part and not part.isspace()]
+        for column, value in cells.items():
+            old = parts[words[column]]
+            written = number_like(value, old, digits)
+            parts[words[column]] = old if float(written) == float(old) else written
+        lines[rows[number]] = "".join(parts)
+    return "".join(lines)
+
+
+def _table_rows(text: str, n_rows: int) -> tuple[list[str], list[int]]:
+    """Return the lines of a text with what ends them between, and which are the last ones that are not blank."""
+    lines = re.split("(\r\n|\n|\r)", text)
+    return lines, [i for i in range(0, len(lines), 2) if lines[i].strip()][-n_rows:]
 
 
 def _cells(line: str, separator: str) -> list[str]:

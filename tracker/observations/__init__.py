@@ -13,7 +13,6 @@ __all__ = [
     "observed",
     "placing",
     "plans",
-    "readers",
     "request",
     "shifts",
     "sides",

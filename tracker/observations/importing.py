@@ -18,7 +18,7 @@ from tracker.observations.readers import MASK_FORMATS, PICTURE_FORMATS, find_fil
 from tracker.observations.request import ImportRequest
 from tracker.observations.sources import FileGroup, Found, match_cameras, no_camera, source_files
 from tracker.observations.space import read_space
-from tracker.observations.stored import save_observations
+from tracker.observations.stored import new_folder, save_observations
 from tracker.observations.stored_masks import store_masks
 from tracker.session.session import Session
 
@@ -33,7 +33,9 @@ def plan_import(session: Session, request: ImportRequest, calibrated: bool = Tru
 
     Raises:
         FormatError: a file is missing or malformed, of an unknown format, or of no camera of the session.
+        SessionError: the session has observations of this name.
     """
+    new_folder(session, request.name)
     format_name, files = find_files(request.paths, request.masks)
     if format_name in MASK_FORMATS:
         return plan_masks(session, request, format_name, files)

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.errors import FormatError, TrackerError
 from tracker.geometry.arrays import IntArray
@@ -68,3 +70,21 @@ class MaskPlan:
     views: tuple[ViewPreview, ...]
     problems: tuple[TrackerError, ...]
     """Contradictions to the session; with any, it cannot be stored."""
+
+    def mask(self, camera: str, i: int, size: tuple[int, int]) -> NDArray[np.uint8]:
+        """Return the mask at a place in the files of a camera as footage has it, (H, W): 0 background, k person k.
+
+        Args:
+            camera: its name.
+            i: the place.
+            size: width and height of the camera, px.
+
+        Raises:
+            TrackerError: the file is damaged, or has changed.
+        """
+        given = dict(self.options).get("picture_size")
+        width, height = map(int, given.split("x")) if given is not None else size
+        mask = self.rules.apply(self.masks[camera].read(i, (width, height)).labels)
+        if (width, height) == size:
+            return mask
+        return np.asarray(cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST_EXACT), dtype=np.uint8)

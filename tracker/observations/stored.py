@@ -98,6 +98,20 @@ def save_observations(session: Session, observations: ObservationSet, files: Map
         write_text_atomic(temporary / _FILE, tomli_w.dumps(_content(observations)))
 
 
+def new_folder(session: Session, name: str) -> Path:
+    """Return the folder of observations that are not stored yet.
+
+    Raises:
+        SessionError: the name is none of a file, or there are observations of this name.
+    """
+    check(name, FileStem, "the name of the observations", SessionError)
+    folder = session.folder / FOLDER / name
+    refuse_links(session.folder, f"{FOLDER}/{name}")
+    if folder.exists():
+        raise SessionError(f"{folder} exists already; choose another name, or remove that folder")
+    return folder
+
+
 @contextmanager
 def appearing_folder(session: Session, name: str) -> Generator[Path, None, None]:
     """Yield a folder beside that of observations of a name, which it becomes at the end of the `with` block.
@@ -105,11 +119,7 @@ def appearing_folder(session: Session, name: str) -> Generator[Path, None, None]
     Raises:
         SessionError: there are observations of this name, or the folder cannot be written.
     """
-    check(name, FileStem, "the name of the observations", SessionError)
-    folder = session.folder / FOLDER / name
-    refuse_links(session.folder, f"{FOLDER}/{name}")
-    if folder.exists():
-        raise SessionError(f"{folder} exists already; choose another name, or remove that folder")
+    folder = new_folder(session, name)
     temporary = folder.with_name(f".{name}.{secrets.token_hex(4)}.tmp")
     try:
         temporary.mkdir(parents=True)

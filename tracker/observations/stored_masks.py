@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 
 import cv2
 import msgspec
-import numpy as np
 import tomli_w
 
 from tracker.errors import SessionError, TrackerError
@@ -119,16 +118,9 @@ def store_masks(session: Session, plan: "MaskPlan") -> Session:
 
 def _write_masks(plan: "MaskPlan", camera: str, size: tuple[int, int], folder: Path) -> None:
     folder.mkdir(parents=True)
-    given = dict(plan.options).get("picture_size")
-    width, height = map(int, given.split("x")) if given is not None else size
-    masks = plan.masks[camera]
     for i, picture in enumerate(plan.pictures[camera].tolist()):
-        if picture < 0:
-            continue
-        mask = plan.rules.apply(masks.read(i, (width, height)).labels)
-        if (width, height) != size:
-            mask = np.asarray(cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST_EXACT), dtype=np.uint8)
-        (folder / f"{picture:06d}.png").write_bytes(cv2.imencode(".png", mask)[1].tobytes())
+        if picture >= 0:
+            (folder / f"{picture:06d}.png").write_bytes(cv2.imencode(".png", plan.mask(camera, i, size))[1].tobytes())
 
 
 def _content(plan: "MaskPlan") -> dict[str, Any]:

@@ -121,9 +121,9 @@ class TrackedRows:
             trust = tracks.trust * repaired.trust
             agreed[frame] = agreement(model, repaired.pose, tracks.poses, trust)
         tracked, self._changes = self._changes, self._with_poses(model, agreed, active)
-        smoothed = self.smoothed(subjects, person, fps) if smooth else [*self._changes.values()]
+        smoothed, by_motion = self.smoothed(subjects, person, fps) if smooth else ([*self._changes.values()], None)
         self._changes = tracked
-        features = self.run_features(model, smoothed)
+        features = self.run_features(model, by_motion)
         out = []
         for change in smoothed:
             assert change.pose is not None
@@ -178,7 +178,7 @@ class TrackedRows:
         if frame in self._other_poses:
             others.append(self._other_poses[frame][1])
             apart = limbs_elsewhere(PosedBody(model, pose.values), PosedBody(model, others[-1]))
-            trust.append(np.array([limb.name not in apart for limb in limbs(model)], dtype=np.float64))
+            trust.append(trust[0] * [limb.name not in apart for limb in limbs(model)])  # alike: the mean of both
         return consensus(model, pose.values, np.array(others), np.array(trust), active).pose
 
     def _seams(self, model: BodyModel, keyframes: Mapping[int, Array]) -> dict[int, Seam]:
@@ -215,48 +215,54 @@ class TrackedRows:
             out[frame] = replace(change, pose=pose)
         return out
 
-    def run_features(self, model: BodyModel, smoothed: Sequence[PoseChange]) -> dict[int, Array]:
+    def run_features(self, model: BodyModel, by_motion: Mapping[int, Array] | None) -> dict[int, Array]:
         """Return the features of all limbs by frame, (n_limbs, 8) each, from which their final statuses follow.
 
         Args:
             model: the body.
-            smoothed: rows from `smoothed`.
+            by_motion: poses from `smoothed`; None if nothing was smoothed.
         """
-        after = {c.frame: c.pose.values for c in smoothed if c.pose is not None and c.frame in self._features}
-        before = {f: pose.values for f in after if (pose := self._changes[f].pose) is not None}
+        known = {f: pose.values for f, c in sorted(self._changes.items()) if (pose := c.pose) is not None}
+        before = {f: pose for f, pose in known.items() if f in self._features and f in (by_motion or known)}
         if not before:
             return {}
+        after = before if by_motion is None else by_motion
         steps = smoothing_steps(model, np.array([*before.values()]), np.array([after[f] for f in before]))
         found = run_features(np.array([self._features[f] for f in before], dtype=np.float64), steps)
         return dict(zip(before, found, strict=True))
 
-    def smoothed(self, subjects: Subjects, person: int, fps: float) -> list[PoseChange]:
-        """Return the rows with smoothed poses, in the order of time.
+    def smoothed(self, subjects: Subjects, person: int, fps: float) -> tuple[list[PoseChange], dict[int, Array]]:
+        """Return the rows with smoothed poses, in the order of time, and the poses with doubted limbs by motion alone.
 
-        Everything else stays. A lost limb, or all of a lost frame if no limb is known to be lost, is not a measurement.
-        Locked degrees of freedom keep their values. The arguments are those of `finished`.
+        Everything else stays. A limb that is lost by the tracks without a view each is not a measurement. One that its
+        own frame alone calls lost is: most of these are right, and the steps to their motion before and after tell more
+        about them. Nothing of a lost frame is a measurement if no limb is known to be lost. Locked degrees of freedom
+        keep their values. The arguments are those of `finished`.
         """
-        model = subjects.models[person]
+        model, active = subjects.models[person], subjects.active_dofs[person]
         keyframes = {f: of_people[person] for f, of_people in subjects.keyframes.items() if person in of_people}
         rows = {f: c.pose for f, c in self._changes.items() if f not in keyframes and c.pose is not None}
         if not rows:
-            return []
+            return [], {}
         at = sorted({*rows, *keyframes})
         n = model.n_dofs
+        measured = np.array([np.ones(n, dtype=bool) if f in keyframes else _measured(model, rows[f]) for f in at])
         track = PoseTrack(
             model,
             np.array(at) / fps,
             np.array([keyframes[f] if f in keyframes else rows[f].values for f in at]),
             np.array([np.zeros((n, n)) if f in keyframes else _unpacked(self._covariances[f], n) for f in at]),
             np.array([f in keyframes for f in at]),
-            np.array([np.ones(n, dtype=bool) if f in keyframes else _trusted(model, rows[f]) for f in at]),
+            np.array([m if f in self.tracks else m | m.any() for f, m in zip(at, measured, strict=True)]),
         )
+        found = smooth_poses(track)
+        by_motion = found if (track.trusted == measured).all() else smooth_poses(replace(track, trusted=measured))
         out = []
-        for frame, pose in zip(at, smooth_poses(track), strict=True):
+        for frame, pose in zip(at, found, strict=True):
             if frame in rows:
-                values = with_locked_dofs(model, pose, rows[frame].values, subjects.active_dofs[person])
+                values = with_locked_dofs(model, pose, rows[frame].values, active)
                 out.append(replace(self._changes[frame], pose=replace(rows[frame], values=values)))
-        return out
+        return out, dict(zip(at, by_motion, strict=True))
 
 
 def resumed_rows(
@@ -293,8 +299,8 @@ def _unpacked(packed: NDArray[np.float32], n: int) -> Array:
     return out
 
 
-def _trusted(model: BodyModel, row: PoseRecord) -> NDArray[np.bool_]:
-    """Return the degrees of freedom that a tracked pose measures, (n_dofs,)."""
+def _measured(model: BodyModel, row: PoseRecord) -> NDArray[np.bool_]:
+    """Return the degrees of freedom that a tracked pose measures without doubt, (n_dofs,)."""
     out = np.ones(model.n_dofs, dtype=bool)
     if row.status != "lost":
         return out

@@ -19,7 +19,13 @@ from tracker.pipeline.keypoint_evidence import read_points, stored_seen_bodies, 
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.smoothing import TrackedRows, resumed_rows
 from tracker.pipeline.track_session import Leg, StoreWriter, TrackSession, outward
-from tracker.pipeline.tracked_changes import StoredPerson, keyframes_of, recorded_method, settings_record
+from tracker.pipeline.tracked_changes import (
+    StoredPerson,
+    keyframes_of,
+    poses_to_replace,
+    recorded_method,
+    settings_record,
+)
 from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Person, Session
 from tracker.store.annotation_store import AnnotationStore
@@ -105,7 +111,8 @@ def stored_run(
     active = [active_dofs(p.model, locked) for p, locked in zip(people, locks, strict=True)]
     others = [i for i in range(len(people)) if i not in plan.people]
     keyframes = keyframes_of(store, people, frozenset(plan.frames), others)
-    subjects = Subjects.of([p.model for p in people], plan.people, active, keyframes)
+    former = poses_to_replace(store, people, frozenset(plan.frames), plan.people, plan.settings)
+    subjects = Subjects.of([p.model for p in people], plan.people, active, keyframes, former)
     floor, left = floor_plane(session.up, session.floor), _frames_left(store, plan)
     legs, done = [], list[int]()
     for whole, rest in zip(plan.legs, left, strict=True):

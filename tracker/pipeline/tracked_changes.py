@@ -1,5 +1,6 @@
 """Convert pose estimates to rows of the store, and stored keyframes to input of a tracker."""
 
+import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, NamedTuple
@@ -89,6 +90,32 @@ def keyframes_of(
             record = store.pose(person.name, row.frame) if is_taken else None
             if record is not None and len(record.values) == len(person.model.value_names):
                 found.setdefault(row.frame, {})[index] = record.values
+    return found
+
+
+def poses_to_replace(
+    store: AnnotationStore, people: Sequence[Person], frames: Collection[int], tracked: Collection[int],
+    settings: TrackerSettings,
+) -> dict[int, dict[int, Array]]:  # fmt: skip
+    """Return the stored poses that a run replaces, by frame and index of the person.
+
+    Poses by other settings are left out: a run with new ones is compared with them, and owes nothing to them.
+
+    Args:
+        store: annotations of the session.
+        people: of the session.
+        frames: of the run.
+        tracked: indices of the people who are tracked.
+        settings: of the run.
+    """
+    found: dict[int, dict[int, Array]] = {}
+    same = json.loads(json.dumps(settings_record(settings)))
+    for index in tracked:
+        n_values = len(people[index].model.value_names)
+        for frame, record in store.poses(people[index].name, range(min(frames), max(frames) + 1)).items():
+            is_same = all(record.settings.get(name) == value for name, value in same.items())
+            if frame in frames and not record.keyframe and len(record.values) == n_values and is_same:
+                found.setdefault(frame, {})[index] = record.values
     return found
 
 

@@ -143,12 +143,12 @@ def _format(summary: dict[str, Any]) -> str:
         if v["place"] is None:
             lines.append(f"  {v['view']}: no files")
             continue
-        what = "people" if summary["are_masks"] else "points"
+        what, rows = ("people", "masks") if summary["are_masks"] else ("points", "rows")
         frames = f"no {what}" if v["frames"] is None else f"{what} in frames {v['frames'][0]} to {v['frames'][1]}"
         share = f", {v['share']:.1%} of the picture" if v["share"] == v["share"] else ""
         people = f", up to {v['most_people']} people" if v["most_people"] > 1 else ""
         confidence = f", median confidence {v['confidence']:.2f}" if v["confidence"] == v["confidence"] else ""
-        lines.append(f"  {v['view']}: {v['place']}, {v['rows']} rows, {frames}{people}{confidence}{share}")
+        lines.append(f"  {v['view']}: {v['place']}, {v['rows']} {rows}, {frames}{people}{confidence}{share}")
     if not summary["are_masks"]:
         lines += _point_lines(summary)
     lines += [f"  note: {note}" for note in summary["notes"]]

@@ -26,7 +26,7 @@ from tracker.tracking import confidence
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
 from tracker.tracking.subjects import Subjects
-from tracker.tracking.tracker import TrackingRun
+from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
 _SAVE_S = 0.5
 """Shortest time between two saves of a running tracker, seconds."""
@@ -188,7 +188,15 @@ class Tracking:
     def _subjects(self, people: tuple[int, ...], frames: Sequence[int]) -> Subjects:
         session_state, models = self._session_state, self._session_state.present
         active = [session_state.active_dofs(person) for person in range(len(models))]
-        return Subjects.of(models, people, active, session_state.saver.keyframes(frames))
+        saver, settings = session_state.saver, self._settings
+        former = saver.poses_to_replace(frames, people, settings)
+        return Subjects.of(models, people, active, saver.keyframes(frames), former)
+
+    @property
+    def _settings(self) -> TrackerSettings:
+        """The settings of a run that begins now."""
+        state = self._session_state.state
+        return track_settings.of_run(state.settings, state.run_choices)
 
     def _clock_and_floor(self) -> tuple[float, GroundPlane | None]:
         session = self._session_state.session
@@ -196,11 +204,10 @@ class Tracking:
 
     def _begin(self, legs: Sequence[Leg], label: str, edit: int | None, on_end: Callable[[bool], None]) -> None:
         """Begin a run in a worker thread; the caller is editing."""
-        session_state = self._session_state
-        state, saver = session_state.state, session_state.saver
+        session_state, saver = self._session_state, self._session_state.saver
         session_state.require_turn(None, [k for leg in legs for k in leg.run.frames])
         session = TrackSession(
-            make_tracker(track_settings.of_run(state.settings, state.run_choices)),
+            make_tracker(self._settings),
             legs,
             [StoredPerson(p.name, saver.revisions.current(i)) for i, p in enumerate(session_state.session.people)],
             _SaverWriter(session_state, edit),

@@ -80,6 +80,7 @@ def _ingredients(state: State) -> tuple[object, ...]:
         Identity(state.calibration.preview) if state.calibration.is_previewed else None,
         Identity(None if state.reason is None else state.reason.alternatives),
         Identity(None if state.other_copy is None else state.other_copy.poses),
+        Identity(state.observations.plan),
         Identity(state.observations.drawn),
         Identity(state.observations.drawn_judgements),
     )

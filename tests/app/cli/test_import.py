@@ -115,7 +115,7 @@ def test_masks_are_used_and_left(run, tmp_path):
     assert status == 0
     lines = out.splitlines()
     assert lines[0] == "net: masks, of anyone"
-    assert lines[1] == f"  cam0: {folder}/cam0, 6 rows, people in frames 0 to 5, 6.2% of the picture"
+    assert lines[1] == f"  cam0: {folder}/cam0, 6 masks, people in frames 0 to 5, 6.2% of the picture"
     assert lines[-1] == "nothing was stored"
     assert not (session.folder / "observations").exists()
     status, out, _ = run("import", session.folder, folder, "--as", "net", "--values", "ann=1")

@@ -27,8 +27,8 @@ def session(tmp_path):
     return make_session(tmp_path / "s", N, people=("ann", "bob"), size=SIZE)
 
 
-def planned(session, path, **choices):
-    return plan_import(session, ImportRequest("net", (path,), ("ann", "bob"), **choices))
+def planned(session, path, name="net", **choices):
+    return plan_import(session, ImportRequest(name, (path,), ("ann", "bob"), **choices))
 
 
 def problems(plan):
@@ -262,6 +262,8 @@ def test_only_the_category_of_people_is_taken(session, tmp_path):
     data["categories"][0]["name"] = "dancer"
     (tmp_path / "c.json").write_text(json.dumps(data))
     with pytest.raises(FormatError, match="a category named 'person' among several, found 'dancer', 'ball'"):
+        planned(session, tmp_path / "c.json", "other")
+    with pytest.raises(SessionError, match=r"observations/net exists already; choose another name"):
         planned(session, tmp_path / "c.json")
 
 

@@ -115,6 +115,19 @@ def test_after_a_correction_only_the_stretches_beside_it_are_tracked(session, st
         to_track(range(1, 5))
 
 
+def test_a_run_knows_the_poses_that_it_replaces(session, store):
+    track(session, store)
+    stored = store.poses("person", range(11))
+    with stored_run(session, store, None, TrackPlan(range(3, 9), (0,), SETTINGS)) as run:
+        assert sorted(run.subjects.former) == [3, 4, 6, 7, 8]  # no keyframe
+        for frame, poses in run.subjects.former.items():
+            np.testing.assert_array_equal(poses[0], stored[frame].values)
+    other = replace(SETTINGS, max_iterations=SETTINGS.max_iterations + 1)
+    for plan in (TrackPlan(range(3, 9), (), SETTINGS), TrackPlan(range(3, 9), (0,), other)):
+        with stored_run(session, store, None, plan) as run:
+            assert run.subjects.former == {}
+
+
 def test_frames_with_a_gap_are_tracked_as_legs_of_their_own():
     plan = TrackPlan(
         frames_of([KeyframeStretch(20, 23), KeyframeStretch(5, 8), KeyframeStretch(8, 10)]), (0,), SETTINGS

@@ -20,7 +20,7 @@ from tracker.store.records import PoseChange, PoseRecord
 from tracker.tracking.chamfer.method import CHAMFER
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.confidence import LimbFeatures, PoseQuality
-from tracker.tracking.estimate import AlternativePose, PoseEstimate
+from tracker.tracking.estimate import AlternativePose, OtherPass, PoseEstimate
 from tracker.tracking.subjects import Subjects
 
 N = 12
@@ -247,3 +247,34 @@ def test_odd_texts_of_an_interrupted_run_are_refused(texts):
     change = PoseChange("person", 3, PoseRecord(model.neutral(), (), 1))
     with pytest.raises(DamagedStoreError, match="covariance and features of frame 3"):
         resumed_rows({0: (change,)}, {"0": {"3": texts}})
+
+
+def one_row(rows, model, frame, pose, lost=()):
+    status = "lost" if max(lost, default=0) > 0.25 else "good"
+    record = PoseRecord(pose, ("tracked",) * len(pose), 1, status=status, limbs_lost=lost)
+    rows.add(PoseChange("person", frame, record), 1e-4 * np.eye(model.n_dofs), None)
+
+
+def test_passes_that_agree_count_alike_however_doubtful():
+    model = load_model("gavrila34", 1.7)
+    pose = model.neutral()
+    other, rows = pose + 0.04 * (np.arange(len(pose)) == 0), TrackedRows()
+    one_row(rows, model, 3, pose, (0.2,) * len(limbs(model)))
+    rows.add_other_pass(OtherPass((0, 5), {3: other}))
+    subjects = Subjects.of([model], keyframes={0: {0: pose}, 5: {0: pose}})
+    (found,) = rows.finished(subjects, 0, 30.0, smooth=False)
+    assert found.pose.values[0] - pose[0] == pytest.approx(0.02, abs=0.002)
+
+
+def test_a_limb_in_doubt_stays_where_it_was_found_and_its_motion_tells_about_it():
+    model, rows = load_model("gavrila34", 1.7), TrackedRows()
+    raised = model.dof_names.index("left_shoulder.abduction")
+    arm = next(i for i, limb in enumerate(limbs(model)) if limb.dofs[raised])
+    for frame in range(N):
+        pose = model.neutral()
+        pose[raised] += 1.0 * (frame == 6)
+        one_row(rows, model, frame, pose, tuple(0.4 * (i == arm and frame == 6) for i in range(len(limbs(model)))))
+    smoothed, by_motion = rows.smoothed(Subjects.of([model]), 0, 5.0)
+    angles = np.array([change.pose.values[raised] for change in smoothed]) - model.neutral()[raised]
+    assert angles[6] > 0.8
+    assert by_motion[6][raised] - model.neutral()[raised] < 0.3

@@ -9,6 +9,7 @@ import numpy as np
 from tracker.body.model import PosedBody
 from tracker.exports.keypoints import project_through_lens
 from tracker.exports.like.mended_points import MendedPoints
+from tracker.formats.bvh_patching import patch_bvh
 from tracker.formats.c3d import patch_c3d
 from tracker.formats.file_axes import axes_matrix
 from tracker.formats.keypoints.coco_patching import patch_coco
@@ -31,8 +32,6 @@ Files = dict[str, bytes]
 """Content of files that differ from those that came, by their path."""
 Changes = dict[int, list[tuple[int, Array]]]
 """Number of a person in the file and x, y, confidence of the points, (n_points, 3), by row."""
-PATCHED = ("openpose", "coco", "deeplabcut", "hdf5", "trc", "csv", "c3d")
-"""Formats whose points can be replaced."""
 
 
 class ChangedPictures(NamedTuple):
@@ -133,25 +132,30 @@ def _seen(session: Session, view: int, frame: int, person: MendedPoints) -> Arra
     return np.column_stack([np.where(inside[:, None], px, 0.0), confidence])
 
 
-def mended_space(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> Files:
-    """Return the files of points in space that change."""
+def mended_space(session: Session, observations: ObservationSet, mended: Sequence[MendedPoints]) -> tuple[Files, float]:
+    """Return the files of points in space that change, and how far a point is from its place at most, metres."""
     options = dict(observations.options)
     R_file = axes_matrix(options.get("axes", "x,y,z")).T
     unit_m = float(options["unit_m"]) if "unit_m" in options else None
+    is_known = np.array([bool(points) for points in observations.counterparts.values()])
     patch: Mapping[str, Callable[[Path, Mapping[int, Array]], bytes]] = {
         "trc": patch_trc,
         "csv": lambda path, changes: patch_points_csv(path, unit_m, changes),
         "c3d": lambda path, changes: patch_c3d(path, unit_m, changes),
     }
-    out: Files = {}
+    out, farthest_m = Files(), 0.0
     rows = np.round(observations.row_frames).astype(np.int64)
     for source, person in zip(observations.sources, mended, strict=True):
         changes = _rows(rows, observations.row_frames, person)
         if changes:
             in_file = {row: points @ R_file.T for row, points in changes.items()}
             path = source_path(session, observations.name, source)
-            out[source.path] = patch[observations.format](path, in_file)
-    return out
+            if observations.format == "bvh":
+                out[source.path], distance_m = patch_bvh(path, unit_m, in_file, is_known)
+                farthest_m = max(farthest_m, distance_m)
+            else:
+                out[source.path] = patch[observations.format](path, in_file)
+    return out, farthest_m
 
 
 def _rows(nearest: IntArray, row_frames: Array, person: MendedPoints) -> dict[int, Array]:

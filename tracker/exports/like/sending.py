@@ -9,11 +9,10 @@ from pathlib import Path
 from tracker.errors import FormatError, Remedy, SessionError, TrackerError
 from tracker.exports.export_files import unwritable
 from tracker.exports.like.mended_points import PoseChoice, mended_points
-from tracker.exports.like.patches import PATCHED, Files, mended_pictures, mended_space
+from tracker.exports.like.patches import Files, mended_pictures, mended_space
 from tracker.observations.assignment import people_by_poses
 from tracker.observations.joints import observed_joints
 from tracker.observations.observed import ObservationSet
-from tracker.observations.readers import FORMATS
 from tracker.observations.stored import checksum, source_path
 from tracker.session.session import Session
 
@@ -30,6 +29,8 @@ class LikeExport:
     """Frames whose points were replaced in some file."""
     exchanged: tuple[tuple[int, str, str], ...] = ()
     """Frame, person and camera in whose view left and right were exchanged."""
+    farthest_m: float = 0.0
+    """How far a replaced point is from its place at most, metres, where the format does not let it go there."""
 
 
 def export_like(
@@ -68,23 +69,16 @@ def export_like(
         observations = replace(observations, people=people)
     mended = mended_points(session, observations, joints_world, poses, learn_offsets)
     frames = sorted({f for person in mended for f in person.bodies})
-    if (frames or exchange_sides) and observations.format not in PATCHED:
-        listed = ", ".join(FORMATS[name].title for name in PATCHED)
-        raise FormatError(
-            f"expected observations of a format whose points can be replaced in place ({listed}), found "
-            f"{FORMATS[observations.format].title}",
-            Remedy("export_other_format"),
-        )
-    changed: Files = {}
+    changed, farthest_m = Files(), 0.0
     exchanged: tuple[tuple[int, int, int], ...] = ()
     if observations.points is not None and (frames or exchange_sides):
         changed, exchanged = mended_pictures(session, observations, mended, exchange_sides)
     elif frames:
-        changed = mended_space(session, observations, mended)
+        changed, farthest_m = mended_space(session, observations, mended)
     changed = {path: data for path, data in changed.items() if data != contents[path]}
     paths = _write(out, contents | changed)
     named = tuple((f, observations.people[k], session.camera_names[view]) for f, k, view in exchanged)
-    return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames), named)
+    return LikeExport(tuple(paths.values()), tuple(paths[p] for p in changed), tuple(frames), named, farthest_m)
 
 
 def _stored_contents(session: Session, observations: ObservationSet) -> Files:

@@ -7,6 +7,9 @@ interval is selected (`pose_paths`).
 
 Between two keyframes of a person, all frames are tracked backward from the second one. The path through both passes
 changes from one to the other where they agree best. Their disagreement on a frame is its *seam*.
+
+Stored poses by the same settings stay candidates of the path, also beyond the last keyframe. A run then replaces a pose
+only where frames and motion speak for the new pose.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -33,7 +36,7 @@ from tracker.tracking.estimation.frame_problem import Bodies, FrameProblem, Pers
 from tracker.tracking.estimation.pose_paths import ROUNDS, Candidates, propagate_candidates, viterbi_path
 from tracker.tracking.estimation.pose_score import PoseScorer, common_evidence, scorer_without_prediction
 from tracker.tracking.estimation.settings import EstimationSettings, chamfer_cost, trust
-from tracker.tracking.subjects import Keyframes
+from tracker.tracking.subjects import Keyframes, Subjects
 from tracker.tracking.tracker import TrackingRun
 from tracker.tracking.view_regions import regions
 from tracker.tracking.view_tracks import velocities_of
@@ -120,6 +123,13 @@ def track_backward(
         for estimate in better:
             known[at[estimate.frame]] = TrackedFrame.of(estimate)
         yield BackwardStep(backward[0].frame, person, done, total, better, other)
+    for person in subjects.tracked:
+        for interval in _changed_intervals(known, person, subjects):
+            better = _PathSelection(run, known, interval, (), settings).better()
+            at = {known[i].frame: i for i in interval.frames}
+            for estimate in better:
+                known[at[estimate.frame]] = TrackedFrame.of(estimate)
+            yield BackwardStep(known[interval.frames.start].frame, person, total, total, better)
 
 
 def _intervals_of(tracked: Sequence[TrackedFrame], person: int, keyframes: Keyframes) -> list[_Interval]:
@@ -143,6 +153,25 @@ def _intervals_of(tracked: Sequence[TrackedFrame], person: int, keyframes: Keyfr
         if end > frames.start:
             whole = range(frames.start, end)
             out.append(_Interval(person, whole, (whole,)))
+    return out
+
+
+def _changed_intervals(tracked: Sequence[TrackedFrame], person: int, subjects: Subjects) -> list[_Interval]:
+    """Return the intervals that are not between two keyframes, and on which the former poses of a person are others."""
+    model, keyframes = subjects.models[person], [person in subjects.keyframes_at(f.frame) for f in tracked]
+    ends = [i for i, fixed in enumerate(keyframes) if fixed]
+    changed = []
+    for i, found in enumerate(tracked):
+        former = None if ends and ends[0] <= i <= ends[-1] else subjects.former.get(found.frame, {}).get(person)
+        poses = [] if former is None else [PosedBody(model, pose) for pose in (former, found.poses[person])]
+        if poses and distance_m(*poses) > SAME_POSE_M:
+            changed.append(i)
+    out: list[_Interval] = []
+    for i in changed:
+        if out and out[-1].frames.stop == i:
+            out[-1] = out[-1]._replace(frames=range(out[-1].frames.start, i + 1))
+        else:
+            out.append(_Interval(person, range(i, i + 1), ()))
     return out
 
 
@@ -178,7 +207,7 @@ class _PathSelection:
             run: gives the observer and the subjects.
             tracked: all frames.
             interval: the lost interval.
-            backward: the estimates of backward tracking on its frames, in the order of tracking.
+            backward: the estimates of backward tracking on its frames, in the order of tracking; empty without any.
             settings: of the tracker.
         """
         self._observer, self._models, self._settings = run.observer, run.subjects.models, settings
@@ -190,9 +219,10 @@ class _PathSelection:
         if any(any(run.observer.ahead_frames(f.frame)) for f in tracked[first : end + 1]):
             self._velocities = velocities_of(self._models, {f.frame: f.poses for f in tracked})
         self._forward, self._backward = tracked[first:end], backward
-        self._candidates = [
-            self._candidates_of(f, TrackedFrame.of(b)) for f, b in zip(self._forward, backward, strict=True)
-        ]
+        is_known = interval.is_between_keyframes or not backward
+        former = [run.subjects.former.get(f.frame, {}).get(self._person) if is_known else None for f in self._forward]
+        self._former = [self._locked(pose, i) for i, pose in enumerate(former)]
+        self._candidates = [self._candidates_of(i) for i in range(len(self._forward))]
         self._views = lru_cache(_CACHED_FRAMES)(self._observe)
         self._scorer = lru_cache(_CACHED_FRAMES)(self._make_scorer)
 
@@ -212,11 +242,14 @@ class _PathSelection:
     def better(self) -> tuple[PoseEstimate, ...]:
         """Return the estimates of the selected path that replace those of forward tracking, in tracking order."""
         out = []
+        n_passes = 2 if self._backward else 1
         for i, chosen in enumerate(self._path):
-            if chosen == 1:
+            if 0 < chosen < n_passes:
                 out.append(self._merged(i, 1, self._backward[i], f"tracked back from frame {self._after[0].frame}"))
-            elif chosen > 1:
-                out.append(self._merged(i, chosen, self._estimate(i, chosen), "taken over from neighbouring frames"))
+            elif chosen > 0:
+                is_former = chosen < n_passes + len(self._former[i])
+                note = "as before this run" if is_former else "taken over from neighbouring frames"
+                out.append(self._merged(i, chosen, self._estimate(i, chosen), note))
         return tuple(out)
 
     def other_pass(self) -> OtherPass:
@@ -236,8 +269,8 @@ class _PathSelection:
         """Return the costs of the candidates of a frame, nats; 0 for all where the passes agree, and none is known."""
         candidates = self._candidates[i]
         if not np.isfinite(candidates.costs).all():
-            forward, backward = (h.body for h in candidates.hypotheses)
-            if distance_m(forward, backward) <= SAME_POSE_M:
+            first, *others = (h.body for h in candidates.hypotheses)
+            if all(distance_m(first, other) <= SAME_POSE_M for other in others):
                 return np.zeros(len(candidates.poses))
             candidates.score(self._scorer(i))
         return candidates.costs
@@ -249,14 +282,19 @@ class _PathSelection:
     def _part_colors(self) -> PartColors | None:
         """Colours of the person on the trusted frames around the interval."""
         out: PartColors | None = None
-        for good in (*self._before[-1:], self._after[0]):
+        for good in (*self._before[-1:], *self._after[:1]):
             out = self._colors(good).learn(out, 0.5)
         return out
 
-    def _candidates_of(self, *passes: TrackedFrame) -> Candidates:
-        p = self._person
+    def _locked(self, pose: Array | None, i: int) -> list[Array]:
+        """Return a pose, if there is one, with the locked degrees of freedom of a frame of the interval."""
+        locked = self._forward[i].poses[self._person]
+        return [] if pose is None else [with_locked_dofs(self._model, pose, locked, self._active_dofs)]
+
+    def _candidates_of(self, i: int) -> Candidates:
+        p, passes = self._person, [self._forward[i], *map(TrackedFrame.of, self._backward[i : i + 1])]
         alternatives = [v for e in passes if e.alternatives for v in e.alternatives[p]]
-        return Candidates(self._model, [e.poses[p] for e in passes], alternatives)
+        return Candidates(self._model, [*(e.poses[p] for e in passes), *self._former[i]], alternatives)
 
     def _bodies(self, i: int, pose: Array) -> Bodies:
         """Return all people on a frame of the interval, the person in a pose, (n_values,)."""
@@ -270,8 +308,9 @@ class _PathSelection:
         )
 
     def _observe(self, i: int) -> tuple[ViewEvidence, ...]:
-        """Return the evidence of a frame around the poses of both passes; all candidates are compared on it."""
-        guesses = [self._bodies(i, e.poses[self._person]) for e in (self._forward[i], self._backward[i])]
+        """Return the evidence of a frame around the passes and the former pose; all candidates are compared on it."""
+        passes = [e.poses[self._person] for e in (self._forward[i], *self._backward[i : i + 1])]
+        guesses = [self._bodies(i, pose) for pose in (*passes, *self._former[i])]
         return common_evidence(self._observer, self._forward[i].frame, guesses, self._settings)
 
     def _estimate(self, i: int, chosen: int) -> PoseEstimate:

@@ -104,8 +104,14 @@ def test_masks_are_used_at_once_in_place_of_the_background(controller, tmp_path)
     masks[..., height // 10 :, width // 10 :] = 1
     folder = write_masks(tmp_path / "m", session.camera_names, masks)
     controller.observing.plan(ImportRequest("net", (folder,), ()))
-    assert kinds(controller, "imported") == {}
+    corner = session.cameras[0].camera.undistort_points(np.array([[width // 10, height // 10]], np.float64))[0]
+    outline = kinds(controller, "imported")[0].reshape(-1, 2)
+    assert np.linalg.norm(outline - corner, axis=1).min() < 0.01
+    (folder / "FRONT" / "FRONT_000000.png").rename(tmp_path / "moved.png")
+    assert 0 not in kinds(controller, "imported")  # the file is not there now
+    (tmp_path / "moved.png").rename(folder / "FRONT" / "FRONT_000000.png")
     controller.observing.store()
+    assert kinds(controller, "imported") == {}
     assert controller.state.observations.message == "The cameras use the masks of net as silhouettes."
     assert controller.session.cameras[0].masks == session.folder / "observations" / "net" / "masks" / "FRONT"
     assert all(c.masks is not None for c in load_session(session.folder).cameras)

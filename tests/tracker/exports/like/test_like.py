@@ -6,7 +6,6 @@ from contextlib import closing
 import numpy as np
 import pytest
 from observed_files import (
-    write_bvh_chain,
     write_c3d,
     write_coco_images,
     write_deeplabcut,
@@ -497,19 +496,6 @@ def test_axes_and_units_of_the_file(session, tmp_path):
     one, other = read_trc(tmp_path / "a.trc"), read_trc(tmp_path / "b.trc")
     assert np.abs(one.points - other.points).max() < 0.015
     assert not np.array_equal(one.points[EDITED], other.points[EDITED])
-
-
-def test_formats_that_cannot_be_changed_in_place(session, tmp_path):
-    bodies = poses(session)
-    write_bvh_chain(tmp_path / "a.bvh")
-    request = ImportRequest("mp", (tmp_path / "a.bvh",), ("ann",), unit_m=0.01, first_frame=0)
-    (tmp_path / "map.toml").write_text('left_hip = "LeftUpLeg"\nleft_knee = "LeftLeg"\n')
-    plan = plan_import(session, ImportRequest(**(vars(request) | {"joint_map": tmp_path / "map.toml"})))
-    store_import(session, plan)
-    store(session, bodies)
-    with pytest.raises(FormatError, match=r"whose points can be replaced in place .*, found BVH"):
-        export_like(session, load_observations(session, "mp"), tmp_path / "b.bvh")
-    assert not (tmp_path / "b.bvh").exists()
 
 
 def test_a_stored_file_that_was_changed(session, tmp_path):

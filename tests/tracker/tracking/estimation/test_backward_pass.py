@@ -210,3 +210,51 @@ def test_alternatives_take_part_where_the_passes_are_apart(scene):
     better = {e.frame: e.poses[0] for e in steps[-1].better}
     assert {*LOST} <= better.keys()
     assert all(off_m(model, better[k], truth[k]) < 0.03 for k in LOST)
+
+
+@pytest.mark.slow
+def test_a_former_pose_that_fits_better_stays(scene):
+    """Nothing says that the arm is lost, and no keyframe follows: the pose that is replaced tells."""
+    model, truth, views, first = scene
+    former = {k: {0: v} for k, v in enumerate(truth)}
+    steps = list(track_back(Shown(views), [model], tracked(first, ()), TrackSettings(), former=former))
+    (better,) = (s.better for s in steps)
+    assert [e.frame for e in better] == list(LOST)
+    for estimate in better:
+        np.testing.assert_array_equal(estimate.poses[0], truth[estimate.frame])
+        assert (estimate.statuses, estimate.notes) == (("good",), ("as before this run",))
+
+
+def test_a_former_pose_that_fits_worse_is_replaced(scene):
+    model, truth, views, first = scene
+    former = {k: {0: v} for k, v in enumerate(first)}
+    observer = Shown(views)
+    steps = list(track_back(observer, [model], tracked(truth, ()), TrackSettings(), former=former))
+    assert [s.better for s in steps] == [()]
+    assert {*observer.asked} == {1, *LOST, 5}  # where they differ, and for the colours around
+    assert list(track_back(observer, [model], tracked(first, ()), TrackSettings(), former=former)) == []
+
+
+@pytest.mark.slow
+def test_between_keyframes_a_former_pose_changes_neither_the_passes_nor_their_seam(scene):
+    model, truth, views, first = scene
+    keyframes = {k: {0: truth[k]} for k in (0, N - 1)}
+    found, former = tracked(first, ()), {k: {0: truth[k]} for k in LOST}
+    with_former = list(track_back(Shown(views), [model], found, keyframes=keyframes, former=former))[-1]
+    assert {e.frame for e in with_former.better} >= {*LOST}
+    assert {*with_former.better[1].notes} <= {"tracked back from frame 8", "as before this run"}
+    for k in LOST:
+        np.testing.assert_array_equal(with_former.other_pass.poses[k], first[k])
+
+
+def test_locked_degrees_of_freedom_of_a_former_pose_do_not_come_back(scene):
+    model, truth, views, first = scene
+    free = np.array([n != "right_elbow.extension" for n in model.dof_names])
+    former = {k: {0: v + 0.2 * ~free} for k, v in enumerate(truth)}
+    found = tracked(first, ())
+    better = list(track_back(Shown(views), [model], found, TrackSettings(), former=former, active_dofs=[free]))[
+        -1
+    ].better
+    assert [e.frame for e in better] == list(LOST)
+    for estimate in better:
+        np.testing.assert_array_equal(estimate.poses[0][~free], first[estimate.frame, ~free])
