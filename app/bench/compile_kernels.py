@@ -142,7 +142,6 @@ def _call_others(session: Session) -> None:
     They label parts in an image, carve and label voxels, compare bodies with silhouettes, film simulated people, learn
     what is usual in a run, and check its cameras.
     """
-    from tracker.calibration.camera_correction import N_CORRECTIONS
     from tracker.calibration.rig_problem import sums_of_pieces
     from tracker.contours.label_image import part_labels
     from tracker.evidence.silhouettes import SilhouetteFinder
@@ -176,8 +175,8 @@ def _call_others(session: Session) -> None:
         observer, frames = Observer(sources, recording), [(k, (body,)) for k in range(_FRAME, _FRAME + _FRAMES)]
         learn_run(observer, frames)
         (view, *_) = observer.evidence(_FRAME)
-    _, pieces = ContourResiduals([view], [body]).piece_sums(body.values)
-    sums_of_pieces(pieces, model, body.kinematics, view.camera, np.zeros(N_CORRECTIONS))
+    _, pieces = ContourResiduals([view], [body]).piece_sums(body.kinematics)
+    sums_of_pieces(pieces, model, body.kinematics, view.camera, np.array([s.half_axes for s in model.shapes]))
 
 
 def _track(

@@ -131,7 +131,8 @@ def motions_by_pose(model: BodyModel, kinematics: Kinematics) -> Array:
     """Differentiate the motions of all parts by the degrees of freedom, (n_parts, N_MOTIONS, n_dofs)."""
     axes, origins = kinematics.axes_world, kinematics.origins_world
     turns = ~model.dof_is_length[:, None]
-    twists = np.concatenate([turns * axes, np.where(turns, np.cross(origins, axes), axes)], axis=1)  # (n_dofs, 6)
+    crossed = (skew(origins) @ axes[..., None])[..., 0]
+    twists = np.concatenate([turns * axes, np.where(turns, crossed, axes)], axis=1)  # (n_dofs, 6)
     out = np.zeros((len(model.parts), N_MOTIONS, model.n_dofs))
     out[:, :6] = twists.T * model.moves.T[:, None, :]
     return out
@@ -167,10 +168,12 @@ def motions_of_points(
 
 def _origins_by_sizes(model: BodyModel, kinematics: Kinematics, by_sizes: SizeArrays) -> Array:
     """Differentiate the joints by the sizes, (n_parts, 3, n_sizes), metres."""
-    Rs, out = kinematics.Ts_world_part[:, :3, :3], np.zeros_like(by_sizes.joints)
-    for part, parent in enumerate(model.parents):
+    parents = np.array(model.parents)
+    out = kinematics.Ts_world_part[parents, :3, :3] @ by_sizes.joints
+    out[parents < 0] = 0.0
+    for part, parent in enumerate(model.parents):  # parents come first
         if parent >= 0:
-            out[part] = out[parent] + Rs[parent] @ by_sizes.joints[part]
+            out[part] += out[parent]
     return out
 
 

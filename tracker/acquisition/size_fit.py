@@ -241,7 +241,7 @@ class _Problem:
         ]
         return self._free, np.array(own).reshape(equations.own_gradients.shape)
 
-    def linearize(self, state: _State) -> ArrowEquations:
+    def linearize(self, state: _State, below: float = np.inf) -> ArrowEquations:
         """See `BundleProblem`."""
         sizes, poses = state
         body, by_sizes = self._parameters.body(sizes), self._parameters.derivatives(sizes)
@@ -296,7 +296,7 @@ class _Problem:
         for residuals, view in zip(self._residuals[i], frame.views, strict=True):
             if view.ahead_frames == ahead_frames:
                 assert surfaces is not None
-                own_cost, sums = residuals.with_surfaces(body, surfaces).piece_sums(then.values)
+                own_cost, sums = residuals.piece_sums(then.kinematics, surfaces)
                 cost += own_cost
                 pieces.append((view.camera, sums))
         sums_of_motions = sum_motions(pieces, body, then.kinematics, self._with_shapes)

@@ -144,7 +144,7 @@ class ReprojectionProblem(ABC):
 
     # --- for the solver -----------------------------------------------------------------------------------------
 
-    def linearize(self, rig: Rig) -> ArrowEquations:
+    def linearize(self, rig: Rig, below: float = np.inf) -> ArrowEquations:
         """See `BundleProblem`."""
         out, cost = ArrowEquations.zeros(int(self.ends[-1]), self.n_groups, self.n_own), 0.0
         located = self.locate(rig.own)

@@ -40,7 +40,7 @@ def residual_pieces(
         body = parameters[seen.person].body(state.sizes[seen.person])
         for camera, evidence, residuals in views_of(seen, nothing):
             then = body.retract(pose, seen.path.step(seen.ahead_s[camera]))
-            pieces = residuals.with_surfaces(body, residuals.resized(body)).piece_sums(then)[1].pulled
+            pieces = residuals.piece_sums(body.kinematics(then), residuals.resized(body))[1].pulled
             # Resizing keeps the borders of pixels, not their centres.
             points_px = (pieces.points_px + evidence.corner_px + 0.5) / evidence.scale - 0.5
             scaled = evidence.scale * pieces.gradients, evidence.scale**2 * pieces.hessians

@@ -42,8 +42,7 @@ def score_frame(
         sigmas: standard deviations of corrections in their prior, (N_CORRECTIONS,).
     """
     state = RigState(corrections, tuple(sizes), tuple(b.values for b in frame.bodies))
-    nothing = np.zeros(corrections.shape, np.bool_)
-    problem = RigProblem(seen_people([frame]), parameters, sigmas, corrections).with_free(nothing, sizes=False)
+    problem = RigProblem(seen_people([frame]), parameters, sigmas, corrections, with_sizes=False)
     found = solve_bundle(problem, state, EFFORT.steps, least_gain=LEAST_GAIN)
     n = corrections.size
     cameras = np.arange(len(found.equations.gradient)) < n

@@ -1,6 +1,7 @@
 """Shapes of several bodies as arrays, for the kernels that trace contours."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -110,16 +111,15 @@ def _surfaces(
     for i, p in enumerate(profiles):
         if p is not None:
             table[i, :, : len(p.radii)] = p.radii, p.heights, p.along / p.outward, p.outward
-    points, normals = (np.stack(g) for g in zip(*(_closed_grid(s) for s in shapes), strict=True))
+    points, normals = _grids(shapes)
     return Surfaces(
         half_axes,
         centers,
         np.linalg.norm(points, axis=1).max(axis=-1),
         profile_sizes,
         table,
-        # Contiguous rows, which kernels read as vectors; stacking leaves them point by point.
-        np.ascontiguousarray(points / half_axes[..., None], np.float32),
-        np.ascontiguousarray(normals * half_axes[..., None], np.float32),
+        np.asarray(points / half_axes[..., None], np.float32),
+        np.asarray(normals * half_axes[..., None], np.float32),
         np.sum(points * normals, axis=1).astype(np.float32),
         np.stack([_solid(s) for s in shapes]),
         _adjoining(models),
@@ -127,14 +127,29 @@ def _surfaces(
     )
 
 
+def _grids(shapes: Sequence[Shape]) -> tuple[Array, Array]:
+    """Return points and normals of the grids of shapes, (P, 3, rings * sectors) each, in rows that kernels read as
+    vectors."""
+    half_axes = np.array([s.half_axes for s in shapes])[..., None]
+    points, normals = (np.stack(g) for g in zip(*map(_unit_grid, shapes), strict=True))
+    normals /= half_axes
+    return points * half_axes, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def _unit_grid(shape: Shape) -> tuple[Array, Array]:
+    """Return those of a shape with unit half-axes."""
+    return _closed_grid(replace(shape, half_axes=(1.0, 1.0, 1.0)))
+
+
+@lru_cache(maxsize=256)
 def _closed_grid(shape: Shape) -> tuple[Array, Array]:
     """Return points and normals of a shape's grid, (3, rings * sectors), with flat ends beyond the first and last
-    ring."""
+    ring; cached, because sizes change without the form."""
     points, normals = shape.grid(N_RINGS, N_SECTORS)
     points = np.concatenate([points[:1], points, points[-1:]])
     normals = np.concatenate([np.zeros_like(normals[:1]), normals, np.zeros_like(normals[:1])])
     normals[0, :, 2], normals[-1, :, 2] = -1.0, 1.0
-    return points.reshape(-1, 3).T, normals.reshape(-1, 3).T
+    return np.ascontiguousarray(points.reshape(-1, 3).T), np.ascontiguousarray(normals.reshape(-1, 3).T)
 
 
 def _solid(shape: Shape) -> FloatArray:
@@ -148,10 +163,16 @@ def _solid(shape: Shape) -> FloatArray:
     (e1, e2), tapers = ((1.0, 1.0), (0.0, 0.0))
     if isinstance(shape, TaperedSuperquadric):
         (e1, e2), tapers = shape.exponents, shape.taper
-    section = (1 + np.linspace(0, 1, N_SECTION + 1) ** (2 / e2)) ** (e2 / 2)
-    along = (1 - np.linspace(0, 1, N_ALONG + 1) ** (2 / e1)) ** (e1 / 2)
     quadric = (1 / around.girths[0], 1 / around.girths[1], around.taper, around.bulge, around.exact)
-    return np.array([*quadric, *tapers, e2 == 1.0 and tapers[0] == tapers[1], *section, *along], np.float32)
+    return np.array([*quadric, *tapers, e2 == 1.0 and tapers[0] == tapers[1], *_tables(e1, e2)], np.float32)
+
+
+@lru_cache(maxsize=256)
+def _tables(e1: float, e2: float) -> Array:
+    """Return the section and then the table along the axis of a solid of some exponents; cached, as sizes change
+    without them."""
+    section = (1 + np.linspace(0, 1, N_SECTION + 1) ** (2 / e2)) ** (e2 / 2)
+    return np.concatenate([section, (1 - np.linspace(0, 1, N_ALONG + 1) ** (2 / e1)) ** (e1 / 2)])
 
 
 def _adjoining(models: tuple[BodyModel, ...]) -> NDArray[np.bool_]:

@@ -108,8 +108,8 @@ class ArrowEquations(NamedTuple):
 class BundleProblem(Protocol[S]):
     """A problem for `solve_bundle`; its state holds all unknowns."""
 
-    def linearize(self, state: S, /) -> ArrowEquations:
-        """Return the normal equations at a state."""
+    def linearize(self, state: S, below: float = ..., /) -> ArrowEquations:
+        """Return the normal equations at a state; where the cost is not below a bound, the rest of them may be 0."""
         ...
 
     def moved(self, state: S, shared: Array, own: Array, /) -> S:
@@ -175,7 +175,7 @@ def _solve(
             if equations.promised(*step, damping) <= enough(here.cost):
                 return BundleFit(state, here, evaluations)
             trial = problem.moved(state, *step)
-            there = problem.linearize(trial)
+            there = problem.linearize(trial, here.cost)
             evaluations += 1
             if there.cost < here.cost:
                 break

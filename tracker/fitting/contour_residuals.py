@@ -34,11 +34,11 @@ from tracker.fitting.contour_arrays import (
     scratch_buffer,
     sums_buffer,
 )
-from tracker.fitting.contour_kernels import COST_ONLY, accumulate_normal_equations
+from tracker.fitting.contour_kernels import COST_ONLY, WITH_JACOBIAN, accumulate_normal_equations
 from tracker.fitting.gauss_newton import NormalEquations
 from tracker.fitting.match_points import points_to_match
 from tracker.fitting.twists import twists_to_dofs
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import Array, FloatArray, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.geometry.segment_distance import sort_points, stack_rows
 
@@ -200,29 +200,9 @@ class ContourResiduals:
         return static_contours_buffer(len(arrays.sizes), self._max_pieces, arrays.points.shape[1], moves)
 
     def resized(self, model: BodyModel) -> Surfaces:
-        """Return the shapes of all bodies, the person's at other sizes, for `with_surfaces`."""
+        """Return the shapes of all bodies, the person's at other sizes, for `piece_sums`."""
         models = tuple(model if i == self._person else m for i, m in enumerate(self._models))
         return resized_surfaces(models, self._term.surfaces)
-
-    def with_surfaces(self, model: BodyModel, surfaces: Surfaces) -> "ContourResiduals":
-        """Return the same residuals for the person's body at other sizes. Both use the same buffers.
-
-        Args:
-            model: the body.
-            surfaces: see `resized`; several views share it.
-        """
-        out = copy(self)
-        out._model, out._term = model, self._term._replace(surfaces=surfaces)
-        return out
-
-    def with_camera(self, camera: Camera) -> "ContourResiduals":
-        """Return the same residuals of a single view under another camera of the same pixels. Both use the same
-        buffers."""
-        out, term = copy(self), self._term
-        assert len(term.views.sizes) == 1
-        views = term.views._replace(P=camera.projection[None], eyes=camera.center_world[None])
-        out._term = term._replace(views=views, static=term.static._replace(Ts=np.full_like(term.static.Ts, np.nan)))
-        return out
 
     def with_information(self, factor: float) -> "ContourResiduals":
         """Return the same residuals with their information multiplied by a factor. Both use the same buffers."""
@@ -230,26 +210,29 @@ class ContourResiduals:
         out._term = self._term._replace(views=views._replace(weights=factor * views.weights))
         return out
 
-    def piece_sums(self, pose: Array) -> tuple[float, PieceSums]:
-        """Return the cost of a pose, (n_values,), and the residuals piece by piece.
+    def piece_sums(
+        self, kinematics: Kinematics, surfaces: Surfaces | None = None, camera: Camera | None = None
+    ) -> tuple[float, PieceSums]:
+        """Return the cost of a pose and the residuals piece by piece.
 
         For residuals of a single view, whose pieces are those in the buffers.
+
+        Args:
+            kinematics: of the pose.
+            surfaces: shapes of the bodies at other sizes, see `resized`; several views share them.
+            camera: another one of the same pixels.
         """
-        assert len(self._term.views.sizes) == 1
-        cost, scratch = self._accumulate(self._model.kinematics(pose)), self._term.scratch
-        firsts = scratch.firsts[self._own.start : self._own.stop + 1]
-        at = slice(firsts[0], firsts[-1])
-        pieces, pulls = scratch.pieces[:, at].astype(np.float64), scratch.pulls[:, at].copy()
-        normals = pieces[3:5].T
-        at_ends = np.stack([pulls[[2, 3]], pulls[[3, 4]]]).transpose(2, 0, 1)
-        sums = PieceSums(
-            np.repeat(np.arange(len(firsts) - 1), np.diff(firsts)),
-            pieces[:2].T,
-            pieces[5:8].T,
-            pulls[1][:, None] * normals + pulls[5:7].T,
-            pulls[0][:, None, None] * normals[:, :, None] * normals[:, None, :] + at_ends,
-        )
-        return cost, sums
+        term, own = self._term, self._own
+        assert len(term.views.sizes) == 1
+        if surfaces is not None:
+            term = term._replace(surfaces=surfaces)
+        if camera is not None:
+            term.static.Ts[:] = np.nan  # contours of static parts are traced again
+            views = term.views._replace(P=camera.projection[None], eyes=camera.center_world[None])
+            term = term._replace(views=views)
+        term.Ts[own] = kinematics.Ts_world_part
+        cost, scratch = accumulate_normal_equations(term, WITH_JACOBIAN), term.scratch
+        return cost, PieceSums(*_unpacked(scratch.firsts[own.start : own.stop + 1], scratch.pieces, scratch.pulls))
 
     def restricted_to(self, parts: IntArray) -> "ContourResiduals":
         """Return the residuals for poses that differ in some parts of the person only; faster.
@@ -321,3 +304,25 @@ def _score(candidates: Array, tree: Tree, n_dofs: int, term: ContourTerm, out: A
     for c in range(candidates.shape[0]):
         forward_kinematics(candidates[c], tree, term.Ts[term.first : term.last], axes, origins)
         out[c] = accumulate_normal_equations(term, COST_ONLY)
+
+
+@njit(nogil=True, cache=True)
+def _unpacked(
+    firsts: IntArray, pieces: FloatArray, pulls: Array
+) -> tuple[IntArray, Array, Array, Array, Array]:  # fmt: skip
+    """Return the fields of `PieceSums` from the buffers of `Scratch`, from the parts' first pieces on, (P + 1,)."""
+    n = firsts[-1] - firsts[0]
+    parts, points, units = np.empty(n, np.int64), np.empty((n, 2)), np.empty((n, 3))
+    gradients, hessians = np.empty((n, 2)), np.empty((n, 2, 2))
+    for part in range(len(firsts) - 1):
+        for k in range(firsts[part], firsts[part + 1]):
+            i, u, v = k - firsts[0], np.float64(pieces[3, k]), np.float64(pieces[4, k])
+            parts[i] = part
+            for j in range(2):
+                points[i, j] = pieces[j, k]
+            for j in range(3):
+                units[i, j] = pieces[5 + j, k]
+            gradients[i, 0], gradients[i, 1] = pulls[1, k] * u + pulls[5, k], pulls[1, k] * v + pulls[6, k]
+            hessians[i, 0, 0], hessians[i, 1, 1] = pulls[0, k] * u * u + pulls[2, k], pulls[0, k] * v * v + pulls[4, k]
+            hessians[i, 0, 1] = hessians[i, 1, 0] = pulls[0, k] * u * v + pulls[3, k]
+    return parts, points, units, gradients, hessians

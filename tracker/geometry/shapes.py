@@ -110,7 +110,7 @@ class TaperedSuperquadric:
         """
         eta = np.linspace(-np.pi / 2, np.pi / 2, n_rings + 2)[1:-1]
         omega = np.arange(n_sectors, dtype=np.float64) * (2 * np.pi / n_sectors) + np.pi / n_sectors
-        return self.surface(*np.meshgrid(eta, omega, indexing="ij"))
+        return self.surface(*np.meshgrid(eta, omega, indexing="ij", sparse=True))
 
     def triangles(self, n_rings: int = 24, n_sectors: int = 32) -> Triangles:
         """Return a closed surface in the shape's frame."""
@@ -129,9 +129,7 @@ class TaperedSuperquadric:
 
     def profile_at(self, heights: Array) -> Profile:
         """Return the profile of a solid of revolution at given heights within (-1, 1), (n,), in unit coordinates."""
-        e1, k = self.exponents[0], self.taper[0]
-        sine = _signed_power(heights, 1 / e1)  # of the latitude
-        return _profile(e1, k, np.arcsin(np.clip(sine, -1.0, 1.0)))
+        return _profile_at(self.exponents[0], self.taper[0], tuple(heights.tolist()))
 
     @property
     def enclosure(self) -> Enclosure:
@@ -237,6 +235,13 @@ def _superquadric_profile(shape: TaperedSuperquadric, tolerance_m: float) -> Pro
     eta = np.linspace(-np.pi / 2, np.pi / 2, 401)[1:-1]
     z, r = _signed_power(np.sin(eta), e1), np.cos(eta) ** e1
     return _profile(e1, k, eta[_chords(np.stack([max(a1, a2) * r * (1 + k * z), a3 * z], axis=1), tolerance_m)])
+
+
+@lru_cache(maxsize=1024)
+def _profile_at(e1: float, k: float, heights: tuple[float, ...]) -> Profile:
+    """Return the profile of a superquadric of revolution at some heights; cached, because it is that of all sizes."""
+    sine = _signed_power(np.array(heights), 1 / e1)  # of the latitude
+    return _profile(e1, k, np.arcsin(np.clip(sine, -1.0, 1.0)))
 
 
 def _profile(e1: float, k: float, eta: Array) -> Profile:

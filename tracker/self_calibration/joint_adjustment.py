@@ -29,7 +29,7 @@ class AlikeLenses(PointProblem):
         super().__init__(problem.observations, problem.prior, problem.n_groups, problem.sigmas_px)
         self._alike = alike
 
-    def linearize(self, rig: Rig) -> ArrowEquations:
+    def linearize(self, rig: Rig, below: float = np.inf) -> ArrowEquations:
         """See `BundleProblem`."""
         out, cost = super().linearize(rig), 0.0
         precision = CALIBRATED.focal**-2

@@ -78,7 +78,7 @@ def test_an_acquired_body_goes_to_the_next_session(run, placed, quick, tmp_path)
 def test_a_fit_that_is_stopped_leaves_the_session_as_it_was(run, placed, monkeypatch, tmp_path):
     before, steps, linearize = files_of(placed), [], size_fit._Problem.linearize
 
-    def stopped(problem, state):
+    def stopped(problem, state, *below):
         steps.append(linearize(problem, state))
         if len(steps) == 2:
             signal.raise_signal(signal.SIGINT)  # as Ctrl+C does

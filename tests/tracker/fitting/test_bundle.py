@@ -22,7 +22,7 @@ class Curves:
         x = self.A[group] @ np.concatenate([state[0], state[1][group]])
         return np.tanh(x) - self.targets[group], self.A[group] / np.cosh(x)[:, None] ** 2
 
-    def linearize(self, state):
+    def linearize(self, state, below=np.inf):
         out = ArrowEquations.zeros(N, GROUPS, M)
         found = [normal_equations(*self.residuals(state, g)) for g in range(GROUPS)]
         for g, own in enumerate(found):
