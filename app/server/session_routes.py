@@ -158,6 +158,6 @@ def refusal(host_is_private: bool, has_token: bool) -> str | None:
         return None
     found = "one without a token" if host_is_private else "one that other machines can reach"
     return (
-        f"expected a page that only its user can open, found {found}; use the command line: 'quadrille SESSION' opens "
-        "another session, 'quadrille import' brings observations"
+        f"expected a page that only its user can open, found {found}; name files on the command line, to "
+        "'quadrille SESSION' or 'quadrille import'"
     )

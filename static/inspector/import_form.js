@@ -174,7 +174,7 @@ function describe(plan) {
     ...(plan.are_masks ? [] : [points]),
     ...plan.notes.map((text) => line(`Note: ${text}.`)),
     ...plan.problems.map((text) => line(`${capital(text.replace(/\.$/, ""))}.`, "is-failed")),
-    line(plan.problems.length ? "Nothing can be imported." : plan.are_masks ? "The views show their outlines; the cameras will use them as silhouettes. Nothing was stored yet." : "The views show these points. Nothing was stored yet."),
+    line(plan.problems.length ? "Nothing can be imported." : plan.are_masks ? "The views show their outlines. The cameras will use these masks as silhouettes. Nothing was stored yet." : "The views show these points. Nothing was stored yet."),
   ];
 }
 

@@ -83,7 +83,10 @@ async def test_files_are_described_and_then_stored(controller, serve, form):
     assert not (controller.session.folder / "observations").exists()
     assert await post(IMPORT, {}) == (200, '{"stored": true}')
     assert [s.name for s in controller.state.observations.sets] == ["net"]
-    await post(PLAN, form)
+    status, text = await post(PLAN, form)
+    assert (status, "exists already; choose another name" in text) == (400, True), text
+    assert (await post(PLAN, form | {"name": "other"}))[0] == 200
+    (controller.session.folder / "observations" / "other").mkdir()  # somebody stores one of this name meanwhile
     status, text = await post(IMPORT, {})
     assert (status, "exists already; choose another name" in text) == (400, True), text
     assert [s.name for s in controller.state.observations.sets] == ["net"]

@@ -126,7 +126,7 @@ async def test_problems_of_files_forbid_the_import(fresh_page, endpoint):
     plan |= {"are_masks": True, "people": []}
     view |= {"confidence": None, "share": 0.062}
     await check.click()
-    await section.get_by_text("FRONT: 40 rows, people in frames 0 to 39, 6.2 % of the picture").wait_for()
+    await section.get_by_text("FRONT: 40 masks, people in frames 0 to 39, 6.2 % of the picture").wait_for()
     await section.get_by_text("The cameras will use these masks as silhouettes.").wait_for()
     plan["problems"] = ["Expected 40 pictures, found 30."]
     await check.click()
