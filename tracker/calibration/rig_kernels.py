@@ -16,7 +16,7 @@ OF_CAMERA = slice(TIME)
 """Columns of a piece by which its camera moves: the logarithm of the focal length, then the rotation and the
 translation of its part in the world."""
 OF_PART = slice(1, 10)
-"""Those by which its part moves: the same rotation and translation, and its half-axes."""
+"""Columns by which its part moves: the same rotation and translation, and its half-axes."""
 N_COLUMNS, N_PART = OF_PART.stop, OF_PART.stop - OF_PART.start
 """Numbers of all columns, and of those of a part."""
 

@@ -42,7 +42,7 @@ class BvhMotion(NamedTuple):
 
 
 class BvhPose(NamedTuple):
-    """Where a skeleton is, in each of n frames."""
+    """Places of a skeleton in n frames."""
 
     positions: Array
     """Of the joints, (n, n_joints, 3), metres."""
