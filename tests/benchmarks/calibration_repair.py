@@ -313,14 +313,14 @@ def drift(data: Path, folder: Path) -> Measured:
 
 
 class _Repair(NamedTuple):
-    """What corrections make of a camera that is late."""
+    """Result of corrections for a camera that is late."""
 
     late_ms: float
     """By its corrected clock, against the mean of the others."""
     drift: float
     """The same, seconds a second."""
     checks: list[dict[str, Any]]
-    """What each check that named something said."""
+    """Answer of each check that named something."""
     before_mm: float
     """Mean error of the joints before the first correction."""
     after_mm: float
