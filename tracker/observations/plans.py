@@ -12,6 +12,7 @@ from tracker.errors import FormatError, TrackerError
 from tracker.geometry.arrays import IntArray
 from tracker.observations.mask_files import MaskFiles, MaskRules
 from tracker.observations.observed import ObservationSet, SourceFile
+from tracker.observations.request import picture_size
 
 
 @dataclass(frozen=True)
@@ -82,9 +83,8 @@ class MaskPlan:
         Raises:
             TrackerError: the file is damaged, or has changed.
         """
-        given = dict(self.options).get("picture_size")
-        width, height = map(int, given.split("x")) if given is not None else size
-        mask = self.rules.apply(self.masks[camera].read(i, (width, height)).labels)
-        if (width, height) == size:
+        written = picture_size(self.options) or size
+        mask = self.rules.apply(self.masks[camera].read(i, written).labels)
+        if written == size:
             return mask
         return np.asarray(cv2.resize(mask, size, interpolation=cv2.INTER_NEAREST_EXACT), dtype=np.uint8)

@@ -1,7 +1,7 @@
 """What is to be imported, and how."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -56,3 +56,9 @@ class ImportRequest:
             "values": " ".join(f"{name}={value}" for name, value in self.values.items()) or None,
         }
         return tuple((key, str(value)) for key, value in found.items() if value is not None)
+
+
+def picture_size(options: Iterable[tuple[str, str]]) -> tuple[int, int] | None:
+    """Return the size of the pictures that files are of, px, if the options say that it is not that of the footage."""
+    width, _, height = dict(options).get("picture_size", "").partition("x")
+    return (int(width), int(height)) if width else None

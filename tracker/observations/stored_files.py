@@ -50,9 +50,3 @@ def stored_pictures(session: Session, observations: ObservationSet) -> list[Stor
         for i, (name, (group, table)) in enumerate(zip(cameras, groups, strict=True))
         if name
     ]
-
-
-def picture_size(observations: ObservationSet) -> tuple[int, int] | None:
-    """Return the size of the pictures that key points are of, px, if it was said not to be that of the footage."""
-    width, _, height = dict(observations.options).get("picture_size", "").partition("x")
-    return (int(width), int(height)) if width else None

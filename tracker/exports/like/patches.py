@@ -24,8 +24,9 @@ from tracker.motion.velocity import velocity
 from tracker.observations.joints import side_pairs, triangulate_observations
 from tracker.observations.observed import ObservationSet
 from tracker.observations.placing import rescaled
+from tracker.observations.request import picture_size
 from tracker.observations.stored import source_path
-from tracker.observations.stored_files import StoredPictures, picture_size, stored_pictures
+from tracker.observations.stored_files import StoredPictures, stored_pictures
 from tracker.session.session import Session
 
 Files = dict[str, bytes]
@@ -57,7 +58,7 @@ def mended_pictures(
     triangulated, pairs = triangulate_observations(observations, cameras), side_pairs(observations)
     detections, is_exchanged = triangulated.detections, triangulated.is_exchanged & exchange_sides
     exchanged: list[tuple[int, int, int]] = []
-    size, names = picture_size(observations), [c.name for c in cameras]
+    size, names = picture_size(observations.options), [c.name for c in cameras]
     by_path = {source_path(session, observations.name, s): s.path for s in observations.sources}
     found: list[tuple[StoredPictures, Changes]] = []
     for pictures in stored_pictures(session, observations):
