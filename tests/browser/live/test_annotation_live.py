@@ -67,7 +67,7 @@ async def test_a_plan_is_annotated_and_reviewed(tab, folder):
     await page.keyboard.press("Alt+m")
     await page.keyboard.type("see the hand")
     await page.keyboard.press("Enter")
-    await section.get_by_text("see the hand").wait_for()
+    await section.get_by_role("button", name="see the hand").wait_for()
 
     await section.get_by_label("Tasks to list").select_option("rejected")
     await page.locator(".plan-tasks button").click()

@@ -37,7 +37,7 @@ async def test_a_doubt_leads_to_its_reason_and_to_a_good_pose(live):
     assert "left arm: 60 % chance that it is lost" in await card.inner_text()
     await card.click()
     await shows(live, f"quadrille.state.shown.frame === {WRONG_FRAME}")
-    assert (await state_of(live))["state"]["point"] == "left_wrist"
+    await shows(live, "quadrille.state.state.point === 'left_wrist'")
     await live.locator("#show-reason").click()
     await shows(live, EXPLAINED, 120)
     reason = (await state_of(live))["reason"]
