@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from app.remedies import page_text
 from app.runtime.jobs import Job
 from app.state.progress import TrackState
 from app.state.run_choices import RunChoices
+from app.storage.turns import TurnError
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
@@ -219,11 +221,17 @@ class Tracking:
         run.job.run()
 
     def resume(self) -> None:
-        """Continue a paused run, if there is one."""
+        """Continue a paused run, if there is one.
+
+        Raises:
+            TurnError: somebody else works on one of its frames; it stays paused.
+        """
         with self._activities.starting(self):
-            if self._run is not None and not self._run.job.running:
+            run = self._run
+            if run is not None and not run.job.running:
+                self._session_state.require_turn(None, run.session.frames)  # later stages write all of them again
                 self._session_state.set(track=replace(self._session_state.state.track, running=True))
-                self._run.job.run()
+                run.job.run()
 
     def pause(self) -> None:
         """Pause a running run with its results on disk. The caller must not hold the lock: the last step takes it."""
@@ -298,7 +306,8 @@ class Tracking:
     def _paused(self, run: _Run) -> None:
         with self._session_state.lock:
             if run is self._run:
-                self._save(run)
+                with suppress(TurnError):  # the run's end saves again, and tells of a refusal
+                    self._save(run)
                 self._session_state.set(track=replace(self._session_state.state.track, running=False))
                 self._session_state.request_evidence()
 
@@ -321,7 +330,12 @@ class Tracking:
         self._session_state.refresh_saving()
 
     def _end(self, run: _Run, how: str, failed: bool = False) -> None:
-        self._save(run)
+        """End a run, and tell how; poses that somebody else's work keeps from being saved are lost."""
+        try:
+            self._save(run)
+        except TurnError as error:
+            how, failed = f"stopped, because {page_text(error)}", True
+            self._session_state.show_frame(self._session_state.state.frame)  # the stored poses: a shown one may be lost
         summary = run.display.summary()
         self._run = None
         tracked = run.session.tracked
