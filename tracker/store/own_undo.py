@@ -80,7 +80,7 @@ def redo_own(connection: Connection, tree: EditTree, author: str, in_tree: bool 
 
 
 def own_labels(connection: Connection, author: str) -> OwnLabels:
-    """Return what an annotator can undo and redo; only the latest edits are read."""
+    """Return what an annotator can undo and redo; the latest edits are read, up to their last that holds."""
     with connection.snapshot():
         db = connection.db
         undo, undone = _last_own(db, author), _undone_own(db, author)
@@ -102,7 +102,7 @@ def _undone_own(db: sqlite3.Connection, author: str) -> tuple[int, str] | None:
 def _last_own(db: sqlite3.Connection, author: str) -> int | None:
     """Return the last edit of an annotator that holds and changed poses by itself."""
     takers = _takers(db)
-    return next((e for e, by in _held(db, takers) if by == author and e not in takers), None)
+    return next((e for e in _held(db, author, takers) if e not in takers), None)
 
 
 def _last_own_taker(db: sqlite3.Connection, author: str) -> int | None:
@@ -111,9 +111,7 @@ def _last_own_taker(db: sqlite3.Connection, author: str) -> int | None:
     A redo must follow its undo: an edit made after a taker ends what could be redone.
     """
     takers = _takers(db)
-    for edit, by in _held(db, takers) if takers else ():
-        if by != author:
-            continue
+    for edit in _held(db, author, takers) if takers else ():
         if edit not in takers:
             return None
         if _depth(edit, takers)[0] % 2:
@@ -122,18 +120,26 @@ def _last_own_taker(db: sqlite3.Connection, author: str) -> int | None:
     return None
 
 
-def _held(db: sqlite3.Connection, takers: Mapping[int, int]) -> Iterator[tuple[int, str]]:
-    """Yield the edits that are done and not taken back, the latest first, with their authors."""
+def _held(db: sqlite3.Connection, author: str, takers: Mapping[int, int]) -> Iterator[int]:
+    """Yield the edits of an annotator that are done and not taken back, the latest first.
+
+    No more of the history is read than is asked for, and nothing before the annotator's first edit.
+    """
+    (first,) = db.execute("SELECT min(id) FROM edits WHERE author = ?", (author,)).fetchone()
+    if first is None:
+        return
     sql = (
-        "WITH RECURSIVE line (id) AS (SELECT edit FROM head UNION ALL SELECT parent FROM line JOIN edits USING (id)) "
-        "SELECT id, author FROM line JOIN edits USING (id)"
+        "WITH RECURSIVE line (id, parent, author) AS (SELECT id, parent, author FROM head JOIN edits ON id = edit "
+        "UNION ALL SELECT e.id, e.parent, e.author FROM line JOIN edits e ON e.id = line.parent WHERE e.id >= ?) "
+        "SELECT id, author FROM line"  # joined to another table, all of the line would be read first
     )
     taken: set[int] = set()
-    for edit, author in db.execute(sql):  # a parent is older than its child
+    for edit, by in db.execute(sql, (first,)):  # a parent is older than its child
         if edit not in taken:
             if edit in takers:
                 taken.add(takers[edit])
-            yield int(edit), str(author)
+            if by == author:
+                yield int(edit)
 
 
 def _takers(db: sqlite3.Connection) -> dict[int, int]:

@@ -3,6 +3,7 @@ from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline.methods import METHODS, make_tracker
@@ -66,6 +67,7 @@ def simple_poses_to_replace(store, people, frames, tracked, settings):
     return found
 
 
+@pytest.mark.slow
 def test_poses_to_replace_are_those_of_a_simple_search(tmp_path, monkeypatch):
     rng, model = np.random.default_rng(7), load_model("gavrila22")
     people = [Person(name, m, "#53a504") for name, m in (("man", model), ("woman", load_model("gavrila22", 1.5)))]

@@ -1,11 +1,13 @@
 """Two annotators edit one store in turn; each undoes and redoes only what is their own."""
 
 import random
+from contextlib import suppress
 
 import numpy as np
 import pytest
 
 from tracker.errors import OvertakenEditError, SessionError
+from tracker.store import own_undo
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PinChange, PoseChange, PoseRecord
 
@@ -146,6 +148,60 @@ def test_labels_name_what_a_move_would_take(store):
     store.undo_own()
     store.undo_own("ben", in_tree=True)
     assert (store.own_labels()[:2], store.own_labels("ben")[:2]) == ((None, "anna sets 10"), (None, "ben sets 20"))
+
+
+def simple_held(db, author, takers):
+    """As `own_undo._held`, but from the whole history."""
+    parents = dict(db.execute("SELECT id, parent FROM edits"))
+    authors = dict(db.execute("SELECT id, author FROM edits"))
+    ((edit,),) = db.execute("SELECT edit FROM head")
+    held = []
+    while edit is not None:
+        held.append(edit)
+        edit = parents[edit]
+    for edit in list(held):  # the latest first
+        if edit in held and edit in takers:
+            held.remove(takers[edit])
+    return iter([e for e in held if authors[e] == author])
+
+
+@pytest.mark.slow
+def test_labels_are_those_of_a_simple_search(store, monkeypatch):
+    rng, found = random.Random("labels"), set()
+    for step in range(150):
+        name, move = rng.choice(("anna", "ben", "cleo")), rng.choice(("edit", "undo", "undo", "redo"))
+        if move == "edit":
+            put(store, name, len(name) + rng.randrange(2), step)
+        else:
+            with suppress(SessionError):
+                (store.undo_own if move == "undo" else store.redo_own)(name, in_tree=rng.random() < 0.3)
+        everybody = ("anna", "ben", "cleo", "nobody")
+        labels = [store.own_labels(who) for who in everybody]
+        found.update(labels)
+        with monkeypatch.context() as simple:
+            simple.setattr(own_undo, "_held", simple_held)
+            assert labels == [store.own_labels(who) for who in everybody], step
+    assert len(found) > 50
+
+
+def test_a_long_history_is_not_read_for_the_last_edit(store):
+    def steps(author):
+        """Count steps of the query."""
+        db, n = store._connection.db, []
+        db.set_progress_handler(lambda: n.append(1), 1)
+        store.own_labels(author)
+        db.set_progress_handler(None, 0)
+        return len(n)
+
+    put(store, "ben", 2, 1)
+    counts = []
+    for _ in range(2):
+        for x in range(100):
+            put(store, "anna", 1, x)
+        counts.append((steps("anna"), steps("nobody")))
+    (few, none), (as_few, as_none) = counts
+    assert as_few == few
+    assert as_none - none < 10 * 100, "one look at each author"
 
 
 def test_a_gesture_goes_on_beside_edits_of_other_poses(store):
