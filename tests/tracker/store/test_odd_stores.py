@@ -126,7 +126,8 @@ ODD = [
     "INSERT INTO tasks VALUES ('x', 'plan', 'ann', 1, '', '', '', 0)",
     f"INSERT INTO tasks VALUES ('{'0' * 32}', 'plan', 'ann', -1, '', '', '', 0)",
     f"INSERT INTO tasks VALUES ('{'0' * 32}', 'other', 'ann', 1, '', '', '', 0)",
-    f"INSERT INTO task_states VALUES ('{'0' * 32}', '{'0' * 32}', 'fine', '', '', '', 0)",
+    f"INSERT INTO task_states VALUES ('{'0' * 32}', '{'0' * 32}', 'fine', '', '', '', 0, NULL)",
+    f"INSERT INTO task_states VALUES ('{'0' * 32}', '{'0' * 32}', 'verified', '', '', '', 0, 'x')",
     f"INSERT INTO comments VALUES ('{'0' * 32}', '', 'ann', 1, '', X'FF', 0, '', '', 0)",
 ]  # fmt: skip
 
