@@ -94,7 +94,7 @@ def _plan_of_pictures(
     sources, by_path = source_files([(g, name) for (g, _), name in zip(groups, names, strict=True)])
     rows = np.unique(np.concatenate([f for f in frames.values()])).astype(np.float64)
     observations = ObservationSet(
-        request.name, format_name, request.people, joint_map, points, None, rows, sources, tuple(notes),
+        request.name, format_name, request.people, joint_map, points, None, (rows,), sources, tuple(notes),
         request.options,
     )  # fmt: skip
     views = tuple(_preview(name, chosen, tables, points, v) for v, name in enumerate(session.camera_names))
@@ -230,5 +230,5 @@ def _plan_of_space(session: Session, request: ImportRequest, format_name: str, f
     for k, ((path, _), person) in enumerate(zip(files, request.people, strict=True)):
         with_points = np.flatnonzero(np.isfinite(placed.joints.joints_world[:, k]).all(axis=-1).sum(axis=1))
         frames = (int(with_points[0]), int(with_points[-1])) if len(with_points) else None
-        views.append(ViewPreview(person, path, len(placed.row_frames), frames, 1))
+        views.append(ViewPreview(person, path, len(placed.row_frames[k]), frames, 1))
     return ImportPlan(observations, by_path, tuple(views), tuple(problems))

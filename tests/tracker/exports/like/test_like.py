@@ -68,15 +68,15 @@ def observed(session, bodies, offset=OFFSET):
     return out
 
 
-def store(session, bodies, edited=(EDITED,), joints=None):
+def store(session, bodies, edited=(EDITED,), joints=None, person="ann"):
     """Store poses; on edited frames all values are a person's, or those of some joints alone."""
     model = session.people[0].model
     by_hand = [joints is None or name.rpartition(".")[0] in joints for name in model.value_names]
     with closing(AnnotationStore(session.annotations_path)) as annotations:
-        revision = annotations.add_model_revision("ann", format_model(model))
+        revision = annotations.add_model_revision(person, format_model(model))
         changes = [
             PoseChange(
-                "ann",
+                person,
                 k,
                 PoseRecord(
                     b.values,
@@ -496,6 +496,38 @@ def test_axes_and_units_of_the_file(session, tmp_path):
     one, other = read_trc(tmp_path / "a.trc"), read_trc(tmp_path / "b.trc")
     assert np.abs(one.points - other.points).max() < 0.015
     assert not np.array_equal(one.points[EDITED], other.points[EDITED])
+
+
+def test_each_person_has_the_rows_of_their_own_file(tmp_path):
+    session = make_session(tmp_path / "s", N, people=("ann", "bob"))
+    bodies, late = poses(session), 4
+    wrong = observed(session, bodies)
+    wrong[EDITED] += 0.2
+    paths = (tmp_path / "ann.trc", tmp_path / "bob.trc")
+    for path, first in zip(paths, (0, late), strict=True):
+        write_trc(path, BODY_25.points, wrong[first:], session.fps, frames=np.arange(first, N))
+    plan = plan_import(session, ImportRequest("mp", paths, ("ann", "bob")))
+    assert not plan.problems, plan.problems
+    store_import(session, plan)
+    store(session, bodies, person="bob")
+    export_like(session, load_observations(session, "mp"), tmp_path / "out")
+    assert (tmp_path / "out" / "ann.trc").read_bytes() == paths[0].read_bytes()
+    before, after = read_trc(paths[1]), read_trc(tmp_path / "out" / "bob.trc")
+    moved = np.abs(before.points - after.points).max(axis=(1, 2))
+    assert np.flatnonzero(moved > 0.1).tolist() == [EDITED - late]
+
+
+def test_rows_at_another_rate_are_where_their_time_is(session, tmp_path):
+    at = 0.3 + np.arange(4 * (N - 2)) / 4  # from between two frames, four times as many a second
+    truth = observed(session, poses(session))
+    share = (at % 1)[:, None, None]
+    points = (1 - share) * truth[at.astype(int)] + share * truth[at.astype(int) + 1]
+    path = tmp_path / "p.csv"
+    write_points_csv(path, BODY_25.points, points, 4 * session.fps, "m")
+    head, *rows = [line.split(",") for line in path.read_text().splitlines()]
+    rows = [[row[0], f"{x / session.fps:.9f}", *row[2:]] for row, x in zip(rows, at, strict=True)]
+    path.write_text("\n".join(map(",".join, [head, *rows])))
+    np.testing.assert_allclose(imported(session, path, clock="time").row_frames, [at], atol=1e-6)
 
 
 def test_a_stored_file_that_was_changed(session, tmp_path):
