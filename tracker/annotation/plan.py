@@ -139,8 +139,7 @@ def decide(
         if pose is None:
             raise TrackerError(f"expected a pose of {person} in frame {frame} to verify, found none; annotate it first")
         if not pose.keyframe and not pose.reviewed:
-            marks = [MarkChange(person, frame, keyframe=False, reviewed=True)]
-            store.commit(f"Verify frame {frame}", marks, author=author)
+            store.commit(f"Verify frame {frame}", [MarkChange(person, frame, keyframe=False, reviewed=True)])
     by, time = annotator() if author is None else author, now()
     shown = store.tasks.planned_poses().get(at)
     seen = None if shown is None else shown.uid

@@ -37,8 +37,8 @@ LATER_COLUMNS: dict[int, dict[str, tuple[str, ...]]] = {
 """Columns that the tables of each older version with checksums lack."""
 LATER_TABLES = ("tasks", "task_states", "comments")
 """Tables that the oldest versions lack."""
-TABLES_SINCE = 10
-"""The first version with `LATER_TABLES`."""
+TABLES_SINCE = next(version for version, later in LATER_COLUMNS.items() if "edits" not in later)
+"""The first version with `LATER_TABLES`, in which edits got their identities, too."""
 OLDEST_VERSION = min(LATER_COLUMNS)
 """The first version of a store with checksums."""
 _KEYS = {

@@ -29,6 +29,7 @@ from tracker.formats.trc import read_trc, write_trc
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.request import ImportRequest
 from tracker.observations.stored import load_observations, source_path
+from tracker.observations.stored_files import stored_pictures
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 
@@ -496,6 +497,40 @@ def test_axes_and_units_of_the_file(session, tmp_path):
     one, other = read_trc(tmp_path / "a.trc"), read_trc(tmp_path / "b.trc")
     assert np.abs(one.points - other.points).max() < 0.015
     assert not np.array_equal(one.points[EDITED], other.points[EDITED])
+
+
+def test_folders_of_equal_names_stay_apart(session, tmp_path):
+    """Files are only numbered, and one camera has more of them than another."""
+    points = seen(session, [observed(session, poses(session))])
+    write_openpose(tmp_path / "k", session.camera_names, points)
+    folders = [tmp_path / "k" / name for name in session.camera_names]
+    for v, folder in enumerate(folders):
+        for i, file in enumerate(sorted(folder.iterdir())):
+            file.rename(folder / f"{i:06d}_keypoints.json")
+        if v == 0:
+            (folder / f"{N - 1:06d}_keypoints.json").unlink()
+    request = ImportRequest("mp", tuple(folders), ("ann",), first_frame=0)
+    plan = plan_import(session, request)
+    assert not plan.problems, plan.problems
+    store_import(session, plan)
+    found = stored_pictures(session, load_observations(session, "mp"))
+    assert [(p.camera, len(p.files)) for p in found] == [
+        (name, N - (v == 0)) for v, name in enumerate(session.camera_names)
+    ]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_mark_of_the_byte_order_stays(session, tmp_path, encoding):
+    bodies = poses(session)
+    path, _ = write_kind("openpose", session, tmp_path, observed(session, bodies))
+    for file in path.rglob("*.json"):
+        file.write_text(file.read_text(), encoding=encoding)
+    observations = imported(session, path)
+    store(session, bodies)
+    done = export_like(session, observations, tmp_path / "back", learn_offsets=False)
+    assert done.frames == (EDITED,)
+    (one, *_) = sorted((tmp_path / "back").rglob(f"*{EDITED:012d}*.json"))
+    assert len(json.loads(one.read_text(encoding=encoding))["people"]) == 1
 
 
 def test_each_person_has_the_rows_of_their_own_file(tmp_path):
