@@ -14,7 +14,7 @@ from tracker.errors import DamagedStoreError
 from tracker.store.connection import Connection
 from tracker.store.identities import derived_uid
 from tracker.store.own_undo import held_edits
-from tracker.validation import MAX_FRAMES, check
+from tracker.validation import MAX_FRAMES, Time, check
 
 T = TypeVar("T")
 
@@ -40,7 +40,7 @@ class TaskRow(NamedTuple):
     """Name of the annotator; empty for anybody."""
     author: str
     """Name of the person who planned it."""
-    time: str
+    time: Time
     """Time at which it was planned, ISO 8601, UTC."""
 
 
@@ -54,7 +54,7 @@ class StateRow(NamedTuple):
     comment: str
     """Reason, as of a rejection; may be empty."""
     author: str
-    time: str
+    time: Time
     pose: Uid | None = None
     """Identity of the pose on which it was made; None without a pose, and for rows from before version 11."""
 
@@ -77,7 +77,7 @@ class CommentRow(NamedTuple):
     resolved: _Flag
     """1 resolves the comment, 0 leaves or opens it."""
     author: str
-    time: str
+    time: Time
 
 
 class MadePose(NamedTuple):
@@ -106,7 +106,7 @@ class _PlannedRow(NamedTuple):
     person: str
     frame: _Frame
     keyframe: _Flag
-    time: str
+    time: Time
     edit: str
     body: str
     """Model of the body as TOML."""
@@ -204,7 +204,7 @@ class TaskLog:
     def edit_times(self) -> list[tuple[str, str]]:
         """Return author and time of all edits, undone ones too, earliest first."""
         return self._connection.all(
-            "SELECT author, time FROM edits ORDER BY time", (), lambda row: (str(row[0]), str(row[1]))
+            "SELECT author, time FROM edits ORDER BY time", (), lambda row: (str(row[0]), _checked_time(row[1], row[0]))
         )
 
     def _all(self, table: str, row_type: Callable[..., T], order: str) -> list[T]:
@@ -230,5 +230,9 @@ def _planned(*columns: Any) -> _PlannedRow:
 
 
 def _made(row: Sequence[Any]) -> MadePose:
-    person, frame, keyframe, *edit = row
-    return MadePose(str(person), int(frame), bool(keyframe), *map(str, edit))
+    person, frame, keyframe, author, time, uid = row
+    return MadePose(str(person), int(frame), bool(keyframe), str(author), _checked_time(time, author), str(uid))
+
+
+def _checked_time(time: Any, author: Any) -> str:
+    return str(check(time, Time, f"the time of an edit of {author!r:.40}", DamagedStoreError))
