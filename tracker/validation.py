@@ -53,6 +53,21 @@ FrameRate: TypeAlias = Annotated[
     float, Meta(ge=1e-3, le=1e5, description="a frame rate above 0, from 0.001 to 100000 per second")
 ]
 
+_ANY_DAY = r"(?:0[1-9]|1[0-2])-(?:0[1-9]|1\d|2[0-8])|(?:0[13-9]|1[0-2])-(?:29|30)|(?:0[13578]|1[02])-31"
+_LEAP_YEAR = r"(?:\d\d(?:0[48]|[2468][048]|[13579][26])|(?:[02468][048]|[13579][26])00)"
+_DAY = rf"(?:\d{{4}}-(?:{_ANY_DAY})|{_LEAP_YEAR}-02-29)"
+_CLOCK = r"(?:[01]\d|2[0-3]):[0-5]\d:[0-5]\d(?:\.\d{3}|\.\d{6})?"
+"""Days of all years, leap years, days and clock times, for a regular expression."""
+Time: TypeAlias = Annotated[
+    str,
+    Meta(
+        pattern=rf"(?a)^(?!0000|9999){_DAY}T{_CLOCK}\+00:00\Z",
+        description="a time in UTC such as 2026-11-27T09:30:00.000000+00:00",
+    ),
+]
+"""A time as stores have it: as text, times are in order. The calendar has the day, as `datetime.fromisoformat` demands.
+The year is from 1 to 9998, so that later times can follow."""
+
 
 def same_form(name: str) -> str:
     """Return a name in the one Unicode form in which names are compared (NFC).
@@ -153,6 +168,7 @@ def _trail(declared: Any, value: Any, path: str) -> list[_Step]:
     trail = [_Step("", value, *_resolve(declared, value))]
     for name, index in re.findall(r"\.([^.\[\]]+)|\[(\d+)\]", path):
         key, value, declared, *_ = trail[-1]
+        column = declared.fields[int(index)].name if isinstance(declared, msgspec.inspect.NamedTupleType) else ""
         inner = _inner(declared, name, int(index or 0))
         try:
             value = value[name or int(index)]
@@ -162,7 +178,7 @@ def _trail(declared: Any, value: Any, path: str) -> list[_Step]:
             break
         title = value.get("name") if isinstance(value, dict) else None
         named = isinstance(title, str) and re.fullmatch(r"[\w .-]{1,40}", title)
-        key += f".{name}" if name else f"[{title if named else index}]"
+        key += f".{name or column}" if name or column else f"[{title if named else index}]"
         trail.append(_Step(key.removeprefix("."), value, *_resolve(inner, value)))
     return trail
 
@@ -186,6 +202,8 @@ def _inner(declared: Any, name: str, index: int) -> Any:
     """Return the type of a field or item; None if the declaration has none."""
     if isinstance(declared, msgspec.inspect.StructType):
         return next((f.type for f in declared.fields if f.encode_name == name), None)
+    if isinstance(declared, msgspec.inspect.NamedTupleType):
+        return declared.fields[index].type
     if isinstance(declared, msgspec.inspect.TupleType):
         return declared.item_types[index] if index < len(declared.item_types) else None
     return getattr(declared, "item_type", None)

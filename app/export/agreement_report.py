@@ -48,7 +48,8 @@ def write_report(copies: Copies, found: Agreement, tolerance_m: float | None, pa
     plotted = [(joint, found.joints[joint]) for joint in LIMB_JOINTS if joint in found.joints]
     plots = [_plot(_label(name, joint.pair, found), joint) for name, joint in plotted]
     body = [
-        f"<h1>{html.escape(title)}</h1><p>{len(copies.subjects)} poses. Differences: {order}. Intervals are 95%.</p>",
+        f"<h1>{html.escape(title)}</h1><p>{len(copies.subjects)} poses. Differences: {order}. Intervals are 95%, each "
+        "of one joint or angle. Those of a joint hold along every line in space.</p>",
         *(f"<p>Note: {html.escape(note)}.</p>" for note in copies.notes),
         "<h2>Bland-Altman plots of the limb joints</h2>",
         "<p>Difference against mean of two annotators, both along the line of the joint's bias. "
@@ -78,9 +79,10 @@ def _plot(name: str, joint: JointAgreement) -> str:
     ]
     marks.append(f'<line class="zero" x1="{_LEFT}" x2="{right}" y1="{y(0):.1f}" y2="{y(0):.1f}"/>')
     for kind, value, (low, high) in zip(("bias", "limit", "limit"), lines, bands, strict=True):
-        if np.isfinite([value, low, high]).all():
+        if np.isfinite([low, high]).all():
             size = f'y="{y(high):.1f}" height="{y(low) - y(high):.1f}"'
             marks.append(f'<rect class="{kind} band" x="{_LEFT}" width="{right - _LEFT}" {size}/>')
+        if np.isfinite(value):
             marks.append(f'<line class="{kind}" x1="{_LEFT}" x2="{right}" y1="{y(value):.1f}" y2="{y(value):.1f}"/>')
             marks.append(f'<text x="{_LEFT - 5}" y="{y(value) + 4:.1f}" text-anchor="end">{value:.1f}</text>')
     marks += [
@@ -92,7 +94,7 @@ def _plot(name: str, joint: JointAgreement) -> str:
     marks.append(f'<text x="{middle}" y="{_HEIGHT - 5}" text-anchor="middle">mean, cm from the middle</text>')
     marks.append(f'<text x="{_LEFT - 5}" y="{_TOP - 8}" text-anchor="end">mm</text>')
     marks.append(f'<text class="title" x="{_LEFT}" y="{_TOP - 8}">{_words(name)}</text>')
-    label = f"{_words(name)}: bias {bias:.1f} mm, limits {lower:.1f} to {upper:.1f} mm"
+    label = f"{_words(name)}: bias {_cell(bias)} mm, limits {_interval((lower, upper), 1, 1)} mm"
     return f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{label}">{"".join(marks)}</svg>'
 
 
@@ -141,18 +143,17 @@ def _head(*columns: str) -> str:
 
 
 def _row(name: str, numbers: Sequence[float], limits: Limits, unit: float, error: float, icc: Icc, n: int) -> str:
-    cells = [f"{x:.1f}" for x in numbers]
+    cells = [_cell(x) for x in numbers]
     for value, interval in ((limits.lower, limits.lower_interval), (limits.upper, limits.upper_interval)):
-        cells += [f"{unit * value:.1f}", _interval(interval, unit, 1)]
-    agreement = [f"{icc.value:.3f}", _interval(icc.interval, 1, 3)] if np.isfinite(icc.value) else ["-", "-"]
-    cells += [f"{unit * error:.1f}", *agreement, str(n)]
+        cells += [_cell(unit * value), _interval(interval, unit, 1)]
+    cells += [_cell(unit * error), _cell(icc.value, 3), _interval(icc.interval, 1, 3), str(n)]
     return f"<tr><td>{_words(name)}{_numbers(cells)}</tr>"
 
 
 def _annotators(found: Agreement) -> list[str]:
     out = ["<h2>Against the consensus, mm</h2>", _head("mean distance", "95%")]
     for name, own in found.annotators.items():
-        cells = [f"{1000 * own.mean_distance_m:.1f}", f"{1000 * own.p95_distance_m:.1f}"]
+        cells = [_cell(1000 * own.mean_distance_m), _cell(1000 * own.p95_distance_m)]
         out.append(f"<tr><td>{html.escape(name)}{_numbers(cells)}</tr>")
     return [*out, "</table>"]
 
@@ -179,8 +180,14 @@ def _numbers(cells: Sequence[str]) -> str:
     return "".join(f'<td class="number">{cell}' for cell in cells)
 
 
+def _cell(value: float, digits: int = 1) -> str:
+    return f"{value:.{digits}f}" if np.isfinite(value) else "-"
+
+
 def _interval(interval: Interval, unit: float, digits: int) -> str:
-    return f"{unit * interval[0]:.{digits}f} to {unit * interval[1]:.{digits}f}"
+    if not np.isfinite(interval).all():
+        return "-"
+    return " to ".join(_cell(unit * end, digits) for end in interval)
 
 
 def _label(name: str, pair: tuple[str, str], found: Agreement) -> str:

@@ -3,7 +3,7 @@
 import unicodedata
 
 from tracker.errors import TrackerError
-from tracker.store.annotator import checked_annotator
+from tracker.store.annotator import checked_annotator, one_form
 from tracker.validation import quoted
 
 MAX_CHARACTERS = 60
@@ -16,7 +16,7 @@ def joined_name(text: str) -> str:
     Raises:
         TrackerError: it is too long, or has characters that nobody can see.
     """
-    name = " ".join(unicodedata.normalize("NFC", text).split())
+    name = one_form(text)
     if not name:
         return ""
     if len(name) > MAX_CHARACTERS or not name.isprintable():

@@ -26,7 +26,7 @@ def set_annotator(name: str | None) -> None:
             with suppress(OSError, UnicodeDecodeError, TrackerError):
                 os.environ[VARIABLE] = checked_annotator(_file().read_text("utf-8").strip())
         return
-    os.environ[VARIABLE] = checked_annotator(name)
+    os.environ[VARIABLE] = name = checked_annotator(name)
     with suppress(OSError):  # where nothing can be remembered, the name holds for this process
         _file().parent.mkdir(parents=True, exist_ok=True)
         write_text_atomic(_file(), f"{name}\n")

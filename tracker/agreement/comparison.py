@@ -1,6 +1,8 @@
 """Compare the poses of annotators: joint by joint, angle by angle, frame by frame, and each against the consensus.
 
-Differences are those of the second annotator less the first, in the axes of the world.
+Differences are those of the second annotator less the first, in the axes of the world. Of several annotators, figures
+are of the pair with the largest bias, and their intervals allow for that choice (`statistics.limits_of_agreement`). An
+interval is of one joint or angle: of twenty that only chance tells apart, one may show a bias.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,9 +29,12 @@ class JointAgreement:
     bias_m: Array
     """Mean difference, (3,)."""
     along: Limits
-    """Of the difference along the line of the bias, so that its bias is the length of `bias_m`."""
+    """Of the difference along the line of the bias, so that its bias is the length of `bias_m`.
+
+    Its intervals hold for all lines in space at once, since the differences themselves chose this one. That of the bias
+    reaches 0 or less unless the bias is certain. Three subjects or fewer determine none."""
     by_axis: tuple[Limits, ...]
-    """Of the difference along each axis of the world."""
+    """Of the difference along each axis of the world; intervals are of one axis."""
     typical_error_m: float
     """Along the line of the bias, of all annotators."""
     typical_error_by_axis_m: tuple[float, ...]
@@ -66,7 +71,7 @@ class AnnotatorAgreement:
     """An annotator against the consensus of all, metres."""
 
     mean_distance_m: float
-    """Over subjects and joints."""
+    """Over subjects and joints; NaN, like the next, if the bodies have no joint in common."""
     p95_distance_m: float
     bias_m: Mapping[str, Array]
     """Mean difference of each joint from the consensus, (3,)."""
@@ -91,7 +96,7 @@ class Agreement:
     joints: Mapping[str, JointAgreement]
     angles: Mapping[str, AngleAgreement]
     worst: tuple[Disagreement, ...]
-    """One for each subject, the largest distance first."""
+    """One for each subject whose bodies have a joint in common, the largest distance first."""
 
 
 def compare(copies: Copies, annotators: Sequence[int] | None = None, people: Sequence[str] | None = None) -> Agreement:
@@ -135,8 +140,8 @@ def _joint(points: Array, names: tuple[str, ...]) -> JointAgreement:
         (names[a], names[b]),
         len(points),
         bias,
-        limits_of_agreement(difference @ line),
-        tuple(limits_of_agreement(d) for d in difference.T),
+        limits_of_agreement(difference @ line, dimensions=points.shape[-1], chosen_of=len(biases)),
+        tuple(limits_of_agreement(d, chosen_of=len(biases)) for d in difference.T),
         mean_squares(points @ line).typical_error,
         tuple(mean_squares(points[..., axis]).typical_error for axis in range(3)),
         icc_agreement(mean_squares(points)),
@@ -150,11 +155,12 @@ def _joint(points: Array, names: tuple[str, ...]) -> JointAgreement:
 
 def _angle(means: Array, steps: Array, names: tuple[str, ...]) -> AngleAgreement:
     """Compare an angle by its consensus, (n,), and the steps from there to each annotator, (n, k), rad."""
-    a, b = max(combinations(range(len(names)), 2), key=lambda pair: abs((steps[:, pair[1]] - steps[:, pair[0]]).mean()))
+    pairs = list(combinations(range(len(names)), 2))
+    a, b = max(pairs, key=lambda pair: abs((steps[:, pair[1]] - steps[:, pair[0]]).mean()))
     return AngleAgreement(
         (names[a], names[b]),
         len(steps),
-        limits_of_agreement(steps[:, b] - steps[:, a]),
+        limits_of_agreement(steps[:, b] - steps[:, a], chosen_of=len(pairs)),
         mean_squares(steps).typical_error,
         icc_agreement(mean_squares(means[:, None] + steps)),
     )
@@ -168,8 +174,8 @@ def _against_consensus(points: Array, joints: Sequence[str], names: Sequence[str
         columns = [(j, m) for m, j in enumerate(joints) if np.isfinite(distance[:, m]).any()]
         finite = distance[np.isfinite(distance)]
         out[name] = AnnotatorAgreement(
-            float(finite.mean()),
-            float(np.quantile(finite, 0.95)),
+            float(finite.mean()) if finite.size else np.nan,
+            float(np.quantile(finite, 0.95)) if finite.size else np.nan,
             {j: np.nanmean(steps[:, i, m], axis=0) for j, m in columns},
             {j: float(np.nanmean(distance[:, m])) for j, m in columns},
         )
@@ -183,6 +189,8 @@ def _worst(
     out = []
     for subject, of in zip(subjects, points, strict=True):
         distance = np.array([np.linalg.norm(of[b] - of[a], axis=-1) for a, b in pairs])
+        if not np.isfinite(distance).any():
+            continue
         pair, joint = np.unravel_index(int(np.nanargmax(distance)), distance.shape)
         a, b = pairs[int(pair)]
         out.append(Disagreement(subject, joints[int(joint)], float(distance[pair, joint]), (names[a], names[b])))

@@ -140,13 +140,15 @@ def joint_centers(body: PosedBody, joints: Sequence[str]) -> Array:
     return np.array([known.get(joint, np.full(3, np.nan)) for joint in joints])
 
 
-def farthest_joint(a: PosedBody, b: PosedBody) -> tuple[str, float]:
+def farthest_joint(a: PosedBody, b: PosedBody) -> tuple[str, float] | None:
     """Return the joint whose centres are farthest apart in two poses of a person, and their distance, metres.
 
-    The poses are compared in their own bodies, by the joints that both have.
+    The poses are compared in their own bodies, by the joints that both have; None if there is none.
     """
     joints = (*JOINTS, *FOOT_POINTS)
     apart_m = np.linalg.norm(joint_centers(a, joints) - joint_centers(b, joints), axis=1)
+    if not np.isfinite(apart_m).any():
+        return None
     at = int(np.nanargmax(apart_m))
     return joints[at], float(apart_m[at])
 
@@ -187,4 +189,7 @@ def notes_on(sessions: Sequence[Session], bodies: Mapping[Subject, tuple[PosedBo
             out.append(f"the bodies of '{person}' have different degrees of freedom, and their angles are not compared")
         if any(len({texts[m] for m in models}) > 1 for models in of_person):
             out.append(f"the bodies of '{person}' have different sizes, and distances of joints include them")
+        joints = {*JOINTS, *FOOT_POINTS}
+        if any(not joints.intersection(*(m.point_names for m in models)) for models in of_person):
+            out.append(f"the bodies of '{person}' have no joint in common, and their joints are not compared")
     return tuple(out)

@@ -2,7 +2,8 @@
 
 Sources: Bland & Altman 1999, "Measuring agreement in method comparison studies"; McGraw & Wong 1996, "Forming
 inferences about some intraclass correlation coefficients"; Hopkins 2000, "Measures of reliability in sports medicine
-and science".
+and science"; Hotelling 1931, "The generalization of Student's ratio"; Johnson & Wichern 2007, "Applied multivariate
+statistical analysis".
 """
 
 from typing import NamedTuple
@@ -55,24 +56,36 @@ class Icc(NamedTuple):
     interval: Interval
 
 
-def limits_of_agreement(differences: Array) -> Limits:
+def limits_of_agreement(differences: Array, dimensions: int = 1, chosen_of: int = 1) -> Limits:
     """Return bias and limits of agreement, bias +- 1.96 SD (Bland & Altman 1999, Sect. 2).
 
-    The variance of a limit is s^2 (1/n + 1.96^2 / (2 (n - 1))) (Sect. 2.4); Student's t with n - 1 degrees of freedom
+    The variance of a limit is s^2 (1/n + 1.96^2 / (2 (n - 1))) (Sect. 2.4). Student's t with n - 1 degrees of freedom
     turns it into an interval.
+
+    A line that was chosen by its own bias needs a wider interval, or copies that only chance tells apart would show
+    one. For differences along any line in p dimensions, t gives way to the root of p (n - 1) / (n - p) F with p and
+    n - p degrees of freedom. Hotelling's T^2 has this distribution, and the interval holds for all lines at once
+    (Hotelling 1931; Johnson & Wichern 2007, Sect. 5.4). For p = 1 it is t itself. The limits take the same factor.
+
+    The pair with the largest bias of m pairs has the level 1 - 0.05 / m (Bonferroni; Johnson & Wichern, Sect. 5.4).
 
     Args:
         differences: signed, (n,).
+        dimensions: of the space in which the differences choose their line; 1 for a line that is given.
+        chosen_of: number of pairs of annotators of which this one was chosen by its bias.
     """
-    from scipy.special import ndtri, stdtrit  # imported lazily: the command's help needs none
+    from scipy.special import fdtri, ndtri  # imported lazily: the command's help needs none
 
     n = len(differences)
     bias = float(np.mean(differences)) if n else np.nan
     if n < 2:
         unknown = (np.nan, np.nan)
         return Limits(bias, np.nan, np.nan, unknown, unknown, unknown)
-    z, t, sd = float(ndtri(0.975)), float(stdtrit(n - 1, 0.975)), float(np.std(differences, ddof=1))
-    of_bias, of_limit = t * sd / np.sqrt(n), t * sd * np.sqrt(1 / n + z**2 / (2 * (n - 1)))
+    z, sd, freedom = float(ndtri(0.975)), float(np.std(differences, ddof=1)), n - dimensions
+    t_squared = np.nan
+    if freedom > 0:
+        t_squared = dimensions * (n - 1) / freedom * float(fdtri(dimensions, freedom, 1 - 0.05 / chosen_of))
+    of_bias, of_limit = sd * np.sqrt(t_squared / n), sd * np.sqrt(t_squared * (1 / n + z**2 / (2 * (n - 1))))
     lower, upper = bias - z * sd, bias + z * sd
     return Limits(bias, lower, upper, _around(bias, of_bias), _around(lower, of_limit), _around(upper, of_limit))
 

@@ -1,10 +1,11 @@
 """The plan of annotation: tasks, and their states.
 
 A task is `draft` until its annotator sets a keyframe, and `annotated` from then on: both follow from the poses.
-Verified, rejected and withdrawn are decisions of a person, stored with author and time. The latest of all counts.
+Verified, rejected and withdrawn are decisions of a person, stored with author, time and the pose that was seen. The
+latest counts that holds: *verified* for this pose alone, *rejected* until the annotator has set another one.
 """
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from tracker.store.annotator import annotator
 from tracker.store.edit_tree import now
 from tracker.store.identities import derived_uid, new_uid
 from tracker.store.records import MarkChange
-from tracker.store.task_log import MadePose, State, StateRow, TaskRow
+from tracker.store.task_log import MadePose, PlannedPose, State, StateRow, TaskRow
 
 STATES: tuple[State, ...] = ("draft", "annotated", "verified", "rejected")
 """States of the tasks that are not withdrawn, in the order in which they are counted."""
@@ -55,34 +56,38 @@ def add_tasks(store: AnnotationStore, wishes: Iterable[tuple[str, int, str]], au
 
 def read_tasks(store: AnnotationStore) -> list[Task]:
     """Return all tasks with their states, by person, frame and annotator; withdrawn ones too."""
-    present = {(m.person, m.frame): m for m in store.tasks.present_poses()}
+    present = store.tasks.planned_poses()
     by_hand: dict[tuple[str, int, str], MadePose] = {}
     for made in store.tasks.keyframe_edits():
         by_hand[made.person, made.frame, made.author] = by_hand[made.person, made.frame, ""] = made
-    decided = {state.task: state for state in store.tasks.states()}
-    return [_task(row, present, by_hand, decided.get(row.uid)) for row in store.tasks.tasks()]
+    decided: dict[str, list[StateRow]] = defaultdict(list)
+    for state in store.tasks.states():
+        decided[state.task].append(state)
+    return [_task(row, present, by_hand, decided[row.uid]) for row in store.tasks.tasks()]
 
 
 def _task(
     row: TaskRow,
-    present: Mapping[tuple[str, int], MadePose],
+    present: Mapping[tuple[str, int], PlannedPose],
     by_hand: Mapping[tuple[str, int, str], MadePose],
-    decided: StateRow | None,
+    decided: Sequence[StateRow],
 ) -> Task:
     pose = present.get((row.person, row.frame))
     made = by_hand.get((row.person, row.frame, row.annotator)) if pose is not None and pose.keyframe else None
     plain = Task(row, "draft", "", "", row.time)
     if made is not None and (row.kind == "plan" or made.time > row.time):
         plain = Task(row, "annotated", "", made.author, made.time)
-    if decided is None:
-        return plain
-    at = Task(row, decided.state, decided.comment, decided.author, decided.time)
-    holds = {
-        "withdrawn": True,
-        "rejected": plain.state == "draft" or plain.time <= decided.time,
-        "verified": pose is not None and pose.time <= decided.time,
-    }
-    return at if holds.get(decided.state, False) else plain
+    for decision in reversed(decided):
+        if decision.state == "draft":  # planned again
+            break
+        holds = {
+            "withdrawn": True,
+            "rejected": plain.state == "draft" or plain.time <= decision.time,
+            "verified": pose is not None and decision.is_about(pose),
+        }
+        if holds.get(decision.state, False):
+            return Task(row, decision.state, decision.comment, decision.author, decision.time)
+    return plain
 
 
 def is_disputed(store: AnnotationStore, person: str, frame: int) -> bool:
@@ -136,5 +141,7 @@ def decide(
         if not pose.keyframe and not pose.reviewed:
             store.commit(f"Verify frame {frame}", [MarkChange(person, frame, keyframe=False, reviewed=True)])
     by, time = annotator() if author is None else author, now()
-    store.tasks.add(states=[StateRow(new_uid(), row.uid, state, comment, by, time) for row in rows])
+    shown = store.tasks.planned_poses().get(at)
+    seen = None if shown is None else shown.uid
+    store.tasks.add(states=[StateRow(new_uid(), row.uid, state, comment, by, time, seen) for row in rows])
     return len(rows)

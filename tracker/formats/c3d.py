@@ -72,7 +72,8 @@ def read_c3d(path: Path, unit_m: float | None) -> MarkerTable:
     where = f"C3D file {path}"
     data = _read(path, where)
     found = _layout(data, where)
-    n_frames = min(found.n_promised, (len(data) - found.data_at) // found.stride)
+    n_bytes = len(data) - found.data_at
+    n_frames = min(found.n_promised, n_bytes // found.stride)
     if n_frames < 1:
         raise FormatError(f"{where}: expected frames of points, found none; copy or export it again")
     check_size((n_frames, found.n_points, 4), where)
@@ -83,8 +84,12 @@ def read_c3d(path: Path, unit_m: float | None) -> MarkerTable:
     points[~(np.abs(points) <= MAX_NUMBER).all(axis=-1)] = np.nan
     points[(values[..., 3] < 0) | (points == 0).all(axis=-1)] = np.nan  # a missing point
     frames = max(found.first - 1, 0) + np.arange(n_frames)  # a file counts from 1
-    is_whole = n_frames == found.n_promised
-    notes = [] if is_whole else [f"its header promises {found.n_promised} frames, it has {n_frames}"]
+    n_there = n_frames
+    if n_bytes - n_frames * found.stride >= max(found.stride, _BLOCK_BYTES):  # more than what fills the last block
+        n_there = n_bytes // found.stride
+    notes = []
+    if n_there != found.n_promised:
+        notes.append(f"its header promises {found.n_promised} frames, it has {n_there}")
     return MarkerTable(names, frames, frames / found.rate, points, found.rate, None, tuple(notes))
 
 

@@ -27,7 +27,7 @@ def json_spans(text: str) -> Any:
     """Return the structure of a JSON text that has been parsed before, with a `Span` for each number."""
     root: list[Any] = []
     stack: list[tuple[Any, str | None]] = [(root, None)]
-    for match in _TOKEN.finditer(text):
+    for match in _TOKEN.finditer(text, int(text.startswith("\ufeff"))):  # after a mark of the byte order
         token, (holder, key) = match[1], stack[-1]
         if token in "]}":
             stack.pop()

@@ -21,7 +21,8 @@ from tracker.validation import MAX_NUMBER, quoted
 
 _KIND = TextKind("CSV file", TABLE_BYTES, FormatError, "export it again")
 _COORDINATE = re.compile(r"(?P<name>.+?)[ _.:-](?P<axis>[xyz])(?:[ _(\[]+(?P<unit>mm|cm|m|in|ft)[)\]]?)?", re.I | re.S)
-_FRAMES = {"frame", "frames", "frame#", "frame_number", "sync_index", "fnum", "index", ""}
+_FRAMES = ("frame", "frames", "frame#", "frame_number", "sync_index", "fnum", "index", "")
+"""Columns of frames, the surest first: an index without a name is only that of the table."""
 _TIMES = {"time", "time_s", "time (s)", "timestamp", "seconds", "t"}
 
 
@@ -47,7 +48,8 @@ def read_points_csv(path: Path, unit_m: float | None, rate: float) -> MarkerTabl
     scale = METRES_BY_WORD[unit] if unit else unit_m
     if scale is None:
         raise FormatError(f"{where}, line {number}: expected a unit in the names, found none", Remedy("say_unit"))
-    frame_at = next((i for i, c in enumerate(columns) if c.lower() in _FRAMES and i not in at), None)
+    others = {c.lower(): i for i, c in reversed([*enumerate(columns)]) if i not in at}
+    frame_at = next((others[name] for name in _FRAMES if name in others), None)
     time_at = next((i for i, c in enumerate(columns) if c.lower() in _TIMES), None)
     chosen = [*([] if time_at is None else [time_at]), *at]
     rows = NumberRows(where, ",", 1 + len(chosen), n_required=1 + (time_at is not None))

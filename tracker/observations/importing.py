@@ -76,6 +76,7 @@ def _plan_of_pictures(
         raise problems[0]
     cameras = {c.camera.name: c.camera for c in session.cameras}
     tables = {name: _scaled(table, cameras[name].size, request.picture_size) for name, (_, table) in chosen.items()}
+    tables = {name: _with_certain_points(table) for name, table in tables.items()}
     if request.confidence is not None:
         tables = {name: _with_confidence(table, request.confidence) for name, table in tables.items()}
     problems += picture_problems(tables, cameras)
@@ -94,7 +95,7 @@ def _plan_of_pictures(
     sources, by_path = source_files([(g, name) for (g, _), name in zip(groups, names, strict=True)])
     rows = np.unique(np.concatenate([f for f in frames.values()])).astype(np.float64)
     observations = ObservationSet(
-        request.name, format_name, request.people, joint_map, points, None, rows, sources, tuple(notes),
+        request.name, format_name, request.people, joint_map, points, None, (rows,), sources, tuple(notes),
         request.options,
     )  # fmt: skip
     views = tuple(_preview(name, chosen, tables, points, v) for v, name in enumerate(session.camera_names))
@@ -116,6 +117,17 @@ def _with_confidence(table: PictureTable, confidence: float) -> PictureTable:
     if not table.has_confidence:
         points[..., 2] = np.where(table.is_found, confidence, 0.0)
     return PictureTable(table.names, table.numbers, points, table.size, table.rate, table.notes)
+
+
+def _with_certain_points(table: PictureTable) -> PictureTable:
+    """Return points that are certain where they alone state no confidence, as those that a person set."""
+    is_certain = table.is_found & np.isnan(table.points[..., 2])
+    if not table.has_confidence or not is_certain.any():
+        return table
+    points = table.points.copy()
+    points[is_certain, 2] = 1.0
+    note = f"{is_certain.sum()} points without a confidence, as a person sets them, were taken as certain"
+    return PictureTable(table.names, table.numbers, points, table.size, table.rate, (*table.notes, note))
 
 
 def _skeleton(
@@ -230,5 +242,5 @@ def _plan_of_space(session: Session, request: ImportRequest, format_name: str, f
     for k, ((path, _), person) in enumerate(zip(files, request.people, strict=True)):
         with_points = np.flatnonzero(np.isfinite(placed.joints.joints_world[:, k]).all(axis=-1).sum(axis=1))
         frames = (int(with_points[0]), int(with_points[-1])) if len(with_points) else None
-        views.append(ViewPreview(person, path, len(placed.row_frames), frames, 1))
+        views.append(ViewPreview(person, path, len(placed.row_frames[k]), frames, 1))
     return ImportPlan(observations, by_path, tuple(views), tuple(problems))

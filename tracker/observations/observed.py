@@ -100,8 +100,9 @@ class ObservationSet:
     """Key points in pictures; None for points in space."""
     joints: ObservedJoints | None
     """Points in space; None for key points, whose joints `observed_joints` triangulates."""
-    row_frames: Array
-    """Frame of the session of each row or picture of the files, (n_rows,), fractional where their rate differs."""
+    row_frames: tuple[Array, ...]
+    """Frame of the session of each row, (n_rows,), fractional where the rate differs: for each file of points in space,
+    or once for the pictures of all files."""
     sources: tuple[SourceFile, ...] = ()
     """The files."""
     notes: tuple[str, ...] = ()

@@ -61,6 +61,8 @@ def _moving_frames(points: ObservedPoints, margin: int) -> IntArray:
 
     Those are the frames whose median step in the pictures is at least half of that in the fastest tenth of all.
     """
+    if points.n_frames < 2:
+        return np.empty(0, np.int64)
     steps = np.linalg.norm(np.diff(points.points_px[:, :, 0], axis=0), axis=-1).reshape(points.n_frames - 1, -1)
     inner = np.arange(margin, points.n_frames - margin)
     known = np.isfinite(steps).any(axis=1)

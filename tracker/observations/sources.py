@@ -144,10 +144,10 @@ def source_files(groups: Sequence[tuple[FileGroup, str]]) -> tuple[tuple[SourceF
     sources: dict[str, SourceFile] = {}
     by_path: dict[str, Path] = {}
     for group, camera in groups:
-        for file in group.files:
-            path = file.relative_to(group.root).as_posix()
-            if by_path.get(path, file) != file:
-                path = f"{file.parent.name}/{path}"
+        inside = {file: file.relative_to(group.root).as_posix() for file in group.files}
+        if any(by_path.get(path, file) != file for file, path in inside.items()):  # files of a folder stay together
+            inside = {file: f"{file.parent.name}/{path}" for file, path in inside.items()}
+        for file, path in inside.items():
             if by_path.get(path, file) != file:
                 raise FormatError(f"expected files of different names, found two named {path}; rename one")
             try:

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.errors import FormatError, Remedy
-from tracker.footage.frame_rates import nominal_rate
 from tracker.formats.file_axes import remap_axes
 from tracker.formats.joint_maps import JointMap, guess_joint_map, read_joint_map
 from tracker.formats.number_rows import check_size
@@ -17,7 +16,7 @@ from tracker.observations.observed import ObservedJoints
 from tracker.observations.placing import short_list
 from tracker.observations.readers import SPACE_FORMATS
 from tracker.observations.request import ImportRequest
-from tracker.session.clocks import Placement, place_rows
+from tracker.session.clocks import Placement, place_rows, row_places
 from tracker.session.session import Session
 
 
@@ -26,8 +25,8 @@ class PlacedPoints(NamedTuple):
 
     joints: ObservedJoints
     joint_map: JointMap
-    row_frames: Array
-    """Frame of each row of the first file, (n_rows,)."""
+    row_frames: tuple[Array, ...]
+    """Frame of each row of each file, (n_rows,)."""
 
 
 def read_space(
@@ -42,7 +41,7 @@ def read_space(
     declared = tuple({c.declared_fps for c in session.cameras if c.declared_fps is not None})
     known = Placement(session.n_frames, declared, request.first_frame, request.clock)
     tables, notes, problems = list[MarkerTable](), list[str](), list[FormatError]()
-    rows = np.zeros(0)
+    rows = list[Array]()
     for path in paths:
         where = f"{SPACE_FORMATS[format_name].title} file {path}"
         read = remap_axes(SPACE_FORMATS[format_name].read(path, request.unit_m, session.fps), request.axes)
@@ -51,7 +50,8 @@ def read_space(
         placed = place_rows(read, where, session.fps, known)
         tables.append(placed)
         notes += [f"{path.name}: {note}" for note in placed.notes]
-        rows = rows if len(rows) else _row_frames(read, placed, session.fps)
+        is_resampled = len(placed.frames) != len(read.frames)
+        rows.append(row_places(read, where, session.fps, known) if is_resampled else placed.frames.astype(np.float64))
         is_chosen = request.first_frame is not None or request.clock is not None
         wrong, gaps = _outside(placed, where, session.n_frames, is_chosen)
         problems += wrong
@@ -76,14 +76,7 @@ def read_space(
             )
         )
     problems += _not_seen(joints_world, session)
-    return PlacedPoints(ObservedJoints(names, request.people, joints_world), joint_map, rows), problems, notes
-
-
-def _row_frames(read: MarkerTable, placed: MarkerTable, fps: float) -> Array:
-    """Return the frame of each row of a file from where its rows were placed."""
-    if len(read.frames) == len(placed.frames):
-        return placed.frames.astype(np.float64)
-    return float(placed.frames[0]) + (read.frames - read.frames[0]) * (nominal_rate(fps) / nominal_rate(read.rate))
+    return PlacedPoints(ObservedJoints(names, request.people, joints_world), joint_map, tuple(rows)), problems, notes
 
 
 def _outside(placed: MarkerTable, where: str, n_frames: int, is_chosen: bool) -> tuple[list[FormatError], list[str]]:

@@ -191,7 +191,7 @@ def _content(observations: ObservationSet) -> dict[str, Any]:
 
 
 def _arrays(observations: ObservationSet) -> dict[str, Array]:
-    found: dict[str, Array] = {"row_frames": observations.row_frames}
+    found: dict[str, Array] = {_rows_of(i): rows for i, rows in enumerate(observations.row_frames)}
     if observations.points is not None:
         found |= {"points_px": observations.points.points_px, "confidence": observations.points.confidence}
     if observations.joints is not None:
@@ -203,15 +203,17 @@ def _arrays(observations: ObservationSet) -> dict[str, Array]:
 
 def _from_arrays(
     row: _Content, arrays: Mapping[str, Array], session: Session
-) -> tuple[ObservedPoints | None, ObservedJoints | None, Array]:
-    """Return points, joints and the frames of the rows.
+) -> tuple[ObservedPoints | None, ObservedJoints | None, tuple[Array, ...]]:
+    """Return points, joints and the frames of the rows of each file.
 
     Raises:
         KeyError: an array is missing.
         ValueError: one has another shape, as AssertionError says too.
     """
-    rows = arrays["row_frames"]
-    if rows.ndim != 1 or not np.isfinite(rows).all():
+    all_rows = [arrays[_rows_of(0)]]
+    while (rows := arrays.get(_rows_of(len(all_rows)))) is not None:
+        all_rows.append(rows)
+    if not all(rows.ndim == 1 and np.isfinite(rows).all() for rows in all_rows):
         raise ValueError("row_frames")
     joints = points = None
     if "joints_world" in arrays:
@@ -224,7 +226,12 @@ def _from_arrays(
         n_frames = points.n_frames
     if n_frames != session.n_frames:
         raise ValueError(f"{n_frames} frames")
-    return points, joints, rows
+    return points, joints, tuple(all_rows)
+
+
+def _rows_of(file: int) -> str:
+    """Return the name of the array with the rows of a file."""
+    return f"row_frames_{file}" if file else "row_frames"
 
 
 def _read_arrays(path: Path) -> dict[str, Array]:

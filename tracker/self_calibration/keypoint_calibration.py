@@ -142,7 +142,7 @@ def _spread(observations: ObservationSet) -> ObservationSet:
         )
     chosen = frames[spread_indices(len(frames), MAX_FRAMES)]
     few = replace(points, points_px=points.points_px[chosen], confidence=points.confidence[chosen])
-    return replace(observations, points=few, row_frames=chosen.astype(np.float64))
+    return replace(observations, points=few, row_frames=(chosen.astype(np.float64),))
 
 
 def _require_shared(seen: SeenJoints, cameras: Sequence[Camera], n_crowded: int) -> None:

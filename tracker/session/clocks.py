@@ -66,6 +66,16 @@ def place_rows(table: MarkerTable, where: str, fps: float, known: Placement | No
     Raises:
         FormatError: the file can be read in several ways that matter, or the resampled table would be too large.
     """
+    rows = row_places(table, where, fps, known)
+    placed, is_chosen = _on_frames(table, rows, fps), known is not None and known.first_frame is not None
+    return replace(placed, notes=(*table.notes, *_notes(table, rows, placed, fps, is_chosen)))
+
+
+def row_places(table: MarkerTable, where: str, fps: float, known: Placement | None = None) -> Array:
+    """Return the frame of the session at which each row of a file lies, (n_rows,), fractional at another rate.
+
+    Arguments and errors are those of `place_rows`.
+    """
     known = known or Placement()
     if known.clock == "time":
         if not (np.diff(table.times) > 0).all():
@@ -76,16 +86,13 @@ def place_rows(table: MarkerTable, where: str, fps: float, known: Placement | No
                 Remedy("choose_first_frame", frames="N"),
             )
         start = table.times[0] * fps if known.first_frame is None else known.first_frame
-        rows = start + (table.times - table.times[0]) * fps
-    else:
-        rates = _stamped_rates(table)
-        ratio = _frames_per_number(table, where, fps, rates, known)
-        start = known.first_frame
-        if start is None:
-            start = _first_number(table, where, rates, ratio, known.n_frames) * ratio
-        rows = start + ratio * (table.frames - table.frames[0])
-    placed = _on_frames(table, rows, fps)
-    return replace(placed, notes=(*table.notes, *_notes(table, rows, placed, fps, known.first_frame is not None)))
+        return start + (table.times - table.times[0]) * fps
+    rates = _stamped_rates(table)
+    ratio = _frames_per_number(table, where, fps, rates, known)
+    start = known.first_frame
+    if start is None:
+        start = _first_number(table, where, rates, ratio, known.n_frames) * ratio
+    return start + ratio * (table.frames - table.frames[0])
 
 
 def _stamped_rates(table: MarkerTable) -> list[float]:

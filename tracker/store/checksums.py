@@ -22,7 +22,7 @@ COLUMNS = {
     "pins": "person, frame, point, camera, change",
     "settings": "key, value",
     "tasks": "uid, kind, person, frame, annotator, author, time",
-    "task_states": "uid, task, state, comment, author, time",
+    "task_states": "uid, task, state, comment, author, time, pose",
     "comments": "uid, about, person, frame, limb, text, resolved, author, time",
 }
 """Columns of each table that its checksums cover."""
@@ -32,10 +32,13 @@ LATER_COLUMNS: dict[int, dict[str, tuple[str, ...]]] = {
     7: {"pose_changes": ("errors", "made_in", "trace"), **_NO_UID},
     8: {"pose_changes": ("made_in", "trace"), **_NO_UID},
     9: _NO_UID,
+    10: {"task_states": ("pose",)},
 }
 """Columns that the tables of each older version with checksums lack."""
 LATER_TABLES = ("tasks", "task_states", "comments")
-"""Tables that the older versions lack."""
+"""Tables that the oldest versions lack."""
+TABLES_SINCE = next(version for version, later in LATER_COLUMNS.items() if "edits" not in later)
+"""The first version with `LATER_TABLES`, in which edits got their identities, too."""
 OLDEST_VERSION = min(LATER_COLUMNS)
 """The first version of a store with checksums."""
 _KEYS = {
@@ -115,7 +118,7 @@ def differences(db: sqlite3.Connection, version: int) -> list[str]:
     """
     found = []
     known = {name: (n, total) for name, n, total in contents(db)}
-    tables = [table for table in COLUMNS if version not in LATER_COLUMNS or table not in LATER_TABLES]
+    tables = [table for table in COLUMNS if version >= TABLES_SINCE or table not in LATER_TABLES]
     if set(known) != {*tables, _SCHEMA}:
         found.append("the list of its tables is not as it was written")
     for table in tables:

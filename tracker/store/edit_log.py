@@ -5,7 +5,7 @@ import sqlite3
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from typing import Any, Literal, NamedTuple, TypeAlias, TypeVar
 
 from tracker.errors import DamagedStoreError
 from tracker.store import rows
@@ -14,7 +14,7 @@ from tracker.store.edit_tree import show_change
 from tracker.store.records import ModelRevision
 from tracker.store.settings import checked_setting
 from tracker.store.task_log import Rows, TaskLog, Uid, write_rows
-from tracker.validation import check
+from tracker.validation import Time, check
 
 T = TypeVar("T")
 
@@ -56,9 +56,9 @@ class LoggedEdit(NamedTuple):
 class Move(NamedTuple):
     """An undo or redo of an edit."""
 
-    kind: str
+    kind: Literal["undo", "redo"]
     uid: str
-    time: str
+    time: Time
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +113,7 @@ def read_log(connection: Connection) -> EditLog:
             for number, uid, label, author, time, program in edits
         ],
         frozenset(done),
-        every("SELECT kind, edit, time FROM moves ORDER BY id", (), lambda r: Move(r[0], numbers[r[1]], r[2])),
+        every("SELECT kind, edit, time FROM moves ORDER BY id", (), lambda r: _checked_move(r[0], numbers[r[1]], r[2])),
         revisions,
         dict(every("SELECT key, value FROM settings", (), _setting)),
         numbers,
@@ -128,7 +128,7 @@ class _Edit(NamedTuple):
     uid: Uid
     label: str
     author: str
-    time: str
+    time: Time
     program: str
 
 
@@ -145,6 +145,11 @@ class _ById(dict[int, T]):
 
 def _checked_edit(row: Sequence[Any]) -> _Edit:
     found: _Edit = check(list(row), _Edit, f"edit {row[0]!r:.20}", DamagedStoreError)
+    return found
+
+
+def _checked_move(*row: Any) -> Move:
+    found: Move = check(row, Move, f"the undo or redo of edit {row[1]!r:.40}", DamagedStoreError)
     return found
 
 

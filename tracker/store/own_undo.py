@@ -90,6 +90,11 @@ def own_labels(connection: Connection, author: str) -> OwnLabels:
         return OwnLabels(None if undo is None else _label(db, undo, takers), redone[1], undo, redone[0])
 
 
+def held_edits(db: sqlite3.Connection) -> set[int]:
+    """Return the edits that are done and that nobody has taken back."""
+    return {edit for edit, _ in _held(db, _takers(db))}
+
+
 def _undone_own(db: sqlite3.Connection, author: str) -> tuple[int, str] | None:
     """Return the edit that redo in the tree would reach, and its label; None if it is not the annotator's."""
     found = db.execute(

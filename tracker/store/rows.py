@@ -25,7 +25,7 @@ from tracker.store.records import (
     Pin,
     PoseRecord,
 )
-from tracker.validation import MAX_FRAMES, Number, check
+from tracker.validation import MAX_FRAMES, Number, Time, check
 
 _Flag: TypeAlias = Annotated[int, Meta(ge=0, le=1, description="0 or 1")]
 _Frame: TypeAlias = Annotated[int, Meta(ge=0, lt=MAX_FRAMES, description=f"a frame from 0 to {MAX_FRAMES - 1}")]
@@ -69,7 +69,7 @@ class _Pose(msgspec.Struct):
     cost_px: Number | None
     settings: str
     author: str
-    time: str
+    time: Time
     program: str
     view_costs_px: bytes | None
     part_costs_px: bytes | None
@@ -105,14 +105,14 @@ class _Edit(msgspec.Struct):
     edit: _Id
     label: str
     author: str
-    time: str
+    time: Time
 
 
 class _Revision(msgspec.Struct):
     id: _Id
     person: str
     toml: str
-    time: str
+    time: Time
 
 
 CURRENT_POSES = "FROM poses p JOIN pose_changes c ON c.id = p.change"

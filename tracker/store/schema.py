@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from tracker.store import checksums, identities
 
-VERSION = 10
+VERSION = 11
 """Version of the store; older ones are upgraded, newer ones are refused."""
 
 _SCHEMA = """
@@ -86,6 +86,7 @@ _TASKS = (
     "checksum INTEGER) WITHOUT ROWID",
 )
 """The tables of the plan of annotation, with their checksums. Their rows are only added (`task_log`)."""
+_DECIDED_POSES = ("ALTER TABLE task_states ADD COLUMN pose TEXT",)
 
 _UPGRADES = {
     1: (
@@ -115,6 +116,7 @@ _UPGRADES = {
         "ALTER TABLE pose_changes ADD COLUMN trace TEXT",
     ),
     9: ("ALTER TABLE edits ADD COLUMN uid TEXT", *_TASKS),
+    10: _DECIDED_POSES,
 }
 """Statements that upgrade a store from each older version to the next."""
 STATEMENTS = (*_SCHEMA.split(";\n"), *checksums.ADDED, *(text for texts in _UPGRADES.values() for text in texts))
@@ -142,7 +144,7 @@ def version(db: sqlite3.Connection) -> int:
 
 def create(db: sqlite3.Connection) -> None:
     """Create the tables of a new store in an empty file, within a transaction of the caller."""
-    _run(db, (*_SCHEMA.split(";\n"), *checksums.ADDED, *_TASKS))
+    _run(db, (*_SCHEMA.split(";\n"), *checksums.ADDED, *_TASKS, *_DECIDED_POSES))
 
 
 def upgrade(db: sqlite3.Connection) -> int:
@@ -169,6 +171,9 @@ def show_as_new(db: sqlite3.Connection) -> None:
     """Make an older store readable like one of today's without writing to it."""
     found = version(db)
     if found == VERSION:
+        return
+    if found >= checksums.TABLES_SINCE:
+        db.execute("CREATE TEMP VIEW task_states AS SELECT *, NULL AS pose FROM main.task_states")
         return
     for table in checksums.LATER_TABLES:
         columns = checksums.COLUMNS[table].split(", ")

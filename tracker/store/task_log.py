@@ -12,7 +12,9 @@ from msgspec import Meta
 
 from tracker.errors import DamagedStoreError
 from tracker.store.connection import Connection
-from tracker.validation import MAX_FRAMES, check
+from tracker.store.identities import derived_uid
+from tracker.store.own_undo import held_edits
+from tracker.validation import MAX_FRAMES, Time, check
 
 T = TypeVar("T")
 
@@ -22,6 +24,7 @@ State: TypeAlias = Literal["draft", "annotated", "verified", "rejected", "withdr
 """States of a task. The log stores the last three; the first two follow from the poses (`tracker.annotation.plan`)."""
 
 _Frame: TypeAlias = Annotated[int, Meta(ge=0, lt=MAX_FRAMES, description=f"a frame from 0 to {MAX_FRAMES - 1}")]
+_Flag: TypeAlias = Annotated[int, Meta(ge=0, le=1, description="0 or 1")]
 Uid: TypeAlias = Annotated[str, Meta(pattern=r"^[0-9a-f]{32}\Z", description="32 hexadecimal digits")]
 """Identity of a row."""
 
@@ -37,7 +40,7 @@ class TaskRow(NamedTuple):
     """Name of the annotator; empty for anybody."""
     author: str
     """Name of the person who planned it."""
-    time: str
+    time: Time
     """Time at which it was planned, ISO 8601, UTC."""
 
 
@@ -51,7 +54,13 @@ class StateRow(NamedTuple):
     comment: str
     """Reason, as of a rejection; may be empty."""
     author: str
-    time: str
+    time: Time
+    pose: Uid | None = None
+    """Identity of the pose on which it was made; None without a pose, and for rows from before version 11."""
+
+    def is_about(self, shown: "PlannedPose") -> bool:
+        """Return whether it was made on a pose; for an older row, whether the pose was made before it."""
+        return self.pose == shown.uid if self.pose else shown.time <= self.time
 
 
 class CommentRow(NamedTuple):
@@ -65,10 +74,10 @@ class CommentRow(NamedTuple):
     limb: str
     """Name of the limb (`tracker.body.limbs`); empty for the whole body."""
     text: str
-    resolved: Annotated[int, Meta(ge=0, le=1)]
+    resolved: _Flag
     """1 resolves the comment, 0 leaves or opens it."""
     author: str
-    time: str
+    time: Time
 
 
 class MadePose(NamedTuple):
@@ -83,6 +92,31 @@ class MadePose(NamedTuple):
     """Identity of the edit."""
 
 
+class PlannedPose(NamedTuple):
+    """The present pose of a frame that has a task."""
+
+    keyframe: bool
+    time: str
+    """Time of the edit that made it."""
+    uid: str
+    """Identity that follows from that edit, its values and its body: one that undo shows again has the same."""
+
+
+class _PlannedRow(NamedTuple):
+    person: str
+    frame: _Frame
+    keyframe: _Flag
+    time: Time
+    edit: str
+    body: str
+    """Model of the body as TOML."""
+    numbers: bytes
+
+    @property
+    def uid(self) -> str:
+        return derived_uid("pose", self.edit, self.body, self.numbers)
+
+
 Rows: TypeAlias = tuple[Sequence[TaskRow], Sequence[StateRow], Sequence[CommentRow]]
 """All rows of the log: tasks, states, comments."""
 
@@ -90,10 +124,6 @@ TABLES: dict[str, type[TaskRow] | type[StateRow] | type[CommentRow]] = {
     "tasks": TaskRow, "task_states": StateRow, "comments": CommentRow
 }  # fmt: skip
 """The tables, and the rows that they hold."""
-_DONE = (
-    "WITH RECURSIVE done (edit) AS "
-    "(SELECT edit FROM head UNION ALL SELECT parent FROM done JOIN edits ON id = done.edit)"
-)
 _EDIT = "JOIN edits e ON e.id = coalesce(c.made_in, c.edit)"
 _MADE = "c.person, c.frame, c.keyframe, e.author, e.time, e.uid"
 
@@ -134,31 +164,47 @@ class TaskLog:
             f"SELECT {_MADE} FROM poses p JOIN pose_changes c ON c.id = p.change {_EDIT}", (), _made
         )
 
+    def planned_poses(self) -> dict[tuple[str, int], PlannedPose]:
+        """Return the present poses of the frames that have a task, by person and frame."""
+        with self._connection.snapshot():
+            bodies = dict(self._connection.all("SELECT id, toml FROM model_revisions", (), tuple))
+            found = self._connection.all(
+                "SELECT p.person, p.frame, c.keyframe, e.time, e.uid, c.model_revision, c.numbers "
+                "FROM (SELECT DISTINCT person, frame FROM tasks) JOIN poses p USING (person, frame) "
+                f"JOIN pose_changes c ON c.id = p.change {_EDIT}",
+                (),
+                lambda row: _planned(*row[:5], bodies.get(row[5]), row[6]),
+            )
+        return {(row.person, row.frame): PlannedPose(bool(row.keyframe), row.time, row.uid) for row in found}
+
     def keyframe_edits(self) -> list[MadePose]:
-        """Return the done edits that set or marked keyframes, earliest first, assessments left out."""
-        return self._connection.all(
-            f"{_DONE} SELECT {_MADE} FROM pose_changes c {_EDIT} WHERE c.keyframe = 1 AND c.numbers IS NOT NULL "
-            "AND c.edit IN (SELECT edit FROM done) ORDER BY e.time, e.uid",
-            (),
-            _made,
-        )
+        """Return the edits that hold and that set or marked keyframes, earliest first, assessments left out."""
+        with self._connection.snapshot():
+            held = held_edits(self._connection.db)
+            found = self._connection.all(
+                f"SELECT c.edit, {_MADE} FROM pose_changes c {_EDIT} WHERE c.keyframe = 1 AND c.numbers IS NOT NULL "
+                "ORDER BY e.time, e.uid",
+                (),
+                lambda row: (int(row[0]), _made(row[1:])),
+            )
+        return [made for edit, made in found if edit in held]
 
     def verifications(self) -> dict[tuple[str, int], StateRow]:
         """Return the decision by which each present pose is verified, by person and frame.
 
-        The last decision on any task of the pose counts, and none from before the pose was made.
+        The last decision on any task of the pose counts, and none on another pose.
         """
         poses = {task.uid: (task.person, task.frame) for task in self.tasks()}
         decided = {poses[s.task]: s for s in self.states() if s.task in poses and s.state != "withdrawn"}
         if not decided:
             return {}
-        made = {(m.person, m.frame): m.time for m in self.present_poses()}
-        return {at: s for at, s in decided.items() if s.state == "verified" and at in made and made[at] <= s.time}
+        shown = self.planned_poses()
+        return {at: s for at, s in decided.items() if s.state == "verified" and at in shown and s.is_about(shown[at])}
 
     def edit_times(self) -> list[tuple[str, str]]:
         """Return author and time of all edits, undone ones too, earliest first."""
         return self._connection.all(
-            "SELECT author, time FROM edits ORDER BY time", (), lambda row: (str(row[0]), str(row[1]))
+            "SELECT author, time FROM edits ORDER BY time", (), lambda row: (str(row[0]), _checked_time(row[1], row[0]))
         )
 
     def _all(self, table: str, row_type: Callable[..., T], order: str) -> list[T]:
@@ -178,6 +224,15 @@ def write_rows(db: sqlite3.Connection, found: Rows) -> None:
         db.executemany(f"INSERT OR IGNORE INTO {table} ({', '.join(row_type._fields)}) VALUES ({marks})", new)
 
 
+def _planned(*columns: Any) -> _PlannedRow:
+    found: _PlannedRow = check(columns, _PlannedRow, f"the pose of frame {columns[1]!r:.20}", DamagedStoreError)
+    return found
+
+
 def _made(row: Sequence[Any]) -> MadePose:
-    person, frame, keyframe, *edit = row
-    return MadePose(str(person), int(frame), bool(keyframe), *map(str, edit))
+    person, frame, keyframe, author, time, uid = row
+    return MadePose(str(person), int(frame), bool(keyframe), str(author), _checked_time(time, author), str(uid))
+
+
+def _checked_time(time: Any, author: Any) -> str:
+    return str(check(time, Time, f"the time of an edit of {author!r:.40}", DamagedStoreError))

@@ -1,7 +1,7 @@
 """`quadrille assign`: plan which frames are annotated by whom, and write blind copies."""
 
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -65,6 +65,7 @@ def command(arguments: Annotated[AssignArguments, tyro.conf.arg(name="")]) -> No
     from tracker.store.annotation_store import AnnotationStore
 
     set_annotator(arguments.annotator)
+    arguments = replace(arguments, to=tuple(map(_annotator, arguments.to)))
     _check(arguments)
     at = load_target(arguments.session, arguments.person, several=True)
     with SessionLock(at.session.folder), closing(AnnotationStore(at.session.annotations_path)) as store:
@@ -77,6 +78,20 @@ def command(arguments: Annotated[AssignArguments, tyro.conf.arg(name="")]) -> No
     print(format_plan(tasks))
     for copy in copies:
         print(f"wrote {copy['folder']}: {copy['tasks']} tasks of {copy['annotator']}, pass {copy['pass']}")
+
+
+def _annotator(text: str) -> str:
+    """Return the name of an annotator in the form that a person joins by.
+
+    Raises:
+        TrackerError: it is none.
+    """
+    from app.participants.names import joined_name
+
+    name = joined_name(text)
+    if not name:
+        raise TrackerError(f"expected an annotator as --to, found {text!r}; leave it out for anybody")
+    return name
 
 
 def _check(arguments: AssignArguments) -> None:

@@ -122,14 +122,15 @@ def _format(copies: "Copies", found: "Agreement", tolerance_m: float | None) -> 
         lines.append(f"{_row(name, figures, 'deg')}{_icc(angle.icc)}{_pair(angle.pair, two)}")
     for name, own in found.annotators.items():
         mean, p95 = 1000 * own.mean_distance_m, 1000 * own.p95_distance_m
-        lines.append(f"{name}: {mean:.1f} mm from the consensus, 95% below {p95:.1f}")
+        if mean == mean:  # the bodies have a joint in common
+            lines.append(f"{name}: {mean:.1f} mm from the consensus, 95% below {p95:.1f}")
     return "\n".join([*lines, *_worst(found, tolerance_m), *(f"note: {note}" for note in copies.notes)])
 
 
 def _worst(found: "Agreement", tolerance_m: float | None) -> list[str]:
     worst = [d for d in found.worst if tolerance_m is None or d.distance_m > tolerance_m]
     if tolerance_m is None:
-        lines = ["largest differences:"]
+        lines = ["largest differences:"] if worst else []
     else:
         share = f"{len(worst)} of {len(found.worst)} poses"
         lines = [f"{share} differ by more than {1000 * tolerance_m:g} mm{':' * bool(worst)}"]

@@ -1,7 +1,7 @@
 """`quadrille tasks`: list the tasks of a plan and decide on them; comments."""
 
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -60,8 +60,10 @@ def command(arguments: Annotated[TasksArguments, tyro.conf.arg(name="")]) -> Non
     from tracker.annotation.speed import measure_speed
     from tracker.session.lock import SessionLock
     from tracker.store.annotation_store import AnnotationStore
+    from tracker.store.annotator import one_form
 
     set_annotator(arguments.annotator)
+    arguments = replace(arguments, of=None if arguments.of is None else one_form(arguments.of))
     deeds = [
         w for w in ("verify", "reject", "withdraw", "comment", "resolve") if getattr(arguments, w) not in (None, False)
     ]

@@ -70,7 +70,7 @@ class Annotating:
         """
         session = self._session_state.session
         people = session.people if person is None else session.people[person : person + 1]
-        to = [checked_annotator(name) for name in dict.fromkeys(names)]
+        to = list(dict.fromkeys(map(checked_annotator, names)))
         wishes = [(one.name, *pair) for one in people for pair in dealt(choose_frames(session, one, choice), to, each)]
         added = self._write(lambda store, author: add_tasks(store, wishes, author))
         if not added:

@@ -185,7 +185,8 @@ class OtherCopies:
     def _differences(self, copy: OtherCopy, person: int, frames: frozenset[int]) -> tuple[CopyDifference, ...]:
         """Compare the poses of a person on those of some frames that this session has annotated, too."""
         pairs = self._pairs(copy, person, frames).items()
-        return tuple(CopyDifference(frame, *farthest_joint(*bodies)) for frame, bodies in pairs)
+        farthest = ((frame, farthest_joint(*bodies)) for frame, bodies in pairs)
+        return tuple(CopyDifference(frame, *joint) for frame, joint in farthest if joint is not None)
 
     def _pairs(self, copy: OtherCopy, person: int, frames: frozenset[int]) -> dict[int, tuple[PosedBody, PosedBody]]:
         """Return the poses of both copies, by frame, where this session has annotated the person, too."""

@@ -45,6 +45,20 @@ def content(folder):
     return {path: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
+def test_names_of_annotators_have_one_form(run, session):
+    """A Mac types a letter and its accent apart, and nobody sees a second space."""
+    plan = ("assign", session, "--frames", "0:3", "--json")
+    tasks = asked(run(*plan, "--to", "Jose\u0301  M ", "--annotator", " Jose\u0301  M"))["tasks"]
+    assert {t["annotator"] for t in tasks} == {"Jos\u00e9 M"}
+    annotate(session, 0.1, [0], None)
+    assert run("tasks", session, "--of", "Jose\u0301 M ")[1].splitlines()[2] == "  annotated    1: 0"
+    speed = asked(run("tasks", session, "--json"))["speed"]
+    assert set(speed) == {"Jos\u00e9 M"}
+    assert_refused(run(*plan, "--to", "Jose\u0301", "Jos\u00e9"), ["each annotator once"])
+    assert_refused(run(*plan, "--to", " "), ["expected an annotator", "--to"])
+    assert_refused(run(*plan, "--to", 61 * "a"), ["at most 60 visible characters"])
+
+
 def test_a_plan_is_shown_and_grows(run, session):
     assert run("assign", session)[1] == "no tasks are planned\n"
     found = asked(run("assign", session, "--every", "20", "--to", "anna", "ben", "--annotator", "lead", "--json"))

@@ -17,10 +17,11 @@ ELBOW, WRIST = JOINTS.index("left_elbow"), JOINTS.index("right_wrist")
 
 
 def copies_of(points):
-    """Copies without angles of points, (n, k, m, 3)."""
-    n, k = points.shape[:2]
+    """Copies without angles of points, (n, k, m, 3); joints beyond the limbs' go by numbers."""
+    n, k, m = points.shape[:3]
     names, subjects = tuple("abcd"[:k]), tuple(Subject("ann", 5 * i) for i in range(n))
-    return Copies(names, subjects, JOINTS, points, (), np.zeros((n, 0)), np.zeros((n, k, 0)), 25.0)
+    joints = JOINTS if m == len(JOINTS) else tuple(map(str, range(m)))
+    return Copies(names, subjects, joints, points, (), np.zeros((n, 0)), np.zeros((n, k, 0)), 25.0)
 
 
 def white_noise(rng, n, k):
@@ -71,6 +72,51 @@ def test_of_several_annotators_the_pair_with_the_largest_bias_is_named(annotated
     assert found.pair == ("b", "c")
     assert found.along.bias == pytest.approx(0.012)
     assert set(compare(copies_of(points)).annotators) == {"a", "b"}
+
+
+def reaching(copies):
+    """Parts of the joints whose interval of the bias reaches 0: along its line, and along one axis."""
+    joints = compare(copies).joints.values()
+    along = [joint.along.bias_interval[0] <= 0 for joint in joints]
+    axis = [joint.by_axis[0].bias_interval[0] <= 0 <= joint.by_axis[0].bias_interval[1] for joint in joints]
+    return np.mean(along), np.mean(axis)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("k", [2, 3, 4])
+@pytest.mark.parametrize("n", [N, 6])
+def test_copies_without_bias_show_none(k, n):
+    """Of 400 comparisons of copies that only chance tells apart, at most one in twenty shows a bias, or so."""
+    noise = NOISE_M * np.random.default_rng(k).normal(size=(n, k, 400, 3)) * (1.0, 2.0, 0.5)
+    along, axis = reaching(copies_of(noise))
+    assert along >= 0.93
+    assert axis >= 0.93
+
+
+@pytest.mark.parametrize("k", [2, 3, 4])
+def test_copies_with_a_bias_show_it(k):
+    points = NOISE_M * np.random.default_rng(k).normal(size=(N, k, 20, 3))
+    points[:, -1] += BIAS_M * np.array([2.0, -1.0, 2.0]) / 3
+    assert reaching(copies_of(points))[0] == 0
+
+
+def test_three_poses_say_nothing_of_a_line_in_space():
+    points = np.random.default_rng(0).normal(size=(3, 2, 1, 3))
+    (found,) = compare(copies_of(points)).joints.values()
+    assert np.isnan([found.along.bias_interval, found.along.lower_interval]).all()
+    assert np.isfinite([found.along.lower, *found.by_axis[0].bias_interval]).all()
+
+
+def test_bodies_without_a_common_joint_have_no_worst_one():
+    points = np.random.default_rng(0).normal(size=(3, 2, 2, 3))
+    points[0, 0, 0] = points[0, 1, 1] = np.nan
+    found = compare(copies_of(points))
+    assert [d.subject.frame for d in found.worst if d.subject.frame == 0] == []
+    assert len(found.worst) == 2
+    alone = compare(copies_of(points[:1]))
+    assert (alone.worst, alone.joints) == ((), {})
+    assert np.isnan(alone.annotators["a"].mean_distance_m)
+    assert compare(copies_of(points[:, :, :0])).joints == {}
 
 
 def test_worst_poses_come_first(annotated):

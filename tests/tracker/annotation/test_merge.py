@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tracker.annotation.edit_union import interleave
 from tracker.annotation.numbered_settings import join_numbered, numbered_settings, renumbered
-from tracker.annotation.plan import read_tasks
+from tracker.annotation.plan import decide, read_tasks
 from tracker.formats.model_toml import format_model, load_model
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.calibration_log import CALIBRATION_EDITS, CALIBRATIONS, present_revision, revisions_of_poses
@@ -116,6 +116,17 @@ def test_a_keyframe_goes_before_a_later_pose_of_a_program(copies):
     assert (root(both, 0), both.pose("ann", 0).author, root(both, 1)) == (7, "anna", 8)
     assert {t.row.kind for t in read_tasks(both)} == {"plan"}
     assert (both.undo(), root(both, 0)) == ("Merge", 8)
+
+
+def test_a_verdict_stays_with_its_pose_where_that_of_the_other_copy_is_shown(copies):
+    a, b, merge = copies
+    b.commit("b", put(0, 7, keyframe=True))
+    decide(a, ("ann", 0), "verified", author="rita")  # a pose that is elsewhere
+    both = merge()
+    assert (root(both, 0), both.pose("ann", 0).author) == (7, "ben")
+    states = {t.row.kind: t.state for t in read_tasks(both) if t.row.frame == 0}
+    assert states == {"plan": "annotated", "disagreement": "rejected"}
+    assert both.tasks.verifications() == {}
 
 
 def test_a_mark_and_an_assessment_of_one_pose_are_joined(copies):

@@ -62,6 +62,39 @@ def test_a_verified_pose_that_changes_is_to_be_verified_again(store, monkeypatch
     assert state(store, 1) == ("annotated", "anna")
 
 
+def test_a_verdict_is_on_one_pose_alone(store):
+    drag(store, 1, 1)
+    decide(store, ("ann", 1), "rejected", "elbow")
+    drag(store, 1, 2)
+    decide(store, ("ann", 1), "verified", author="rita")
+    assert store.tasks.verifications()["ann", 1].author == "rita"
+    store.undo()  # the rejected pose, which is older than the verdict on the other
+    assert state(store, 1)[0] == "rejected"
+    assert store.tasks.verifications() == {}
+    store.redo()
+    assert state(store, 1) == ("verified", "rita")
+    assert store.tasks.verifications()["ann", 1].author == "rita"
+
+
+def test_a_gesture_that_goes_on_after_the_verdict_is_to_be_verified_again(store):
+    edit = store.commit("Drag", [PoseChange("ann", 1, pose(1, keyframe=True))], author="anna").edit
+    decide(store, ("ann", 1), "verified")
+    store.amend(edit, [PoseChange("ann", 1, pose(2, keyframe=True))])
+    assert state(store, 1) == ("annotated", "anna")
+    assert store.tasks.verifications() == {}
+
+
+@pytest.mark.parametrize("in_tree", [True, False])
+def test_an_annotation_that_is_taken_back_is_none(store, in_tree):
+    drag(store, 5, 1, author="ben")
+    drag(store, 5, 2, author="anna")
+    assert state(store, 5, "anna") == ("annotated", "anna")
+    store.undo_own("anna", in_tree=in_tree)
+    assert (state(store, 5, "anna"), state(store, 5, "ben")) == (("draft", ""), ("annotated", "ben"))
+    store.redo_own("anna", in_tree=in_tree)
+    assert state(store, 5, "anna") == ("annotated", "anna")
+
+
 def test_a_tracked_pose_that_is_verified_is_reviewed(store):
     drag(store, 1, keyframe=False, author="")
     decide(store, ("ann", 1), "verified")

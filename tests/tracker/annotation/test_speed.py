@@ -1,10 +1,13 @@
 """Seconds and edits per verified frame, from the times of the history."""
 
+from contextlib import closing
+
 import pytest
-from annotated_copies import new_store, pose
+from annotated_copies import copied, merged, new_store, pose
 
 from tracker.annotation import plan
 from tracker.annotation.speed import measure_speed
+from tracker.errors import DamagedStoreError
 from tracker.store import edit_tree
 from tracker.store.records import PoseChange
 
@@ -46,3 +49,18 @@ def test_pauses_do_not_count_and_a_pose_belongs_to_its_annotator(tmp_path, at):
     assert (rita.verified, rita.decisions, rita.seconds_per_decision) == (0, 2, 2.0)
     assert {s.name: s for s in measure_speed(store, pause_s=61)}["anna"].edit_seconds == 131.0
     store.close()
+
+
+@pytest.mark.parametrize("table", ["edits", "task_states"])
+def test_a_time_that_is_none_is_named(tmp_path, table):
+    """Of a store from elsewhere, for the speed and for a merge."""
+    with closing(new_store(tmp_path / "a")) as store:
+        store.commit("Drag", [PoseChange("ann", 1, pose(1))], author="anna")
+        plan.add_tasks(store, [("ann", 1, "")])
+        plan.decide(store, ("ann", 1), "verified", author="rita")
+    with closing(copied(tmp_path / "a", tmp_path / "b")) as store:
+        store._connection.db.execute(f"UPDATE {table} SET time = 'yesterday'")
+        with pytest.raises(DamagedStoreError, match=r"expected a time in UTC such as .*, found 'yesterday'"):
+            measure_speed(store)
+    with pytest.raises(DamagedStoreError, match="found 'yesterday'"):
+        merged(tmp_path / "a", tmp_path / "b", tmp_path / "ab")

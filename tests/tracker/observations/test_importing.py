@@ -193,7 +193,7 @@ def test_points_in_space(session, tmp_path):
     found = load_observations(session, "mp")
     assert found.points is None
     assert np.abs(found.joints.joints_world[:, 0] - TRUTH).max() < 1e-6
-    assert found.row_frames.tolist() == [*range(N)]
+    assert found.row_frames[0].tolist() == [*range(N)]
 
 
 @pytest.mark.parametrize(

@@ -171,6 +171,17 @@ def test_coco_flags_are_no_confidence(session, tmp_path):
     assert "expected a confidence for each point, found none" in str(plan.problems[0])
 
 
+def test_people_without_a_score_among_others_are_certain(session, tmp_path):
+    path = tmp_path / "coco.json"
+    write_coco_images(path, session.camera_names, BODY_25.points, seen(session, [TRUTH]), "cameras")
+    data = json.loads(path.read_text())
+    del data["annotations"][2]["score"]  # corrected by hand
+    path.write_text(json.dumps(data))
+    found = imported(session, path)
+    assert sorted(set(found.points.confidence[found.points.is_known].round(6))) == [0.7, 1.0]
+    assert any("25 points without a confidence" in note for note in found.notes)
+
+
 def test_coco_of_another_size(session, tmp_path):
     write_coco_images(tmp_path / "c.json", session.camera_names, BODY_25.points, seen(session, [TRUTH]), "scores")
     data = json.loads((tmp_path / "c.json").read_text())
@@ -308,6 +319,14 @@ def test_malformed_csv_of_points(tmp_path, text, expected):
         read_points_csv(tmp_path / "a.csv", 1.0, 30.0)
 
 
+def test_a_csv_with_the_index_of_its_table_and_a_column_of_frames(tmp_path):
+    lines = [",frame,left_wrist_x_m,left_wrist_y_m,left_wrist_z_m", "0,100,1,2,3", "1,103,1,2,3"]
+    (tmp_path / "p.csv").write_text("\n".join(lines))
+    assert read_points_csv(tmp_path / "p.csv", None, 30.0).frames.tolist() == [100, 103]
+    (tmp_path / "p.csv").write_text("\n".join(lines).replace("frame", "error"))
+    assert read_points_csv(tmp_path / "p.csv", None, 30.0).frames.tolist() == [0, 1]
+
+
 def test_a_csv_without_a_unit(tmp_path):
     write_points_csv(tmp_path / "a.csv", BODY_25.points, TRUTH, 30.0, "")
     with pytest.raises(FormatError, match="a unit in the names, found none") as caught:
@@ -365,6 +384,17 @@ def test_malformed_c3d(tmp_path, change, expected):
     (tmp_path / "a.c3d").write_bytes(change((tmp_path / "a.c3d").read_bytes()))
     with pytest.raises(FormatError, match=expected):
         read_c3d(tmp_path / "a.c3d", None)
+
+
+def test_a_c3d_with_more_frames_than_its_header_can_say(tmp_path):
+    pytest.importorskip("ezc3d")
+    path = tmp_path / "p.c3d"
+    write_c3d(path, BODY_25.points, TRUTH, 30.0)
+    data = bytearray(path.read_bytes())
+    data[8:10] = (5).to_bytes(2, "little")
+    path.write_bytes(data)
+    found = read_c3d(path, None)
+    assert (len(found.frames), found.notes) == (5, (f"its header promises 5 frames, it has {len(TRUTH)}",))
 
 
 def test_a_c3d_that_was_cut_off(tmp_path):

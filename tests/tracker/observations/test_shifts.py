@@ -90,6 +90,10 @@ def test_the_first_of_three_views_is_late(tmp_path):
     assert shifts(session, late(seen(session, [walking(N)], NOISE_PX), 0, 4)) == {"cam0": 4}
 
 
+def test_one_frame_tells_no_shift(session, points):
+    assert shifts(session, points[:1]) == {}
+
+
 def test_known_clocks_are_no_shift(session, points):
     """Footage that is known to be late by whole frames shows later instants, and so do its key points."""
     early = late(points, 1, -3)

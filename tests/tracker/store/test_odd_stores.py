@@ -3,8 +3,11 @@
 import re
 import sqlite3
 from contextlib import closing
+from datetime import datetime
+from itertools import product
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from damage import written_store
@@ -13,7 +16,9 @@ from tracker.errors import DamagedStoreError
 from tracker.store import checksums, definitions, query_limit, schema
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.connection import Connection
+from tracker.store.edit_tree import now
 from tracker.store.schema import VERSION
+from tracker.validation import Time
 
 
 @pytest.fixture(scope="module")
@@ -97,6 +102,7 @@ def blob(*numbers):
 
 
 POSE = "UPDATE pose_changes SET {} WHERE person = 'ann' AND frame = 8"
+TIME = "2026-11-27T09:30:00.000000+00:00"
 ODD = [
     POSE.format("numbers = 'text'"), POSE.format("numbers = 7"), POSE.format("numbers = X'00'"),
     POSE.format("numbers = X''"), POSE.format(f"numbers = {blob(*[np.nan] * 40)}"),
@@ -123,11 +129,19 @@ ODD = [
     "UPDATE pose_changes SET frame = 'x' WHERE frame = 8",
     "UPDATE pin_changes SET person = X'FF'", "UPDATE pose_changes SET made_in = 99", "UPDATE edits SET uid = NULL",
     "UPDATE edits SET uid = 'x'", "UPDATE edits SET uid = (SELECT uid FROM edits WHERE id = 1)",
-    "INSERT INTO tasks VALUES ('x', 'plan', 'ann', 1, '', '', '', 0)",
-    f"INSERT INTO tasks VALUES ('{'0' * 32}', 'plan', 'ann', -1, '', '', '', 0)",
-    f"INSERT INTO tasks VALUES ('{'0' * 32}', 'other', 'ann', 1, '', '', '', 0)",
-    f"INSERT INTO task_states VALUES ('{'0' * 32}', '{'0' * 32}', 'fine', '', '', '', 0)",
-    f"INSERT INTO comments VALUES ('{'0' * 32}', '', 'ann', 1, '', X'FF', 0, '', '', 0)",
+    f"INSERT INTO tasks VALUES ('x', 'plan', 'ann', 1, '', '', '{TIME}', 0)",
+    f"INSERT INTO tasks VALUES ('{'0' * 32}', 'plan', 'ann', -1, '', '', '{TIME}', 0)",
+    f"INSERT INTO tasks VALUES ('{'0' * 32}', 'other', 'ann', 1, '', '', '{TIME}', 0)",
+    f"INSERT INTO task_states VALUES ('{'0' * 32}', '{'0' * 32}', 'fine', '', '', '{TIME}', 0, NULL)",
+    f"INSERT INTO task_states VALUES ('{'0' * 32}', '{'0' * 32}', 'verified', '', '', '{TIME}', 0, 'x')",
+    f"INSERT INTO comments VALUES ('{'0' * 32}', '', 'ann', 1, '', X'FF', 0, '', '{TIME}', 0)",
+]  # fmt: skip
+TIMES = ["yesterday", "2026-02-30T10:00:00+00:00", "2026-11-27T10:00:00", "2026-11-27T10:00:00+01:00", ""]
+OF_TIMES = [
+    "UPDATE edits SET time = '{}'", "UPDATE moves SET time = '{}'", "UPDATE model_revisions SET time = '{}'",
+    f"INSERT INTO tasks VALUES ('{'0' * 32}', 'plan', 'ann', 1, '', '', '{{}}', 0)",
+    f"INSERT INTO task_states VALUES ('{'0' * 32}', '{'0' * 32}', 'verified', '', '', '{{}}', 0, NULL)",
+    f"INSERT INTO comments VALUES ('{'0' * 32}', '', 'ann', 1, '', 'so', 0, '', '{{}}', 0)",
 ]  # fmt: skip
 
 
@@ -209,6 +223,43 @@ def test_odd_rows_are_named(path, statement):
     assert text.isprintable()
     assert re.search(r"frame|row [\d']|edit |setting|revision|decoded", text), text
     assert len(text) < 500
+
+
+@pytest.mark.parametrize("statement", OF_TIMES)
+def test_odd_times_are_named(path, statement):
+    """Times order edits and decisions, and are reckoned with."""
+    changed(path, statement.format("yesterday"))
+    with closing(AnnotationStore(path, read_only=True)) as store:
+        with pytest.raises(DamagedStoreError, match=r"expected a time in UTC such as 20.*, found 'yesterday'"):
+            store.read_log()
+        if "edits" in statement:
+            for read in (
+                store.history, store.tasks.edit_times, store.tasks.keyframe_edits, store.tasks.present_poses,
+            ):  # fmt: skip
+                with pytest.raises(DamagedStoreError, match="found 'yesterday'"):
+                    read()
+
+
+@pytest.mark.parametrize(
+    "text", [*TIMES, "9999-12-31T23:59:59+00:00", f"{TIME}\n", "2026-11-27T24:00:00+00:00", TIME.replace("2", "\u0662")]
+)
+def test_a_time_is_one_in_utc(text):
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert(text, Time)
+    assert msgspec.convert(now(), Time)
+
+
+def test_each_day_of_the_calendar_is_a_time():
+    """The days of years with and without a leap day, against Python's calendar."""
+    for year, month, day in product((0, 1, 1900, 1970, 2000, 2026, 2028, 2100), range(14), range(33)):
+        text = f"{year:04}-{month:02}-{day:02}T10:00:00.000+00:00"
+        try:
+            datetime.fromisoformat(text)
+        except ValueError:
+            with pytest.raises(msgspec.ValidationError):
+                msgspec.convert(text, Time)
+        else:
+            assert msgspec.convert(text, Time) == text
 
 
 @pytest.mark.slow

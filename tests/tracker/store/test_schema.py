@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tracker.annotation.plan import decide, read_tasks
 from tracker.body.searches import Search
 from tracker.errors import DamagedStoreError, SessionError
 from tracker.store import checksums, schema
@@ -92,6 +93,37 @@ def version_8(path):
 def version_9(path):
     """A store as its version 9 was written: four edits of two authors, one an audit and the last undone."""
     return written(path, "store_version_9.sql")
+
+
+@pytest.fixture
+def version_10(path):
+    """A store as its version 10 was written: a keyframe that was verified, and a task without a pose."""
+    return written(path, "store_version_10.sql")
+
+
+@pytest.mark.parametrize("read_only", [False, True])
+def test_in_version_10_decisions_named_no_pose_and_counted_by_their_time(version_10, read_only):
+    before = version_10.read_bytes()
+    store = AnnotationStore(version_10, read_only=read_only)
+    assert [(s.author, s.pose) for s in store.tasks.states()] == [("rita", None)]
+    assert [(t.row.frame, t.state) for t in read_tasks(store)] == [(1, "verified"), (2, "draft")]
+    store.close()
+    assert (version_10.read_bytes() == before) == read_only
+
+
+def test_a_store_of_version_10_takes_poses_of_decisions_and_is_still_checked(version_10):
+    store = AnnotationStore(version_10)
+    first = store.pose("ann", 1)
+    store.commit("Drag", [PoseChange("ann", 1, PoseRecord(first.values + 1, ("manual",) * 2, 1, keyframe=True))])
+    assert [t.state for t in read_tasks(store)] == ["annotated", "draft"]
+    decide(store, ("ann", 1), "verified")
+    assert len(store.tasks.states()[-1].pose) == 32
+    store.close()
+    with closing(sqlite3.connect(version_10)) as db:
+        db.execute("UPDATE task_states SET pose = NULL")
+        db.commit()
+    with pytest.raises(DamagedStoreError, match="rows of 'task_states'"):
+        AnnotationStore(version_10)
 
 
 def uids(path):

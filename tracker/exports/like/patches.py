@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.body.model import PosedBody
+from tracker.errors import SessionError
 from tracker.exports.keypoints import project_through_lens
 from tracker.exports.like.mended_points import MendedPoints
 from tracker.formats.bvh_patching import patch_bvh
@@ -19,7 +20,7 @@ from tracker.formats.keypoints.openpose import patch_openpose
 from tracker.formats.keypoints.picture_table import PictureTable
 from tracker.formats.points_csv import patch_points_csv
 from tracker.formats.trc import patch_trc
-from tracker.geometry.arrays import Array, IntArray
+from tracker.geometry.arrays import Array
 from tracker.motion.velocity import velocity
 from tracker.observations.joints import side_pairs, triangulate_observations
 from tracker.observations.observed import ObservationSet
@@ -145,9 +146,12 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
         "c3d": lambda path, changes: patch_c3d(path, unit_m, changes),
     }
     out, farthest_m = Files(), 0.0
-    rows = np.round(observations.row_frames).astype(np.int64)
-    for source, person in zip(observations.sources, mended, strict=True):
-        changes = _rows(rows, observations.row_frames, person)
+    if len(observations.row_frames) != len(mended):
+        raise SessionError(
+            f"expected the rows of each file of {observations.name}, found those of the first; import the files again"
+        )
+    for source, person, row_frames in zip(observations.sources, mended, observations.row_frames, strict=True):
+        changes = _rows(row_frames, person)
         if changes:
             in_file = {row: points @ R_file.T for row, points in changes.items()}
             path = source_path(session, observations.name, source)
@@ -159,17 +163,19 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
     return out, farthest_m
 
 
-def _rows(nearest: IntArray, row_frames: Array, person: MendedPoints) -> dict[int, Array]:
+def _rows(row_frames: Array, person: MendedPoints) -> dict[int, Array]:
     """Return the points of each row that is nearest to a replaced frame, between two of them interpolated."""
     out: dict[int, Array] = {}
-    for row, (frame, at) in enumerate(zip(nearest.tolist(), row_frames.tolist(), strict=True)):
+    for row, (frame, at) in enumerate(
+        zip(np.round(row_frames).astype(np.int64).tolist(), row_frames.tolist(), strict=True)
+    ):
         if frame not in person.bodies:
             continue
         points = person.points_world(person.bodies[frame])
         other = frame + (1 if at > frame else -1)
-        if at != frame and other in person.bodies:
+        if at != frame and other in person.all_bodies:
             share = abs(at - frame)
-            points = (1 - share) * points + share * person.points_world(person.bodies[other])
+            points = (1 - share) * points + share * person.points_world(person.all_bodies[other])
         points[~person.replaced[frame]] = np.nan
         out[row] = points
     return out

@@ -58,12 +58,7 @@ def _table(labels: Any, video: Any, where: str) -> PictureTable:
     if not (np.abs(points[~absent][:, :2]) <= MAX_NUMBER).all():
         raise FormatError(f"{where}: expected coordinates within {MAX_NUMBER:g}; export it again")
     points[absent] = (np.nan, np.nan, 0.0)
-    notes = []
-    by_hand = ~absent & np.isnan(points[..., 2])
-    if by_hand.any() and not by_hand[~absent].all():
-        points[by_hand, 2] = 1.0
-        notes.append(f"{by_hand.sum()} points that a person set have no confidence and were taken as certain")
-    return PictureTable(names, numbers, points, notes=tuple(notes))
+    return PictureTable(names, numbers, points)
 
 
 def _instances(picture: Any) -> list[Any]:

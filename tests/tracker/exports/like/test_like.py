@@ -29,6 +29,7 @@ from tracker.formats.trc import read_trc, write_trc
 from tracker.observations.importing import plan_import, store_import
 from tracker.observations.request import ImportRequest
 from tracker.observations.stored import load_observations, source_path
+from tracker.observations.stored_files import stored_pictures
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import PoseChange, PoseRecord
 
@@ -68,15 +69,15 @@ def observed(session, bodies, offset=OFFSET):
     return out
 
 
-def store(session, bodies, edited=(EDITED,), joints=None):
+def store(session, bodies, edited=(EDITED,), joints=None, person="ann"):
     """Store poses; on edited frames all values are a person's, or those of some joints alone."""
     model = session.people[0].model
     by_hand = [joints is None or name.rpartition(".")[0] in joints for name in model.value_names]
     with closing(AnnotationStore(session.annotations_path)) as annotations:
-        revision = annotations.add_model_revision("ann", format_model(model))
+        revision = annotations.add_model_revision(person, format_model(model))
         changes = [
             PoseChange(
-                "ann",
+                person,
                 k,
                 PoseRecord(
                     b.values,
@@ -496,6 +497,72 @@ def test_axes_and_units_of_the_file(session, tmp_path):
     one, other = read_trc(tmp_path / "a.trc"), read_trc(tmp_path / "b.trc")
     assert np.abs(one.points - other.points).max() < 0.015
     assert not np.array_equal(one.points[EDITED], other.points[EDITED])
+
+
+def test_folders_of_equal_names_stay_apart(session, tmp_path):
+    """Files are only numbered, and one camera has more of them than another."""
+    points = seen(session, [observed(session, poses(session))])
+    write_openpose(tmp_path / "k", session.camera_names, points)
+    folders = [tmp_path / "k" / name for name in session.camera_names]
+    for v, folder in enumerate(folders):
+        for i, file in enumerate(sorted(folder.iterdir())):
+            file.rename(folder / f"{i:06d}_keypoints.json")
+        if v == 0:
+            (folder / f"{N - 1:06d}_keypoints.json").unlink()
+    request = ImportRequest("mp", tuple(folders), ("ann",), first_frame=0)
+    plan = plan_import(session, request)
+    assert not plan.problems, plan.problems
+    store_import(session, plan)
+    found = stored_pictures(session, load_observations(session, "mp"))
+    assert [(p.camera, len(p.files)) for p in found] == [
+        (name, N - (v == 0)) for v, name in enumerate(session.camera_names)
+    ]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_mark_of_the_byte_order_stays(session, tmp_path, encoding):
+    bodies = poses(session)
+    path, _ = write_kind("openpose", session, tmp_path, observed(session, bodies))
+    for file in path.rglob("*.json"):
+        file.write_text(file.read_text(), encoding=encoding)
+    observations = imported(session, path)
+    store(session, bodies)
+    done = export_like(session, observations, tmp_path / "back", learn_offsets=False)
+    assert done.frames == (EDITED,)
+    (one, *_) = sorted((tmp_path / "back").rglob(f"*{EDITED:012d}*.json"))
+    assert len(json.loads(one.read_text(encoding=encoding))["people"]) == 1
+
+
+def test_each_person_has_the_rows_of_their_own_file(tmp_path):
+    session = make_session(tmp_path / "s", N, people=("ann", "bob"))
+    bodies, late = poses(session), 4
+    wrong = observed(session, bodies)
+    wrong[EDITED] += 0.2
+    paths = (tmp_path / "ann.trc", tmp_path / "bob.trc")
+    for path, first in zip(paths, (0, late), strict=True):
+        write_trc(path, BODY_25.points, wrong[first:], session.fps, frames=np.arange(first, N))
+    plan = plan_import(session, ImportRequest("mp", paths, ("ann", "bob")))
+    assert not plan.problems, plan.problems
+    store_import(session, plan)
+    store(session, bodies, person="bob")
+    export_like(session, load_observations(session, "mp"), tmp_path / "out")
+    assert (tmp_path / "out" / "ann.trc").read_bytes() == paths[0].read_bytes()
+    before, after = read_trc(paths[1]), read_trc(tmp_path / "out" / "bob.trc")
+    moved = np.abs(before.points - after.points).max(axis=(1, 2))
+    assert np.flatnonzero(moved > 0.1).tolist() == [EDITED - late]
+
+
+def test_rows_at_another_rate_are_where_their_time_is(session, tmp_path):
+    at = 0.3 + np.arange(4 * (N - 2)) / 4  # from between two frames, four times as many a second
+    truth = observed(session, poses(session))
+    share = (at % 1)[:, None, None]
+    points = (1 - share) * truth[at.astype(int)] + share * truth[at.astype(int) + 1]
+    path = tmp_path / "p.csv"
+    write_points_csv(path, BODY_25.points, points, 4 * session.fps, "m")
+    head, *rows = [line.split(",") for line in path.read_text().splitlines()]
+    rows = [[row[0], f"{x / session.fps:.9f}", *row[2:]] for row, x in zip(rows, at, strict=True)]
+    path.write_text("\n".join(map(",".join, [head, *rows])))
+    np.testing.assert_allclose(imported(session, path, clock="time").row_frames, [at], atol=1e-6)
 
 
 def test_a_stored_file_that_was_changed(session, tmp_path):
