@@ -107,7 +107,7 @@ def _undone_own(db: sqlite3.Connection, author: str) -> tuple[int, str] | None:
 def _last_own(db: sqlite3.Connection, author: str) -> int | None:
     """Return the last edit of an annotator that holds and changed poses by itself."""
     takers = _takers(db)
-    return next((e for e in _held(db, author, takers) if e not in takers), None)
+    return next((e for e in _own_held(db, author, takers) if e not in takers), None)
 
 
 def _last_own_taker(db: sqlite3.Connection, author: str) -> int | None:
@@ -116,7 +116,7 @@ def _last_own_taker(db: sqlite3.Connection, author: str) -> int | None:
     A redo must follow its undo: an edit made after a taker ends what could be redone.
     """
     takers = _takers(db)
-    for edit in _held(db, author, takers) if takers else ():
+    for edit in _own_held(db, author, takers) if takers else ():
         if edit not in takers:
             return None
         if _depth(edit, takers)[0] % 2:
@@ -125,26 +125,28 @@ def _last_own_taker(db: sqlite3.Connection, author: str) -> int | None:
     return None
 
 
-def _held(db: sqlite3.Connection, author: str, takers: Mapping[int, int]) -> Iterator[int]:
-    """Yield the edits of an annotator that are done and not taken back, the latest first.
-
-    No more of the history is read than is asked for, and nothing before the annotator's first edit.
-    """
+def _own_held(db: sqlite3.Connection, author: str, takers: Mapping[int, int]) -> Iterator[int]:
+    """Yield the edits of an annotator among those of `_held`; nothing before the annotator's first edit is read."""
     (first,) = db.execute("SELECT min(id) FROM edits WHERE author = ?", (author,)).fetchone()
-    if first is None:
-        return
+    return iter(()) if first is None else (edit for edit, by in _held(db, takers, first) if by == author)
+
+
+def _held(db: sqlite3.Connection, takers: Mapping[int, int], first: int = 0) -> Iterator[tuple[int, str]]:
+    """Yield the edits that are done and not taken back, the latest first, with their authors, back to one of them.
+
+    No more of the history is read than is asked for.
+    """
     sql = (
         "WITH RECURSIVE line (id, parent, author) AS (SELECT id, parent, author FROM head JOIN edits ON id = edit "
         "UNION ALL SELECT e.id, e.parent, e.author FROM line JOIN edits e ON e.id = line.parent WHERE e.id >= ?) "
         "SELECT id, author FROM line"  # joined to another table, all of the line would be read first
     )
     taken: set[int] = set()
-    for edit, by in db.execute(sql, (first,)):  # a parent is older than its child
+    for edit, author in db.execute(sql, (first,)):  # a parent is older than its child
         if edit not in taken:
             if edit in takers:
                 taken.add(takers[edit])
-            if by == author:
-                yield int(edit)
+            yield int(edit), str(author)
 
 
 def _takers(db: sqlite3.Connection) -> dict[int, int]:

@@ -150,7 +150,7 @@ def test_labels_name_what_a_move_would_take(store):
     assert (store.own_labels()[:2], store.own_labels("ben")[:2]) == ((None, "anna sets 10"), (None, "ben sets 20"))
 
 
-def simple_held(db, author, takers):
+def simple_held(db, takers, first):
     """As `own_undo._held`, but from the whole history."""
     parents = dict(db.execute("SELECT id, parent FROM edits"))
     authors = dict(db.execute("SELECT id, author FROM edits"))
@@ -162,7 +162,7 @@ def simple_held(db, author, takers):
     for edit in list(held):  # the latest first
         if edit in held and edit in takers:
             held.remove(takers[edit])
-    return iter([e for e in held if authors[e] == author])
+    return iter([(e, authors[e]) for e in held])
 
 
 @pytest.mark.slow
