@@ -85,6 +85,10 @@ class RangeState:
     """Number of frames written."""
     total: int = 0
     """Number of frames to write."""
+    people: frozenset[int] = frozenset()
+    """Indices of the people whose poses change; empty if there is no work."""
+    frames: range = range(0)
+    """From the first frame that changes to the last; empty if there is no work."""
     message: str = ""
     """How the last one ended."""
 

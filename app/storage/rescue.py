@@ -60,7 +60,7 @@ def write(
         store: its annotations.
         edits: in order.
         models: text of the body model of each revision that the edits name.
-        author: of the edits.
+        author: of the edits that name none.
         why: they could not be written.
 
     Returns:
@@ -146,7 +146,8 @@ def replay(path: Path, folder: Path, store: AnnotationStore) -> int:
             if edit.amend is not None and edit.amend == last:
                 store.amend(edit.amend, changes, edit.by_program)
             else:
-                store.commit(edit.label, changes, data.author, edit.by_program)
+                author = data.author if edit.author is None else edit.author
+                store.commit(edit.label, changes, author, edit.by_program)
         except SessionError:
             if done and is_own:
                 with suppress(OSError):  # otherwise the edits that were written are written again

@@ -46,6 +46,8 @@ class UnsavedEdit(NamedTuple):
     amend: int | None
     """The edit on disk to add to; None makes a new one."""
     by_program: bool
+    author: str | None = None
+    """Who made it; None for the author of the file."""
 
 
 class _Change(msgspec.Struct):
@@ -58,6 +60,7 @@ class _Edit(msgspec.Struct):
     changes: list[_Change]
     amend: _Row | None
     by_program: bool
+    author: _Line | None = None  # files of former versions have none
 
 
 class Model(msgspec.Struct):
@@ -86,6 +89,7 @@ class Rescue(NamedTuple):
     store: str
     """Id of the store."""
     author: str
+    """Of the edits that name none."""
     time: str
     why: str
     """Reason for which the edits could not be written."""
@@ -100,7 +104,7 @@ def write_rescue(path: Path, rescue: Rescue) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    edits = [_Edit(e.label, [_encoded(c) for c in e.changes], e.amend, e.by_program) for e in rescue.edits]
+    edits = [_Edit(e.label, [_encoded(c) for c in e.changes], *e[2:]) for e in rescue.edits]
     text = msgspec.json.encode(_Content(_VERSION, *rescue[:-1], edits))
     checksum = hashlib.sha256(text).hexdigest()
     write_text_atomic(path, f"{checksum}\n{text.decode()}\n", 0o600)
@@ -123,7 +127,9 @@ def read_rescue(path: Path) -> Rescue:
         content = msgspec.json.decode(text, type=_Content)
         models = {r: parse_model(m.toml, f"of '{m.person}', revision {r}") for r, m in content.models.items()}
         edits = [
-            UnsavedEdit(e.label, [_decoded(c, content.models, models) for c in e.changes], e.amend, e.by_program)
+            UnsavedEdit(
+                e.label, [_decoded(c, content.models, models) for c in e.changes], e.amend, e.by_program, e.author
+            )
             for e in content.edits
         ]
     # One cause of many: text that is no JSON, other types, numbers that no array holds.

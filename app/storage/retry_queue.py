@@ -71,7 +71,7 @@ class RetryQueue:
     @property
     def edits(self) -> list[UnsavedEdit]:
         """The queued edits, in order."""
-        return [UnsavedEdit(e.label, e.changes, e.amend, e.by_program) for e in self._queue]
+        return [UnsavedEdit(e.label, e.changes, e.amend, e.by_program, e.author) for e in self._queue]
 
     def retry(self, patient: bool = True) -> list[int]:
         """Write queued edits until one fails. An edit that others have overtaken goes on as a new one.

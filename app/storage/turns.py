@@ -98,6 +98,9 @@ def work_of(state: State) -> Work | None:
     if track.running and track.first is not None and track.last is not None:
         first, last = sorted((track.first, track.last))
         return Work(f"tracks frames {first} to {last}", None, range(first, last + 1))
+    if state.ranges.frames:
+        what, people, frames = state.ranges.what, state.ranges.people, state.ranges.frames
+        return Work(f"is {what} frames {frames[0]} to {frames[-1]}", people, frames)
     if state.finding.running:
         return Work("finds people", None, _ALL_FRAMES)
     return None

@@ -118,11 +118,12 @@ def poses_to_replace(
         name, text = people[index].name, format_model(people[index].model)
         bodies = {body.id for body in store.model_revisions(name) if body.toml == text}
         calibrations = revisions_of_poses(store, name)
-        for frame, record in store.poses(name, range(min(frames), max(frames) + 1)).items():
-            is_same = all(record.settings.get(key) == value for key, value in same.items())
-            is_same &= record.model_revision in bodies and calibrations.get(frame, calibration) == calibration
-            if frame in frames and not record.keyframe and is_same:
-                found.setdefault(frame, {})[index] = record.values
+        made = store.frames_by_settings(name, range(min(frames), max(frames) + 1))
+        alike = [f for by, own in made if all(by.get(key) == value for key, value in same.items()) for f in own]
+        kept = {f for f in alike if f in frames and calibrations.get(f, calibration) == calibration}
+        for pose in store.frame_poses(name, range(min(kept), max(kept) + 1)) if kept else ():
+            if pose.frame in kept and pose.model_revision in bodies:
+                found.setdefault(pose.frame, {})[index] = pose.values
     return found
 
 

@@ -180,7 +180,7 @@ def row_to_record(row: Sequence[Any], where: object) -> PoseRecord:
         raise DamagedStoreError(f"{where}: expected a source for each of {len(values)} values, found {len(sources)}")
     return PoseRecord(
         values, sources, found.model_revision, bool(found.keyframe), found.status, found.cost_px,
-        check(decoded_json(found.settings, where), dict[str, Any], f"{where}, settings", DamagedStoreError),
+        settings(found.settings, where),
         found.author, found.time, found.program, _costs(found.view_costs_px, where), _costs(found.part_costs_px, where),
         found.remark or "", bool(found.reviewed), _numbers(found.limbs, where), _covariances(found.errors, where),
         _trace(found.trace, where),
@@ -229,8 +229,15 @@ def row_to_revision(row: Sequence[Any]) -> ModelRevision:
     return ModelRevision(found.id, found.person, found.toml, found.time)
 
 
+def settings(text: Any, where: object) -> dict[str, Any]:
+    """Decode the settings that made a pose, checked."""
+    return check(decoded_json(text, where), dict[str, Any], f"{where}, settings", DamagedStoreError)
+
+
 def frame_number(value: Any, where: object) -> int:
     """Return a frame, checked."""
+    if type(value) is int and 0 <= value < MAX_FRAMES:  # no name of the row is made for each of many
+        return value
     return int(check(value, _Frame, f"{where}, frame", DamagedStoreError))
 
 

@@ -81,9 +81,9 @@ class Ranges:
                     f"expected poses at both ends of frames {first} to {last} and frames between them, found none; "
                     "set a pose at each end first"
                 )
-            total = sum(end - start - 1 for _, start, end in gaps)
+            poses = [(i, frame) for i, start, end in gaps for frame in range(start + 1, end)]
             run = _Run(self._label(f"interpolate frames {first} to {last}", people), "interpolated", by_program=True)
-            self._begin(run, "interpolating", total, (c for gap in gaps for c in self._filled(*gap)))
+            self._begin(run, "interpolating", poses, (c for gap in gaps for c in self._filled(*gap)))
 
     def clear(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
         """Remove the poses of a range, except keyframes.
@@ -101,7 +101,7 @@ class Ranges:
                 )
             changes = (PoseChange(self._name(i), row.frame, None) for i, row in rows)
             run = _Run(self._label(f"clear frames {first} to {last}", people), "cleared", by_program=True)
-            self._begin(run, "clearing", len(rows), changes)
+            self._begin(run, "clearing", [(i, row.frame) for i, row in rows], changes)
 
     def mark(self, first: int, last: int, mark: Mark, people: Sequence[int] | None = None) -> None:
         """Mark the poses of a range.
@@ -114,11 +114,11 @@ class Ranges:
             rows = self._rows(first, last, people)
             if not rows:
                 raise TrackerError(f"expected poses in frames {first} to {last} to mark, found none; set or track some")
-            changes = [c for i, row in rows if (c := _marked(self._name(i), row, mark)) is not None]
+            marked = {(i, row.frame): c for i, row in rows if (c := _marked(self._name(i), row, mark)) is not None}
             where = f"frame {first}" if first == last else f"frames {first} to {last}"
             how = {"keyframe": "as keyframe", "none": "as no keyframe"}.get(mark, f"as {mark}")
             run = _Run(self._label(f"mark {where} {how}", people), "marked", by_program=False)
-            self._begin(run, "marking", len(changes), iter(changes))
+            self._begin(run, "marking", list(marked), iter(marked.values()))
 
     def take_replaced(self, first: int, last: int, people: Sequence[int] | None = None) -> None:
         """Put the poses back that those of a range replaced; keyframes stay. Doing it again takes the present ones.
@@ -129,16 +129,17 @@ class Ranges:
         first, last = self._within(first, last)
         with self._activities.editing():
             saver = self._session_state.saver
-            changes = [
-                PoseChange(self._name(i), frame, replace(other, keyframe=False))
+            changes = {
+                (i, frame): PoseChange(self._name(i), frame, replace(other, keyframe=False))
                 for i in self._checked(people)
                 for frame, (now, other) in saver.replaced(i, range(first, last + 1)).items()
                 if not now.keyframe
-            ]
+            }
             if not changes:
                 raise nothing_replaced(first, last)
             label = self._label(f"take the other poses of frames {first} to {last}", people)
-            self._begin(_Run(label, "exchanged", by_program=True), "exchanging", len(changes), iter(changes))
+            run = _Run(label, "exchanged", by_program=True)
+            self._begin(run, "exchanging", list(changes), iter(changes.values()))
 
     def toggle_keyframe(self) -> None:
         """Make the shown pose of the selected person a keyframe, or remove the mark; a draft is stored."""
@@ -155,7 +156,7 @@ class Ranges:
             )
             change = PoseChange(self._name(state.person), state.frame, record)
             run = _Run(self._label(f"keyframe, frame {state.frame}", [state.person]), "marked", by_program=False)
-            self._begin(run, "marking", 1, iter([change]))
+            self._begin(run, "marking", [(state.person, state.frame)], iter([change]))
 
     def toggle_reviewed(self) -> None:
         """Mark the shown pose of the selected person as reviewed, or remove the mark."""
@@ -193,10 +194,28 @@ class Ranges:
         """Stop the work, see `halt`."""
         self.halt()
 
-    def _begin(self, run: _Run, what: str, total: int, changes: Iterator[Change]) -> None:
-        """Write changes: a few before this returns, many in the background."""
+    def _begin(self, run: _Run, what: str, poses: Sequence[tuple[int, int]], changes: Iterator[Change]) -> None:
+        """Write changes: a few before this returns, many in the background.
+
+        Args:
+            run: the work, which begins.
+            what: its kind, as text for the user.
+            poses: person and frame of each change.
+            changes: in the order in which they are written.
+
+        Raises:
+            TurnError: somebody else works on one of the poses.
+            TrackerError: the changes cannot be made; those before stay.
+        """
+        frames: dict[int, list[int]] = {}
+        for person, frame in poses:
+            frames.setdefault(person, []).append(frame)
+        for person, own in frames.items():
+            self._session_state.require_turn([person], own)
         self._session_state.open_edit_owner = None
-        self._session_state.set(ranges=RangeState(running=True, what=what, total=total))
+        ends = [k for own in frames.values() for k in (min(own), max(own))]
+        within = range(min(ends), max(ends) + 1) if ends else range(0)
+        self._session_state.set(ranges=RangeState(True, what, 0, len(poses), frozenset(frames), within))
         run.job = Job(
             lambda: _pieces(changes),
             lambda piece, _: self._write(run, piece),
@@ -204,9 +223,13 @@ class Ranges:
             lambda: None,
         )
         self._run = run
-        if total <= _AT_ONCE:
-            for piece in _pieces(changes):
-                self._write(run, piece)
+        if len(poses) <= _AT_ONCE:
+            try:
+                for piece in _pieces(changes):
+                    self._write(run, piece)
+            except TrackerError as error:
+                self._end(run, f"stopped, because {page_text(error)}")
+                raise
             self._end(run, "done")
         else:
             run.job.run()

@@ -1,30 +1,28 @@
 """Track from the shown frame in a worker thread: show progress, pause, resume, and save as one history entry."""
 
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
 from app.control.session.activities import Activities
 from app.control.session.session_state import SessionState
 from app.control.tracking import track_settings
+from app.control.tracking.run_display import RunDisplay
 from app.remedies import page_text
 from app.runtime.jobs import Job
-from app.state.people import ShownPose
 from app.state.progress import TrackState
 from app.state.run_choices import RunChoices
-from app.state.state import StateChanges, finite_or_none
+from app.storage.turns import TurnError
 from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.pipeline.methods import make_tracker
-from tracker.pipeline.run_repair import RepairStep
-from tracker.pipeline.track_session import AuditStep, Leg, RunChange, SmoothedRows, Step, TrackSession, outward
+from tracker.pipeline.track_session import Leg, RunChange, Step, TrackSession, outward
 from tracker.pipeline.tracked_changes import StoredPerson
-from tracker.tracking import confidence
 from tracker.tracking.confidence import Status
-from tracker.tracking.estimate import BackwardStep, PoseEstimate, TrackedFrame
+from tracker.tracking.estimate import PoseEstimate, TrackedFrame
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackerSettings, TrackingRun
 
@@ -37,13 +35,9 @@ class _Run(NamedTuple):
 
     session: TrackSession
     job: Job[Step]
+    display: RunDisplay
     on_end: Callable[[bool], None]
     """Is told at its end whether it did all its work."""
-
-    @property
-    def subjects(self) -> Subjects:
-        """The people whom it tracks, and their keyframes."""
-        return self.session.subjects
 
 
 class _SaverWriter:
@@ -219,7 +213,7 @@ class Tracking:
             lambda error: self._ended(run, error),
             lambda: self._paused(run),
         )
-        run = _Run(session, job, on_end)
+        run = _Run(session, job, RunDisplay(session_state, session, lambda: job.running), on_end)
         self._run, session_state.open_edit_owner = run, None
         frames = session.frames
         track = TrackState(running=True, first=frames[0], last=session.ends(frames[0])[1], total=len(frames))
@@ -227,11 +221,17 @@ class Tracking:
         run.job.run()
 
     def resume(self) -> None:
-        """Continue a paused run, if there is one."""
+        """Continue a paused run, if there is one.
+
+        Raises:
+            TurnError: somebody else works on one of its frames; it stays paused.
+        """
         with self._activities.starting(self):
-            if self._run is not None and not self._run.job.running:
+            run = self._run
+            if run is not None and not run.job.running:
+                self._session_state.require_turn(None, run.session.frames)  # later stages write all of them again
                 self._session_state.set(track=replace(self._session_state.state.track, running=True))
-                self._run.job.run()
+                run.job.run()
 
     def pause(self) -> None:
         """Pause a running run with its results on disk. The caller must not hold the lock: the last step takes it."""
@@ -299,92 +299,15 @@ class Tracking:
         with self._session_state.lock:
             if run is self._run:
                 run.session.take(step)
-                if isinstance(step, SmoothedRows):
-                    self._show_finished(run)
-                elif isinstance(step, AuditStep | RepairStep):
-                    track = replace(self._session_state.state.track, stage="audit", done=step.done, total=step.total)
-                    self._session_state.set(track=replace(track, running=run.job.running))
-                elif isinstance(step, BackwardStep):
-                    self._show_improved(run, step, seconds)
-                    self._session_state.refresh_saving()
-                elif isinstance(step, PoseEstimate):
-                    self._show_tracked(run, step, seconds)
-
-    def _show_finished(self, run: _Run) -> None:
-        """Show the smoothed pose of the shown frame, and how many frames are doubtful or lost in the end."""
-        session_state = self._session_state
-        session_state.note_stored()
-        session_state.refresh_saving()
-        state = session_state.state
-        session_state.show_frame(state.frame, follow=state.follow, track=_with_doubts(state.track, run))
-
-    def _show_improved(self, run: _Run, step: BackwardStep, seconds: float) -> None:
-        """Show the progress of the backward pass, and what it improved at the end of an interval."""
-        session_state, tracked = self._session_state, run.session.tracked
-        track = session_state.state.track
-        if step.better:  # not at every step: there may be many frames
-            track = _with_doubts(track, run)
-        steps = len(tracked) + step.done
-        track = replace(
-            track, running=run.job.running, stage="back", done=step.done, total=step.total,
-            per_second=steps / max(1e-6, seconds),
-        )  # fmt: skip
-        if session_state.state.frame in {found.frame for found in step.better}:
-            session_state.show_frame(session_state.state.frame, follow=session_state.state.follow, track=track)
-        else:
-            session_state.set(track=track)
-
-    def _show_tracked(self, run: _Run, found: PoseEstimate, seconds: float) -> None:
-        """Show the progress of the first pass, and the frame if it is shown or followed."""
-        session_state = self._session_state
-        worst = confidence.worst([found.statuses[i] for i in run.subjects.tracked])
-        track = session_state.state.track
-        done, (first, last) = track.done + 1, run.session.ends(found.frame)
-        track = replace(
-            track, running=run.job.running, at=found.frame, done=done, per_second=done / max(1e-6, seconds),
-            first=first, last=last,
-            doubtful=track.doubtful + (worst == "doubtful"), lost=track.lost + (worst == "lost"),
-        )  # fmt: skip
-        if session_state.state.follow or session_state.state.frame == found.frame:
-            changes = self._found(run, found)
-            changes["track"] = track
-            session_state.set(**changes)
-        else:
-            session_state.set(track=track)
-        if time.monotonic() - session_state.last_save > _SAVE_S:
-            self._save(run)
-
-    def _found(self, run: _Run, found: PoseEstimate) -> StateChanges:
-        """Return the fields of the state that show a tracked frame."""
-        keyframes, tracked = run.subjects.keyframes_at(found.frame), run.subjects.tracked
-        names = [c.camera.name for c in run.session.observer.cameras]
-        view_costs_px = dict(zip(names, map(finite_or_none, found.view_costs_px), strict=True))
-        people = []
-        for i, shown in enumerate(self._session_state.state.people):
-            stored = self._session_state.saver.pose(i, found.frame) if i in keyframes or i not in tracked else None
-            if stored is not None:
-                people.append(stored)
-            elif i not in tracked:
-                people.append(ShownPose(shown.values, None, revision=self._session_state.state.revisions[i]))
-            else:
-                part_costs_px = tuple(finite_or_none(c) for c in found.part_costs_px[i])
-                trace = found.traces[i] if found.traces else None
-                shown = ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], part_costs_px)
-                people.append(replace(shown, trace=trace))
-        models, revisions = self._session_state.frame_poses.bodies(people)
-        return {
-            "frame": found.frame,
-            "people": tuple(people),
-            "models": models,
-            "revisions": revisions,
-            "cost_px": finite_or_none(found.cost_px),
-            "view_costs_px": tuple(map(view_costs_px.get, self._session_state.session.camera_names)),
-        }
+                run.display.show(step, seconds)
+                if isinstance(step, PoseEstimate) and time.monotonic() - self._session_state.last_save > _SAVE_S:
+                    self._save(run)
 
     def _paused(self, run: _Run) -> None:
         with self._session_state.lock:
             if run is self._run:
-                self._save(run)
+                with suppress(TurnError):  # the run's end saves again, and tells of a refusal
+                    self._save(run)
                 self._session_state.set(track=replace(self._session_state.state.track, running=False))
                 self._session_state.request_evidence()
 
@@ -407,28 +330,20 @@ class Tracking:
         self._session_state.refresh_saving()
 
     def _end(self, run: _Run, how: str, failed: bool = False) -> None:
-        self._save(run)
-        track = self._session_state.state.track
+        """End a run, and tell how; poses that somebody else's work keeps from being saved are lost."""
+        try:
+            self._save(run)
+        except TurnError as error:
+            how, failed = f"stopped, because {page_text(error)}", True
+            self._session_state.show_frame(self._session_state.state.frame)  # the stored poses: a shown one may be lost
+        summary = run.display.summary()
         self._run = None
         tracked = run.session.tracked
         run.job.discard()
         if tracked:
             self.after_run(range(min(tracked), max(tracked) + 1))
-        message = f"{how}: {_summary(len(run.session.tracked), track)}"
+        message = f"{how}: {summary}"
         text = run.session.contradiction
         notice = f"{page_text(text[:1].upper() + text[1:], Remedy('check_cameras'))}." if text else failed * message
         self._session_state.set(track=TrackState(message=message, failed=failed, notice=notice))
         run.on_end(how == "done")
-
-
-def _with_doubts(track: TrackState, run: _Run) -> TrackState:
-    """Return the progress of a run with the numbers of frames that are doubtful and lost by now."""
-    statuses = (frame.statuses for frame in run.session.tracked.values())
-    worst = Counter(confidence.worst([of_frame[i] for i in run.subjects.tracked]) for of_frame in statuses)
-    return replace(track, doubtful=worst["doubtful"], lost=worst["lost"])
-
-
-def _summary(frames: int, track: TrackState) -> str:
-    """Return a summary of a run, for people to read."""
-    odd = [f"{n} {what}" for n, what in ((track.doubtful, "doubtful"), (track.lost, "lost")) if n]
-    return ", ".join([f"{frames} frame{'' if frames == 1 else 's'}", *odd])

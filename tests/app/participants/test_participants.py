@@ -12,24 +12,6 @@ from app.storage.turns import TurnError
 from tracker.errors import TrackerError
 
 
-@pytest.fixture
-def people(opened):
-    """Nobody but the host, whose name is anna."""
-    host = opened()
-    saver = host._session_state.saver
-    saver._author = saver.moves._author = "anna"  # as if named on the command line
-    people = Participants(host)
-    yield people
-    people.close()
-
-
-@pytest.fixture
-def pair(people):
-    """Controllers of anna, the host, and of ben."""
-    people.join("host")
-    return people.host, people.join("annotate", "ben").controller
-
-
 def shown(controller):
     return controller.state.poses[0].tolist()
 

@@ -12,6 +12,7 @@ from mutation import mutate_tree
 
 from app.storage import rescue
 from app.storage.rescue_file import Model, Rescue, UnsavedEdit, read_rescue, write_rescue
+from app.storage.retry_queue import RetryQueue
 from tracker.body.searches import Search
 from tracker.errors import SessionError
 from tracker.formats.model_toml import format_model, load_model
@@ -46,7 +47,7 @@ def written(tmp_path, store):
     ]
     path = tmp_path / "rescue.json"
     models = {3: Model("ann", format_model(MODEL))}
-    edits = [UnsavedEdit("drag head", changes, None, False), UnsavedEdit("track", changes[:1], 1, True)]
+    edits = [UnsavedEdit("drag head", changes, None, False), UnsavedEdit("track", changes[:1], 1, True, "ben")]
     write_rescue(path, Rescue(str(tmp_path), store.id, "eve", "2026-03-01", "the disk is full", models, edits))
     return path
 
@@ -59,6 +60,7 @@ def test_it_is_read_as_it_was_written(tmp_path, store):
     found = read_rescue(written(tmp_path, store))
     edit = found.edits[0]
     assert (edit.label, edit.by_program, found.edits[1].amend) == ("drag head", False, 1)
+    assert [e.author for e in found.edits] == [None, "ben"]
     np.testing.assert_array_equal(edit.changes[0].pose.values, np.linspace(0, 1, N_VALUES))
     assert edit.changes[0].pose.view_costs_px == (1.0, None)
     assert edit.changes[0].pose.trace == (Search("limbs", ("left_arm",), 4.0, None, False),)
@@ -76,6 +78,36 @@ def test_contents_that_are_no_rescue(tmp_path, text):
     path.write_bytes(signed(text))
     with pytest.raises(SessionError, match=r"rescue file .* (holds what no program writes|has version)"):
         read_rescue(path)
+
+
+def test_edits_of_several_people_keep_their_authors(tmp_path, store, monkeypatch):
+    def fail(*args, **kwargs):
+        raise SessionError("the disk is full")
+
+    store.add_model_revision("ann", format_model(MODEL))
+    queue = RetryQueue(store)
+    with monkeypatch.context() as full:
+        full.setattr(store, "commit", fail)
+        for frame, author in enumerate(("anna", "ben", "anna")):
+            queue.write(f"clear {frame}", [PoseChange("ann", frame, None)], None, False, author)
+    path = tmp_path / "rescue.json"
+    write_rescue(path, Rescue(str(tmp_path), store.id, "anna", "2026-03-01", "the disk is full", {}, queue.edits))
+    assert rescue.replay(path, tmp_path, store) == 3
+    assert [(e.label, e.author) for e in store.history()] == [
+        ("clear 2", "anna"),
+        ("clear 1", "ben"),
+        ("clear 0", "anna"),
+    ]
+
+
+def test_edits_of_a_former_version_are_of_the_author_of_the_file(tmp_path, store):
+    path = written(tmp_path, store)
+    data = json.loads(path.read_bytes().partition(b"\n")[2])
+    for edit in data["edits"]:
+        edit.pop("author")
+    path.write_bytes(signed(json.dumps(data).encode()))
+    rescue.replay(path, tmp_path, store)
+    assert {e.author for e in store.history()} == {"eve"}
 
 
 def with_pose(**changes):
@@ -124,6 +156,7 @@ def with_assessed_status(status):
         (lambda data: data["models"].update({"3": {"person": "ann", "toml": "x = 1"}}), "revision 3"),
         (lambda data: data["edits"][0].update(amend=2**70), "amend"),
         (lambda data: data["edits"][0].update(label="\x9b2J"), "label"),
+        (lambda data: data["edits"][0].update(author="\x9b2J"), "author"),
         (lambda data: data["edits"][0]["changes"][0].update(kind="tail"), "tail"),
     ],
 )

@@ -1,0 +1,127 @@
+"""Show the steps of a tracking run: its progress, the frames that it tracks, and what later stages improve."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+
+from app.control.session.session_state import SessionState
+from app.state.people import ShownPose
+from app.state.progress import TrackState
+from app.state.state import StateChanges, finite_or_none
+from tracker.pipeline.run_repair import RepairStep
+from tracker.pipeline.track_session import AuditStep, SmoothedRows, Step, TrackSession
+from tracker.tracking import confidence
+from tracker.tracking.estimate import BackwardStep, PoseEstimate
+
+
+class RunDisplay:
+    """Shows one run. The caller holds the session's lock."""
+
+    def __init__(self, session_state: SessionState, session: TrackSession, is_running: Callable[[], bool]) -> None:
+        """Show nothing yet.
+
+        Args:
+            session_state: holds the state.
+            session: the run.
+            is_running: whether the run goes on after the present step.
+        """
+        self._session_state, self._session, self._is_running = session_state, session, is_running
+
+    def show(self, step: Step, seconds: float) -> None:
+        """Show a step that the run has taken.
+
+        Args:
+            step: of any stage.
+            seconds: time that the run has worked so far.
+        """
+        if isinstance(step, SmoothedRows):
+            self._show_finished()
+        elif isinstance(step, AuditStep | RepairStep):
+            track = replace(self._session_state.state.track, stage="audit", done=step.done, total=step.total)
+            self._session_state.set(track=replace(track, running=self._is_running()))
+        elif isinstance(step, BackwardStep):
+            self._show_improved(step, seconds)
+            self._session_state.refresh_saving()
+        elif isinstance(step, PoseEstimate):
+            self._show_tracked(step, seconds)
+
+    def summary(self) -> str:
+        """Return a summary of the run, for people to read."""
+        track, n_frames = self._session_state.state.track, len(self._session.tracked)
+        odd = [f"{n} {what}" for n, what in ((track.doubtful, "doubtful"), (track.lost, "lost")) if n]
+        return ", ".join([f"{n_frames} frame{'' if n_frames == 1 else 's'}", *odd])
+
+    def _show_finished(self) -> None:
+        """Show the smoothed pose of the shown frame, and how many frames are doubtful or lost in the end."""
+        session_state = self._session_state
+        session_state.note_stored()
+        session_state.refresh_saving()
+        state = session_state.state
+        session_state.show_frame(state.frame, follow=state.follow, track=self._with_doubts(state.track))
+
+    def _show_improved(self, step: BackwardStep, seconds: float) -> None:
+        """Show the progress of the backward pass, and what it improved at the end of an interval."""
+        session_state, track = self._session_state, self._session_state.state.track
+        if step.better:  # not at every step: there may be many frames
+            track = self._with_doubts(track)
+        steps = len(self._session.tracked) + step.done
+        track = replace(
+            track, running=self._is_running(), stage="back", done=step.done, total=step.total,
+            per_second=steps / max(1e-6, seconds),
+        )  # fmt: skip
+        if session_state.state.frame in {found.frame for found in step.better}:
+            session_state.show_frame(session_state.state.frame, follow=session_state.state.follow, track=track)
+        else:
+            session_state.set(track=track)
+
+    def _show_tracked(self, found: PoseEstimate, seconds: float) -> None:
+        """Show the progress of the first pass, and the frame if it is shown or followed."""
+        session_state = self._session_state
+        worst = confidence.worst([found.statuses[i] for i in self._session.subjects.tracked])
+        track = session_state.state.track
+        done, (first, last) = track.done + 1, self._session.ends(found.frame)
+        track = replace(
+            track, running=self._is_running(), at=found.frame, done=done, per_second=done / max(1e-6, seconds),
+            first=first, last=last,
+            doubtful=track.doubtful + (worst == "doubtful"), lost=track.lost + (worst == "lost"),
+        )  # fmt: skip
+        if session_state.state.follow or session_state.state.frame == found.frame:
+            changes = self._tracked_frame(found)
+            changes["track"] = track
+            session_state.set(**changes)
+        else:
+            session_state.set(track=track)
+
+    def _tracked_frame(self, found: PoseEstimate) -> StateChanges:
+        """Return the fields of the state that show a tracked frame."""
+        session_state, subjects = self._session_state, self._session.subjects
+        keyframes, tracked = subjects.keyframes_at(found.frame), subjects.tracked
+        names = [c.camera.name for c in self._session.observer.cameras]
+        view_costs_px = dict(zip(names, map(finite_or_none, found.view_costs_px), strict=True))
+        people = []
+        for i, shown in enumerate(session_state.state.people):
+            stored = session_state.saver.pose(i, found.frame) if i in keyframes or i not in tracked else None
+            if stored is not None:
+                people.append(stored)
+            elif i not in tracked:
+                people.append(ShownPose(shown.values, None, revision=session_state.state.revisions[i]))
+            else:
+                part_costs_px = tuple(finite_or_none(c) for c in found.part_costs_px[i])
+                trace = found.traces[i] if found.traces else None
+                shown = ShownPose(found.poses[i], "tracked", found.statuses[i], found.notes[i], part_costs_px)
+                people.append(replace(shown, trace=trace))
+        models, revisions = session_state.frame_poses.bodies(people)
+        return {
+            "frame": found.frame,
+            "people": tuple(people),
+            "models": models,
+            "revisions": revisions,
+            "cost_px": finite_or_none(found.cost_px),
+            "view_costs_px": tuple(map(view_costs_px.get, session_state.session.camera_names)),
+        }
+
+    def _with_doubts(self, track: TrackState) -> TrackState:
+        """Return the progress with the numbers of frames that are doubtful and lost by now."""
+        tracked, people = self._session.tracked.values(), self._session.subjects.tracked
+        worst = Counter(confidence.worst([frame.statuses[i] for i in people]) for frame in tracked)
+        return replace(track, doubtful=worst["doubtful"], lost=worst["lost"])

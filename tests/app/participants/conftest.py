@@ -1,0 +1,23 @@
+"""Two people on one session."""
+
+import pytest
+
+from app.participants.participants import Participants
+
+
+@pytest.fixture
+def people(opened):
+    """Nobody but the host, whose name is anna."""
+    host = opened()
+    saver = host._session_state.saver
+    saver._author = saver.moves._author = "anna"  # as if named on the command line
+    people = Participants(host)
+    yield people
+    people.close()
+
+
+@pytest.fixture
+def pair(people):
+    """Controllers of anna, the host, and of ben."""
+    people.join("host")
+    return people.host, people.join("annotate", "ben").controller
