@@ -10,7 +10,7 @@ from tracker.errors import FormatError
 from tracker.session.clocks import Clock
 
 Content = Literal["key points", "masks", "joints"]
-"""What files hold."""
+"""Content of the files of an import."""
 
 
 @dataclass(frozen=True)
