@@ -219,6 +219,7 @@ def _send_back(arguments: ExportArguments) -> None:
         "skip_lost",
         "split",
         "distinct_people",
+        "overwrite",
         *OPTIONS,
     )
     if given := [name.replace("_", "-") for name in others if getattr(arguments, name) not in (None, False, ())]:

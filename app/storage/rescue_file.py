@@ -47,7 +47,7 @@ class UnsavedEdit(NamedTuple):
     """The edit on disk to add to; None makes a new one."""
     by_program: bool
     author: str | None = None
-    """Who made it; None for the author of the file."""
+    """Name of the person who made it; None for the author of the file."""
 
 
 class _Change(msgspec.Struct):

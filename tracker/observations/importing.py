@@ -15,7 +15,7 @@ from tracker.observations.observed import ObservationSet, ObservedPoints
 from tracker.observations.placing import place_pictures, rescaled
 from tracker.observations.plans import ImportPlan, MaskPlan, ViewPreview
 from tracker.observations.readers import MASK_FORMATS, PICTURE_FORMATS, find_files
-from tracker.observations.request import ImportRequest
+from tracker.observations.request import ImportRequest, refuse_choices
 from tracker.observations.sources import FileGroup, Found, match_cameras, no_camera, source_files
 from tracker.observations.space import read_space
 from tracker.observations.stored import new_folder, save_observations
@@ -38,11 +38,12 @@ def plan_import(session: Session, request: ImportRequest, calibrated: bool = Tru
     new_folder(session, request.name)
     format_name, files = find_files(request.paths, request.masks)
     if format_name in MASK_FORMATS:
+        refuse_choices(request, "masks")
         return plan_masks(session, request, format_name, files)
-    if request.values:
-        raise FormatError("expected masks, whose values tell people apart, found key points or joints; give no values")
     if format_name not in PICTURE_FORMATS:
+        refuse_choices(request, "joints")
         return _plan_of_space(session, request, format_name, files)
+    refuse_choices(request, "key points")
     return _plan_of_pictures(session, request, format_name, files, calibrated)
 
 

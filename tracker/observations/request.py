@@ -4,8 +4,13 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal, get_args
 
+from tracker.errors import FormatError
 from tracker.session.clocks import Clock
+
+Content = Literal["key points", "masks", "joints"]
+"""Content of the files of an import."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,32 @@ class ImportRequest:
             "values": " ".join(f"{name}={value}" for name, value in self.values.items()) or None,
         }
         return tuple((key, str(value)) for key, value in found.items() if value is not None)
+
+
+_CHOICES: dict[str, tuple[str, str, tuple[Content, ...]]] = {
+    "offsets": ("offsets", "key points or masks, whose views may be late", ("key points", "masks")),
+    "cameras": ("cameras", "key points or masks of each camera", ("key points", "masks")),
+    "picture_size": ("size of pictures", "key points or masks in pixels", ("key points", "masks")),
+    "confidence": ("confidence", "key points, which have a confidence", ("key points",)),
+    "values": ("values", "masks, whose values tell people apart", ("masks",)),
+    "clock": ("clock", "joints, whose rows may have times", ("joints",)),
+    "axes": ("axes", "joints, which have axes", ("joints",)),
+    "unit_m": ("unit", "joints, which have a unit", ("joints",)),
+}
+"""Choices that count for some contents alone: their name, what they are for, and the contents."""
+
+
+def refuse_choices(request: ImportRequest, content: Content) -> None:
+    """Refuse choices that do not count for the content of the files: they would be left out without a word.
+
+    Raises:
+        FormatError: there is such a choice.
+    """
+    plain = ImportRequest(request.name, request.paths, request.people)
+    for field_name, (name, expected, contents) in _CHOICES.items():
+        if content not in contents and getattr(request, field_name) != getattr(plain, field_name):
+            found = " or ".join(c for c in get_args(Content) if c not in contents)
+            raise FormatError(f"expected {expected}, found {found}; give no {name}")
 
 
 def picture_size(options: Iterable[tuple[str, str]]) -> tuple[int, int] | None:

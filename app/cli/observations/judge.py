@@ -47,12 +47,14 @@ def command(arguments: Annotated[JudgeArguments, tyro.conf.arg(name="")]) -> Non
     path = arguments.report
     if path is not None and path.exists() and not arguments.overwrite:
         raise TrackerError(f"expected --report at a path that is free, found {path}; say --overwrite to replace it")
+    if path is not None and (path.is_dir() or not path.parent.is_dir()):
+        raise TrackerError(f"expected --report at a file in a folder that exists, found {path}; give another path")
     found = judge_session(session, arguments.of, Reporter(silent=arguments.json))
+    print(format_json(record(found)) if arguments.json else _format(found))
     if path is not None:
         write_report(session, arguments.of, found, path)
-    print(format_json(record(found)) if arguments.json else _format(found))
-    if path is not None and not arguments.json:
-        print(f"wrote {path}")
+        if not arguments.json:
+            print(f"wrote {path}")
 
 
 def judge_session(session: "Session", name: str, progress: Reporter) -> list["Judgement"]:

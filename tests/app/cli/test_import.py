@@ -154,6 +154,7 @@ def test_masks_of_the_wrong_size_name_the_option(run, tmp_path):
         (["--joint-map", "nothing.toml"], "joint map nothing.toml not found"),
         (["--values", "ann"], "--values as NAME=VALUE"),
         (["--values", "ann=1"], "masks, whose values tell people apart, found key points or joints"),
+        (["--axes", "x,z,y"], "expected joints, which have axes, found key points or masks; give no axes"),
         (["--masks"], "expected masks among the files, found OpenPose JSON"),
         (["--cameras", "cam9=x"], "unknown camera 'cam9'"),
     ],
@@ -172,6 +173,9 @@ def test_export_like_refuses_options_of_formats(run, session, tmp_path):
     like = ["export", session.folder, "--out", tmp_path / "b.trc", "--like", "trc"]
     assert_refused(run(*like, "--units", "mm"), ["--like without --units: the files stay as they came; leave it out"])
     assert_refused(run(*like, "--keyframes-only"), ["--like without --keyframes-only"])
+    assert_refused(run(*like, "--overwrite"), ["--like without --overwrite"])
+    shifted = ["import", session.folder, tmp_path / "a.trc", "--as", "late", "--offset", "cam0=2"]
+    assert_refused(run(*shifted), ["key points or masks, whose views may be late, found joints; give no offsets"])
     assert_refused(run(*like[:-2], "--poses", "all"), ["--poses, --plain-joints and --exchange-sides with --like NAME"])
     assert_refused(run(*like[:-1], "no"), ["found 'no'; the session has trc"])
     assert run(*like)[0] == 0

@@ -83,6 +83,8 @@ def test_the_report_is_one_file_with_pictures(run, imported, tmp_path):
     assert text.count("data:image/jpeg;base64,") == 2 * 4
     assert "http" not in text
     assert_refused(run("judge", imported, "--of", "net", "--report", path), ["a path that is free", "--overwrite"])
+    nowhere = tmp_path / "nothing" / "judged.html"
+    assert_refused(run("judge", imported, "--of", "net", "--report", nowhere), ["--report at a file in a folder"])
     assert path.read_text("utf-8") == text
 
 

@@ -57,6 +57,7 @@ KINDS = {
     "stored numbers": ("points.npz", None),
 }
 """For each kind: the file that is mutated, and the package that it needs."""
+OF_JOINTS = ("trc", "c3d", "bvh", "csv")
 OF_MASKS = ("masks", "coco polygon", "coco runs", "coco text", "stored masks")
 APART = ("h5py", "sleap_io")
 """Packages that read in a process of their own."""
@@ -110,7 +111,9 @@ def read(kind, session, path, case):
         found = load_observations(session, "mp")
         observed_joints(found, [c.camera for c in session.cameras])
         return False
-    plan = plan_import(session, ImportRequest(f"m{case}", (path,), ("ann",), unit_m=0.01))
+    plan = plan_import(
+        session, ImportRequest(f"m{case}", (path,), ("ann",), unit_m=0.01 if kind in OF_JOINTS else None)
+    )
     if kind in OF_MASKS:
         if not plan.problems and case % 10 == 0:
             used = store_import(session, plan)
