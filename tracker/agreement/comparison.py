@@ -2,7 +2,7 @@
 
 Differences are those of the second annotator less the first, in the axes of the world. Of several annotators, figures
 are of the pair with the largest bias, and their intervals allow for that choice (`statistics.limits_of_agreement`). An
-interval is of one joint or angle: of twenty that only chance tells apart, one may show a bias.
+interval is of one joint or angle: of twenty without a systematic difference, one may show a bias.
 """
 
 from collections.abc import Mapping, Sequence

@@ -62,9 +62,9 @@ def limits_of_agreement(differences: Array, dimensions: int = 1, chosen_of: int 
     The variance of a limit is s^2 (1/n + 1.96^2 / (2 (n - 1))) (Sect. 2.4). Student's t with n - 1 degrees of freedom
     turns it into an interval.
 
-    A line that was chosen by its own bias needs a wider interval, or copies that only chance tells apart would show
-    one. For differences along any line in p dimensions, t gives way to the root of p (n - 1) / (n - p) F with p and
-    n - p degrees of freedom. Hotelling's T^2 has this distribution, and the interval holds for all lines at once
+    A line that was chosen by its own bias needs a wider interval, or copies without a systematic difference would
+    show one. For differences along any line in p dimensions, t gives way to the root of p (n - 1) / (n - p) F with p
+    and n - p degrees of freedom. Hotelling's T^2 has this distribution, and the interval holds for all lines at once
     (Hotelling 1931; Johnson & Wichern 2007, Sect. 5.4). For p = 1 it is t itself. The limits take the same factor.
 
     The pair with the largest bias of m pairs has the level 1 - 0.05 / m (Bonferroni; Johnson & Wichern, Sect. 5.4).

@@ -80,13 +80,16 @@ def _task(
     for decision in reversed(decided):
         if decision.state == "draft":  # planned again
             break
+        is_about = pose is not None and decision.is_about(pose)
         holds = {
             "withdrawn": True,
             "rejected": plain.state == "draft" or plain.time <= decision.time,
-            "verified": pose is not None and decision.is_about(pose),
+            "verified": is_about,
         }
         if holds.get(decision.state, False):
             return Task(row, decision.state, decision.comment, decision.author, decision.time)
+        if is_about:  # it overrules earlier ones
+            break
     return plain
 
 

@@ -37,13 +37,12 @@ def plan_import(session: Session, request: ImportRequest, calibrated: bool = Tru
     """
     new_folder(session, request.name)
     format_name, files = find_files(request.paths, request.masks)
+    is_of_pictures = format_name in PICTURE_FORMATS
+    refuse_choices(request, "masks" if format_name in MASK_FORMATS else "key points" if is_of_pictures else "joints")
     if format_name in MASK_FORMATS:
-        refuse_choices(request, "masks")
         return plan_masks(session, request, format_name, files)
-    if format_name not in PICTURE_FORMATS:
-        refuse_choices(request, "joints")
+    if not is_of_pictures:
         return _plan_of_space(session, request, format_name, files)
-    refuse_choices(request, "key points")
     return _plan_of_pictures(session, request, format_name, files, calibrated)
 
 

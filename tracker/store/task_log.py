@@ -192,14 +192,13 @@ class TaskLog:
     def verifications(self) -> dict[tuple[str, int], StateRow]:
         """Return the decision by which each present pose is verified, by person and frame.
 
-        The last decision on any task of the pose counts, and none on another pose.
+        The last decision on this pose counts, in any of its tasks.
         """
         poses = {task.uid: (task.person, task.frame) for task in self.tasks()}
-        decided = {poses[s.task]: s for s in self.states() if s.task in poses and s.state != "withdrawn"}
-        if not decided:
-            return {}
-        shown = self.planned_poses()
-        return {at: s for at, s in decided.items() if s.state == "verified" and at in shown and s.is_about(shown[at])}
+        decided = [(poses[s.task], s) for s in self.states() if s.task in poses and s.state != "withdrawn"]
+        shown = self.planned_poses() if decided else {}
+        last = {at: s for at, s in decided if at in shown and s.is_about(shown[at])}
+        return {at: s for at, s in last.items() if s.state == "verified"}
 
     def edit_times(self) -> list[tuple[str, str]]:
         """Return author and time of all edits, undone ones too, earliest first."""

@@ -306,7 +306,7 @@ class Tracking:
     def _paused(self, run: _Run) -> None:
         with self._session_state.lock:
             if run is self._run:
-                with suppress(TurnError):  # the run's end saves again, and tells of a refusal
+                with suppress(TurnError):  # saved again when the run ends, which reports the error
                     self._save(run)
                 self._session_state.set(track=replace(self._session_state.state.track, running=False))
                 self._session_state.request_evidence()

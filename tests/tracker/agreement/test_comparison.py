@@ -86,7 +86,7 @@ def reaching(copies):
 @pytest.mark.parametrize("k", [2, 3, 4])
 @pytest.mark.parametrize("n", [N, 6])
 def test_copies_without_bias_show_none(k, n):
-    """Of 400 comparisons of copies that only chance tells apart, at most one in twenty shows a bias, or so."""
+    """Of 400 comparisons of copies without a systematic difference, at most one in twenty shows a bias, or so."""
     noise = NOISE_M * np.random.default_rng(k).normal(size=(n, k, 400, 3)) * (1.0, 2.0, 0.5)
     along, axis = reaching(copies_of(noise))
     assert along >= 0.93

@@ -76,6 +76,17 @@ def test_a_verdict_is_on_one_pose_alone(store):
     assert store.tasks.verifications()["ann", 1].author == "rita"
 
 
+def test_a_verified_pose_that_comes_back_is_verified_again_by_the_verdict_on_it(store):
+    for x, reviewer in ((1, "rita"), (2, "tom")):
+        drag(store, 1, x)
+        decide(store, ("ann", 1), "verified", author=reviewer)
+    store.undo()
+    assert state(store, 1) == ("verified", "rita")
+    assert store.tasks.verifications()["ann", 1].author == "rita"
+    decide(store, ("ann", 1), "rejected", "elbow")
+    assert (state(store, 1)[0], store.tasks.verifications()) == ("rejected", {})
+
+
 def test_a_gesture_that_goes_on_after_the_verdict_is_to_be_verified_again(store):
     edit = store.commit("Drag", [PoseChange("ann", 1, pose(1, keyframe=True))], author="anna").edit
     decide(store, ("ann", 1), "verified")

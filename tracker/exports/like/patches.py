@@ -166,9 +166,8 @@ def mended_space(session: Session, observations: ObservationSet, mended: Sequenc
 def _rows(row_frames: Array, person: MendedPoints) -> dict[int, Array]:
     """Return the points of each row that is nearest to a replaced frame, between two of them interpolated."""
     out: dict[int, Array] = {}
-    for row, (frame, at) in enumerate(
-        zip(np.round(row_frames).astype(np.int64).tolist(), row_frames.tolist(), strict=True)
-    ):
+    nearest = np.round(row_frames).astype(np.int64)
+    for row, (frame, at) in enumerate(zip(nearest.tolist(), row_frames.tolist(), strict=True)):
         if frame not in person.bodies:
             continue
         points = person.points_world(person.bodies[frame])
