@@ -10,14 +10,19 @@ from app.storage.turns import TurnError
 from tracker.errors import TrackerError
 
 
+def begin_run(user, tracker):
+    """Track from frame 2 until frame 3 is done; the next step, for which pause and stop wait, is let go soon."""
+    user.navigation.seek(2)
+    drag(user, "torso", (4.0, 0.0))
+    user.tracking.start(False, 6)
+    tracker.let_go(1)
+    wait_for(lambda: user.state.track.at == 3)
+    threading.Timer(0.2, tracker.let_go, (1,)).start()
+
+
 def test_a_paused_run_goes_on_only_when_its_frames_are_free(people, tracker):
     anna, ben = people.host, people.join("annotate", "ben").controller
-    anna.navigation.seek(2)
-    drag(anna, "torso", (4.0, 0.0))
-    anna.tracking.start(False, 6)
-    tracker.let_go(1)
-    wait_for(lambda: anna.state.track.at == 3)
-    threading.Timer(0.2, tracker.let_go, (1,)).start()  # a pause waits for the step
+    begin_run(anna, tracker)
     anna.tracking.pause()
     ben.navigation.seek(5)
     ben.dragging.begin(1, FRONT, 0, "torso", tuple(pixel_of(ben, "torso")))
@@ -53,12 +58,7 @@ def test_a_run_whose_poses_are_refused_ends_with_a_notice(people, tracker):
 
 def test_a_stop_reports_what_it_could_not_save(people, tracker):
     anna, ben = people.host, people.join("annotate", "ben").controller
-    anna.navigation.seek(2)
-    drag(anna, "torso", (4.0, 0.0))
-    anna.tracking.start(False, 6)
-    tracker.let_go(1)
-    wait_for(lambda: anna.state.track.at == 3)
-    threading.Timer(0.2, tracker.let_go, (1,)).start()
+    begin_run(anna, tracker)
     ben.navigation.seek(4)
     ben._session_state.set(is_pin_held=True)
     anna.tracking.stop()
