@@ -8,7 +8,8 @@ from tracker.self_calibration.person_silhouettes import PersonSilhouette
 
 RADIUS_M = 0.08
 _FEET = [i for i, n in enumerate(NAMES) if n.endswith("Ankle")]
-_HEAD = [i for i, n in enumerate(NAMES) if n in ("Nose", "REye", "LEye", "REar", "LEar")]
+_NECK, _HEAD_M = NAMES.index("Neck"), 0.2
+"""The head is one more sphere above the neck, metres."""
 
 
 def sphere_contour(camera, center, n=48):
@@ -26,10 +27,11 @@ def sphere_contour(camera, center, n=48):
 def outlined(cameras, n_frames, seed=0, noise_px=0.0, reach=1.0):
     """Silhouettes of a person who walks and dances, by frame and camera, and the points of the body, (F, N, 3)."""
     points, random = dancing(n_frames, seed, reach), np.random.default_rng((seed, 11))
-    points[..., 2] += RADIUS_M
+    up = np.array([0.0, 0.0, 1.0])
+    points = np.concatenate([points, points[:, [_NECK]] + _HEAD_M * up], axis=1) + RADIUS_M * up
     rows = []
     for body in points:
-        crown = body[_HEAD].mean(axis=0) + [0, 0, 2 * RADIUS_M]
+        crown = body[-1] + [0, 0, RADIUS_M]
         feet = body[_FEET].mean(axis=0) * [1, 1, 0]
         row = []
         for camera in cameras:
