@@ -36,8 +36,9 @@ def outlined(cameras, n_frames, seed=0, noise_px=0.0, reach=1.0):
         row = []
         for camera in cameras:
             px = np.concatenate([camera.project(sphere_contour(camera, p)) for p in body])
-            hull = cv2.convexHull(px.astype(np.float32))[:, 0].astype(np.float64)
+            noisy = px + noise_px * random.normal(size=px.shape)
+            hull = cv2.convexHull(noisy.astype(np.float32))[:, 0].astype(np.float64)
             ends = camera.project(np.stack([crown, feet])) + 4 * noise_px * random.normal(size=(2, 2))
-            row.append(PersonSilhouette(hull + noise_px * random.normal(size=hull.shape), ends))
+            row.append(PersonSilhouette(hull, ends))
         rows.append(row)
     return rows, points

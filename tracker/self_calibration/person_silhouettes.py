@@ -10,14 +10,15 @@ import numpy as np
 from tracker.geometry.arrays import Array, Mask
 from tracker.images.silhouette_cleaning import MIN_AREA
 
-MIN_ELONGATION = 2.0
-"""Least ratio of the standard deviations of a silhouette along and across its axis at which a person counts as upright.
-A walking body has 3 to 5, one with arms stretched aside 2, one that crouches or bends 1 to 1.7."""
 
+class UprightRules(NamedTuple):
+    """Properties of the silhouette of a person who stands upright."""
 
-END_SHARE = 0.03
-"""Standard deviation of the ends of an upright silhouette, as a share of its length: half the length of a foot, and of
-the way of the crown in a step."""
+    elongation: float = 2.0
+    """Least ratio of its standard deviations along and across its axis. A walking body has 3 to 5, one with arms
+    stretched aside 2, one that crouches or bends 1 to 1.7."""
+    end: float = 0.03
+    """Standard deviation of its ends as a share of its length: half a foot, or the way of the crown in a step."""
 
 
 class Flaw(StrEnum):
@@ -32,15 +33,15 @@ class Flaw(StrEnum):
 class PersonSilhouette(NamedTuple):
     """Silhouette of a person in a picture."""
 
-    hull_px: Array
+    hull_px: Array = np.zeros((0, 2))
     """Vertices of its convex hull, (n, 2), original pixels, in order; none if it does not count."""
-    upright_px: Array
+    upright_px: Array = np.full((2, 2), np.nan)
     """Crown and middle of the feet, (2, 2), original pixels; NaN unless the person is upright."""
     flaw: Flaw | None = None
+    """Reason for which it does not count, in part or as a whole."""
 
 
-_NOWHERE, _NO_HULL = np.full((2, 2), np.nan), np.zeros((0, 2))
-NOTHING = PersonSilhouette(_NO_HULL, _NOWHERE, Flaw.NOBODY)
+NOTHING = PersonSilhouette(flaw=Flaw.NOBODY)
 """Silhouette where nobody is seen."""
 
 
@@ -57,15 +58,15 @@ def measure_silhouette(mask: Mask, undistort: Callable[[Array], Array]) -> Perso
     if not len(areas) or areas.sum() < MIN_AREA * mask.size:
         return NOTHING
     if len(areas) > 1 and 2 * areas[1] > areas[0]:
-        return PersonSilhouette(_NO_HULL, _NOWHERE, Flaw.SEVERAL)
+        return PersonSilhouette(flaw=Flaw.SEVERAL)
     if mask[[0, -1]].any() or mask[:, [0, -1]].any():
-        return PersonSilhouette(_NO_HULL, _NOWHERE, Flaw.CUT)
+        return PersonSilhouette(flaw=Flaw.CUT)
     contours, _ = cv2.findContours(mask.view(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     contour = np.concatenate(contours)[:, 0].astype(np.float64)
     plain = undistort(contour).astype(np.float32)
     hull = contour[cv2.convexHull(plain, returnPoints=False)[:, 0]]
     upright = _ends(mask, contour)
-    return PersonSilhouette(hull, _NOWHERE if upright is None else upright, Flaw.BENT if upright is None else None)
+    return PersonSilhouette(hull, flaw=Flaw.BENT) if upright is None else PersonSilhouette(hull, upright)
 
 
 def _areas(mask: Mask) -> Array:
@@ -79,10 +80,10 @@ def _ends(mask: Mask, contour: Array) -> Array | None:
     m = cv2.moments(mask.view(np.uint8), binaryImage=True)
     middle = np.array([m["m10"], m["m01"]]) / m["m00"]
     variances, axes = np.linalg.eigh(np.array([[m["mu20"], m["mu11"]], [m["mu11"], m["mu02"]]]))
-    if variances[1] < MIN_ELONGATION**2 * variances[0]:
+    if variances[1] < UprightRules().elongation ** 2 * variances[0]:
         return None
     up = axes[:, 1] * -np.sign(axes[1, 1])  # y points down in a picture
     along = (contour - middle) @ up
     across = (contour - middle) @ np.array([-up[1], up[0]])
-    top = across[along > along.max() - END_SHARE * np.ptp(along)].mean()
+    top = across[along > along.max() - UprightRules().end * np.ptp(along)].mean()
     return np.stack([middle + along.max() * up + top * np.array([-up[1], up[0]]), middle + along.min() * up])

@@ -34,8 +34,6 @@ from tracker.self_calibration.seen_joints import SeenJoints
 from tracker.self_calibration.silhouette_chain import EFFORT, SeenSilhouettes, fitted_to_frontier, silhouette_chains
 from tracker.self_calibration.stature import STATURE_SIGMA, scaled_by, upright_by_ends
 
-_CHAIN_FRAMES = 20
-"""Frames by which the cameras are placed first: each fit of a chain takes half a second with them."""
 _REMEDIES: Mapping[Flaw, str] = {
     Flaw.NOBODY: "film the person where the cameras see the same place",
     Flaw.CUT: "keep the whole person in the pictures, with room around",
@@ -153,7 +151,7 @@ def _placed(
             f"expected the person upright in two cameras on at least {MIN_SHARED} frames, found {len(standing)}; let "
             "the person also walk upright, arms down: it shows the vertical"
         )
-    few = seen.on_frames(standing[spread_indices(len(standing), _CHAIN_FRAMES)])
+    few = seen.on_frames(standing[spread_indices(len(standing), EFFORT.frames)])
     best = None
     for chain in silhouette_chains(few, cameras):
         placed = [chain.placed[i] for i in range(len(cameras))]

@@ -22,21 +22,22 @@ from tracker.self_calibration.seen_joints import SeenJoints
 from tracker.self_calibration.upright_start import cameras_over_floor, on_floor
 
 
-class _Effort(NamedTuple):
-    """Bounds of the search."""
+class ChainEffort(NamedTuple):
+    """Bounds of the search. With them, `fast_arms` is found, of whom the right turn was second of 72."""
 
-    turns: int
+    turns: int = 72
     """Turns about the vertical that are tried."""
-    fitted: int
+    fitted: int = 4
     """Best of them that are fitted."""
-    chains: int
+    chains: int = 3
     """Chains that are followed."""
-    rounds: int
-    """Times that frontier points of these are found anew and fitted."""
+    rounds: int = 2
+    """Number of times that frontier points are found again in each, and fitted."""
+    frames: int = 20
+    """Frames by which cameras are placed first: each fit takes half a second with them."""
 
 
-EFFORT = _Effort(turns=72, fitted=4, chains=3, rounds=2)
-"""On `fast_arms` the right turn was second of 72, and third of the fits with a focal length that was 21% too long."""
+EFFORT = ChainEffort()
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +102,7 @@ def silhouette_chains(seen: SeenSilhouettes, lenses: Sequence[Camera]) -> list[C
 def fitted_to_frontier(
     cameras: Sequence[Camera], seen: SeenSilhouettes, gauge: Gauge, rounds: int, lenses: UnknownLenses | None = None
 ) -> AdjustedJoints | None:
-    """Fit cameras to crown, feet and frontier points, which are found anew some times; None where that fails."""
+    """Fit cameras to crown, feet and frontier points, which are found again some times; None where that fails."""
     found = None
     for _ in range(rounds):
         joints = seen.standing.with_more(frontier_points(seen.hulls_px, cameras))

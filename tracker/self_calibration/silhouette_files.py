@@ -38,7 +38,7 @@ def silhouettes_in_masks(
                 continue
             labels = np.unique(plan.masks[camera.name].read(i, source.camera.size).labels)
             if not plan.rules.is_matte and np.count_nonzero(labels) > 1:
-                out[k][v] = PersonSilhouette(NOTHING.hull_px, NOTHING.upright_px, Flaw.SEVERAL)
+                out[k][v] = PersonSilhouette(flaw=Flaw.SEVERAL)
                 continue
             out[k][v] = _measured(plan.mask(camera.name, i, source.camera.size) > 0, camera, 1.0)
     return out

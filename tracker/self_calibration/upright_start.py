@@ -7,6 +7,7 @@ the camera, in statures, as far as the person changes place; priors of a usual c
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -16,13 +17,19 @@ from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.self_calibration.person_silhouettes import END_SHARE
+from tracker.self_calibration.person_silhouettes import UprightRules
 
-_USUAL = (0.5, 0.1, 0.7)
-"""Standard deviations of usual cameras: how far they look down and how far they are rolled, rad, and the logarithm of
-their height over the floor in statures. They only begin an adjustment, from 30 degrees and twice the height off."""
-_INDEPENDENT = 20
-"""Number of coordinates of ends of silhouettes that are taken for independent: ten steps."""
+
+class _UsualCamera(NamedTuple):
+    """Standard deviations of usual cameras. They only begin an adjustment, from 30 degrees and twice the height off."""
+
+    tilt_rad: float = 0.5
+    """How far it looks down."""
+    roll_rad: float = 0.1
+    log_height: float = 0.7
+    """Logarithm of its height over the floor in statures."""
+    independent: int = 20
+    """Number of coordinates of ends of silhouettes that are taken for independent: those of ten steps."""
 
 
 def cameras_over_floor(upright_px: Array, lenses: Sequence[Camera]) -> tuple[Camera, ...]:
@@ -54,8 +61,8 @@ def _over_floor(upright_px: Array, lens: Camera) -> Camera:
             "film the whole person, who also walks upright"
         )
     held = replace(lens, T_world_camera=np.eye(4))
-    feet = held.rays(seen[:, 1])
-    sigmas_px = END_SHARE * np.linalg.norm(seen[:, 0] - seen[:, 1], axis=1, keepdims=True)
+    feet, usual = held.rays(seen[:, 1]), _UsualCamera()
+    sigmas_px = UprightRules().end * np.linalg.norm(seen[:, 0] - seen[:, 1], axis=1, keepdims=True)
 
     def errors(x: Array) -> Array:
         up = _up(x)
@@ -63,9 +70,11 @@ def _over_floor(upright_px: Array, lens: Camera) -> Camera:
         off = held.project(feet * reach[:, None] + up) - seen[:, 0]
         off = np.where(np.isfinite(off), off, np.linalg.norm(lens.size)) / sigmas_px
         # Gross errors count by their logarithm. Of a person on one place, errors are alike from frame to frame.
-        return np.concatenate([np.arcsinh(off).ravel(), max(1.0, np.sqrt(off.size / _INDEPENDENT)) * x / _USUAL])
+        return np.concatenate(
+            [np.arcsinh(off).ravel(), max(1.0, np.sqrt(off.size / usual.independent)) * x / usual[:3]]
+        )
 
-    starts = product((0.0, _USUAL[0]), (-_USUAL[2], 0.0, _USUAL[2]))
+    starts = product((0.0, usual.tilt_rad), (-usual.log_height, 0.0, usual.log_height))
     best = min((least_squares(errors, (tilt, 0.0, height)) for tilt, height in starts), key=lambda fit: fit.cost)
     up = _up(best.x)
     forward = np.array([0.0, 0.0, 1.0]) - up[2] * up

@@ -6,7 +6,7 @@ from filmed_people import FOCAL_PX, aligned, blanks, rig
 from person_outlines import outlined
 
 from tracker.errors import CalibrationError
-from tracker.self_calibration.person_silhouettes import NOTHING, Flaw, PersonSilhouette
+from tracker.self_calibration.person_silhouettes import Flaw, PersonSilhouette
 from tracker.self_calibration.silhouette_calibration import calibrate_by_silhouettes
 
 CAMERAS = rig(3)
@@ -17,7 +17,7 @@ def flawed(rows, camera, flaw, keeps_hull=False):
     """The same silhouettes with a flaw in a camera, or in all where it is None."""
 
     def changed(s):
-        return PersonSilhouette(s.hull_px if keeps_hull else NOTHING.hull_px, NOTHING.upright_px, flaw)
+        return PersonSilhouette(s.hull_px, flaw=flaw) if keeps_hull else PersonSilhouette(flaw=flaw)
 
     return [[changed(s) if camera in (None, i) else s for i, s in enumerate(row)] for row in rows]
 
