@@ -1,9 +1,9 @@
 """Calibrate cameras by a person and compare: `python tests/benchmarks/person_calibration.py --data DIR`.
 
 Recordings have key points of a detector (`detector/keypoints`) and a calibration. `walk` and `fast_arms` have exact
-masks, too; silhouettes of `balance_real` are those of the footage against its own median. The found cameras are compared with
-the given ones after the best similarity of all joints, because neither shares a world or a scale. Simulated people have
-noise of 3 px and gross errors (`tests/support/filmed_people.py`).
+masks, too; silhouettes of `balance_real` are those of the footage against its own median. The found cameras are
+compared with the given ones after the best similarity of all joints, because neither shares a world or a scale. Simulated
+people have noise of 3 px and gross errors (`tests/support/filmed_people.py`).
 """
 
 import argparse
@@ -207,8 +207,8 @@ def measure_silhouettes(data: Path, write: Sequence[Path]):
                 cells[title] = [f"refused: {str(error).split(';')[0]}", *[""] * (len(HEADS) - 1)]
             print(title, cells[title], flush=True)
     conditions = Conditions(
-        "`walk` (60 frames) and `fast_arms` (50) with exact masks, and `balance_real` (100) with silhouettes against its "
-        "own median; four cameras each",
+        "`walk` (60 frames) and `fast_arms` (50) with exact masks, and `balance_real` (100) with silhouettes against "
+        "its own median; four cameras each",
         "one person; only `fast_arms` has a stated height, 1.55 m",
         "nothing, or the lenses of the given calibration",
         "defaults",

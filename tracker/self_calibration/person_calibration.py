@@ -1,6 +1,6 @@
 """Cameras that a person has calibrated, and how well they are determined: alike for key points and silhouettes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,16 +74,20 @@ def of_one_size(cameras: Sequence[Camera]) -> tuple[tuple[int, ...], ...]:
 
 
 def adjusted_to(
-    cameras: Sequence[Camera], seen: SeenJoints, gauge: Gauge, lenses: UnknownLenses | None
+    cameras: Sequence[Camera],
+    seen: SeenJoints,
+    gauge: Gauge,
+    lenses: UnknownLenses | None,
+    failure: Callable[[], CalibrationError] = no_common_view,
 ) -> AdjustedJoints:
     """Fit cameras and joints.
 
     Raises:
-        CalibrationError: cameras do not see them from different sides, or at too little spread.
+        CalibrationError: cameras do not see them from different sides, which is the `failure`, or at too little spread.
     """
     found = adjust_joints(cameras, seen.observations(), seen.n_joints, gauge, lenses)
     if found is None:
-        raise no_common_view()
+        raise failure()
     numbers, groups = np.unique(found.observed.groups, return_inverse=True)
     require_spread(Rig(found.cameras, found.points_world[numbers]), replace(found.observed, groups=groups))
     return found
@@ -134,6 +138,11 @@ def require_determined(
         f"{1000 * volume.expected_m:.0f} mm to be expected from {len(seen.px)} frames in which the person moves over "
         f"{way:.1f} m; {advice(len(adjusted.cameras))}"
     )
+
+
+def undetermined(n_cameras: int) -> CalibrationError:
+    """Return the error of silhouettes that do not determine cameras."""
+    return CalibrationError(f"expected silhouettes that determine the cameras, found none that do; {advice(n_cameras)}")
 
 
 def advice(n_cameras: int) -> str:

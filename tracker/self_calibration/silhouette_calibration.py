@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -17,16 +18,16 @@ from tracker.errors import CalibrationError
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.cameras import Camera
 from tracker.self_calibration.frontier_points import frontier_points
-from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses, no_common_view
+from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses
 from tracker.self_calibration.person_calibration import (
     PersonCalibration,
     adjusted_to,
-    advice,
     held_out_errors,
     lens_notes,
     of_one_size,
     require_determined,
     scale_notes,
+    undetermined,
     volume_error,
 )
 from tracker.self_calibration.person_silhouettes import Flaw, PersonSilhouette
@@ -64,9 +65,7 @@ def calibrate_by_silhouettes(
         with one_blas_thread():
             return _calibrated(silhouettes, cameras, stature_m, has_lenses, report)
     except np.linalg.LinAlgError as error:
-        raise CalibrationError(
-            f"expected silhouettes that determine the cameras, found none that do; {advice(len(cameras))}"
-        ) from error
+        raise undetermined(len(cameras)) from error
 
 
 def _calibrated(
@@ -98,7 +97,7 @@ def _calibrated(
     statures = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
     statures = statures[np.isfinite(statures)]
     if not len(statures):
-        raise no_common_view()
+        raise undetermined(len(cameras))
     scale = (DEFAULT_HEIGHT_M if stature_m is None else stature_m) / float(np.median(statures))
     volume = volume_error(adjusted, scale)
     require_determined(volume, adjusted, points, scale, "silhouettes")
@@ -161,7 +160,7 @@ def _placed(
         if found is not None and (best is None or found.sigma_px < best[0].sigma_px):
             best = found, gauge
     if best is None:
-        raise no_common_view()
+        raise undetermined(len(cameras))
     return best[0].cameras, best[1]
 
 
@@ -169,11 +168,12 @@ def _refined(
     cameras: Sequence[Camera], seen: SeenSilhouettes, gauge: Gauge, lenses: UnknownLenses | None
 ) -> tuple[AdjustedJoints, SeenJoints]:
     """Fit cameras to frontier points alone: ends of silhouettes are no points of the body."""
+    failure = partial(undetermined, len(cameras))
     points = frontier_points(seen.hulls_px, cameras)
-    found = adjusted_to(cameras, points, gauge, lenses)
+    found = adjusted_to(cameras, points, gauge, lenses, failure)
     for _ in range(EFFORT.rounds):
         points = frontier_points(seen.hulls_px, found.cameras)
-        found = adjusted_to(found.cameras, points, gauge, lenses)
+        found = adjusted_to(found.cameras, points, gauge, lenses, failure)
     return found, points
 
 

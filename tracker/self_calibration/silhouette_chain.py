@@ -18,6 +18,7 @@ from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
 from tracker.self_calibration.frontier_points import frontier_points, plane_angles
 from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses, adjust_joints
+from tracker.self_calibration.person_calibration import undetermined
 from tracker.self_calibration.seen_joints import SeenJoints
 from tracker.self_calibration.upright_start import cameras_over_floor, on_floor
 
@@ -92,10 +93,7 @@ def silhouette_chains(seen: SeenSilhouettes, lenses: Sequence[Camera]) -> list[C
         refined = [_fitted(c.placed, seen, EFFORT.rounds) for c in longer[: EFFORT.chains]]
         chains = sorted((c for c in refined if c is not None), key=lambda c: c.sigma_px)
         if not chains:
-            raise CalibrationError(
-                "expected silhouettes that two cameras show from different sides, found none; put the cameras at an "
-                "angle to each other"
-            )
+            raise undetermined(len(own))
     return chains
 
 
