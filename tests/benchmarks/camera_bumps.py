@@ -58,17 +58,6 @@ GENERIC = ("broad_man",)
 """People whose bumped recordings are tracked with a body of height alone."""
 BODIES = ("acquired", "generic")
 COMMAND = "python tests/benchmarks/camera_bumps.py --data DIR --write docs/calibration.md"
-CONDITIONS = Conditions(
-    f"the first {N_FRAMES} frames of `walk`, `fast_arms`, `two_people` and {len(SIMULATED)} simulated people, who are "
-    f"at {FPS:g} frames/s and of seeds from {SEED} on; four cameras. One of them is bumped so that the joints shift by "
-    f"{SHIFTS_PX[0]:g} to {SHIFTS_PX[1]:g} px in its picture",
-    "acquired under the right calibration; of one simulated person it has sizes by height alone. Right calibrations "
-    "are measured with both",
-    "the reference joints of frame 0",
-    "defaults; tracked under the wrong calibration with `--no-audit`",
-    "the rules of the check were chosen on other bumps of the three recordings; none on these",
-    COMMAND,
-)
 
 
 class Bump(NamedTuple):
@@ -236,6 +225,23 @@ def _kept(
     return Judged(**json.loads(result.read_text("utf-8")))
 
 
+def conditions(found: Sequence[Judged]) -> Conditions:
+    """Return the conditions of the recordings that were measured."""
+    names = list(dict.fromkeys(j.recording for j in found))
+    films = [f"`{name}`" for name in names if name in FILMED]
+    others = len(names) - len(films)
+    people = [f"{others} simulated people at {FPS:g} frames/s, of seeds from {SEED} on"] if others else []
+    return Conditions(
+        f"the first {N_FRAMES} frames of {', '.join([*films, *people])}; four cameras. One of them is bumped so that "
+        f"the joints shift by {SHIFTS_PX[0]:g} to {SHIFTS_PX[1]:g} px in its picture",
+        "acquired under the right calibration, or with sizes by height alone, as the rows say",
+        "the reference joints of frame 0",
+        "defaults; tracked under the wrong calibration with `--no-audit`",
+        "the rules of the check, on other bumps of the three recordings; none on these",
+        COMMAND,
+    )
+
+
 def named_cells(found: Sequence[Judged]) -> list[str]:
     """Count bumps by whether the right camera is named."""
     if not found:
@@ -266,11 +272,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True, help="folder with walk, fast_arms and two_people")
     parser.add_argument("--work", type=Path, help="folder that keeps scenes, sessions and results")
+    parser.add_argument("--kept", action="store_true", help="show what --work keeps of an interrupted run, and end")
     parser.add_argument("--only", nargs="+", help="recordings to print, not to write")
     parser.add_argument("--bumps", type=int, default=len(TURNS), help="bumps of each recording, to print")
     add_write_option(parser)
     words = parser.parse_args()
     check_places(words.write, TABLES)
+    if words.kept:
+        names = [*FILMED, *(person for _, person in SIMULATED)]
+        kept = [path for name in names for path in sorted((words.work / name).glob("*.json"))]
+        _show([Judged(**json.loads(path.read_text("utf-8"))) for path in kept], words.write)
+        return
     found = list[Judged]()
     with tempfile.TemporaryDirectory() as scratch:
         folder = words.work or Path(scratch)
@@ -297,7 +309,7 @@ def _show(found: Sequence[Judged], write: Sequence[Path]) -> None:
         own = [j for j in healthy if j.body == body]
         rows[f"right calibrations, {body} bodies"] = [str(len(own)), "", "", f"{sum(bool(j.named) for j in own)}"]
     heads = ("recordings", "right camera named", "named first", "another camera named")
-    show(write, TABLES[0], CONDITIONS, table(heads, rows, "bumps"))
+    show(write, TABLES[0], conditions(found), table(heads, rows, "bumps"))
     turned = [j for j in bumps if j.kind == "rotation"]
     rows = {
         "all": rotation_cells(turned),
@@ -308,7 +320,7 @@ def _show(found: Sequence[Judged], write: Sequence[Path]) -> None:
         "bumps", "pitch, degrees rms", "yaw", "roll", "errors over standard deviations, rms: pitch, yaw, roll",
         "together",
     )  # fmt: skip
-    show(write, TABLES[1], CONDITIONS, table(heads, rows, "turned cameras"), is_repeated=True)
+    show(write, TABLES[1], conditions(found), table(heads, rows, "turned cameras"), is_repeated=True)
 
 
 if __name__ == "__main__":

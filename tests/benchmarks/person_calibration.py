@@ -2,8 +2,8 @@
 
 Recordings have key points of a detector (`detector/keypoints`) and a calibration. `walk` and `fast_arms` have exact
 masks, too; silhouettes of `balance_real` are those of the footage against its own median. The found cameras are
-compared with the given ones after the best similarity of all joints, because neither shares a world or a scale. Simulated
-people have noise of 3 px and gross errors (`tests/support/filmed_people.py`).
+compared with the given ones after the best similarity of all joints, because neither shares a world or a scale.
+Simulated people have noise of 3 px and gross errors (`tests/support/filmed_people.py`).
 """
 
 import argparse

@@ -85,5 +85,6 @@ def _ends(mask: Mask, contour: Array) -> Array | None:
     up = axes[:, 1] * -np.sign(axes[1, 1])  # y points down in a picture
     along = (contour - middle) @ up
     across = (contour - middle) @ np.array([-up[1], up[0]])
-    top = across[along > along.max() - UprightRules().end * np.ptp(along)].mean()
-    return np.stack([middle + along.max() * up + top * np.array([-up[1], up[0]]), middle + along.min() * up])
+    # Raised hands stand beside the axis; the crown is where the axis leaves the silhouette.
+    on_axis = along[np.abs(across) <= UprightRules().end * np.ptp(along)]
+    return np.stack([middle + on_axis.max() * up, middle + along.min() * up]) if len(on_axis) else None

@@ -54,6 +54,11 @@ def test_a_silhouette_that_does_not_count_says_why(boxes, flaw, has_hull):
     assert np.isnan(found.upright_px).all()
 
 
+def test_raised_hands_are_no_crown():
+    found = measured((50, 20, 69, 105), (55, 10, 64, 20), (44, 4, 49, 60), (70, 4, 75, 60))
+    np.testing.assert_allclose(found.upright_px, [[59.5, 10], [59.5, 105]], atol=0.6)
+
+
 def test_parts_of_one_person_are_one_silhouette():
     assert measured((50, 20, 69, 70), (52, 74, 60, 99)).flaw is None
 
