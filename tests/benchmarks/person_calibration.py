@@ -196,26 +196,25 @@ def measure_recordings(data: Path, write: Sequence[Path]):
 
 
 def measure_silhouettes(data: Path, write: Sequence[Path]):
-    """Write the table of silhouettes."""
-    cells = {}
-    for name, height_m in HEIGHTS_M.items():
-        for lenses in (False, True):
-            title = f"`{name}`, {LENS_NAMES[lenses]}"
-            try:
-                cells[title] = silhouette_row(data / name, height_m, lenses)
-            except CalibrationError as error:
-                cells[title] = [f"refused: {str(error).split(';')[0]}", *[""] * (len(HEADS) - 1)]
-            print(title, cells[title], flush=True)
+    """Write the table of silhouettes, after each row: one takes a minute of processor time."""
     conditions = Conditions(
         "`walk` (60 frames) and `fast_arms` (50) with exact masks, and `balance_real` (100) with silhouettes against "
         "its own median; four cameras each",
         "one person; only `fast_arms` has a stated height, 1.55 m",
         "nothing, or the lenses of the given calibration",
         "defaults",
-        "bounds of the search of the first turns, on `fast_arms`",
+        "bounds of the search of the first turns, and the crown on the axis, on `fast_arms`",
         COMMAND,
     )
-    show(write, TABLES[1], conditions, table(HEADS, cells, "recording"))
+    cells = {}
+    for lenses in (False, True):
+        for name, height_m in HEIGHTS_M.items():
+            title = f"`{name}`, {LENS_NAMES[lenses]}"
+            try:
+                cells[title] = silhouette_row(data / name, height_m, lenses)
+            except CalibrationError as error:
+                cells[title] = [f"refused: {str(error).split(';')[0]}", *[""] * (len(HEADS) - 1)]
+            show(write, TABLES[1], conditions, table(HEADS, cells, "recording"))
 
 
 def measure_simulated(n_rigs: int, write: Sequence[Path]):
