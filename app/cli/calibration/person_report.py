@@ -43,15 +43,16 @@ def record_of(found: "PersonCalibration") -> dict[str, Any]:
 def format_record(record: dict[str, Any]) -> str:
     """Return the same for people."""
     lines = [
-        f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['joints']} {record['points']} of a person "
-        f"in {record['frames']} frames"
+        f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['joints']} {record['points']} of a "
+        f"person in {record['frames']} frames"
     ]
     width = max(len(c["name"]) for c in record["cameras"])
     for c in record["cameras"]:
         sigma = f" +- {c['focal_sigma_percent']:.1f}%" if c["focal_sigma_percent"] else ", as given"
         off = "  nothing held out" if c["held_out_px"] != c["held_out_px"] else f"{c['held_out_px']:6.2f} px held out"
         lines.append(
-            f"  {c['name']:{width}}  {c['joints']:5} {record['points']}, focal length {c['focal_px'][0]:7.1f} px{sigma}, {off}"
+            f"  {c['name']:{width}}  {c['joints']:5} {record['points']}, focal length {c['focal_px'][0]:7.1f} px"
+            f"{sigma}, {off}"
         )
     size, (low, high) = " x ".join(f"{side:.1f}" for side in record["volume_m"]), record["interval_mm"]
     lines.append(
