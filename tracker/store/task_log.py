@@ -96,8 +96,10 @@ class PlannedPose(NamedTuple):
     """The present pose of a frame that has a task."""
 
     keyframe: bool
+    author: str
+    """Of the edit that made it."""
     time: str
-    """Time of the edit that made it."""
+    """Time of that edit."""
     uid: str
     """Identity that follows from that edit, its values and its body: one that undo shows again has the same."""
 
@@ -106,6 +108,7 @@ class _PlannedRow(NamedTuple):
     person: str
     frame: _Frame
     keyframe: _Flag
+    author: str
     time: Time
     edit: str
     body: str
@@ -169,13 +172,13 @@ class TaskLog:
         with self._connection.snapshot():
             bodies = dict(self._connection.all("SELECT id, toml FROM model_revisions", (), tuple))
             found = self._connection.all(
-                "SELECT p.person, p.frame, c.keyframe, e.time, e.uid, c.model_revision, c.numbers "
+                "SELECT p.person, p.frame, c.keyframe, e.author, e.time, e.uid, c.model_revision, c.numbers "
                 "FROM (SELECT DISTINCT person, frame FROM tasks) JOIN poses p USING (person, frame) "
                 f"JOIN pose_changes c ON c.id = p.change {_EDIT}",
                 (),
-                lambda row: _planned(*row[:5], bodies.get(row[5]), row[6]),
+                lambda row: _planned(*row[:6], bodies.get(row[6]), row[7]),
             )
-        return {(row.person, row.frame): PlannedPose(bool(row.keyframe), row.time, row.uid) for row in found}
+        return {(row.person, row.frame): PlannedPose(bool(row.keyframe), row.author, row.time, row.uid) for row in found}
 
     def keyframe_edits(self) -> list[MadePose]:
         """Return the edits that hold and that set or marked keyframes, earliest first, assessments left out."""

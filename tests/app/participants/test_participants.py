@@ -9,6 +9,7 @@ from gestures import FRONT, drag, pixel_of, wait_for
 
 from app.participants.participants import Participants
 from app.storage.turns import TurnError
+from tracker.annotation.frame_choice import FrameChoice
 from tracker.errors import TrackerError
 
 
@@ -291,3 +292,20 @@ def test_a_run_of_one_leaves_the_others_to_other_frames(people, tracker):
     assert ben.state.people[0].source == "tracked"
     ben.history.undo()
     assert anna.stored_poses.rows(0)[0] == [2, 3, 4, 5, 6]
+
+
+def test_a_verdict_on_a_pose_that_somebody_has_changed_since_is_refused(pair):
+    anna, ben = pair
+    anna.annotating.plan(FrameChoice(frames="0"), None, [], each=False)
+    drag(anna, "torso", (9.0, 0.0))
+    wait_for(lambda: ben.state.annotation.tasks[0].state == "annotated")
+    seen = ben.state.annotation.tasks[0].pose
+    drag(anna, "torso", (-9.0, 0.0))
+    wait_for(lambda: ben.state.annotation.tasks[0].pose != seen)
+    undo = anna.state.undo
+    for decide in (lambda: ben.annotating.verify(0, 0, seen), lambda: ben.annotating.reject(0, 0, "elbow", seen)):
+        with pytest.raises(TrackerError, match="found another one by anna; look at it"):
+            decide()
+    assert (ben.state.annotation.tasks[0].state, anna.state.undo) == ("annotated", undo)
+    anna.annotating.verify(0, 0, seen)  # her own work of a moment ago
+    assert anna.state.annotation.tasks[0].state == "verified"
