@@ -147,8 +147,8 @@ class FrameCache:
     def request(self, frame: int, done: Callable[[int], None], asker: object = None) -> None:
         """Compute the evidence of a frame in the background, unless the same one asks for another first.
 
-        Work starts when the request is a moment old and no picture is in the making. Where frames pass, as in playback on
-        a machine that is busy, the moment is twice as long as the last frame was shown: nobody would wait for the evidence.
+        Work starts when the request is a moment old and no picture is in the making. Where frames pass, as in playback
+        on a busy machine, the moment is twice as long as the last frame was shown: nobody waits for this evidence.
 
         Args:
             frame: whose evidence is computed.

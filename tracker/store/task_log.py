@@ -178,7 +178,9 @@ class TaskLog:
                 (),
                 lambda row: _planned(*row[:6], bodies.get(row[6]), row[7]),
             )
-        return {(row.person, row.frame): PlannedPose(bool(row.keyframe), row.author, row.time, row.uid) for row in found}
+        return {
+            (row.person, row.frame): PlannedPose(bool(row.keyframe), row.author, row.time, row.uid) for row in found
+        }
 
     def keyframe_edits(self) -> list[MadePose]:
         """Return the edits that hold and that set or marked keyframes, earliest first, assessments left out."""
