@@ -15,7 +15,7 @@ from tracker.store.annotator import annotator
 from tracker.store.edit_tree import now
 from tracker.store.identities import derived_uid, new_uid
 from tracker.store.records import MarkChange
-from tracker.store.task_log import MadePose, PlannedPose, State, StateRow, TaskRow
+from tracker.store.task_log import MadePose, PlannedPose, State, StateRow, TaskRow, last_verdict
 
 STATES: tuple[State, ...] = ("draft", "annotated", "verified", "rejected")
 """States of the tasks that are not withdrawn, in the order in which they are counted."""
@@ -84,18 +84,18 @@ def _task(
     plain = Task(row, "draft", "", "", row.time)
     if made is not None and (row.kind == "plan" or made.time > row.time):
         plain = Task(row, "annotated", "", made.author, made.time)
+    verdict = last_verdict(decided, pose)
     for decision in reversed(decided):
         if decision.state == "draft":  # planned again
             break
-        is_about = pose is not None and decision.is_about(pose)
         holds = {
             "withdrawn": True,
             "rejected": plain.state == "draft" or plain.time <= decision.time,
-            "verified": is_about,
+            "verified": decision is verdict,
         }
         if holds.get(decision.state, False):
             return Task(row, decision.state, decision.comment, decision.author, decision.time)
-        if is_about:  # it overrules earlier ones
+        if decision is verdict:  # it overrules earlier ones
             break
     return plain
 
@@ -146,7 +146,7 @@ def decide(
     rows = [row for row in tasks if of is None or row.annotator == of]
     if not rows:
         raise TrackerError(f"expected a task of {person} in frame {frame}, found none; plan the frame first")
-    by, time = annotator() if author is None else author, now()
+    by = annotator() if author is None else author
     require_seen(store, at, seen, by)
     if state == "verified":
         pose = store.pose(person, frame)
@@ -155,8 +155,8 @@ def decide(
         if not pose.keyframe and not pose.reviewed:
             store.commit(f"Verify frame {frame}", [MarkChange(person, frame, keyframe=False, reviewed=True)])
     shown = store.tasks.planned_poses().get(at)
-    seen = None if shown is None else shown.uid
-    store.tasks.add(states=[StateRow(new_uid(), row.uid, state, comment, by, time, seen) for row in rows])
+    time, pose_uid = now(), None if shown is None else shown.uid
+    store.tasks.add(states=[StateRow(new_uid(), row.uid, state, comment, by, time, pose_uid) for row in rows])
     return len(rows)
 
 

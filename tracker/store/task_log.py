@@ -4,6 +4,7 @@ The union of the rows of two copies is their merge: a row has the same `uid` eve
 """
 
 import sqlite3
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, TypeVar
 
@@ -200,10 +201,13 @@ class TaskLog:
         The last decision on this pose counts, in any of its tasks.
         """
         poses = {task.uid: (task.person, task.frame) for task in self.tasks()}
-        decided = [(poses[s.task], s) for s in self.states() if s.task in poses and s.state != "withdrawn"]
+        decided = defaultdict[tuple[str, int], list[StateRow]](list)
+        for state in self.states():
+            if state.task in poses:
+                decided[poses[state.task]].append(state)
         shown = self.planned_poses() if decided else {}
-        last = {at: s for at, s in decided if at in shown and s.is_about(shown[at])}
-        return {at: s for at, s in last.items() if s.state == "verified"}
+        verdicts = {at: last_verdict(decided[at], pose) for at, pose in shown.items()}
+        return {at: verdict for at, verdict in verdicts.items() if verdict is not None and verdict.state == "verified"}
 
     def edit_times(self) -> list[tuple[str, str]]:
         """Return author and time of all edits, undone ones too, earliest first."""
@@ -218,6 +222,17 @@ class TaskLog:
 
         fields = ", ".join(TABLES[table]._fields)
         return self._connection.all(f"SELECT {fields} FROM {table} ORDER BY {order}", (), convert)
+
+
+def last_verdict(decided: Sequence[StateRow], shown: PlannedPose | None) -> StateRow | None:
+    """Return the last verdict on a pose, which alone says whether it is verified; None without one.
+
+    Args:
+        decided: decisions, earliest first.
+        shown: the pose; None for none.
+    """
+    about = (s for s in reversed(decided) if shown is not None and s.state != "withdrawn" and s.is_about(shown))
+    return next(about, None)
 
 
 def write_rows(db: sqlite3.Connection, found: Rows) -> None:

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from gestures import FRONT, drag, pixel_of, wait_for
+from gestures import FRONT, drag, pixel_of, start_run, wait_for
 
 from app.participants.participants import Participants
 from app.storage.turns import TurnError
@@ -276,9 +276,7 @@ def test_bodies_of_the_host_are_taken_over(pair):
 
 def test_a_run_of_one_leaves_the_others_to_other_frames(people, tracker):
     anna, ben = people.host, people.join("annotate", "ben").controller
-    anna.navigation.seek(2)
-    drag(anna, "torso", (4.0, 0.0))
-    anna.tracking.start(False, 6)
+    start_run(anna)
     ben.navigation.seek(4)
     with pytest.raises(TurnError, match="tracks frames 3 to 6"):
         drag(ben, "torso", (4.0, 0.0))
