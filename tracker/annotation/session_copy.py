@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from tracker.annotation.numbered_settings import Numbered, renumbered
+from tracker.annotation.observation_copies import copy_observations
 from tracker.errors import SessionError
 from tracker.files import sync_folder
-from tracker.annotation.observation_copies import copy_observations
 from tracker.pipeline.calibration_revisions import follow_history
 from tracker.session.folder import tidy_path
 from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_session

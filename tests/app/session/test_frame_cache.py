@@ -28,7 +28,7 @@ def test_a_picture_has_the_size_asked_for_and_is_made_once(opened, monkeypatch):
 
 @pytest.fixture
 def clocked(opened, monkeypatch):
-    """Frames whose evidence is noted with its time, by a clock that sleep advances; and the function that does the work."""
+    """Frames whose evidence is noted with its time, by a clock that sleep advances; and what does the work."""
     now, made, work = [100.0], [], []
     frames = opened().frames
     frames._rest_s = 0.2
