@@ -81,10 +81,11 @@ async def in_browsers(
         paths = (chromium_path(), of_other or chromium_path())
         browsers, roots = [], {}
         for name, path in zip(("drags", "plays"), paths, strict=True):
-            before = _processes("chrom").keys()
+            before = _processes("chrom")
             browsers.append(await playwright.chromium.launch(executable_path=path, args=FLAGS))
             stack.push_async_callback(browsers[-1].close)
-            roots[f"browser that {name}"] = min(_processes("chrom").keys() - before)
+            now = _processes("chrom")
+            roots[f"browser that {name}"] = min(p for p in now.keys() - before.keys() if now[p][0] not in now)
         there = (address, "ben") if elsewhere is None else (elsewhere.address, "")
         anna, ben = await opened(browsers[0], address, ""), await opened(browsers[1], *there)
         await ben.keyboard.press("Shift+Space")  # loops
