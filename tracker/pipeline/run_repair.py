@@ -24,10 +24,17 @@ from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
-from tracker.fitting.hypothesis import SAME_POSE_M, limbs_elsewhere
+from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M, Hypothesis, distance_m, limbs_elsewhere
 from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
-from tracker.tracking.estimation.limb_repair import FrameEvidence, Repair, better_limbs, limbs_to_search
+from tracker.tracking.estimation.limb_repair import (
+    MIN_GAIN_NATS,
+    FrameEvidence,
+    Repair,
+    better_limbs,
+    limbs_to_search,
+)
+from tracker.tracking.estimation.pose_paths import select_alternatives
 from tracker.tracking.estimation.pose_score import common_evidence
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.subjects import Subjects
@@ -103,6 +110,7 @@ class RunRepair:
                 break
             for done in self._repair(known, self._elsewhere(scores)[0]):
                 yield RepairStep(first + n + min(done, n), first + 2 * n)
+            self._select_alternatives()
             changed = [k for k in self._frames if self._bodies[k] is not before[k]]
             if not changed or first == 2 * n * (_MAX_TRIES - 1):
                 break
@@ -220,6 +228,29 @@ class RunRepair:
         if found.is_better:
             self._bodies[frame] = with_body(bodies, person, PosedBody(model, found.pose))
         return found.is_better
+
+    def _select_alternatives(self) -> None:
+        """Take alternatives that a stretch of frames speaks for together, though none of them does alone."""
+        for i in self._subjects.tracked:
+            frames = [self._candidates(k, i) for k in self._frames]
+            selected = select_alternatives(frames, MIN_GAIN_NATS)
+            for k, found, chosen in zip(self._frames, frames, selected, strict=True):
+                if chosen:
+                    best, *others = found[chosen], *found[:chosen], *found[chosen + 1 :]
+                    self._bodies[k] = with_body(self._bodies[k], i, best.body)
+                    likely = tuple(h for h in others if h.cost < best.cost + CLEAR_NATS)
+                    self._found[k, i] = self._found[k, i]._replace(pose=best.pose, cost=best.cost, alternatives=likely)
+                    *before, last = self._traces[k, i]
+                    self._traces[k, i] = (*before, last._replace(after_nats=round(best.cost, 1), taken=True))
+
+    def _candidates(self, frame: int, person: int) -> list[Hypothesis]:
+        """Return the pose of a person on a frame, and the alternatives that are elsewhere or cheaper."""
+        body, examined = self._bodies[frame][person], self._found.get((frame, person))
+        if examined is None:
+            return [Hypothesis(body)]
+        cost = examined.cost
+        others = (h for h in examined.alternatives if h.cost < cost or distance_m(h.body, body) > SAME_POSE_M)
+        return [Hypothesis(body, "repair", cost), *others]
 
     def _results(self, scores: Mapping[int, Array]) -> dict[int, dict[int, RepairedPose]]:
         elsewhere, parts = self._elsewhere(scores)

@@ -8,9 +8,12 @@ from region_scenes import CAMERAS, N_FRAMES, Walk, limb_of
 from staging import SUIT
 
 from tracker.body.limbs import limbs
-from tracker.fitting.hypothesis import SAME_POSE_M
+from tracker.body.searches import Search
+from tracker.fitting.hypothesis import SAME_POSE_M, Hypothesis
+from tracker.pipeline import run_repair
 from tracker.pipeline.run_repair import RunRepair
 from tracker.tracking.chamfer.settings import TrackSettings
+from tracker.tracking.estimation.limb_repair import MIN_GAIN_NATS, Repair
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.view_tracks import FrameTracks
 
@@ -74,6 +77,25 @@ def test_a_leg_is_found_that_all_tracks_have_elsewhere(walk):
         else:
             assert np.array_equal(pose, walk.tracked[k][0].values)
             assert trust.all()
+
+
+@pytest.mark.slow
+def test_a_leg_is_taken_that_only_all_frames_together_speak_for(walk, monkeypatch):
+    """Each frame gains less than a repair asks for, and is no repair by itself."""
+
+    def undecided(evidence, bodies, person, *args):
+        k = next(k for k, views in enumerate(walk.views) if views is evidence.views)
+        true = Hypothesis(walk.true[k][0], "repair", -0.7 * MIN_GAIN_NATS)
+        entry = Search.of("repair", ("right_calf",), 0.0, true.cost, False)
+        return Repair(bodies[0].values, 0.0, 0.7 * MIN_GAIN_NATS, (true,) if walk.wrong[k] else (), entry)
+
+    monkeypatch.setattr(run_repair, "better_limbs", undecided)
+    found = repaired(walk)[-1].found[0]
+    leg = [x.name for x in limbs(walk.model)].index("right_calf")
+    for k in np.flatnonzero(walk.wrong):
+        assert np.array_equal(found[k].pose, walk.true[k][0].values)
+        assert [entry.taken for entry in found[k].trace] == [True, False]
+        assert not found[k].trust[:, leg].any()
 
 
 @pytest.mark.slow

@@ -261,9 +261,11 @@ class _PathSelection:
     @cached_property
     def _path(self) -> list[int]:
         """The index of the selected candidate of each frame."""
-        ends = [[self._model.points_world(e.poses[self._person]) for e in some] for some in (self._before, self._after)]
+        before, after = (
+            [self._model.points_world(e.poses[self._person]) for e in some] for some in (self._before, self._after)
+        )
         costs = [self._costs(i) for i in range(len(self._candidates))]  # may add alternatives to the candidates
-        return viterbi_path([c.points for c in self._candidates], costs, *ends)
+        return viterbi_path([c.points for c in self._candidates], costs, before, after)
 
     def _costs(self, i: int) -> Array:
         """Return the costs of the candidates of a frame, nats; 0 for all where the passes agree, and none is known."""

@@ -48,6 +48,8 @@ class Repair(NamedTuple):
 
     pose: Array
     """Pose, (n_values,): the tracked one unless a limb is better elsewhere by `MIN_GAIN_NATS`."""
+    cost: float
+    """Its cost, nats; that of the refined one where it stays as tracked."""
     gain: float
     """How much less the best pose costs than the refined one with all limbs where they were tracked, nats, at least
     0."""
@@ -137,7 +139,9 @@ def better_limbs(
     gain = start.cost - best.cost
     is_better = gain > MIN_GAIN_NATS
     entry = search_entry("repair", [*searched, *unproposed], start, [best, *rest])._replace(taken=is_better)
-    return Repair(best.pose if is_better else tracked, gain, tuple(rest) if is_better else (best, *rest), entry)
+    if is_better:
+        return Repair(best.pose, best.cost, gain, tuple(rest), entry)
+    return Repair(tracked, start.cost, gain, (best, *rest), entry)
 
 
 def _with_regions(

@@ -109,9 +109,38 @@ def propagate_candidates(
             yield i
 
 
+def select_alternatives(frames: Sequence[Sequence[Hypothesis]], least_gain: float) -> list[int]:
+    """Select a pose on each frame of a run: the first, or an alternative where those of a stretch are cheaper together.
+
+    Each frame alone may leave open which one is right, while the frames of a stretch agree. A stretch begins and ends
+    with frames that have alternatives; fewer than two frames in a row within it have none, since three frames tell an
+    acceleration.
+
+    Args:
+        frames: the candidates of each frame, the present pose first.
+        least_gain: by how much a stretch must be cheaper, nats.
+
+    Returns:
+        The index of the candidate of each frame.
+    """
+    selected, stretches = [0] * len(frames), list[range]()
+    for i in (i for i, found in enumerate(frames) if len(found) > 1):
+        near = stretches and i - stretches[-1].stop < 2
+        first = stretches.pop().start if near else i
+        stretches.append(range(first, i + 1))
+    for own in stretches:
+        around = range(max(0, own.start - 2), own.start), range(own.stop, min(own.stop + 2, len(frames)))
+        before, after = ([frames[i][0].body.points_world for i in side] for side in around)
+        points = [np.array([h.body.points_world for h in frames[i]]) for i in own]
+        costs = [np.array([h.cost for h in frames[i]]) for i in own]
+        selected[own.start : own.stop] = viterbi_path(points, costs, before, after, least_gain)
+    return selected
+
+
 def viterbi_path(
-    points: Sequence[Array], costs: Sequence[Array], before: Sequence[Array], after: Sequence[Array]
-) -> list[int]:
+    points: Sequence[Array], costs: Sequence[Array], before: Sequence[Array], after: Sequence[Array],
+    least_gain: float = CLEAR_NATS,
+) -> list[int]:  # fmt: skip
     """Select a pose on each frame so that the sum of their costs and of the acceleration costs is least.
 
     Args:
@@ -119,9 +148,10 @@ def viterbi_path(
         costs: their costs, (n_poses,) each, nats.
         before: the points on the one or two frames before the first, (n_points, 3) each; may be empty.
         after: the same on the frames after the last.
+        least_gain: by how much a path must be cheaper, nats.
 
     Returns:
-        The index of the pose of each frame; 0 throughout unless another path is cheaper by `CLEAR_NATS`.
+        The index of the pose of each frame; 0 throughout unless another path is cheaper by `least_gain`.
     """
     fixed = [[p[None] for p in some] for some in (before, after)]
     points = [*fixed[0], *points, *fixed[1]]
@@ -130,7 +160,7 @@ def viterbi_path(
     if len(points) < 3:  # too few for an acceleration
         cheapest = [int(np.argmin(c)) for c in costs]
         gain = sum(float(c[0] - c.min()) for c in costs)
-        return (cheapest if gain >= CLEAR_NATS else [0] * len(costs))[own]
+        return (cheapest if gain >= least_gain else [0] * len(costs))[own]
     # total[i, k] is the least cost of a path that ends with poses i and k of two frames.
     total, backpointers = costs[0][:, None] + costs[1], []
     stay = float(total[0, 0])
@@ -140,7 +170,7 @@ def viterbi_path(
         paths = total[:, :, None] + acceleration
         backpointers.append(paths.argmin(axis=0))
         total = paths.min(axis=0) + cost
-    if stay - total.min() < CLEAR_NATS:
+    if stay - total.min() < least_gain:
         return [0] * len(points[own])
     path = [int(i) for i in np.unravel_index(int(total.argmin()), total.shape)][::-1]
     for step in reversed(backpointers):

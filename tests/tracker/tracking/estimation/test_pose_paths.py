@@ -15,6 +15,7 @@ from tracker.tracking.estimation.pose_paths import (
     ROUNDS,
     Candidates,
     propagate_candidates,
+    select_alternatives,
     viterbi_path,
 )
 
@@ -57,6 +58,35 @@ def test_of_few_frames_the_cheapest_poses_are_taken(n):
     points, costs = [np.zeros((2, 4, 3))] * n, [np.array([2 * CLEAR_NATS, 0.0])] * n
     assert viterbi_path(points, costs, [], []) == [1] * n
     assert viterbi_path(points, [-c for c in costs], [], []) == [0] * n
+
+
+def raised(gavrila, rad=0.0, cost=0.0):
+    """A hypothesis with an arm raised further."""
+    step = np.zeros(gavrila.n_dofs)
+    step[gavrila.dof_names.index("left_shoulder.abduction")] = rad
+    return Hypothesis(PosedBody(gavrila, gavrila.retract(posed(gavrila, 1), step)), "", cost)
+
+
+def test_frames_that_agree_outweigh_what_none_says_alone(gavrila):
+    own, other = raised(gavrila), raised(gavrila, 0.5, -4.0)
+    assert select_alternatives([[own, other]], 6.0) == [0]
+    assert select_alternatives([[own, other]] * 2, 6.0) == [1, 1]
+    assert select_alternatives([[own, raised(gavrila, -0.5), other]] * 4, 6.0) == [2] * 4
+    assert select_alternatives([[own]] * 3, 6.0) == [0] * 3
+
+
+def test_an_arm_that_jumps_there_and_back_is_not_taken(gavrila):
+    own, other = raised(gavrila), raised(gavrila, 0.5, -4.0)
+    assert select_alternatives([[own]] * 2 + [[own, other]] * 3 + [[own]] * 2, 6.0) == [0] * 7
+    # Here it is the pose of three frames that jumps.
+    path = [raised(gavrila, 0.5)]
+    assert select_alternatives([path] * 2 + [[own, other]] * 3 + [path] * 2, 6.0) == [0, 0, 1, 1, 1, 0, 0]
+
+
+def test_stretches_apart_are_judged_apart(gavrila):
+    own, other = raised(gavrila), raised(gavrila, 0.01, -4.0)  # a step without a jump
+    assert select_alternatives([[own, other], [own], [own, other]], 6.0) == [1, 0, 1]
+    assert select_alternatives([[own, other], [own], [own], [own, other]], 6.0) == [0] * 4
 
 
 SIGMA = None
