@@ -199,6 +199,10 @@ class FrameCache:
                 self._remember_view(frame, camera)
                 return pictures.unreadable(self._resamplers(camera, reduction).camera.size)
 
+    def cached_image(self, frame: int, camera: int, reduction: float) -> bytes | None:
+        """Return the picture of `image` if it is cached."""
+        return self._pictures.peek((frame, camera, reduction, self.observer.recording.version(camera)))
+
     @property
     def is_listed(self) -> bool:
         """Whether all footage is indexed."""
