@@ -142,9 +142,9 @@ def diagnose(
         fps: frames per second.
         report: shows progress. An exception that it raises ends the diagnosis.
     """
-    state, search = _as_tracked(frames, parameters), _Search(frames, parameters, prior_sigmas(fps))
+    search = _Search(frames, parameters, prior_sigmas(fps))
     report("fitting poses to the contours", 0.0)
-    start = search.fitted(state, (), accepts=False, steps=EFFORT.heat)
+    start = search.begun()
     state = search.fitted(start.state, ()).state
     best, tried = search.selected(state, (), partial(report, "judging the cameras")), set[int]()
     # One camera that is off can look like two others that are: begin with other cameras as well.
@@ -172,6 +172,17 @@ def glance(frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], 
     if found is None:
         return _diagnosis(_Selection((), fit))
     return _diagnosis(_Selection(found[:1], found[1]))
+
+
+def fit_fault(
+    frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], fps: float, fault: Fault
+) -> Diagnosis:
+    """Fit one fault that is known to be there, however little it is worth; the arguments are those of `diagnose`."""
+    search = _Search(frames, parameters, prior_sigmas(fps))
+    before = search.fitted(search.begun().state, ())
+    first = search.refitted(before, (fault,))
+    found = FoundFault(fault, before.cost - first.cost, {})
+    return _diagnosis(_Selection((found,), search.fitted(first.state, (fault,))))
 
 
 def _diagnosis(selection: "_Selection") -> Diagnosis:
@@ -231,6 +242,10 @@ class _Search:
 
     def __init__(self, frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], sigmas: Array) -> None:
         self._frames, self._parameters, self._sigmas = frames, parameters, sigmas
+
+    def begun(self) -> _Fitted:
+        """Fit the poses as they were tracked roughly, on all evidence."""
+        return self.fitted(_as_tracked(self._frames, self._parameters), (), accepts=False, steps=EFFORT.heat)
 
     def selected(self, state: RigState, not_first: Collection[int], report: Callable[[float], None]) -> _Selection:
         """Keep faults one by one until none is worth it; the first is not of some cameras, given by index."""

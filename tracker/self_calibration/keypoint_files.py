@@ -1,4 +1,4 @@
-"""From footage and files of key points to calibrated cameras."""
+"""From footage and files of key points, or of masks, to calibrated cameras."""
 
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import ExitStack, closing
@@ -9,16 +9,19 @@ from typing import NamedTuple
 from tracker.boards.footage_calibration import footage_paths
 from tracker.boards.lens_fit import blank_camera
 from tracker.calibrations.reading import read_cameras
-from tracker.compute.progress import Report
+from tracker.compute.progress import Report, part_of
 from tracker.errors import CalibrationError
 from tracker.footage.camera_source import CameraSource
 from tracker.footage.video import open_footage
 from tracker.geometry.cameras import Camera
 from tracker.observations.importing import plan_import
 from tracker.observations.observed import ObservationSet
-from tracker.observations.plans import MaskPlan
+from tracker.observations.plans import ImportPlan, MaskPlan
 from tracker.observations.request import ImportRequest
-from tracker.self_calibration.keypoint_calibration import PersonCalibration, calibrate_by_person
+from tracker.self_calibration.keypoint_calibration import calibrate_by_person
+from tracker.self_calibration.person_calibration import PersonCalibration
+from tracker.self_calibration.silhouette_calibration import calibrate_by_silhouettes
+from tracker.self_calibration.silhouette_files import silhouettes_in_footage, silhouettes_in_masks
 from tracker.session.matching import common_length
 from tracker.session.session import Session
 
@@ -27,10 +30,10 @@ _PERSON = "person"
 
 @dataclass(frozen=True)
 class FilmedPerson:
-    """Footage of one person, and the key points that a detector found in it."""
+    """Footage of one person, and key points or masks of the person in it."""
 
-    keypoints: Path
-    """File or folder of key points."""
+    keypoints: Path | None
+    """File or folder of key points or masks; None for silhouettes that are found in the footage itself."""
     videos: Sequence[Path] = ()
     """Video files or folders of images, each named after its camera."""
     camera_paths: Mapping[str, Path] = field(default_factory=dict)
@@ -64,9 +67,20 @@ def calibrate_filmed_person(filmed: FilmedPerson, report: Report) -> PersonCalib
         TrackerError: files cannot be read or do not fit together, or show too little of one person.
     """
     paths = footage_paths(filmed.videos, filmed.camera_paths, filmed.offsets)
-    found = read_keypoints(filmed.keypoints, paths, filmed.offsets, filmed.common_frames)
-    cameras = found.blanks if filmed.lenses is None else _with_lenses(found.blanks, filmed.lenses)
-    return calibrate_by_person(found.observations, cameras, filmed.stature_m, filmed.lenses is not None, report)
+    session = _session_of(filmed.keypoints, paths, filmed.offsets, filmed.common_frames)
+    blanks = tuple(c.camera for c in session.cameras)
+    cameras = blanks if filmed.lenses is None else _with_lenses(blanks, filmed.lenses)
+    has_lenses = filmed.lenses is not None
+    plan = None if filmed.keypoints is None else _plan(session, filmed.keypoints)
+    if plan is not None and not isinstance(plan, MaskPlan):
+        found = _keypoints(plan, filmed.keypoints, blanks)
+        return calibrate_by_person(found.observations, cameras, filmed.stature_m, has_lenses, report)
+    reading, calibrating = part_of(report, 0.0, 0.5), part_of(report, 0.5, 1.0)
+    if plan is None:
+        silhouettes = silhouettes_in_footage(session, cameras, reading)
+    else:
+        silhouettes = silhouettes_in_masks(plan, session, cameras, reading)
+    return calibrate_by_silhouettes(silhouettes, cameras, filmed.stature_m, has_lenses, calibrating)
 
 
 def _with_lenses(blanks: Sequence[Camera], path: Path) -> tuple[Camera, ...]:
@@ -106,35 +120,50 @@ def read_keypoints(
     Raises:
         TrackerError: files cannot be read, or do not fit the footage.
     """
+    session = _session_of(files, paths, offsets, common_frames)
+    return _keypoints(_plan(session, files), files, tuple(c.camera for c in session.cameras))
+
+
+def _session_of(
+    files: Path | None, paths: Mapping[str, Path], offsets: Mapping[str, int], common_frames: bool
+) -> Session:
+    """Return a session that states which cameras and frames there are; nothing of it is written."""
     with ExitStack() as stack:
         footage = {name: stack.enter_context(closing(open_footage(path, name))) for name, path in paths.items()}
         n_frames = common_length(footage, offsets, common_frames)
-        blanks = tuple(blank_camera(name, f.size) for name, f in footage.items())
         sources = tuple(
-            CameraSource(c, paths[c.name], offset=offsets.get(c.name, 0), footage_frames=footage[c.name].n_frames)
-            for c in blanks
+            CameraSource(
+                blank_camera(name, f.size), paths[name], offset=offsets.get(name, 0), footage_frames=f.n_frames
+            )
+            for name, f in footage.items()
         )
         rates = [f.fps for f in footage.values() if f.fps is not None]
-    # Nothing of a session is written: it states which cameras and frames there are.
-    session = Session(files.parent, files.name, max(rates, default=1.0), n_frames, sources, ())
+    place = files or next(iter(paths.values()))
+    return Session(place.parent, place.name, max(rates, default=1.0), n_frames, sources, ())
+
+
+def _plan(session: Session, files: Path) -> ImportPlan | MaskPlan:
     plan = plan_import(session, ImportRequest(_PERSON, (files,), (_PERSON,)), calibrated=False)
-    if isinstance(plan, MaskPlan):
-        raise CalibrationError(
-            f"expected key points in pictures, found masks in {files}; name the files that a pose detector wrote"
-        )
     if plan.problems:
-        raise CalibrationError(f"{plan.problems[0]}; correct the files of key points")
+        kind = "masks" if isinstance(plan, MaskPlan) else "key points"
+        raise CalibrationError(f"{plan.problems[0]}; correct the files of {kind}")
+    _require_files({v.camera for v in plan.views if v.place is None}, files)
+    return plan
+
+
+def _keypoints(plan: ImportPlan | MaskPlan, files: Path | None, blanks: tuple[Camera, ...]) -> KeyPoints:
+    if isinstance(plan, MaskPlan):
+        raise CalibrationError(f"expected key points in pictures, found masks in {files}; name files of key points")
     if plan.observations.points is None:
         raise CalibrationError(
             f"expected key points in pictures, found points in space in {files}; name the files of a pose detector"
         )
-    _require_files({v.camera for v in plan.views if v.place is None}, files)
     return KeyPoints(plan.observations, blanks)
 
 
 def _require_files(without: Collection[str], files: Path) -> None:
     if without:
         raise CalibrationError(
-            f"expected key points of each camera, found none of {', '.join(sorted(without))} in {files}; add them, or "
-            "leave out that footage"
+            f"expected key points or masks of each camera, found none of {', '.join(sorted(without))} in {files}; add "
+            "them, or leave out that footage"
         )

@@ -33,6 +33,11 @@ class SeenJoints:
         """Return the joints on some frames."""
         return replace(self, px=self.px[frames], is_seen=self.is_seen[frames])
 
+    def with_more(self, others: "SeenJoints") -> "SeenJoints":
+        """Return the joints with others on the same frames."""
+        px = np.concatenate([self.px, others.px], axis=2)
+        return SeenJoints(self.names + others.names, px, np.concatenate([self.is_seen, others.is_seen], axis=2))
+
     def observations(self, cameras: Sequence[int] | None = None) -> Observations:
         """Return the joints that at least two of some cameras show, which are numbered as they are given."""
         at = np.arange(self.px.shape[1]) if cameras is None else np.array(cameras)

@@ -34,7 +34,8 @@ class Upright(NamedTuple):
     joints_world: Array
     """(F, N, 3), metres."""
     lean_rad: float
-    """Median angle between the vertical and the direction from the ankles to the shoulders on a frame."""
+    """Median angle between the vertical and the direction from the ankles to the shoulders, or from the feet to the
+    crown, on a frame."""
     floor_by: str
     """Points that the floor was found by."""
 
@@ -102,6 +103,31 @@ def upright(cameras: Sequence[Camera], joints: Array, names: Sequence[str], stat
     spines = spines[np.isfinite(spines).all(axis=1)]
     if not len(spines):
         raise CalibrationError("expected ankles and shoulders in one frame, found none; film the whole person")
+    turn, lean = _upwards(cameras, spines)
+    turned = rigid.apply(turn, joints)
+    below, floor_by = _lowest(dict(zip(names, np.moveaxis(turned, 1, 0), strict=True)), stature_m)
+    return _on_floor(cameras, turn, turned, below, lean, floor_by)
+
+
+def upright_by_ends(cameras: Sequence[Camera], ends: Array, points: Array) -> Upright:
+    """Turn a world so that z points from the feet to the crown, and put its origin on the floor below the person.
+
+    Args:
+        cameras: in any world, metres.
+        ends: crown and feet, (F, 2, 3), metres; NaN where unknown.
+        points: others to take along, (F, N, 3), metres.
+    """
+    turn, lean = _upwards(cameras, ends[:, 0] - ends[:, 1])
+    below = float(np.nanmedian(rigid.apply(turn, ends[:, 1])[:, 2]))
+    return _on_floor(cameras, turn, rigid.apply(turn, points), below, lean, "feet of the silhouettes")
+
+
+def _upwards(cameras: Sequence[Camera], spines: Array) -> tuple[Array, float]:
+    """Return the turn to a world in which spines, (F, 3), point up, and their median angle from its vertical.
+
+    The first camera looks along y, apart from its tilt.
+    """
+    spines = spines[np.isfinite(spines).all(axis=1)]
     up = np.median(spines / np.linalg.norm(spines, axis=1, keepdims=True), axis=0)
     up /= np.linalg.norm(up)
     lean = float(np.median(np.arccos(np.clip(spines @ up / np.linalg.norm(spines, axis=1), -1.0, 1.0))))
@@ -110,8 +136,13 @@ def upright(cameras: Sequence[Camera], joints: Array, names: Sequence[str], stat
         forward = cameras[0].T_world_camera[:3, 1]
     forward = forward / np.linalg.norm(forward)
     turn = rigid.transform(np.stack([np.cross(forward, up), forward, up]), None)
-    turned = rigid.apply(turn, joints)
-    below, floor_by = _lowest(dict(zip(names, np.moveaxis(turned, 1, 0), strict=True)), stature_m)
+    return turn, lean
+
+
+def _on_floor(
+    cameras: Sequence[Camera], turn: Array, turned: Array, below: float, lean: float, floor_by: str
+) -> Upright:
+    """Return a turned world with its origin on the floor below points, (F, N, 3)."""
     middle = np.nanmedian(turned.reshape(-1, 3), axis=0)
     origin = np.array([middle[0], middle[1], below])
     world = rigid.transform(None, -origin) @ turn

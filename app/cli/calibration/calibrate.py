@@ -41,11 +41,15 @@ class CalibrateArguments:
     """.toml file of the board: Caliscope's charuco.toml, anipose's config.toml, or a few lines as in
     docs/calibration.md."""
     people: OptionalPath = None
-    """instead of a board: file or folder of the key points of one person, in a format that `quadrille import` reads."""
+    """instead of a board: file or folder of key points or masks of one person, in a format that `quadrille import`
+    reads."""
+    silhouettes: bool = False
+    """instead of a board: find silhouettes of one person in the videos, of cameras that stand still."""
     height: OptionalNumber = None
-    """with --people: height of the person, metres, which is the scale of the world."""
+    """with --people or --silhouettes: height of the person, metres, which is the scale of the world."""
     lenses: OptionalPath = None
-    """with --people: a calibration of which the lenses are taken; by default focal lengths are estimated."""
+    """with --people or --silhouettes: a calibration of which the lenses are taken; by default focal lengths are
+    estimated."""
     videos: Paths = ()
     """video files or image folders, each named after its camera; frame k of all is of one instant."""
     camera: NamedPaths = ()
@@ -70,7 +74,7 @@ class CalibrateArguments:
 
 
 def command(arguments: Annotated[CalibrateArguments, tyro.conf.arg(name="")]) -> None:
-    """Calibrate cameras by footage of a board, or by key points of a person.
+    """Calibrate cameras by footage of a board, or by key points or silhouettes of a person.
 
     The board may be a ChArUco board, also partly visible, or a checkerboard. Ctrl+C stops it and writes nothing.
     """
@@ -106,7 +110,6 @@ def _by_person(arguments: CalibrateArguments, report: "Report") -> "_Calibrated"
     from app.cli.calibration.person_report import format_record, record_of
     from tracker.self_calibration.keypoint_files import FilmedPerson, calibrate_filmed_person
 
-    assert arguments.people is not None
     filmed = FilmedPerson(
         arguments.people,
         arguments.videos,
@@ -123,14 +126,16 @@ def _by_person(arguments: CalibrateArguments, report: "Report") -> "_Calibrated"
 
 def _check(arguments: CalibrateArguments) -> None:
     """Check what can be checked before the footage is read."""
-    if (arguments.board is None) == (arguments.people is None):
+    by = {"--board": arguments.board is not None, "--people": arguments.people is not None}
+    given = [option for option, value in {**by, "--silhouettes": arguments.silhouettes}.items() if value]
+    if len(given) != 1:
         raise TrackerError(
-            f"expected --board FILE or --people KEYPOINTS, found {'none' if arguments.board is None else 'both'}; "
+            f"expected --board FILE, --people KEYPOINTS or --silhouettes, found {' and '.join(given) or 'none'}; "
             "docs/calibration.md shows how to describe a board, and how to calibrate without one"
         )
     of_board = {"--fisheye": arguments.fisheye, "--every": arguments.every, "--floor-frame": arguments.floor_frame}
     of_people = {"--height": arguments.height, "--lenses": arguments.lenses}
-    source, unused = ("--people", of_people) if arguments.people is None else ("--board", of_board)
+    source, unused = ("--board", of_board) if arguments.board is None else ("--people or --silhouettes", of_people)
     for option, value in unused.items():
         if value not in (None, ()):
             raise TrackerError(f"expected {option} together with {source}, found it without; leave it out")

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from tracker.self_calibration.keypoint_calibration import PersonCalibration
+    from tracker.self_calibration.person_calibration import PersonCalibration
 
 
 def record_of(found: "PersonCalibration") -> dict[str, Any]:
@@ -26,6 +26,7 @@ def record_of(found: "PersonCalibration") -> dict[str, Any]:
     return {
         "frames": len(found.seen.px),
         "joints": len(joints),
+        "points": found.points,
         "cameras": cameras,
         "noise_px": adjusted.sigma_px,
         "held_out_frames": len(found.held_out),
@@ -42,15 +43,16 @@ def record_of(found: "PersonCalibration") -> dict[str, Any]:
 def format_record(record: dict[str, Any]) -> str:
     """Return the same for people."""
     lines = [
-        f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['joints']} joints of a person in "
-        f"{record['frames']} frames"
+        f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['joints']} {record['points']} of a "
+        f"person in {record['frames']} frames"
     ]
     width = max(len(c["name"]) for c in record["cameras"])
     for c in record["cameras"]:
         sigma = f" +- {c['focal_sigma_percent']:.1f}%" if c["focal_sigma_percent"] else ", as given"
-        off = "  no joint held out" if c["held_out_px"] != c["held_out_px"] else f"{c['held_out_px']:6.2f} px held out"
+        off = "  nothing held out" if c["held_out_px"] != c["held_out_px"] else f"{c['held_out_px']:6.2f} px held out"
         lines.append(
-            f"  {c['name']:{width}}  {c['joints']:5} joints, focal length {c['focal_px'][0]:7.1f} px{sigma}, {off}"
+            f"  {c['name']:{width}}  {c['joints']:5} {record['points']}, focal length {c['focal_px'][0]:7.1f} px"
+            f"{sigma}, {off}"
         )
     size, (low, high) = " x ".join(f"{side:.1f}" for side in record["volume_m"]), record["interval_mm"]
     lines.append(

@@ -85,7 +85,7 @@ def test_the_right_description_is_named_where_none_is_found(run, footage, tmp_pa
 
 def test_wrong_words_are_refused_before_footage_is_read(run, footage, tmp_path):
     out = tmp_path / "c.toml"
-    assert_refused(run("calibrate", "--out", out), ["expected --board FILE or --people KEYPOINTS, found none"])
+    assert_refused(run("calibrate", "--out", out), ["--board FILE, --people KEYPOINTS or --silhouettes, found none"])
     assert_refused(
         run("calibrate", "--board", footage / "board.toml", "--out", out), ["at least two cameras, found none"]
     )

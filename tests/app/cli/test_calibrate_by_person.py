@@ -65,9 +65,17 @@ def test_lenses_are_taken_and_a_lacking_height_is_said(run, footage, tmp_path):
     assert "the world has z up" in text
 
 
+def test_footage_without_a_person_is_refused(run, footage, tmp_path):
+    videos = [footage / c.name for c in CAMERAS]
+    result = run("calibrate", "--silhouettes", "--videos", *videos, "--out", tmp_path / "c.toml", "--json")
+    assert_refused(result, ["one whole person in camera 'cam0'", "10 show nobody", "where the cameras see the same"])
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_wrong_words_are_refused(run, footage, tmp_path):
     out = tmp_path / "c.toml"
-    assert_refused(run(*words(footage, out, "--board", footage / "lenses.toml")), ["found both"])
+    assert_refused(run(*words(footage, out, "--board", footage / "lenses.toml")), ["found --board and --people"])
+    assert_refused(run(*words(footage, out, "--silhouettes")), ["found --people and --silhouettes"])
     assert_refused(run(*words(footage, out, "--floor-frame", "3")), ["expected --floor-frame together with --board"])
     assert_refused(
         run("calibrate", "--board", "b.toml", "--height", "1.7", "--out", out),
