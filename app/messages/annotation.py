@@ -39,6 +39,8 @@ class DecideTask(Command, frozen=True, tag="annotation"):
     frame: Frame
     comment: Text = ""
     """Reason of a rejection."""
+    pose: Annotated[str, Meta(max_length=32)] = ""
+    """`pose` of the task as it was shown; a verdict on another pose is refused. Empty for any pose."""
 
 
 class WriteComment(Command, frozen=True, tag="annotation"):
@@ -82,6 +84,8 @@ class TaskInfo(Part, frozen=True):
     """Name of the person who brought it to its state, or empty."""
     is_disagreement: bool
     """Whether two merged copies disagreed there."""
+    pose: str
+    """Identity of its present pose; empty without one."""
 
 
 class CommentInfo(Part, frozen=True):

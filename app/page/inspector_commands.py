@@ -123,8 +123,8 @@ def _plan(controller: Controller, _: int, message: plan_wire.PlanTasks) -> None:
 def _decide(controller: Controller, _: int, message: plan_wire.DecideTask) -> None:
     annotating, person, frame = controller.annotating, message.person, message.frame
     actions: dict[str, Callable[[], None]] = {
-        "verify": lambda: annotating.verify(person, frame),
-        "reject": lambda: annotating.reject(person, frame, message.comment),
+        "verify": lambda: annotating.verify(person, frame, message.pose),
+        "reject": lambda: annotating.reject(person, frame, message.comment, message.pose),
         "withdraw": lambda: annotating.withdraw(person, frame),
     }
     actions[message.action]()

@@ -59,6 +59,8 @@ class ByteBoundedCache(Generic[K, T]):
         """Return the result for a key if it is cached."""
         with self._lock:
             cell = self._cells.get(key)
+            if cell is not None:
+                self._cells.move_to_end(key)
         return cell.results[0] if cell is not None and cell.results else None
 
     @property

@@ -51,6 +51,7 @@ class FrameCache:
         self._empty_caches()
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="evidence")
         self._wanted: dict[object, int] = {}  # by who asks
+        self._asked: dict[object, float] = {}  # when each asked for a new frame
         self._n_pictures = 0  # number of pictures in the making
         self._idle = threading.Condition()
         self._failed: dict[Hashable, Callable[[], object]] = {}  # what could not be read, and how to try it again
@@ -146,18 +147,23 @@ class FrameCache:
     def request(self, frame: int, done: Callable[[int], None], asker: object = None) -> None:
         """Compute the evidence of a frame in the background, unless the same one asks for another first.
 
-        Work starts when the request is a moment old and no picture is in the making.
+        Work starts when the request is a moment old and no picture is in the making. Where frames pass, as in playback
+        on a busy machine, the moment is twice as long as the last frame was shown: nobody waits for this evidence.
 
         Args:
             frame: whose evidence is computed.
             done: called with the frame afterwards.
             asker: who asks. Each person at work shows a frame of their own.
         """
-        self._wanted[asker], asked = frame, time.monotonic()
+        asked, rest_s = time.monotonic(), self._rest_s
+        if self._wanted.get(asker) != frame:
+            passing_s = 2 * (asked - self._asked.get(asker, -_WAIT_S))
+            rest_s = max(rest_s, passing_s) if passing_s < _WAIT_S else rest_s
+            self._wanted[asker], self._asked[asker] = frame, asked
 
         def work() -> None:
-            while self._wanted.get(asker) == frame and time.monotonic() < asked + self._rest_s:
-                time.sleep(self._rest_s / 8)
+            while self._wanted.get(asker) == frame and time.monotonic() < asked + rest_s:
+                time.sleep(rest_s / 8)
             with self._idle:
                 self._idle.wait_for(lambda: not self._n_pictures, _WAIT_S)
             try:
@@ -174,6 +180,7 @@ class FrameCache:
     def forget(self, asker: object) -> None:
         """Cancel the requests of one who asks no more."""
         self._wanted.pop(asker, None)
+        self._asked.pop(asker, None)
 
     def close(self) -> None:
         """Cancel the requests."""
@@ -191,6 +198,10 @@ class FrameCache:
             except RecordingError:
                 self._remember_view(frame, camera)
                 return pictures.unreadable(self._resamplers(camera, reduction).camera.size)
+
+    def cached_image(self, frame: int, camera: int, reduction: float) -> bytes | None:
+        """Return the picture of `image` if it is cached."""
+        return self._pictures.peek((frame, camera, reduction, self.observer.recording.version(camera)))
 
     @property
     def is_listed(self) -> bool:

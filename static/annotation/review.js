@@ -84,7 +84,8 @@ export class Review {
   #decide(action, comment) {
     const { person, frame } = this.here;
     if (!this.tasksHere.length) return;
-    this.#context.send({ type: "annotation", action, person, frame, comment });
+    const [{ pose }] = this.tasksHere; // of all tasks here
+    this.#context.send({ type: "annotation", action, person, frame, comment, pose });
     if (action === "withdraw") return;
     const next = nextTask(filterTasks(this.tasks, "review", ""), { person, frame }, 1);
     if (next) this.#visits.go(next);

@@ -1,6 +1,7 @@
 /** Provenance: where the selected person's pose and each of its joints come from, and the timeline's filter by it. */
 
 import { KINDS, annotatorName, pointPhrases, poseLines } from "../model/provenance.js";
+import { tasksAt } from "../model/tasks.js";
 import { capital, count, displayName } from "../widgets/text.js";
 import { choiceRow, textButton } from "./rows.js";
 
@@ -8,7 +9,7 @@ import { choiceRow, textButton } from "./rows.js";
 
 const ALL = "all";
 const BY_NAME = "annotator:";
-const SHOWN_FACTS = /** @type {const} */ (["provenance", "annotators", "state", "session", "connected", "timeline", "provenanceFilter"]);
+const SHOWN_FACTS = /** @type {const} */ (["provenance", "annotators", "annotation", "state", "session", "connected", "timeline", "provenanceFilter"]);
 
 /**
  * @param {import("../model/index.js").Context} context
@@ -78,11 +79,11 @@ export function provenanceSection({ store, send, actions }, { jumps }) {
 
   let listed = "";
   const showPose = () => {
-    const { provenance, state } = store.facts;
+    const { provenance, state, annotation } = store.facts;
     const isOfSelected = !!provenance && provenance.person === state?.person;
     if (!state || (provenance && !isOfSelected)) return; // of a joint under the pointer: the panel stays as it is
     const isKnown = isOfSelected && provenance.source !== null;
-    const lines = isKnown ? poseLines(provenance) : provenance ? ["No pose is stored on this frame."] : [];
+    const lines = isKnown ? poseLines(provenance, tasksAt(annotation?.tasks ?? [], provenance)) : provenance ? ["No pose is stored on this frame."] : [];
     const joints = isKnown ? grouped(provenance) : [];
     const news = JSON.stringify([lines, joints, state.point]);
     if (news === listed) return;

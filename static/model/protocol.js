@@ -103,7 +103,7 @@
  * @typedef {{type: "annotation", action: "plan", by: "every" | "frames" | "diverse" | "doubted", n?: number, frames?:
  *   string, person?: number | null, to?: string[], each?: boolean}} PlanTasks
  * @typedef {{type: "annotation", action: "verify" | "reject" | "withdraw", person: number, frame: number, comment?:
- *   string}} DecideTask
+ *   string, pose?: string}} DecideTask
  * @typedef {{type: "annotation", action: "comment", person: number, frame: number, limb: number | null, text: string}}
  *   WriteComment
  * @typedef {{type: "annotation", action: "resolve" | "reopen", uid: string}} ResolveComment
@@ -240,7 +240,7 @@
  * @typedef {{type: "cost_map", person: number, dofs: [number, number], current: [number, number], across: number[], up:
  *   number[], nats: number[][]}} CostMapMessage
  * @typedef {{person: number, frame: number, annotator: string, state: TaskState, comment: string, by: string,
- *   is_disagreement: boolean}} TaskInfo
+ *   is_disagreement: boolean, pose: string}} TaskInfo
  * @typedef {{uid: string, person: number, frame: number, limb: string, text: string, author: string, resolved:
  *   boolean}} CommentInfo
  * @typedef {{name: string, verified: number, seconds_per_verified: number | null, edits_per_verified: number | null,

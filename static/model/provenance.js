@@ -100,18 +100,21 @@ function how(source, { method, between, imported_from }) {
  * Lines about the pose as a whole.
  *
  * @param {Provenance} pose with a source
+ * @param {import("./protocol.js").TaskInfo[]} tasks of the person on its frame
  */
-export function poseLines(pose) {
+export function poseLines(pose, tasks) {
   const mark = pose.keyframe ? "Keyframe" : pose.reviewed ? "Reviewed" : "Stored";
+  const verdict = tasks.find(({ state }) => state === "rejected") ?? tasks.find(({ state }) => state === "verified");
   return [
     `${mark} by ${annotatorName(pose.author)}, ${when(pose.time)}`,
+    verdict && `${capital(verdict.state)} by ${annotatorName(verdict.by)}`,
     pose.taken_from && `Taken from ${pose.taken_from}`,
     capital(`${WORDS[pose.source ?? ""] ?? pose.source}${how(pose.source ?? "", pose)}`),
     pose.seam_mm === null ? "" : `Both passes lie up to ${Math.round(pose.seam_mm)} mm apart`,
     `Body ${pose.body}, revision ${pose.body_revision}${pose.is_earlier_body ? ": earlier than the present one" : ""}`,
     `Calibration revision ${pose.calibration_revision}${pose.is_earlier_calibration ? ": earlier than the present one" : ""}`,
     pose.program && `Program ${pose.program}`,
-  ].filter(Boolean);
+  ].filter((line) => typeof line === "string" && line !== "");
 }
 
 /**

@@ -88,6 +88,11 @@ import { defaultLayers } from "./layers.js";
  */
 
 const MAX_ROUNDS = 3;
+/** Facts beside the pictures that a playing page shows with the next pictures, or after that time: each time that something
+ * changes, the browser composes the page again, which takes as long as the pictures do without a graphics card.
+ * @type {Set<string>} */
+const SHOWN_WITH_PICTURES = new Set(["state", "presence"]);
+const READABLE_MS = 200;
 
 export class Store {
   /** @type {Facts} */
@@ -166,19 +171,29 @@ export class Store {
   /** @type {Set<keyof Facts>} */
   #changed = new Set();
   #isScheduled = false;
+  /** Timer after which facts that wait for pictures are shown without; 0 for none. */
+  #timer = 0;
 
   /**
-   * Change facts. Views are notified on the next animation frame.
+   * Change facts. Views are notified on the next animation frame; while the page plays, some facts wait for the next pictures.
    *
    * @param {Partial<Facts>} facts
    */
   set(facts) {
-    if (!this.#isScheduled) {
-      this.#isScheduled = true;
-      requestAnimationFrame(() => this.#flush());
-    }
     Object.assign(this.facts, facts);
-    for (const key of Object.keys(facts)) this.#changed.add(/** @type {keyof Facts} */ (key));
+    const keys = /** @type {(keyof Facts)[]} */ (Object.keys(facts));
+    for (const key of keys) this.#changed.add(key);
+    if (this.#isScheduled) return;
+    if (!this.facts.playing || !keys.length || keys.some((key) => !SHOWN_WITH_PICTURES.has(key))) this.#schedule();
+    else this.#timer ||= setTimeout(() => this.#schedule(), READABLE_MS);
+  }
+
+  #schedule() {
+    clearTimeout(this.#timer);
+    this.#timer = 0;
+    if (this.#isScheduled) return;
+    this.#isScheduled = true;
+    requestAnimationFrame(() => this.#flush());
   }
 
   /** @param {(changed: Set<keyof Facts>) => void} view */

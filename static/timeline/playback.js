@@ -4,6 +4,10 @@
  */
 
 const GAP_MS = 2000;
+/** An animation frame: a due frame is asked for at most that early. */
+const ANIMATION_FRAME_MS = 1000 / 60;
+/** Longest time between two looks at the clock: a request may be given up, or another page may go elsewhere. */
+const MAX_REST_MS = 100;
 
 /** Playback speeds relative to real time. */
 const RATES = [1 / 8, 1 / 4, 1 / 2, 1, 2, 4];
@@ -16,6 +20,8 @@ export class Playback {
   #ticked = 0;
   /** The frame requested last. */
   #requested = 0;
+  /** Timer of the next look at the clock. */
+  #timer = 0;
 
   /**
    * @param {import("../model/store.js").Store} store
@@ -26,6 +32,7 @@ export class Playback {
     this.#navigation = navigation;
     store.subscribe((changed) => {
       if (changed.has("rate") || changed.has("everyFrame")) this.#anchor = this.#here();
+      if (changed.has("shown") && this.#store.facts.playing) this.#tick(performance.now());
     });
   }
 
@@ -38,7 +45,7 @@ export class Playback {
     this.#anchor = { frame: isOutside ? first : target, time: performance.now() };
     this.#ticked = performance.now();
     this.#ask(this.#anchor.frame);
-    requestAnimationFrame((now) => this.#tick(now));
+    this.#rest();
   }
 
   toggleLoop() {
@@ -70,11 +77,34 @@ export class Playback {
     return { frame: this.#store.facts.target, time: performance.now() };
   }
 
+  /**
+   * Rest until the next frame is due. An animation frame each time the screen is drawn would have the browser lay out and
+   * compose the page again, also where nothing changes.
+   */
+  #rest() {
+    const { session, rate, target } = this.#store.facts;
+    const nextMs = this.#anchor.time + ((target + 1 - this.#anchor.frame) * 1000) / ((session?.fps ?? 1) * rate) - performance.now();
+    const restMs = Math.min(MAX_REST_MS, this.#navigation.isWaiting ? MAX_REST_MS : nextMs - ANIMATION_FRAME_MS);
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => requestAnimationFrame((now) => this.#tick(now)), restMs);
+  }
+
   /** @param {number} now */
   #tick(now) {
-    const { playing, session, rate, everyFrame, target, loops } = this.#store.facts;
+    const { playing, session } = this.#store.facts;
     if (!playing || !session) return;
-    requestAnimationFrame((then) => this.#tick(then));
+    this.#advance(now, session);
+    this.#rest();
+  }
+
+  /**
+   * Ask for the frame that is due, if it is not asked for yet.
+   *
+   * @param {number} now
+   * @param {import("../model/protocol.js").SessionMessage} session
+   */
+  #advance(now, session) {
+    const { rate, everyFrame, target, loops } = this.#store.facts;
     // A hidden tab draws nothing, and the user may have gone elsewhere: continue from the current frame.
     // The next frame is due now, so that slow machines still make progress.
     if (now - this.#ticked > GAP_MS) this.#anchor = { frame: target + 1, time: now };

@@ -1,9 +1,11 @@
 """How much a second person who plays slows the drags of the first, as a ratio within one run.
 
 Run by hand, on a quiet machine: `python tests/benchmarks/two_people.py`. Two people have joined the sample session with
-a page each. One drags a wrist, some 30 moves a second, while the other rests and while they play, in turns: with plain
-sockets, which leaves the share of the program; in two Chromium without the 3-D view, which draw on the same cores; and
-in two Chromium of which the other has a core to itself, as on a machine of its own. A word measures one of them.
+a page each. One drags a wrist while the other rests and while they play, in turns: with plain sockets, which leaves the
+share of the program; in two Chromium without the 3-D view, which draw on the same cores; in two Chromium of which the
+other has a core to itself, as on a machine of its own; and in two Chromium of which the other plays in a program of its
+own, which shows what the machine alone costs. A word measures one of them. Browsers print the processor time of
+each side, too.
 """
 
 import asyncio
@@ -66,25 +68,90 @@ async def apart(address: str) -> tuple[list[float], list[float]]:
         return await in_browsers(address, str(wrapper))
 
 
-async def in_browsers(address: str, of_other: str | None = None) -> tuple[list[float], list[float]]:
-    """Latencies while the other page rests, and while it plays, ms; the other's browser may be another program."""
+async def in_browsers(
+    address: str, of_other: str | None = None, elsewhere: Program | None = None
+) -> tuple[list[float], list[float]]:
+    """Latencies while the other page rests, and while it plays, ms.
+
+    The other's browser may be another program, and so may be what they play.
+    """
     alone, beside = [], []
     async with async_playwright() as playwright, AsyncExitStack() as stack:
         # A process for each, as two people have.
         paths = (chromium_path(), of_other or chromium_path())
-        browsers = [await playwright.chromium.launch(executable_path=path, args=FLAGS) for path in paths]
-        for browser in browsers:
-            stack.push_async_callback(browser.close)
-        anna, ben = await opened(browsers[0], address, ""), await opened(browsers[1], address, "ben")
+        browsers, roots = [], {}
+        for name, path in zip(("drags", "plays"), paths, strict=True):
+            before = _processes("chrom")
+            browsers.append(await playwright.chromium.launch(executable_path=path, args=FLAGS))
+            stack.push_async_callback(browsers[-1].close)
+            now = _processes("chrom")
+            roots[f"browser that {name}"] = min(p for p in now.keys() - before.keys() if now[p][0] not in now)
+        there = (address, "ben") if elsewhere is None else (elsewhere.address, "")
+        anna, ben = await opened(browsers[0], address, ""), await opened(browsers[1], *there)
         await ben.keyboard.press("Shift+Space")  # loops
         for _ in range(ROUNDS):
+            spent = ProcessorTime(**roots)
             alone += await dragged(anna)
+            print(f"alone, cores: {spent}")
             await ben.keyboard.press("Space")
             await asyncio.sleep(1)
+            spent = ProcessorTime(**roots)
             beside += await dragged(anna)
+            print(f"while the other plays, cores: {spent}")
             await ben.keyboard.press("Space")
             await asyncio.sleep(1)
     return alone, beside
+
+
+class Elsewhere:
+    """As `in_browsers`; the other plays the same footage in a program of their own, which shares the machine only."""
+
+    def __init__(self, folder: Path) -> None:
+        """Use a session of its own."""
+        self._program = Program(folder, "--annotator", "ben")
+
+    async def __call__(self, address: str) -> tuple[list[float], list[float]]:
+        """Latencies while the other page rests, and while it plays, ms."""
+        await self._program.start()
+        try:
+            return await in_browsers(address, elsewhere=self._program)
+        finally:
+            await self._program.stop()
+
+
+class ProcessorTime:
+    """Processor time of processes with their children, in cores: seconds a second."""
+
+    def __init__(self, **roots: int) -> None:
+        """Begin now; the names are those of the processes."""
+        self._roots, self._before, self._since = roots, _processes(), time.perf_counter()
+
+    def __str__(self) -> str:
+        """Describe the time since the beginning."""
+        now, elapsed = _processes(), time.perf_counter() - self._since
+        words = []
+        for name, root in self._roots.items():
+            family, spent = {root}, 0.0
+            for pid, (parent, seconds) in sorted(now.items()):
+                if pid == root or parent in family:
+                    family.add(pid)
+                    spent += seconds - self._before.get(pid, (0, 0.0))[1]
+            words.append(f"{name} {spent / elapsed:.2f}")
+        return ", ".join(words)
+
+
+def _processes(name: str = "") -> dict[int, tuple[int, float]]:
+    """Parent and processor time, s, of each process by its number; of those with a name that begins so."""
+    found = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            called, _, rest = path.read_text().partition("(")[2].rpartition(")")
+            if not called.startswith(name):
+                continue
+            fields = rest.split()
+            spent = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+            found[int(path.parent.name)] = int(fields[1]), spent
+    return found
 
 
 class Hand:
@@ -182,7 +249,10 @@ async def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary) / "session"
         shutil.copytree(ROOT / "sample_sessions" / "elbow_rotation", folder)
-        for name, measure in (("sockets", by_sockets), ("browsers", in_browsers), ("apart", apart)):
+        other = Path(temporary) / "other"
+        shutil.copytree(folder, other)
+        ways = {"sockets": by_sockets, "browsers": in_browsers, "apart": apart, "elsewhere": Elsewhere(other)}
+        for name, measure in ways.items():
             if sys.argv[1:] and name not in sys.argv[1:]:
                 continue
             if measure is apart:

@@ -26,3 +26,10 @@ def drag(controller, point, by, camera=FRONT, person=0):
     for t in (0.5, 1.0):
         controller.dragging.move(PAGE, tuple(start + t * np.array(by)), int(10 * t))
     controller.dragging.end(PAGE)
+
+
+def start_run(user):
+    """Begin to track frames 3 to 6 from a pose that is set by hand on frame 2."""
+    user.navigation.seek(2)
+    drag(user, "torso", (4.0, 0.0))
+    user.tracking.start(False, 6)

@@ -26,6 +26,8 @@ class MergeReport(NamedTuple):
     """Number of edits that only the one and only the other copy has."""
     conflicts: tuple[Conflict, ...]
     """Poses on which they disagree."""
+    notes: tuple[str, ...]
+    """Sentences on imported observations of equal names with other content."""
 
 
 def merge_sessions(a: Path, b: Path, into: Path, tolerance_m: float) -> MergeReport:
@@ -57,9 +59,9 @@ def merge_sessions(a: Path, b: Path, into: Path, tolerance_m: float) -> MergeRep
         )
     later, earlier = sorted(zip(logs, sessions, strict=True), key=_age, reverse=True)
     session = replace(later[1], people=_people(later[1], earlier[1], merged))
-    write_session_copy(into, session, merged.log, merged.numbered, [later[1].folder, earlier[1].folder])
+    notes = write_session_copy(into, session, merged.log, merged.numbered, [later[1].folder, earlier[1].folder])
     own = len(uids[0] - uids[1]), len(uids[1] - uids[0])
-    return MergeReport(len(merged.log.edits), own, tuple(merged.conflicts))
+    return MergeReport(len(merged.log.edits), own, tuple(merged.conflicts), tuple(notes))
 
 
 def require_copies(a: Session, b: Session) -> None:

@@ -15,7 +15,7 @@ from tracker.store.annotator import annotator
 from tracker.store.edit_tree import now
 from tracker.store.identities import derived_uid, new_uid
 from tracker.store.records import MarkChange
-from tracker.store.task_log import MadePose, PlannedPose, State, StateRow, TaskRow
+from tracker.store.task_log import MadePose, PlannedPose, State, StateRow, TaskRow, last_verdict
 
 STATES: tuple[State, ...] = ("draft", "annotated", "verified", "rejected")
 """States of the tasks that are not withdrawn, in the order in which they are counted."""
@@ -32,6 +32,8 @@ class Task(NamedTuple):
     """Name of the person who brought it to its state; empty for nobody."""
     time: str
     """Time since when it has its state, ISO 8601, UTC."""
+    pose: str = ""
+    """Identity of the present pose; empty without one."""
 
 
 def add_tasks(store: AnnotationStore, wishes: Iterable[tuple[str, int, str]], author: str | None = None) -> int:
@@ -63,7 +65,12 @@ def read_tasks(store: AnnotationStore) -> list[Task]:
     decided: dict[str, list[StateRow]] = defaultdict(list)
     for state in store.tasks.states():
         decided[state.task].append(state)
-    return [_task(row, present, by_hand, decided[row.uid]) for row in store.tasks.tasks()]
+    return [
+        _task(row, present, by_hand, decided[row.uid])._replace(
+            pose=present[row.person, row.frame].uid if (row.person, row.frame) in present else ""
+        )
+        for row in store.tasks.tasks()
+    ]
 
 
 def _task(
@@ -77,18 +84,18 @@ def _task(
     plain = Task(row, "draft", "", "", row.time)
     if made is not None and (row.kind == "plan" or made.time > row.time):
         plain = Task(row, "annotated", "", made.author, made.time)
+    verdict = last_verdict(decided, pose)
     for decision in reversed(decided):
         if decision.state == "draft":  # planned again
             break
-        is_about = pose is not None and decision.is_about(pose)
         holds = {
             "withdrawn": True,
             "rejected": plain.state == "draft" or plain.time <= decision.time,
-            "verified": is_about,
+            "verified": decision is verdict,
         }
         if holds.get(decision.state, False):
             return Task(row, decision.state, decision.comment, decision.author, decision.time)
-        if is_about:  # it overrules earlier ones
+        if decision is verdict:  # it overrules earlier ones
             break
     return plain
 
@@ -115,6 +122,7 @@ def decide(
     comment: str = "",
     of: str | None = None,
     author: str | None = None,
+    seen: str = "",
 ) -> int:
     """Verify, reject or withdraw the tasks of a person in a frame. A verified pose is marked as reviewed, too.
 
@@ -125,26 +133,48 @@ def decide(
         comment: for the annotator.
         of: decide on the tasks of this annotator alone; None for all.
         author: of the decision; by default the annotator of this process.
+        seen: identity of the pose that it is about; empty for the present one, whatever it is.
 
     Returns:
         Number of tasks.
 
     Raises:
-        TrackerError: no task is there, or there is no pose to verify.
+        TrackerError: no task is there, there is no pose to verify, or it is another than the one that was seen.
     """
     person, frame = at
     tasks = [t.row for t in read_tasks(store) if (t.row.person, t.row.frame) == at and t.state != "withdrawn"]
     rows = [row for row in tasks if of is None or row.annotator == of]
     if not rows:
         raise TrackerError(f"expected a task of {person} in frame {frame}, found none; plan the frame first")
+    by = annotator() if author is None else author
+    require_seen(store, at, seen, by)
     if state == "verified":
         pose = store.pose(person, frame)
         if pose is None:
             raise TrackerError(f"expected a pose of {person} in frame {frame} to verify, found none; annotate it first")
         if not pose.keyframe and not pose.reviewed:
             store.commit(f"Verify frame {frame}", [MarkChange(person, frame, keyframe=False, reviewed=True)])
-    by, time = annotator() if author is None else author, now()
     shown = store.tasks.planned_poses().get(at)
-    seen = None if shown is None else shown.uid
-    store.tasks.add(states=[StateRow(new_uid(), row.uid, state, comment, by, time, seen) for row in rows])
+    time, pose_uid = now(), None if shown is None else shown.uid
+    store.tasks.add(states=[StateRow(new_uid(), row.uid, state, comment, by, time, pose_uid) for row in rows])
     return len(rows)
+
+
+def require_seen(store: AnnotationStore, at: tuple[str, int], seen: str, by: str) -> None:
+    """Check that the present pose is the one that a reviewer has seen, or one that the reviewer made since.
+
+    Args:
+        store: annotations of the session.
+        at: person and frame.
+        seen: identity of the pose that was seen; empty for any.
+        by: name of the reviewer.
+
+    Raises:
+        TrackerError: it is another one.
+    """
+    shown = store.tasks.planned_poses().get(at) if seen else None
+    if shown is not None and shown.uid != seen and shown.author != by:
+        raise TrackerError(
+            f"expected the pose of {at[0]} in frame {at[1]} that you have seen, found another one by "
+            f"{shown.author or 'nobody named'}; look at it, then decide"
+        )

@@ -9,9 +9,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from tracker.annotation.numbered_settings import Numbered, renumbered
+from tracker.annotation.observation_copies import copy_observations
 from tracker.errors import SessionError
 from tracker.files import sync_folder
-from tracker.observations.stored import FOLDER as OBSERVATIONS
 from tracker.pipeline.calibration_revisions import follow_history
 from tracker.session.folder import tidy_path
 from tracker.session.session import CALIBRATION_FILE, Session, load_session, save_session
@@ -21,7 +21,7 @@ from tracker.store.edit_log import EditLog
 
 def write_session_copy(
     folder: Path, session: Session, log: EditLog, numbered: Numbered, observed: Sequence[Path]
-) -> None:
+) -> list[str]:
     """Write a session with the cameras and people of another one.
 
     Args:
@@ -29,12 +29,16 @@ def write_session_copy(
         session: whose cameras, people and floor it gets; the calibration follows the log.
         log: the annotations, its settings those without numbers.
         numbered: the settings with numbers.
-        observed: session folders whose imported observations are copied; of equal names the first.
+        observed: session folders whose imported observations are copied.
+
+    Returns:
+        Notes on observations of equal names with other content: those of a later folder get another name.
 
     Raises:
         SessionError: the folder is in use or cannot be written.
     """
     folder = tidy_path(folder)
+    require_free(folder)
     with _appearing(folder) as temporary:
         save_session(replace(session, folder=temporary))
         if (session.folder / CALIBRATION_FILE).exists():  # to the bit: writing rounds, and each rounding is a revision
@@ -44,17 +48,22 @@ def write_session_copy(
             for key, value in renumbered(numbered, [e.uid for e in log.edits], log.done, written).items():
                 store.set_setting(key, value)
             follow_history(load_session(temporary), store)
-        for source in observed:
-            for one in sorted((source / OBSERVATIONS).glob("*")):
-                if one.is_dir() and not (temporary / OBSERVATIONS / one.name).exists():
-                    shutil.copytree(one, temporary / OBSERVATIONS / one.name)
+        return [note for source in observed for note in copy_observations(source, temporary)]
+
+
+def require_free(folder: Path) -> None:
+    """Check that a session can appear at a folder: it does not exist, or is empty.
+
+    Raises:
+        SessionError: it is in use.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise SessionError(f"{folder} exists already and is not an empty folder; choose another name or remove it")
 
 
 @contextmanager
 def _appearing(folder: Path) -> Generator[Path, None, None]:
     """Yield a folder beside another one, which it becomes at the end of the `with` block."""
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise SessionError(f"{folder} exists already and is not an empty folder; choose another name or remove it")
     temporary = folder.with_name(f".{folder.name}.{secrets.token_hex(4)}.tmp")
     try:
         temporary.mkdir(parents=True)

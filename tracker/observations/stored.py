@@ -32,7 +32,9 @@ from tracker.text_files import TABLE_BYTES, TextKind, read_toml
 from tracker.validation import FileStem, Name, check, check_version, quoted
 
 FOLDER = "observations"
-_FILE, _POINTS, _FILES = "observations.toml", "points.npz", "files"
+DESCRIPTION = "observations.toml"
+"""Name of the file that says what observations are."""
+_FILE, _POINTS, _FILES = DESCRIPTION, "points.npz", "files"
 VERSION = 1
 """Newest version of the files that this program writes and reads."""
 KIND = TextKind("observations", TABLE_BYTES, SessionError)

@@ -4,6 +4,7 @@ The union of the rows of two copies is their merge: a row has the same `uid` eve
 """
 
 import sqlite3
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, TypeVar
 
@@ -96,8 +97,10 @@ class PlannedPose(NamedTuple):
     """The present pose of a frame that has a task."""
 
     keyframe: bool
+    author: str
+    """Of the edit that made it."""
     time: str
-    """Time of the edit that made it."""
+    """Time of that edit."""
     uid: str
     """Identity that follows from that edit, its values and its body: one that undo shows again has the same."""
 
@@ -106,6 +109,7 @@ class _PlannedRow(NamedTuple):
     person: str
     frame: _Frame
     keyframe: _Flag
+    author: str
     time: Time
     edit: str
     body: str
@@ -169,13 +173,15 @@ class TaskLog:
         with self._connection.snapshot():
             bodies = dict(self._connection.all("SELECT id, toml FROM model_revisions", (), tuple))
             found = self._connection.all(
-                "SELECT p.person, p.frame, c.keyframe, e.time, e.uid, c.model_revision, c.numbers "
+                "SELECT p.person, p.frame, c.keyframe, e.author, e.time, e.uid, c.model_revision, c.numbers "
                 "FROM (SELECT DISTINCT person, frame FROM tasks) JOIN poses p USING (person, frame) "
                 f"JOIN pose_changes c ON c.id = p.change {_EDIT}",
                 (),
-                lambda row: _planned(*row[:5], bodies.get(row[5]), row[6]),
+                lambda row: _planned(*row[:6], bodies.get(row[6]), row[7]),
             )
-        return {(row.person, row.frame): PlannedPose(bool(row.keyframe), row.time, row.uid) for row in found}
+        return {
+            (row.person, row.frame): PlannedPose(bool(row.keyframe), row.author, row.time, row.uid) for row in found
+        }
 
     def keyframe_edits(self) -> list[MadePose]:
         """Return the edits that hold and that set or marked keyframes, earliest first, assessments left out."""
@@ -195,10 +201,13 @@ class TaskLog:
         The last decision on this pose counts, in any of its tasks.
         """
         poses = {task.uid: (task.person, task.frame) for task in self.tasks()}
-        decided = [(poses[s.task], s) for s in self.states() if s.task in poses and s.state != "withdrawn"]
+        decided = defaultdict[tuple[str, int], list[StateRow]](list)
+        for state in self.states():
+            if state.task in poses:
+                decided[poses[state.task]].append(state)
         shown = self.planned_poses() if decided else {}
-        last = {at: s for at, s in decided if at in shown and s.is_about(shown[at])}
-        return {at: s for at, s in last.items() if s.state == "verified"}
+        verdicts = {at: last_verdict(decided[at], pose) for at, pose in shown.items()}
+        return {at: verdict for at, verdict in verdicts.items() if verdict is not None and verdict.state == "verified"}
 
     def edit_times(self) -> list[tuple[str, str]]:
         """Return author and time of all edits, undone ones too, earliest first."""
@@ -213,6 +222,17 @@ class TaskLog:
 
         fields = ", ".join(TABLES[table]._fields)
         return self._connection.all(f"SELECT {fields} FROM {table} ORDER BY {order}", (), convert)
+
+
+def last_verdict(decided: Sequence[StateRow], shown: PlannedPose | None) -> StateRow | None:
+    """Return the last verdict on a pose, which alone says whether it is verified; None without one.
+
+    Args:
+        decided: decisions, earliest first.
+        shown: the pose; None for none.
+    """
+    about = (s for s in reversed(decided) if shown is not None and s.state != "withdrawn" and s.is_about(shown))
+    return next(about, None)
 
 
 def write_rows(db: sqlite3.Connection, found: Rows) -> None:

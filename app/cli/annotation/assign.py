@@ -68,6 +68,7 @@ def command(arguments: Annotated[AssignArguments, tyro.conf.arg(name="")]) -> No
     arguments = replace(arguments, to=tuple(map(_annotator, arguments.to)))
     _check(arguments)
     at = load_target(arguments.session, arguments.person, several=True)
+    _check_folders(arguments)
     with SessionLock(at.session.folder), closing(AnnotationStore(at.session.annotations_path)) as store:
         added = add_tasks(store, _wishes(at, arguments))
         tasks = read_tasks(store)
@@ -120,6 +121,27 @@ def _check(arguments: AssignArguments) -> None:
         raise TrackerError("expected --blind beside --repeat, found none; frames are repeated in blind copies")
 
 
+def _check_folders(arguments: AssignArguments) -> None:
+    """Refuse folders of copies that are in use, before the plan or any copy is written.
+
+    Raises:
+        TrackerError: one is in use, or is named twice.
+    """
+    from tracker.annotation.session_copy import require_free
+    from tracker.session.folder import tidy_path
+
+    again = [_second_pass(folder) for folder in arguments.blind if arguments.repeat]
+    folders = [tidy_path(folder) for folder in (*arguments.blind, *again)]
+    for k, folder in enumerate(folders):
+        require_free(folder)
+        if folder in folders[:k]:
+            raise TrackerError(f"expected a folder for each copy, found {folder} twice; choose another")
+
+
+def _second_pass(folder: Path) -> Path:
+    return Path(folder).with_name(f"{Path(folder).name}{_SECOND_PASS}")
+
+
 def _wishes(at: Target, arguments: AssignArguments) -> list[tuple[str, int, str]]:
     """Return person, frame and annotator of each task to plan.
 
@@ -152,7 +174,7 @@ def _write_copies(
         n = write_blind_copy(folder, session, log, tasks, name)
         copies.append({"annotator": name, "folder": str(folder), "tasks": n, "pass": 1})
         if arguments.repeat:
-            again = Path(folder).with_name(f"{Path(folder).name}{_SECOND_PASS}")
+            again = _second_pass(folder)
             n = write_second_pass(again, session, log, tasks, name, arguments.repeat)
             copies.append({"annotator": name, "folder": str(again), "tasks": n, "pass": 2})
     return copies

@@ -47,6 +47,7 @@ def _record(into: Path, found: "MergeReport") -> dict[str, Any]:
             }
             for c in found.conflicts
         ],
+        "notes": list(found.notes),
     }  # fmt: skip
 
 
@@ -55,6 +56,7 @@ def _format(into: Path, found: "MergeReport") -> str:
     for (person, frame), winner, other, apart_m in found.conflicts:
         names = f"{winner.author or 'nobody named'} (shown) and {other.author or 'nobody named'}"
         lines.append(f"{person}, frame {frame}: {names} are {1000 * apart_m:.0f} mm apart")
+    lines += found.notes
     n = len(found.conflicts)
     lines.append(f"{n} disagreement{'' if n == 1 else 's'}" + (f"; quadrille tasks {into} lists them" if n else ""))
     return "\n".join(lines)

@@ -12,7 +12,7 @@ from app.runtime.jobs import LatestWinsWorker
 from app.state.state import State
 from tracker.annotation.comments import add_comment, read_comments, resolve_comment
 from tracker.annotation.frame_choice import FrameChoice, choose_frames, dealt
-from tracker.annotation.plan import add_tasks, decide, read_tasks
+from tracker.annotation.plan import add_tasks, decide, read_tasks, require_seen
 from tracker.annotation.speed import measure_speed
 from tracker.body.limbs import limbs
 from tracker.errors import TrackerError
@@ -78,15 +78,21 @@ class Annotating:
             raise TrackerError(f"expected frames to plan, found that {why}; choose others")
         return added
 
-    def verify(self, person: int, frame: int) -> None:
+    def verify(self, person: int, frame: int, seen: str = "") -> None:
         """Verify the tasks of a person on a frame. The pose stays; one that is no keyframe is marked as reviewed.
 
+        Args:
+            person: index of the person.
+            frame: of the pose.
+            seen: identity of the pose that the reviewer saw; empty for the present one.
+
         Raises:
-            TrackerError: there is no task or no pose, or an edit cannot be written.
+            TrackerError: there is no task or no pose, it has changed since, or an edit cannot be written.
         """
         session_state, name = self._session_state, self._session_state.session.people[person].name
         with self._activities.editing():
             session_state.saver.retry()
+            require_seen(session_state.saver.store, (name, frame), seen, session_state.saver.author)
             record = session_state.saver.record(person, frame)
             is_planned = any((t.row.person, t.row.frame) == (name, frame) for t in session_state.state.annotation.tasks)
             if record is not None and is_planned and not record.keyframe and not record.reviewed:
@@ -96,17 +102,18 @@ class Annotating:
                 session_state.note_moved()
                 session_state.show_frame(session_state.state.frame)
                 session_state.refresh_saving()
-        self._decide(name, frame, "verified")
+        self._decide(name, frame, "verified", seen=seen)
 
-    def reject(self, person: int, frame: int, comment: str) -> None:
-        """Reject the tasks of a person on a frame, with the reason.
+    def reject(self, person: int, frame: int, comment: str, seen: str = "") -> None:
+        """Reject the tasks of a person on a frame, with the reason; see `verify`.
 
         Raises:
-            TrackerError: there is no task or no reason, or it cannot be written.
+            TrackerError: there is no task or no reason, the pose has changed since, or it cannot be written.
         """
         if not comment.strip():
             raise TrackerError("expected the reason of the rejection, found none; write what is to be corrected")
-        self._decide(self._session_state.session.people[person].name, frame, "rejected", comment.strip())
+        name = self._session_state.session.people[person].name
+        self._decide(name, frame, "rejected", comment.strip(), seen)
 
     def withdraw(self, person: int, frame: int) -> None:
         """Take the tasks of a person on a frame out of the plan.
@@ -143,8 +150,8 @@ class Annotating:
         """
         self._write(lambda store, author: resolve_comment(store, uid, resolved, author))
 
-    def _decide(self, person: str, frame: int, decision: Decision, comment: str = "") -> None:
-        self._write(lambda store, author: decide(store, (person, frame), decision, comment, author=author))
+    def _decide(self, person: str, frame: int, decision: Decision, comment: str = "", seen: str = "") -> None:
+        self._write(lambda store, author: decide(store, (person, frame), decision, comment, author=author, seen=seen))
 
     def _write(self, write: Callable[[AnnotationStore, str], T]) -> T:
         """Write rows of the plan, and show them."""

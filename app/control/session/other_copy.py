@@ -1,9 +1,9 @@
 """Compare the session with another copy of it, and decide between the poses of both."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -31,6 +31,8 @@ from tracker.store.stored_poses import read_stored_poses
 
 Decision = Literal["keep", "take", "mean"]
 """The own pose, that of the other copy, or the mean of both."""
+_Pairs: TypeAlias = dict[int, tuple[PosedBody, PosedBody]]
+"""Poses of one person in this session and in the copy, by frame."""
 _REST_S = 0.3
 """Minimum time between two comparisons: a drag is written once a second."""
 
@@ -68,12 +70,13 @@ class OtherCopies:
             stored = read_stored_poses(other.annotations_path, person.name, model)
             poses.append({frame: found.body for frame, found in stored.items()})
             annotated.append(frozenset(f for f, p in stored.items() if is_annotated(p.record.keyframe, p.source)))
+        copy = OtherCopy(name, own_name, tuple(poses), tuple(annotated), ((),) * len(poses), TOLERANCE_MM / 1000)
         with self._session_state.lock:
             self._compared = self._session_state.state.timeline_version
-            copy = OtherCopy(name, own_name, tuple(poses), tuple(annotated), ((),) * len(poses), TOLERANCE_MM / 1000)
-            differences = tuple(self._differences(copy, person, frames) for person, frames in enumerate(annotated))
-            notes = self._notes(other, copy)
-            self._session_state.set(other_copy=replace(copy, differences=differences, notes=notes))
+            pairs = [self._pairs(copy, person, frames) for person, frames in enumerate(annotated)]
+            self._session_state.set(
+                other_copy=replace(copy, differences=tuple(map(_farthest, pairs)), notes=self._notes(other, pairs))
+            )
 
     def leave(self) -> None:
         """End the comparison."""
@@ -184,11 +187,9 @@ class OtherCopies:
 
     def _differences(self, copy: OtherCopy, person: int, frames: frozenset[int]) -> tuple[CopyDifference, ...]:
         """Compare the poses of a person on those of some frames that this session has annotated, too."""
-        pairs = self._pairs(copy, person, frames).items()
-        farthest = ((frame, farthest_joint(*bodies)) for frame, bodies in pairs)
-        return tuple(CopyDifference(frame, *joint) for frame, joint in farthest if joint is not None)
+        return _farthest(self._pairs(copy, person, frames))
 
-    def _pairs(self, copy: OtherCopy, person: int, frames: frozenset[int]) -> dict[int, tuple[PosedBody, PosedBody]]:
+    def _pairs(self, copy: OtherCopy, person: int, frames: frozenset[int]) -> _Pairs:
         """Return the poses of both copies, by frame, where this session has annotated the person, too."""
         saver, out = self._session_state.saver, dict[int, tuple[PosedBody, PosedBody]]()
         for row in saver.rows(person, range(min(frames), max(frames) + 1)) if frames else ():
@@ -199,12 +200,17 @@ class OtherCopies:
                     out[row.frame] = own, copy.poses[person][row.frame]
         return out
 
-    def _notes(self, other: Session, copy: OtherCopy) -> tuple[str, ...]:
+    def _notes(self, other: Session, pairs: Sequence[_Pairs]) -> tuple[str, ...]:
         """Return sentences on what else differs between both copies, where they are compared."""
         own = self._session_state.session
-        pairs = [self._pairs(copy, i, frames) for i, frames in enumerate(copy.annotated)]
         people = zip(own.people, pairs, strict=True)
         return notes_on([own, other], {Subject(p.name, f): bodies for p, of in people for f, bodies in of.items()})
+
+
+def _farthest(pairs: _Pairs) -> tuple[CopyDifference, ...]:
+    """Return the joint that lies farthest apart in each pair of poses; none where the bodies share no joint."""
+    farthest = ((frame, farthest_joint(*bodies)) for frame, bodies in pairs.items())
+    return tuple(CopyDifference(frame, *joint) for frame, joint in farthest if joint is not None)
 
 
 def _updated(

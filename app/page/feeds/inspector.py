@@ -261,7 +261,7 @@ def annotation(found: AnnotationState, people: Sequence[str], cameras: Sequence[
     tasks = tuple(
         plan_wire.TaskInfo(
             index[t.row.person], t.row.frame, t.row.annotator, cast(plan_wire.TaskState, t.state), t.comment, t.by,
-            t.row.kind == "disagreement",
+            t.row.kind == "disagreement", t.pose,
         )
         for t in found.tasks
         if t.row.person in index

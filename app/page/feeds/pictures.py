@@ -35,7 +35,7 @@ class PictureSets:
         wanted = self._available(_wanted(state, view), state)
         missing = [key for key, content in wanted.items() if self._sent.get(key) != content]
         self._sent = wanted
-        made = await asyncio.gather(*(asyncio.to_thread(self._make, key, state, view) for key in missing))
+        made = await asyncio.gather(*(self._made(key, state, view) for key in missing))
         now = self._controller.state
         if now.frame != state.frame and not now.track.running:
             self._sent = {}
@@ -56,6 +56,14 @@ class PictureSets:
         if state.track.running or self._controller.frames.cached_evidence(state.frame) is not None:
             return wanted
         return {k: c for k, c in wanted.items() if k[0] not in EVIDENCE or self._sent.get(k) == c}
+
+    async def _made(self, key: Key, state: State, view: View) -> tuple[bytes, float | None]:
+        """Make a picture in a worker, unless it is cached: in playback, handing it over takes longer than that."""
+        layer, camera = key
+        cached = None
+        if layer == "image":
+            cached = self._controller.frames.cached_image(state.frame, camera, view.reductions[camera])
+        return (cached, None) if cached is not None else await asyncio.to_thread(self._make, key, state, view)
 
     def _make(self, key: Key, state: State, view: View) -> tuple[bytes, float | None]:
         """Make a picture. Also return the distance that the darkest colour of a distance image stands for, px."""

@@ -129,6 +129,53 @@ def test_two_annotators_work_blind_and_their_copies_are_merged(run, session, tmp
     assert [(d["frame"], d["shown"]) for d in with_session["disagreements"]] == [(0, "ben"), (20, "anna")]
 
 
+def test_no_blind_copy_is_written_if_one_folder_is_in_use(run, session, tmp_path):
+    a, b = tmp_path / "anna", tmp_path / "ben"
+    words = ["assign", session, "--every", "20", "--to", "anna", "ben", "--blind"]
+    for used in (b, tmp_path / "ben_pass_2"):
+        used.mkdir()
+        (used / "notes.txt").write_text("mine", "utf-8")
+        before = content(session)
+        assert_refused(run(*words, a, b, "--repeat", "1"), [f"{used} exists already"])
+        shutil.rmtree(used)
+        assert content(session) == before
+    assert_refused(run(*words, a, a), ["expected a folder for each copy", "twice"])
+    assert list(tmp_path.glob("*anna*")) == []
+
+
+def observe(folder, name, text):
+    """Store something under the name of observations."""
+    at = folder / "observations" / name
+    at.mkdir(parents=True)
+    (at / "observations.toml").write_text(f'version = 1\nname = "{name}"\n', "utf-8")
+    (at / "points.npz").write_text(text, "utf-8")
+
+
+def observed(folder):
+    """What is stored by `observe`, by name."""
+    found = {at.name: (at / "points.npz").read_text("utf-8") for at in (folder / "observations").iterdir()}
+    for name in found:
+        assert f'name = "{name}"' in (folder / "observations" / name / "observations.toml").read_text("utf-8")
+    return found
+
+
+def test_observations_of_one_name_with_other_content_are_both_kept(run, session, tmp_path):
+    a, b = tmp_path / "anna", tmp_path / "ben"
+    annotate(session, 1.0, [0], "lead")
+    observe(session, "detector", "of both")
+    for folder, x in ((a, 1.0), (b, 2.0)):
+        shutil.copytree(session, folder)
+        observe(folder, "rtmpose", f"of {folder.name}")
+        annotate(folder, x, [1], folder.name)
+    (note,) = asked(run("merge", a, b, "--into", tmp_path / "ab", "--json"))["notes"]
+    assert note == f"both copies have other observations 'rtmpose': those of {a} are 'rtmpose_2' now"
+    assert note in run("merge", b, a, "--into", tmp_path / "ba")[1]
+    kept = {"detector": "of both", "rtmpose": "of ben", "rtmpose_2": "of anna"}
+    assert observed(tmp_path / "ab") == observed(tmp_path / "ba") == kept
+    again = asked(run("merge", tmp_path / "ab", a, "--into", tmp_path / "again", "--json"))
+    assert (again["notes"], observed(tmp_path / "again")) == ([], kept)
+
+
 def test_what_is_no_copy_is_refused_and_nothing_is_written(run, session, tmp_path):
     annotate(session, 1.0, [0], "anna")
     copy, into = tmp_path / "copy", tmp_path / "into"

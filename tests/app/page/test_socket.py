@@ -10,6 +10,7 @@ from page_visits import visiting
 
 from app.messages import encoding
 from app.messages.parsing import MISUNDERSTOOD
+from app.page.feeds.pictures import PictureSets
 
 
 @pytest.fixture
@@ -340,6 +341,21 @@ async def test_pictures_of_a_frame_come_as_sets_of_the_size_asked_for(controller
         assert sizes["parts", 1] == (400, 300)
         limits = {m["layer"]: m["limit_px"] for m in told}
         assert limits == {"image": None, "silhouette": None, "parts": None, "distance": pytest.approx(2 * 0.03 * 640)}
+
+
+async def test_cached_pictures_are_sent_without_a_worker(controller, monkeypatch):
+    """In playback of a loop, a worker for each would take longer than the pictures do."""
+    made = []
+    real = PictureSets._make
+    monkeypatch.setattr(PictureSets, "_make", lambda self, key, *args: made.append(key) or real(self, key, *args))
+    async with visiting(controller) as page:
+        await page.hear("image", lambda m: (m["of"], m["camera"]) == (4, 3))
+        for frame in (7, 0, 7):
+            await page.send("seek", frame=frame)
+            await page.hear("image", lambda m, frame=frame: (m["frame"], m["camera"]) == (frame, 3))
+            if frame == 0:
+                made.clear()
+    assert made == []
 
 
 @pytest.mark.slow

@@ -5,10 +5,11 @@ import time
 
 import numpy as np
 import pytest
-from gestures import FRONT, drag, pixel_of, wait_for
+from gestures import FRONT, drag, pixel_of, start_run, wait_for
 
 from app.participants.participants import Participants
 from app.storage.turns import TurnError
+from tracker.annotation.frame_choice import FrameChoice
 from tracker.errors import TrackerError
 
 
@@ -275,9 +276,7 @@ def test_bodies_of_the_host_are_taken_over(pair):
 
 def test_a_run_of_one_leaves_the_others_to_other_frames(people, tracker):
     anna, ben = people.host, people.join("annotate", "ben").controller
-    anna.navigation.seek(2)
-    drag(anna, "torso", (4.0, 0.0))
-    anna.tracking.start(False, 6)
+    start_run(anna)
     ben.navigation.seek(4)
     with pytest.raises(TurnError, match="tracks frames 3 to 6"):
         drag(ben, "torso", (4.0, 0.0))
@@ -291,3 +290,20 @@ def test_a_run_of_one_leaves_the_others_to_other_frames(people, tracker):
     assert ben.state.people[0].source == "tracked"
     ben.history.undo()
     assert anna.stored_poses.rows(0)[0] == [2, 3, 4, 5, 6]
+
+
+def test_a_verdict_on_a_pose_that_somebody_has_changed_since_is_refused(pair):
+    anna, ben = pair
+    anna.annotating.plan(FrameChoice(frames="0"), None, [], each=False)
+    drag(anna, "torso", (9.0, 0.0))
+    wait_for(lambda: ben.state.annotation.tasks[0].state == "annotated")
+    seen = ben.state.annotation.tasks[0].pose
+    drag(anna, "torso", (-9.0, 0.0))
+    wait_for(lambda: ben.state.annotation.tasks[0].pose != seen)
+    undo = anna.state.undo
+    for decide in (lambda: ben.annotating.verify(0, 0, seen), lambda: ben.annotating.reject(0, 0, "elbow", seen)):
+        with pytest.raises(TrackerError, match="found another one by anna; look at it"):
+            decide()
+    assert (ben.state.annotation.tasks[0].state, anna.state.undo) == ("annotated", undo)
+    anna.annotating.verify(0, 0, seen)  # her own work of a moment ago
+    assert anna.state.annotation.tasks[0].state == "verified"

@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from gestures import FRONT, drag, pixel_of, wait_for
+from gestures import FRONT, drag, pixel_of, start_run, wait_for
 
 from app.control.tracking import ranges
 from app.storage.turns import TurnError
@@ -12,9 +12,7 @@ from tracker.errors import TrackerError
 
 def begin_run(user, tracker):
     """Track from frame 2 until frame 3 is done; the next step, for which pause and stop wait, is let go soon."""
-    user.navigation.seek(2)
-    drag(user, "torso", (4.0, 0.0))
-    user.tracking.start(False, 6)
+    start_run(user)
     tracker.let_go(1)
     wait_for(lambda: user.state.track.at == 3)
     threading.Timer(0.2, tracker.let_go, (1,)).start()
@@ -38,9 +36,7 @@ def test_a_paused_run_goes_on_only_when_its_frames_are_free(people, tracker):
 
 def test_a_run_whose_poses_are_refused_ends_with_a_notice(people, tracker):
     anna, ben = people.host, people.join("annotate", "ben").controller
-    anna.navigation.seek(2)
-    drag(anna, "torso", (4.0, 0.0))
-    anna.tracking.start(False, 6)
+    start_run(anna)
     ben.navigation.seek(4)
     ben._session_state.set(is_pin_held=True)  # as if begun a moment before the run
     tracker.let_go(1000)

@@ -9,7 +9,7 @@ SESSION = "document.querySelector('[data-section=annotation]')"
 def task(frame, state="draft", annotator="", comment="", by=""):
     return {
         "person": 0, "frame": frame, "annotator": annotator, "state": state, "comment": comment, "by": by,
-        "is_disagreement": False,
+        "is_disagreement": False, "pose": f"{frame:032x}",
     }  # fmt: skip
 
 
@@ -85,12 +85,12 @@ async def test_a_reviewer_accepts_and_rejects_pose_by_pose(page, endpoint, secti
     await page.keyboard.press("Alt+t")
     await at(page, 20)
     await page.keyboard.press("Alt+k")
-    await sent(endpoint, action="verify", person=0, frame=20, comment="")
+    await sent(endpoint, action="verify", person=0, frame=20, comment="", pose=f"{20:032x}")
     await at(page, 8)
     await page.keyboard.press("Alt+r")
     await page.keyboard.type("right knee")
     await page.keyboard.press("Enter")
-    await sent(endpoint, action="reject", person=0, frame=8, comment="right knee")
+    await sent(endpoint, action="reject", person=0, frame=8, comment="right knee", pose=f"{8:032x}")
     await at(page, 20)
 
 

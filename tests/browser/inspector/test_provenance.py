@@ -1,5 +1,7 @@
 """Provenance: what the page asks for, the words beside a joint and in the section, and the filter of the timeline."""
 
+import json
+
 import pytest
 from page_driver import handle_of, shows, state_of, to_client, until
 
@@ -10,6 +12,10 @@ POINTS = [
     NO_ONE | {"point": "torso"},
     NO_ONE | {"point": "head", "lost": 0.4},
 ]  # fmt: skip
+NOTHING_PROPOSED = {
+    "number": 0, "running": False, "message": "", "click": None, "error_mm": None, "interval_mm": None,
+    "after_mm": None,
+}  # fmt: skip
 
 
 def message(frame, **more):
@@ -40,6 +46,26 @@ async def test_nothing_is_asked_for_until_the_section_or_a_joint_is_in_sight(pag
     await until(lambda: endpoint.asked == [{"type": "provenance", "person": 0, "annotators": False}])
     await page.mouse.move(x, y - 200)
     await until(lambda: endpoint.asked[-1]["person"] is None)
+
+
+async def test_the_section_says_who_verified_the_pose_as_long_as_that_holds(page, endpoint):
+    await opened(page, endpoint)
+    frame = (await state_of(page))["state"]["frame"]
+    await endpoint.broadcast(message(frame))
+    plan = {"type": "annotation", "annotator": "anna", "comments": [], "speeds": [], "proposal": NOTHING_PROPOSED}
+    said = "document.querySelector('[data-section=provenance]').innerText.match(/(Verified|Rejected) by [^\\n]*/)"
+    for state, by, words in (
+        ("verified", "rita", "Verified by rita"),
+        ("annotated", "anna", None),
+        ("rejected", "tom", "Rejected by tom"),
+    ):
+        task = {
+            "person": 0, "frame": frame, "annotator": "", "state": state, "comment": "", "by": by,
+            "is_disagreement": False, "pose": "",
+        }  # fmt: skip
+        elsewhere = task | {"frame": frame + 1, "state": "verified", "by": "sue"}
+        await endpoint.broadcast(plan | {"tasks": [task, elsewhere]})
+        await shows(page, f"({said}?.[0] ?? null) === {json.dumps(words)}")
 
 
 async def test_the_section_groups_joints_by_origin_and_selects_them(page, endpoint, section):

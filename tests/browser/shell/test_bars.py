@@ -174,6 +174,23 @@ async def test_scrubbing_asks_for_one_frame_at_a_time_and_ends_at_the_last(page,
 
 
 @pytest.mark.slow
+async def test_slow_playback_asks_for_few_animation_frames(page):
+    """Each has the browser compose the page again, which takes time from everybody on the machine."""
+    await page.keyboard.press("Home")
+    await shows(page, "quadrille.state.shown.frame === 0")
+    await page.locator("#rate").select_option("0.125")
+    await page.evaluate("document.activeElement.blur()")
+    await page.evaluate(
+        "() => { window.asked = 0; const ask = requestAnimationFrame;"
+        "window.requestAnimationFrame = (draw) => { asked += 1; return ask(draw); } }"
+    )
+    await page.keyboard.press("Space")
+    await shows(page, "quadrille.state.shown.frame >= 5")
+    assert await page.evaluate("asked / quadrille.state.shown.frame") < 6
+    await page.keyboard.press("Space")
+
+
+@pytest.mark.slow
 async def test_playback_keeps_no_backlog_and_stops_at_the_end(page, endpoint):
     endpoint.image_delay_s = 0.03  # 120 ms a frame, far slower than 30 fps
     await page.keyboard.press("Shift+Period")

@@ -54,6 +54,15 @@ def test_frames_that_both_annotated_are_compared_by_their_farthest_joint(both):
     assert 0.05 < other.distance_m < 0.5
 
 
+def test_the_poses_of_both_are_read_once(both, monkeypatch):
+    controller, ben = both
+    saver, read = controller._session_state.saver, []
+    real = saver.record
+    monkeypatch.setattr(saver, "record", lambda person, frame: read.append(frame) or real(person, frame))
+    controller.other_copies.open(ben)
+    assert sorted(read) == [0, 1]
+
+
 def test_the_other_pose_is_drawn_where_the_copy_has_one(both):
     controller, copy = compared(both)
     assert {p.camera for p in copy_lines(controller.session, controller.state, VIEW)} == {0, 3}
