@@ -308,7 +308,7 @@ def _show(found: Sequence[Judged], write: Sequence[Path]) -> None:
     for body in BODIES:
         own = [j for j in healthy if j.body == body]
         rows[f"right calibrations, {body} bodies"] = [str(len(own)), "", "", f"{sum(bool(j.named) for j in own)}"]
-    heads = ("recordings", "right camera named", "named first", "another camera named")
+    heads = ("number", "right camera named", "named first", "another camera named")
     show(write, TABLES[0], conditions(found), table(heads, rows, "bumps"))
     turned = [j for j in bumps if j.kind == "rotation"]
     rows = {
