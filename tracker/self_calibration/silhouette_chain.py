@@ -165,5 +165,5 @@ def _contradiction(placed: dict[int, Camera], added: int, seen: SeenSilhouettes)
     hulls = seen.of_cameras([*placed]).hulls_px
     angles = np.concatenate([plane_angles(hulls, cameras, (i, at)) for i in range(len(cameras)) if i != at])
     known = np.isfinite(angles)
-    # Where epipoles lie within the silhouettes, nothing contradicts a turn, and nothing confirms it.
+    # Nothing contradicts or confirms a turn if epipoles lie within the silhouettes.
     return float(np.median(np.where(known, angles, np.pi / 2))) if known.any() else np.pi / 2

@@ -152,7 +152,7 @@ def observe(folder, name, text):
 
 
 def observed(folder):
-    """What is stored by `observe`, by name."""
+    """Return the files that `observe` stores, by name."""
     found = {at.name: (at / "points.npz").read_text("utf-8") for at in (folder / "observations").iterdir()}
     for name in found:
         assert f'name = "{name}"' in (folder / "observations" / name / "observations.toml").read_text("utf-8")
