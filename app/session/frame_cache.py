@@ -194,14 +194,14 @@ class FrameCache:
         """
         with self._making_picture():
             try:
-                return self._pictures.get((frame, camera, reduction, self.observer.recording.version(camera)))
+                return self._pictures.get(self._picture_key(frame, camera, reduction))
             except RecordingError:
                 self._remember_view(frame, camera)
                 return pictures.unreadable(self._resamplers(camera, reduction).camera.size)
 
     def cached_image(self, frame: int, camera: int, reduction: float) -> bytes | None:
         """Return the picture of `image` if it is cached."""
-        return self._pictures.peek((frame, camera, reduction, self.observer.recording.version(camera)))
+        return self._pictures.peek(self._picture_key(frame, camera, reduction))
 
     @property
     def is_listed(self) -> bool:
@@ -232,6 +232,9 @@ class FrameCache:
         frame, camera, reduction, _ = key
         image, view = self._read(frame, camera), self._resamplers(camera, reduction)
         return pictures.footage(None if image is None else view.image(image, view.whole), view.camera.size)
+
+    def _picture_key(self, frame: int, camera: int, reduction: float) -> tuple[int, int, float, int]:
+        return frame, camera, reduction, self.observer.recording.version(camera)
 
     def _resampler(self, camera: int, reduction: float) -> WorkingView:
         return WorkingView(self.observer.cameras[camera].camera, 1 / reduction, cv2.BORDER_CONSTANT)

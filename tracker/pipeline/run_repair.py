@@ -230,7 +230,7 @@ class RunRepair:
         return found.is_better
 
     def _select_alternatives(self) -> None:
-        """Take alternatives that a stretch of frames speaks for together, though none of them does alone."""
+        """Select the cheapest path through the alternatives of consecutive frames that each gain too little alone."""
         for i in self._subjects.tracked:
             frames = [self._candidates(k, i) for k in self._frames]
             selected = select_alternatives(frames, MIN_GAIN_NATS)

@@ -57,12 +57,8 @@ def silhouettes_in_footage(session: Session, cameras: Sequence[Camera], report: 
             for k in range(session.n_frames):
                 report("finding silhouettes", k / session.n_frames)
                 views = finder.silhouettes(k)
-                out.append(
-                    [
-                        _measured(v.mask, c, v.camera.size[0] / c.size[0]) if v.mask.any() else NOTHING
-                        for v, c in zip(views, cameras, strict=True)
-                    ]
-                )
+                found = zip(views, cameras, strict=True)
+                out.append([_measured(v.mask, c, v.camera.size[0] / c.size[0]) for v, c in found])
         finally:
             finder.close()
     return out
