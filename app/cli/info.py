@@ -63,6 +63,7 @@ def summarize(session: "Session") -> dict[str, Any]:
                 "offset": c.offset,
                 "time_offset_s": c.clock.ahead_frames / session.fps,
                 "time_rate": c.clock.rate,
+                "lost_frames": [list(lost) for lost in c.clock.lost],
                 "missing": [m.kind for m in missing if m.camera == c.camera.name],
             }
             for c in session.cameras

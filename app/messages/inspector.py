@@ -381,6 +381,8 @@ class CameraCheck(Part, frozen=True):
     """Standard deviations, by the name of the field; of one number, too."""
     since_frame: int | None
     """The frame from which on it is off; null for all frames."""
+    lost_frames: int
+    """Number of frames that it lost before that one; negative where it doubled some."""
     is_seen: bool
     """Whether it shows the people at all."""
 

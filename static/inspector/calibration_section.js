@@ -211,6 +211,11 @@ function describe(found) {
 function mended(camera) {
   if (!camera.is_seen) return [{ text: "shows nobody", title: "Camera without contours of the people on these frames" }];
   if (!camera.kinds.length) return [{ text: "–", title: "Nothing to correct: the misfit is that of the likeliest correction" }];
+  if (camera.lost_frames) {
+    const [n, verb] = [Math.abs(camera.lost_frames), camera.lost_frames > 0 ? "lost" : "doubled"];
+    const title = "Its clock jumps by whole frames there; images stay as they are";
+    return [{ text: `${n} frame${n > 1 ? "s" : ""} ${verb} before frame ${camera.since_frame}`, title }];
+  }
   const { sigma } = camera;
   /** @type {Record<string, [number[], number[]]>} */
   const of = {

@@ -215,7 +215,7 @@
  *   boolean, tried: number | null, camera: number | null, frame: number | null, axes: SilhouetteAxes[]}} FindingMessage
  * @typedef {{name: string, misfit_px: number, misfit_mm: number, kinds: string[], rivals: Record<string, number[]>,
  *   rotation_deg: number[], position_mm: number[], focal_percent: number, time_ms: number, drift_ms_per_s: number,
- *   sigma: Record<string, number[]>, since_frame: number | null, is_seen: boolean}} CameraCheck
+ *   sigma: Record<string, number[]>, since_frame: number | null, lost_frames: number, is_seen: boolean}} CameraCheck
  * @typedef {{camera: number, u: number, v: number, du: number, dv: number}} MisfitArrow
  * @typedef {{type: "calibration", running: boolean, stage: string, share: number, message: string, failed: boolean,
  *   is_checked: boolean, frames: number[], cameras: CameraCheck[], sentences: string[], misfits: MisfitArrow[],

@@ -10,6 +10,7 @@ import argparse
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -33,8 +34,8 @@ from tracker.session.session import load_session
 from tracker.simulate import Simulation, simulate
 
 TABLES = (
-    "calibration_repair bumps", "calibration_repair time", "calibration_repair drift", "calibration_repair change",
-    "calibration_repair body",
+    "calibration_repair bumps", "calibration_repair time", "calibration_repair drift", "calibration_repair lost",
+    "calibration_repair change", "calibration_repair body",
 )  # fmt: skip
 MAX_ROUNDS = 4
 BUMPS = {
@@ -63,6 +64,9 @@ N_DRIFTING = 120
 """Frames of them at 30 frames a second: an offset is known within 2 ms, and 4 s of a drift are 80 ms."""
 CHANGES = (("walk", 0, 30, (0.0, 0.8, 0.0)), ("walk", 2, 20, (0.6, 0.0, 0.0)), ("fast_arms", 1, 25, (0.0, -0.7, 0.3)))
 """Recording, index of the camera, the frame from which on it is turned, and by which angles, degrees."""
+
+LOST = (("walk", 2, 30, 1), ("walk", 0, 25, 2), ("fast_arms", 1, 25, 1), ("fast_arms", 3, 30, 2))
+"""Recording, index of the camera, the frame before which it loses frames, and their number."""
 
 
 @dataclass(frozen=True)
@@ -352,6 +356,37 @@ class _Trial(NamedTuple):
         return _Repair(*clock_ms(at, self.camera), checks, before_mm, error_mm(at))
 
 
+def lost(data: Path, folder: Path) -> Measured:
+    """Let a camera lose frames within a recording."""
+    rows, known = {}, dict[str, tuple[Footage, Path]]()
+    for name, index, since, n in LOST:
+        if name not in known:
+            footage = decoded(name, data / name, folder)
+            known[name] = footage, body_of(footage, folder)
+        footage, body = known[name]
+        camera, label = footage.cameras[index], f"{name}, {n} before {since}"
+        images, late = folder / f"{label}, images", partial(_lost, camera, since, n)
+        at = tracked(started(thinned(footage, images, late=late), folder / label, body))
+        before_mm = error_mm(at)
+        found = [
+            (c["name"], c["lost_frames"], c["since_frame"]) for f in repaired(at) for c in f["cameras"] if c["kind"]
+        ]
+        said = "; ".join(f"{name}: {n} before {since}" for name, n, since in found) or "none"
+        cells = [f"{camera}: {n} before {since}", said, f"{before_mm:.1f}", f"{error_mm(at):.1f}"]
+        rows[label] = cells
+        print(label, cells, flush=True)
+    conditions_of = conditions(
+        "recordings without some frames of a camera", "acquired from footage with all frames", "joints of frame 0"
+    )
+    heads = ("frames lost", "found", "joints before, mm", "after, mm")
+    return Measured("recording", heads, rows, conditions_of)
+
+
+def _lost(camera: str, since: int, n: int, name: str, k: int) -> float:
+    """Return by how many frames the picture of a frame is late in a camera that loses n frames before another one."""
+    return float(n * (name == camera and k >= since))
+
+
 def change(data: Path, folder: Path) -> Measured:
     """Turn a camera within a recording."""
     rows, known = {}, dict[str, tuple[Footage, Path]]()
@@ -417,7 +452,7 @@ def body(data: Path, folder: Path) -> Measured:
 
 
 MEASURES: Mapping[str, Callable[[Path, Path], Measured]] = {
-    "bumps": bumps, "time": time, "drift": drift, "change": change, "body": body
+    "bumps": bumps, "time": time, "drift": drift, "lost": lost, "change": change, "body": body
 }  # fmt: skip
 
 

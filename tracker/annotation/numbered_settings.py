@@ -50,7 +50,8 @@ def numbered_settings(log: EditLog) -> Numbered:
         if int(edit) in log.numbers
     }
     known = log.settings.get(CALIBRATIONS, [])
-    texts = [json.dumps({"toml": c["toml"], "clocks": c.get("clocks", {})}, sort_keys=True) for c in known]
+    parts = [{"toml": c["toml"], "clocks": c.get("clocks", {}), "lost": c.get("lost", {})} for c in known]
+    texts = [json.dumps(own, sort_keys=True) for own in parts]
     named = [n for pair in log.settings.get(CALIBRATION_EDITS, {}).values() for n in pair]
     if max([*named, *log.settings.get(CALIBRATIONS_OF_EDITS, {}).values()], default=0) > len(texts):
         raise DamagedStoreError(f"the history names a calibration beyond the {len(texts)} that are stored; correct it")

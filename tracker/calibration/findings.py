@@ -8,6 +8,7 @@ import numpy as np
 from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, corrected, later_s
 from tracker.calibration.diagnosis import Diagnosis, Fault, is_followed
 from tracker.calibration.viewed_frames import ViewedFrame
+from tracker.footage.camera_source import LostFrames
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 
@@ -103,14 +104,17 @@ def _sigma(diagnosis: Diagnosis, camera: int) -> Array:
     return out
 
 
-def sentence(finding: CameraFinding, since_frame: int | None = None) -> str:
+def sentence(finding: CameraFinding, since_frame: int | None = None, lost: LostFrames | None = None) -> str:
     """Say how a camera is off."""
-    how = " and ".join(WORDS[kind] for kind in finding.kinds)
+    how = "is " + " and ".join(WORDS[kind] for kind in finding.kinds)
     since = "" if since_frame is None else f" since frame {since_frame}"
+    if lost is not None:
+        how = f"{'lost' if lost.n > 0 else 'doubled'} {abs(lost.n)} frame{'s' * (abs(lost.n) > 1)}"
+        since = f" before frame {lost.since}"
     also = ""
     if finding.rivals:
         also = f"; it may as well have been {' or '.join(WORDS[kind] for kind in finding.rivals)}"
     return (
-        f"camera {finding.name} is {how}{since}: the body is {finding.misfit_px:.1f} px off in its pictures, "
+        f"camera {finding.name} {how}{since}: the body is {finding.misfit_px:.1f} px off in its pictures, "
         f"{finding.misfit_mm:.0f} mm at the body{also}"
     )

@@ -102,8 +102,7 @@ class Observer:
 
         Poses that follow one another are found by it: a motion is straight over half a frame, but not over several.
         """
-        n = self.recording.n_frames
-        if self._is_in_time or all(c.clock.nearest(k, n) == k for c in self.cameras for k in (0, n // 2, n - 1)):
+        if self._is_in_time or all(c.clock.is_in_step(self.recording.n_frames) for c in self.cameras):
             return self
         cameras, recording, in_recording, views, keypoints, _ = self._of(range(len(self.cameras)))
         return Observer(cameras, recording, in_recording, views, keypoints, in_time=True)

@@ -82,6 +82,7 @@ def _values(motion: ExportedMotion) -> dict[str, Any]:
 
 def _cameras(sources: Sequence[CameraSource], cameras: Sequence[Camera]) -> dict[str, Any]:
     """Return the cameras as arrays; distortion coefficients that a lens lacks are 0."""
+    lost = [(i, *own) for i, source in enumerate(sources) for own in source.clock.lost]
     n_coefficients = max(camera.distortion.size for camera in cameras)
     distortion: list[Array] = [np.pad(c.distortion, (0, n_coefficients - c.distortion.size)) for c in cameras]
     return {
@@ -93,6 +94,7 @@ def _cameras(sources: Sequence[CameraSource], cameras: Sequence[Camera]) -> dict
         "camera_T_world_camera": [camera.T_world_camera for camera in cameras],
         "camera_offset": [source.offset for source in sources],
         "camera_clock": [(source.clock.ahead_frames, source.clock.rate) for source in sources],
+        "camera_lost_frames": np.array(lost, dtype=np.int64).reshape(-1, 3),
         "camera_footage": [source.footage.name for source in sources],
     }
 

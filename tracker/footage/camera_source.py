@@ -1,10 +1,21 @@
 """One camera of a session: its calibration and the paths of its images."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import floor
 from pathlib import Path
+from typing import NamedTuple
 
 from tracker.geometry.cameras import Camera
+
+
+class LostFrames(NamedTuple):
+    """Frames that a camera did not record."""
+
+    since: int
+    """First frame of the session whose picture is later for it."""
+    n: int
+    """Number of frames; negative where the camera recorded pictures twice."""
 
 
 @dataclass(frozen=True)
@@ -18,14 +29,32 @@ class Clock:
     """Frames by which the picture of frame 0 was taken later than frame 0; negative if earlier."""
     rate: float = 0.0
     """Change of that from one frame to the next, frames; as a pure number it is the same in seconds per second."""
+    lost: tuple[LostFrames, ...] = ()
+    """In the order of the frames."""
 
     def ahead(self, frame: float) -> float:
         """Return by how many frames the picture of a frame was taken later than the frame."""
-        return self.ahead_frames + self.rate * frame
+        return self.ahead_frames + self.rate * frame + sum(lost.n for lost in self.lost if frame >= lost.since)
 
     def nearest(self, frame: int, n_frames: int) -> int:
         """Return the frame, of so many, whose picture was taken nearest to the time of a frame."""
-        return min(max(0, floor((frame - self.ahead_frames) / (1 + self.rate) + 0.5)), n_frames - 1)
+        found = []
+        for first, end in pairwise((0, *(min(lost.since, n_frames) for lost in self.lost), n_frames)):
+            if first < end:  # Between two losses the time of the picture is a straight line over the frames.
+                ahead = self.ahead(first) - self.rate * first
+                found.append(min(max(first, floor((frame - ahead) / (1 + self.rate) + 0.5)), end - 1))
+        return min(found, key=lambda k: abs(k + self.ahead(k) - frame))
+
+    def with_lost(self, more: LostFrames) -> "Clock":
+        """Return the clock of a camera that lost more frames."""
+        n = {lost.since: lost.n for lost in self.lost}
+        n[more.since] = n.get(more.since, 0) + more.n
+        return replace(self, lost=tuple(LostFrames(since, n[since]) for since in sorted(n) if n[since]))
+
+    def is_in_step(self, n_frames: int) -> bool:
+        """Return whether the picture of each frame, of so many, is the nearest one to its time."""
+        turns = {0, n_frames // 2, n_frames - 1, *(k for lost in self.lost for k in (lost.since - 1, lost.since))}
+        return all(self.nearest(k, n_frames) == k for k in turns if 0 <= k < n_frames)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +92,8 @@ class CameraSource:
         offset = whole_frames(start_frames)
         # Fractions are typed with some digits: 2 - 2.4 would leave -0.3999999999999999.
         ahead = round(float(offset - start_frames), 9)
-        return replace(self, offset=offset, clock=Clock(ahead, self.clock.rate if rate is None else rate))
+        clock = replace(self.clock, ahead_frames=ahead, rate=self.clock.rate if rate is None else rate)
+        return replace(self, offset=offset, clock=clock)
 
 
 def whole_frames(start_frames: float) -> int:

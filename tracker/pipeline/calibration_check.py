@@ -1,7 +1,7 @@
 """Judge the cameras of a session by the contours of its stored poses."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from tracker.calibration.viewed_frames import ViewedFrame
 from tracker.compute.progress import Report, part_of, unreported
 from tracker.errors import Remedy, TrackerError
 from tracker.fitting.hypothesis import SAME_POSE_M
+from tracker.footage.camera_source import LostFrames
 from tracker.geometry.arrays import Array
 from tracker.pipeline.posed_recording import MIN_FRAMES, N_FRAMES, PosedRecording
 
@@ -37,6 +38,8 @@ class CalibrationCheck:
     """Sentences on what these frames cannot show."""
     residuals: tuple[ResidualPieces, ...] = ()
     """Of each camera as it is, on the frames that were used; empty after a glance."""
+    lost: Mapping[str, LostFrames] = field(default_factory=dict)
+    """Of cameras whose clock has been off since a frame within the recording: the frames that they lost before it."""
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -56,12 +59,17 @@ class CalibrationCheck:
             apart = f"the two cameras contradict each other by {worst.misfit_px:.1f} px; nothing shows which is off"
             return [apart] if self.diagnosis.kept else []
         by_name = {c.name: c for c in self.cameras}
-        return [sentence(by_name[name], self.since.get(name)) for name in self.named]
+        return [sentence(by_name[name], self.since.get(name), self.lost.get(name)) for name in self.named]
 
     @property
     def sentences(self) -> list[str]:
         """Sentences for the user: on cameras that are off, and on what these frames cannot show."""
         return [*self.contradictions, *self.notes]
+
+    def corrections_on(self, frame: int) -> Array:
+        """Return the corrections of a frame, (V, N_CORRECTIONS); 0 for cameras that have been off since a later one."""
+        is_off = [frame >= self.since.get(c.name, 0) for c in self.cameras]
+        return self.corrections * np.array(is_off)[:, None]
 
     def require_applicable(self, scores: Sequence[tuple[FrameScore, FrameScore]]) -> None:
         """Check that frames which the check did not use confirm its corrections.
@@ -72,7 +80,7 @@ class CalibrationCheck:
         Raises:
             TrackerError: there are no such frames, together they fit worse, or a camera moved within the recording.
         """
-        for name, k in self.since.items():
+        for name, k in {k: v for k, v in self.since.items() if k not in self.lost}.items():
             raise TrackerError(
                 f"expected a camera that is off on all frames, found that {name} is off since frame {k}; make a "
                 f"session of the frames from {k} on, and correct it there"
@@ -119,7 +127,8 @@ def check_calibration(
     after = [f for f in seen if f.frame >= max(since.values(), default=0)]
     if since and len(after) >= MIN_FRAMES:  # The frames before would dilute the correction.
         check = _checked(recording, after, part_of(report, 0.8, 1.0))
-    return replace(check, since={k: v for k, v in since.items() if k in check.named})
+    since = {k: v for k, v in since.items() if k in check.named}
+    return _with_lost_frames(replace(check, since=since), recording.fps)
 
 
 def contradiction(recording: PosedRecording) -> str:
@@ -183,6 +192,19 @@ def _judged(recording: PosedRecording, seen: Sequence[ViewedFrame], diagnosis: D
     return CalibrationCheck(
         tuple(s.frame for s in seen), tuple(cameras), {}, diagnosis, recording.middle_s, tuple(notes)
     )
+
+
+def _with_lost_frames(check: CalibrationCheck, fps: float) -> CalibrationCheck:
+    """Take clocks that have changed within the recording for lost frames: they change by whole frames alone."""
+    cameras, lost = [], {}
+    for camera in check.cameras:
+        n = round(camera.correction[TIME] * fps)
+        if n and camera.name in check.since and camera.kinds == ("time",):
+            lost[camera.name] = LostFrames(check.since[camera.name], n)
+            camera = camera._replace(correction=camera.correction.copy())
+            camera.correction[TIME] = n / fps
+        cameras.append(camera)
+    return replace(check, cameras=tuple(cameras), lost=lost)
 
 
 class _Changes:

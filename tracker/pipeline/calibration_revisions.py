@@ -4,12 +4,13 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 from tracker.calibration.camera_correction import DRIFT, TIME, corrected
 from tracker.errors import SessionError
 from tracker.files import refuse_links, write_text_atomic
-from tracker.footage.camera_source import Clock
+from tracker.footage.camera_source import Clock, LostFrames
 from tracker.formats.anipose import format_calibration
 from tracker.formats.model_toml import has_preset_proportions
 from tracker.geometry.arrays import Array
@@ -44,20 +45,30 @@ def apply_check(session: Session, store: AnnotationStore, check: CalibrationChec
     """
     if not check.named:
         raise SessionError("expected a camera that is off, found none; the calibration stays as it is")
-    corrected_session = with_corrections(session, check.corrections, check.middle_s)
+    corrected_session = with_corrections(session, check.corrections, check.middle_s, check.lost)
     return change_calibration(session, store, corrected_session, f"calibration of {', '.join(check.named)} corrected")
 
 
-def with_corrections(session: Session, corrections: Array, middle_s: float = 0.0) -> Session:
-    """Return a session with corrected cameras, (V, N_CORRECTIONS). Nothing is stored.
+def with_corrections(
+    session: Session, corrections: Array, middle_s: float = 0.0, lost: Mapping[str, LostFrames] = MappingProxyType({})
+) -> Session:
+    """Return a session with corrected cameras. Nothing is stored.
 
-    Offsets of the corrections are those at the time `middle_s`, seconds; those of clocks are at frame 0.
+    Args:
+        session: with the present cameras.
+        corrections: (V, N_CORRECTIONS).
+        middle_s: time that the offsets of the corrections are of, seconds; those of clocks are at frame 0.
+        lost: of cameras whose clock lost frames and is right otherwise, by name.
     """
     cameras = []
     for source, c in zip(session.cameras, corrections, strict=True):
-        before = source.clock
-        late_s = float(c[TIME] - c[DRIFT] * middle_s)
-        clock = Clock(before.ahead_frames + late_s * session.fps, before.rate + float(c[DRIFT]))
+        clock, own = source.clock, lost.get(source.camera.name)
+        if own is not None:
+            clock = clock.with_lost(own)
+        else:
+            late_s = float(c[TIME] - c[DRIFT] * middle_s)
+            ahead_frames = clock.ahead_frames + late_s * session.fps
+            clock = replace(clock, ahead_frames=ahead_frames, rate=clock.rate + float(c[DRIFT]))
         cameras.append(replace(source, camera=corrected(source.camera, c), clock=clock))
     return replace(session, cameras=tuple(cameras))
 
@@ -88,8 +99,9 @@ def follow_history(session: Session, store: AnnotationStore) -> Session:
     if revision is None or _same(present, known[revision - 1]):
         return session
     # A change that was cut off has the cameras of one revision and the clocks of another.
-    if not all(any(_same({**c, **{part: present[part]}}, c) for c in known) for part in ("toml", "clocks")):
-        return session
+    for parts in (("toml",), ("clocks", "lost")):
+        if not any(_same({**c, **{part: present[part] for part in parts}}, c) for c in known):
+            return session
     return _write(session, known[revision - 1])
 
 
@@ -134,8 +146,8 @@ def _number(store: AnnotationStore, content: Mapping[str, Any]) -> int:
 
 def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     """Return whether two revisions are equal but for rounding: writing keeps 12 digits."""
-    clocks = (one["clocks"], other["clocks"])
-    return _alike(*clocks) and _alike(tomllib.loads(one["toml"]), tomllib.loads(other["toml"]))
+    clocks, lost = (one["clocks"], other["clocks"]), (one.get("lost", {}), other.get("lost", {}))
+    return _alike(*clocks) and _alike(*lost) and _alike(tomllib.loads(one["toml"]), tomllib.loads(other["toml"]))
 
 
 def _alike(a: object, b: object) -> bool:
@@ -149,9 +161,11 @@ def _alike(a: object, b: object) -> bool:
 
 
 def _content(session: Session) -> dict[str, Any]:
-    """Return the calibration of a session as a revision holds it: the cameras, and by name their clocks."""
+    """Return the calibration of a session as a revision holds it: the cameras, and by name their clocks and the frames
+    that some have lost."""
     clocks = {c.camera.name: [float(c.clock.ahead_frames), float(c.clock.rate)] for c in session.cameras}
-    return {"toml": format_calibration([c.camera for c in session.cameras]), "clocks": clocks}
+    lost = {c.camera.name: [list(own) for own in c.clock.lost] for c in session.cameras if c.clock.lost}
+    return {"toml": format_calibration([c.camera for c in session.cameras]), "clocks": clocks, "lost": lost}
 
 
 def _write(session: Session, content: Mapping[str, Any]) -> Session:
@@ -163,8 +177,12 @@ def _write(session: Session, content: Mapping[str, Any]) -> Session:
         raise SessionError(
             f"cannot write {session.folder / CALIBRATION_FILE}: {error}; see that you may write to the folder"
         ) from error
-    loaded, clocks = load_session(session.folder), content["clocks"]
-    clocked = [
-        replace(c, clock=Clock(*clocks[c.camera.name])) if c.camera.name in clocks else c for c in loaded.cameras
-    ]
-    return save_cameras(loaded, clocked)
+    loaded, clocks, lost = load_session(session.folder), content["clocks"], content.get("lost", {})
+
+    def clock(name: str) -> Clock:
+        ahead_frames, rate = clocks[name]
+        return Clock(ahead_frames, rate, tuple(LostFrames(*own) for own in lost.get(name, ())))
+
+    return save_cameras(
+        loaded, [replace(c, clock=clock(c.camera.name)) if c.camera.name in clocks else c for c in loaded.cameras]
+    )

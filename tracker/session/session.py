@@ -23,7 +23,7 @@ import tomli_w
 from tracker.body.model import BodyModel
 from tracker.errors import SessionError
 from tracker.files import check_regular, refuse_links, write_text_atomic
-from tracker.footage.camera_source import CameraSource, Clock
+from tracker.footage.camera_source import CameraSource, Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model, load_model
 from tracker.geometry.ground_plane import GroundPlane
@@ -188,7 +188,7 @@ def _load_cameras(row: SessionFile, folder: Path) -> tuple[CameraSource, ...]:
             c.offset,
             c.declared_fps,
             c.footage_frames,
-            Clock(round(c.time_offset_s * row.fps, 9), c.time_rate),
+            Clock(round(c.time_offset_s * row.fps, 9), c.time_rate, tuple(LostFrames(*lost) for lost in c.lost_frames)),
         )
         for c in row.cameras
     )
@@ -307,6 +307,8 @@ def _checked_content(session: Session) -> dict[str, Any]:
             row["time_offset_s"] = round(c.clock.ahead_frames / session.fps, 12)
         if c.clock.rate:
             row["time_rate"] = float(c.clock.rate)
+        if c.clock.lost:
+            row["lost_frames"] = [list(lost) for lost in c.clock.lost]
         cameras.append(row)
     data: dict[str, Any] = {
         "name": session.name,

@@ -23,10 +23,10 @@ from tracker.validation import (
     check_version,
 )
 
-VERSION = 5
+VERSION = 6
 """Newest version. A session is written in the oldest version that can describe it, so that older programs can read it:
 version 2 has a floor, version 3 a camera with a `declared_fps`, version 4 one with `footage_frames`, version 5 one with
-`time_offset_s` or `time_rate`."""
+`time_offset_s` or `time_rate`, version 6 one with `lost_frames`."""
 
 Up: TypeAlias = Literal["x", "-x", "y", "-y", "z", "-z"]
 UPS: tuple[str, ...] = get_args(Up)
@@ -49,6 +49,10 @@ _FrameCount: TypeAlias = Annotated[
         description=f"a whole number of frames from 1 to {MAX_FRAMES} (check the footage and the offsets)",
     ),
 ]
+_Frame: TypeAlias = Annotated[int, Meta(ge=1, le=MAX_FRAMES, description="a frame from 1 on")]
+_Lost: TypeAlias = Annotated[
+    int, Meta(ge=-MAX_FRAMES, le=MAX_FRAMES, description="a whole number of frames; negative where pictures are double")
+]
 
 
 class _Row(msgspec.Struct, forbid_unknown_fields=True):
@@ -70,12 +74,19 @@ class CameraRow(_Row):
     # Whole frames are in `offset`. More than a tenth of a second per second would be another frame rate.
     time_offset_s: Annotated[float, Meta(ge=-1, le=1, description="a time from -1 to 1 s")] = 0.0
     time_rate: Annotated[float, Meta(ge=-0.1, le=0.1, description="a drift from -0.1 to 0.1 s per s")] = 0.0
+    lost_frames: list[tuple[_Frame, _Lost]] = []
 
     def __post_init__(self) -> None:
         if self.offset < 0:
             raise ValueError(
                 f"expected 0 or more as 'offset', found {self.offset}; "
                 f"give each of the others an offset of {-self.offset} instead"
+            )
+        since = [frame for frame, _ in self.lost_frames]
+        if since != sorted(set(since)):
+            raise ValueError(
+                f"expected a later frame in each row of 'lost_frames', found frames {', '.join(map(str, since))}; put "
+                "them in order, and add those of one frame"
             )
 
 
@@ -132,6 +143,8 @@ def read_session_file(path: Path) -> SessionFile:
 
 def needed_version(data: dict[str, Any]) -> int:
     """Return the oldest version that can describe the content of a session file."""
+    if any("lost_frames" in row for row in data["cameras"]):
+        return 6
     if any("time_offset_s" in row or "time_rate" in row for row in data["cameras"]):
         return 5
     if any("footage_frames" in row for row in data["cameras"]):

@@ -14,7 +14,8 @@ from typing import NamedTuple
 from tracker.store.annotation_store import AnnotationStore
 
 CALIBRATIONS = "calibrations"
-"""Setting of the session: the revisions, in order, each with its cameras as `toml`, their `clocks` and its `time`."""
+"""Setting of the session: the revisions, in order, each with its cameras as `toml`, their `clocks`, the frames
+that they have `lost`, and its `time`."""
 CALIBRATION_EDITS = "calibration_edits"
 """Setting of the session: by entry of the history, the revisions before and after it."""
 CALIBRATIONS_OF_EDITS = "calibrations_of_edits"

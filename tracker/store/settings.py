@@ -36,6 +36,7 @@ class _Calibration(msgspec.Struct):
     toml: str
     time: str
     clocks: dict[Name, tuple[Number, Number]] = {}
+    lost: dict[Name, list[tuple[int, int]]] = {}
 
 
 class _Floor(msgspec.Struct):

@@ -104,7 +104,7 @@ def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameS
 
     return {
         "named": list(found.named),
-        "cameras": [_camera(c, found.since.get(c.name)) for c in found.cameras],
+        "cameras": [_camera(c, found) for c in found.cameras],
         "explained": {
             "frames": list(found.frames),
             "nats": sum(c.gain_nats for c in found.cameras if c.kinds),
@@ -116,9 +116,10 @@ def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameS
     }
 
 
-def _camera(finding: "CameraFinding", since: int | None) -> dict[str, Any]:
+def _camera(finding: "CameraFinding", check: "CalibrationCheck") -> dict[str, Any]:
     from tracker.calibration.camera_correction import in_units
 
+    lost = check.lost.get(finding.name)
     return {
         "name": finding.name,
         "misfit_px": finding.misfit_px,
@@ -127,7 +128,8 @@ def _camera(finding: "CameraFinding", since: int | None) -> dict[str, Any]:
         "sigma": in_units(finding.sigma),
         "kind": "+".join(finding.kinds) or None,
         "as_well": list(finding.rivals),
-        "since_frame": since,
+        "since_frame": check.since.get(finding.name),
+        "lost_frames": 0 if lost is None else lost.n,
     }
 
 
@@ -162,6 +164,8 @@ def _correction_lines(camera: dict[str, Any]) -> list[str]:
         lines.append(
             f"  {camera['name']} focal length: {camera['focal_percent']:+.2f} ± {sigma['focal_percent']:.2f} %"
         )
+    if camera["lost_frames"]:
+        return [*lines, f"  {camera['name']} lost frames: {camera['lost_frames']}"]
     if camera["time_ms"]:
         lines.append(f"  {camera['name']} clock: {camera['time_ms']:+.1f} ± {sigma['time_ms']:.1f} ms")
     if camera["time_ms"] or camera["drift_ms_per_s"]:

@@ -77,6 +77,7 @@ def synchronize(
                 "offset": c.offset,
                 "time_offset_s": c.clock.ahead_frames / session.fps,
                 "time_rate": c.clock.rate,
+                "lost_frames": [list(lost) for lost in c.clock.lost],
             }
             for c in session.cameras
         ],

@@ -225,9 +225,9 @@ class Calibrating:
         (seen,), shown = recording.seen([state.frame]), self._session_state.frames.observer
         parameters = [SizeParameters(b.model) for b in seen.bodies]
         sizes, sigmas = check.diagnosis.state.sizes, prior_sigmas(session.fps)
+        corrections = check.corrections_on(state.frame)
         before, after = (
-            score_frame(seen, parameters, sizes, c, sigmas)
-            for c in (np.zeros_like(check.corrections), check.corrections)
+            score_frame(seen, parameters, sizes, c, sigmas) for c in (np.zeros_like(corrections), corrections)
         )
         models = [p.body(s) for p, s in zip(parameters, sizes, strict=True)]
         bodies = tuple(
@@ -235,10 +235,10 @@ class Calibrating:
                 PosedBody(model, model.retract(values, path.step(later_s(c, seen.time_s) + ahead / session.fps)))
                 for model, values, path in zip(models, after.poses, seen.paths, strict=True)
             )
-            for ahead, c in zip(shown.ahead_frames(state.frame), check.corrections, strict=True)
+            for ahead, c in zip(shown.ahead_frames(state.frame), corrections, strict=True)
         )
         cameras = tuple(
-            corrected(source.camera, c).pinhole for source, c in zip(session.cameras, check.corrections, strict=True)
+            corrected(source.camera, c).pinhole for source, c in zip(session.cameras, corrections, strict=True)
         )
         with self._session_state.lock:
             if self._session_state.state.calibration.check is check:

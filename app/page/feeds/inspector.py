@@ -204,7 +204,7 @@ def calibration(found: CalibrationState, n_people: int, field: MisfitField) -> w
         field: see `misfit_field`, of its result.
     """
     check, preview = found.check, found.preview
-    rows = () if check is None else tuple(_camera(c, check.since.get(c.name)) for c in check.cameras)
+    rows = () if check is None else tuple(_camera(c, check) for c in check.cameras)
     return wire.CalibrationMessage(
         found.running, found.stage, found.share, found.message, found.failed, check is not None,
         () if check is None else check.frames, rows, () if check is None else tuple(check.sentences),
@@ -304,13 +304,14 @@ def _intervals(frames: Sequence[int]) -> tuple[tuple[int, int], ...]:
     return tuple((int(part[0]), int(part[-1])) for part in parts if len(part))
 
 
-def _camera(found: CameraFinding, since: int | None) -> wire.CameraCheck:
+def _camera(found: CameraFinding, check: CalibrationCheck) -> wire.CameraCheck:
     turned, moved, zoomed, shifted, drift = _numbers(found.correction)
     deviations = dict(zip(in_units(found.sigma), _numbers(found.sigma), strict=True))
     rivals = {kind: dict(zip(KINDS, _numbers(c), strict=True))[kind] for kind, c in found.rivals.items()}
+    lost = check.lost.get(found.name)
     return wire.CameraCheck(
         found.name, found.misfit_px, found.misfit_mm, found.kinds, rivals, turned, moved, zoomed[0], shifted[0],
-        drift[0], deviations, since, found.is_seen,
+        drift[0], deviations, check.since.get(found.name), 0 if lost is None else lost.n, found.is_seen,
     )  # fmt: skip
 
 

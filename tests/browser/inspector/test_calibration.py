@@ -13,7 +13,7 @@ SIGMA = {
 CAMERA = {
     "name": "FRONT", "misfit_px": 0.4, "misfit_mm": 3.0, "kinds": [], "rivals": {}, "rotation_deg": [0, 0, 0],
     "position_mm": [0, 0, 0], "focal_percent": 0, "time_ms": 0, "drift_ms_per_s": 0, "sigma": SIGMA,
-    "since_frame": None, "is_seen": True,
+    "since_frame": None, "lost_frames": 0, "is_seen": True,
 }  # fmt: skip
 TURNED = CAMERA | {
     "name": "LEFT", "misfit_px": 9.4, "misfit_mm": 70.0, "kinds": ["rotation", "time"],
@@ -60,6 +60,16 @@ async def test_a_check_names_the_camera_and_what_mends_it(page, endpoint, sectio
     await endpoint.broadcast(CHECKED | {"refused": "expected other frames to fit better, found 2 of 11"})
     await shows(page, "document.querySelector('[data-section=calibration]').innerText.includes('found 2 of 11.')")
     assert await section.get_by_role("button", name="Apply").is_disabled()
+
+
+async def test_lost_frames_are_named_in_place_of_a_time(page, endpoint, section):
+    await opened(page)
+    await endpoint.broadcast(CHECKED | {"cameras": [CAMERA, TURNED | {"kinds": ["time"], "lost_frames": 2}]})
+    await shows(page, "document.querySelector('.calibration-cameras')")
+    rows = await page.locator(".calibration-cameras tbody tr").all_inner_texts()
+    assert rows[1].split() == ["LEFT", "9.4", "70", "2", "frames", "lost", "before", "frame", "30"]
+    await endpoint.broadcast(CHECKED | {"cameras": [CAMERA, TURNED | {"kinds": ["time"], "lost_frames": -1}]})
+    await shows(page, "document.querySelector('.calibration-cameras').innerText.includes('1 frame doubled before')")
 
 
 async def test_poses_of_an_earlier_calibration_are_marked_counted_and_tracked_again(page, endpoint, section):

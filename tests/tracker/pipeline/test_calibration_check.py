@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from rig_scenes import CAMERAS, FPS, NAMES, nothing_seen, turned, viewed
 
+from tracker.calibration.camera_correction import N_CORRECTIONS, TIME
 from tracker.errors import TrackerError
+from tracker.footage.camera_source import LostFrames
 from tracker.motion.pose_path import PosePath
 from tracker.pipeline.calibration_check import check_calibration, contradiction
 
@@ -66,6 +68,27 @@ def test_two_cameras_contradict_each_other_without_a_name():
     assert sentence.endswith("nothing shows which is off")
     assert check.named == ()
     assert not check.corrections.any()
+
+
+@pytest.mark.parametrize(("n", "words"), [(1, "lost 1 frame"), (-2, "doubled 2 frames")])
+def test_a_clock_that_changes_within_the_recording_has_lost_whole_frames(n, words):
+    late = np.zeros(N_CORRECTIONS)
+    late[TIME] = n / FPS
+    check = check_calibration(Seen([*viewed({}, range(5)), *viewed({1: late}, range(5, 10))]))
+    assert (check.named, check.lost) == (("cam1",), {"cam1": LostFrames(5, n)})
+    (sentence,) = check.sentences
+    assert sentence.startswith(f"camera cam1 {words} before frame 5: the body is")
+    assert check.corrections[1, TIME] == n / FPS
+    np.testing.assert_array_equal(check.corrections_on(4), 0.0)
+    np.testing.assert_array_equal(check.corrections_on(5), check.corrections)
+    check.require_applicable([(SimpleNamespace(cost=2.0), SimpleNamespace(cost=1.0))])
+
+
+def test_a_camera_that_was_turned_within_the_recording_is_not_corrected():
+    check = check_calibration(Seen([*viewed({}, range(3)), *viewed({1: turned(yaw_deg=1.0)}, range(3, 6))]))
+    assert (check.since, check.lost) == ({"cam1": 3}, {})
+    with pytest.raises(TrackerError, match="found that cam1 is off since frame 3"):
+        check.require_applicable([(SimpleNamespace(cost=2.0), SimpleNamespace(cost=1.0))])
 
 
 def test_a_correction_without_other_frames_is_refused():

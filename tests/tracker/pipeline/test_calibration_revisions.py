@@ -9,6 +9,7 @@ from command_line import SAMPLE
 
 from tracker.calibration.camera_correction import DRIFT, N_CORRECTIONS, TIME
 from tracker.errors import SessionError
+from tracker.footage.camera_source import Clock, LostFrames
 from tracker.formats.anipose import read_calibration, write_calibration
 from tracker.formats.model_toml import format_model
 from tracker.pipeline.calibration_revisions import (
@@ -73,6 +74,23 @@ def test_a_drift_that_was_told_about_the_middle_is_stored_from_frame_0(session):
     clock = with_corrections(session, corrections, middle_s=2.0).cameras[1].clock
     late_s = [clock.ahead(t * session.fps) / session.fps for t in (0.0, 2.0, 3.0)]
     assert late_s == pytest.approx([0.002, 0.01, 0.014])
+
+
+def test_lost_frames_follow_undo_and_redo(session, store):
+    nothing = np.zeros((len(session.cameras), N_CORRECTIONS))
+    late = nothing.copy()
+    late[0, TIME] = 1 / session.fps  # As it was found; the lost frame states it exactly.
+    lost = {session.cameras[0].camera.name: LostFrames(30, 1)}
+    changed = change_calibration(session, store, with_corrections(session, late, 1.0, lost), "FRONT corrected")
+    assert changed.cameras[0].clock == Clock(0.0, 0.0, (LostFrames(30, 1),))
+    assert load_session(session.folder).cameras[0].clock == changed.cameras[0].clock
+    store.undo()
+    changed = follow_history(changed, store)
+    assert load_session(session.folder).cameras[0].clock == Clock()
+    store.redo()
+    changed = follow_history(changed, store)
+    assert load_session(session.folder).cameras[0].clock.lost == (LostFrames(30, 1),)
+    assert present_revision(store) == 2
 
 
 def test_poses_name_the_calibration_that_they_were_made_with(session, store):

@@ -1,3 +1,4 @@
+import re
 import shutil
 from dataclasses import replace
 
@@ -6,7 +7,7 @@ import pytest
 from clips import SIZE, encode
 
 from tracker.errors import CalibrationError, ModelError, Remedy, SessionError
-from tracker.footage.camera_source import CameraSource, Clock
+from tracker.footage.camera_source import CameraSource, Clock, LostFrames
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
 from tracker.geometry.cameras import Camera
@@ -151,6 +152,33 @@ def test_clocks_below_a_frame_are_kept(tmp_path, cameras):
     assert (tmp_path / "s" / "session.toml").read_text() == text
 
 
+def test_lost_frames_are_kept(tmp_path, cameras):
+    lost = (LostFrames(30, 1), LostFrames(45, -2))
+    make(tmp_path, [replace(cameras[0], clock=Clock(0.0, 0.0, lost)), *cameras[1:]])
+    text = (tmp_path / "s" / "session.toml").read_text()
+    assert "version = 6" in text
+    read = load_session(tmp_path / "s")
+    assert read.cameras[0].clock.lost == lost
+    save_session(read)
+    assert (tmp_path / "s" / "session.toml").read_text() == text
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        ("[[30, 1], [20, 1]]", "a later frame in each row of 'lost_frames' in 'cameras[left]', found frames 30, 20"),
+        ("[[30, 1], [30, 1]]", "found frames 30, 30"),
+        ("[[0, 1]]", "a frame from 1 on"),
+        ("[[30, 0.5]]", "a whole number of frames"),
+    ],
+)
+def test_impossible_lost_frames_are_refused(tmp_path, cameras, rows, expected):
+    make(tmp_path, cameras)
+    edit(tmp_path / "s", "offset = 3", f"offset = 3, lost_frames = {rows}")
+    with pytest.raises(SessionError, match=re.escape(expected)):
+        load_session(tmp_path / "s")
+
+
 def test_without_clocks_none_are_written(tmp_path, cameras):
     make(tmp_path, cameras)
     text = (tmp_path / "s" / "session.toml").read_text()
@@ -193,7 +221,7 @@ def edit(folder, old, new):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ("version = 1", "version = 6", "version 6, this program reads up to 5; upgrade"),
+        ("version = 1", "version = 7", "version 7, this program reads up to 6; upgrade"),
         ("version = 1", "version = 'x'", "'version': expected a whole number, found 'x'"),
         ("fps = 50.0", "", "expected the key 'fps', found none"),
         ("fps = 50.0", "fps = 'fast'", "a frame rate above 0.* as 'fps', found 'fast'"),
