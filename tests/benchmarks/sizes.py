@@ -5,19 +5,29 @@ The people and recordings of `acquisition.py`. No height, joint or pose is given
 sigmas have a root mean square of 1 where the stated standard deviations are right.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from acquisition import Recording, new_session, percent, quadrille, run
-from sections import table
+from doc_tables import Conditions
 
 from tracker.acquisition.segment_lengths import SEGMENTS, segment_lengths
 from tracker.evaluation.references import read_joints
 from tracker.session.session import load_session
 
+TABLES = ("sizes",)
 HEADS = (*SEGMENTS, "rms", "errors over sigmas")
+CONDITIONS = Conditions(
+    footage="the people and recordings of `acquisition.py`",
+    body="acquired from the footage; no height, joint or pose is given. Errors are those of the lengths between limb "
+    "joints, as shares of the reference's; the last column is the root mean square of errors over standard deviations",
+    start="found by `init --method auto`",
+    settings="defaults of `acquire`",
+    chosen="those of first poses, of visual hulls, and of the prior on sizes",
+    command="python tests/benchmarks/sizes.py --data DIR --write docs/measurements.md",
+)
 
 
 class Sizes(NamedTuple):
@@ -49,18 +59,5 @@ def acquired_sizes(recording: Recording, folder: Path) -> Iterator[Sizes]:
         yield Sizes(recording.label(person), errors_m / [true_m[n] for n in SEGMENTS], errors_m / sigmas_m)
 
 
-def section(found: Sequence[Sizes]) -> str:
-    """The results as Markdown."""
-    lines = [
-        "## Sizes acquired from nothing",
-        "",
-        "Made by `python tests/benchmarks/sizes.py --data DIR`: errors of the lengths between limb joints after `init "
-        "--method auto` and `acquire`, as shares of the reference's. The last column is the root mean square of the "
-        "errors over their standard deviations.",
-        "",
-    ]
-    return "\n".join([*lines, table(HEADS, {f.name.replace("_", " "): f.cells for f in found})])
-
-
 if __name__ == "__main__":
-    run(__doc__, HEADS, acquired_sizes, section)
+    run(__doc__, HEADS, acquired_sizes, TABLES[0], CONDITIONS)

@@ -22,6 +22,7 @@ from tracker.appearance.region_kernels import (
 from tracker.appearance.region_model import OCCUPIED_M, REACH_M, RegionModel, background_of, sample_share
 from tracker.body.model import BodyModel, PosedBody
 from tracker.compute.sampling import spread_indices
+from tracker.compute.threads import map_parallel
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray, Image, IntArray
 from tracker.geometry.cameras import Camera
@@ -83,17 +84,20 @@ def learn_regions(
         empty: smoothed empty scene of each view, (H, W, 3), in working pixels, or None; empty without any.
     """
     models = tuple(b.model for b in frames[0].bodies)
-    shown, backgrounds = list[_Shown](), list[BackgroundDensity]()
-    for i, camera in enumerate(cameras):
+
+    def of_view(i: int) -> tuple[BackgroundDensity, list[_Shown]]:
         cells = [(k, cells_of(f.views[i])) for k, f in enumerate(frames)]
         drawn = [(k, c, draw_bodies(frames[k].bodies, c)) for k, c in cells if c is not None]
-        backgrounds.append(_background(camera, drawn, empty[i] if empty else None))
-        shown += [_Shown(k, i, c, canvas, background_of(backgrounds[i], c, canvas)) for k, c, canvas in drawn]
+        known = _background(cameras[i], drawn, empty[i] if empty else None)
+        return known, [_Shown(k, i, c, canvas, background_of(known, c, canvas)) for k, c, canvas in drawn]
+
+    backgrounds, of_views = zip(*map_parallel(of_view, range(len(cameras))), strict=True)
+    shown = [s for of_view in of_views for s in of_view]
     weights = np.ones((len(frames), sum(len(m.parts) for m in models)))
     for _ in range(2):  # In the second round, parts count by how far they agree with the first.
         tables = _calibrated(_colors(models, shown, weights, len(cameras)), models, shown, weights)
         weights = _agreement(models, tables, shown, len(frames))
-    return RegionModel(models, tuple(backgrounds), tables)
+    return RegionModel(models, backgrounds, tables)
 
 
 def isotonic(values: Array, weights: Array) -> Array:

@@ -17,6 +17,7 @@ from tracker.appearance.part_drawing import Canvas, draw_bodies, grown
 from tracker.appearance.region_cells import CellView, cells_of
 from tracker.appearance.region_kernels import RegionTables, add_score
 from tracker.body.model import BodyModel, PosedBody
+from tracker.compute.threads import map_parallel
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Camera
@@ -66,12 +67,15 @@ class RegionModel:
             views: evidence of each view.
             bodies: rough poses of all people; the exposure is measured beside them.
         """
-        cells = tuple(map(cells_of, views))
-        background = [
-            np.zeros((0, 0), np.float32) if c is None else background_of(known, c, draw_bodies(bodies, c))
-            for known, c in zip(self.backgrounds, cells, strict=True)
-        ]
-        return RegionFrame(cells, tuple(background))
+
+        def of_view(i: int) -> tuple[CellView | None, FloatArray]:
+            cells = cells_of(views[i])
+            if cells is None:
+                return None, np.zeros((0, 0), np.float32)
+            return cells, background_of(self.backgrounds[i], cells, draw_bodies(bodies, cells))
+
+        cells, background = zip(*map_parallel(of_view, range(len(views))), strict=True)
+        return RegionFrame(cells, background)
 
     def nats(self, frame: RegionFrame, bodies: Sequence[PosedBody]) -> float:
         """Return the sum of `score(...).nats`, in less time."""
