@@ -19,7 +19,7 @@ from tracker.calibration.rig_problem import RigProblem, RigState
 from tracker.calibration.viewed_frames import ViewedFrame, seen_people
 from tracker.compute.progress import Report, unreported
 from tracker.compute.threads import one_blas_thread
-from tracker.fitting.bundle import ArrowEquations, solve_bundle
+from tracker.fitting.bundle import ArrowEquations, BundleFit, settle_bundle, solve_bundle
 from tracker.geometry.arrays import Array
 
 
@@ -157,7 +157,7 @@ def diagnose(
         # As few cameras as possible; of as many, those that explain more.
         best = min(best, other, key=lambda s: (len(s.cameras), search.total(start.problem, s)))
     report("done", 1.0)
-    return _diagnosis(best)
+    return _diagnosis(search.settled(best))
 
 
 def glance(frames: Sequence[ViewedFrame], parameters: Sequence[SizeParameters], fps: float) -> Diagnosis:
@@ -182,7 +182,7 @@ def fit_fault(
     before = search.fitted(search.begun().state, ())
     first = search.refitted(before, (fault,))
     found = FoundFault(fault, before.cost - first.cost, {})
-    return _diagnosis(_Selection((found,), search.fitted(first.state, (fault,))))
+    return _diagnosis(search.settled(_Selection((found,), first)))
 
 
 def _diagnosis(selection: "_Selection") -> Diagnosis:
@@ -269,9 +269,21 @@ class _Search:
         self, state: RigState, chosen: Collection[Fault], accepts: bool = True, steps: int = EFFORT.steps
     ) -> _Fitted:
         """Fit poses, sizes and chosen corrections, on the evidence that the state accepts or on all."""
+        return self._solved(self._problem(state, chosen, accepts), state, chosen, steps)
+
+    def _problem(self, state: RigState, chosen: Collection[Fault], accepts: bool = True) -> RigProblem:
+        """Return the problem of the evidence that a state accepts, or of all, in which chosen corrections are free."""
         seen = seen_people(self._frames, state if accepts else None)
-        problem = RigProblem(seen, self._parameters, self._sigmas, state.corrections)
-        return self._solved(problem, state, chosen, steps)
+        return RigProblem(seen, self._parameters, self._sigmas, state.corrections).with_free(_columns(chosen))
+
+    def settled(self, selection: _Selection) -> _Selection:
+        """Fit the faults of a selection to where the gradient vanishes, on the evidence that its state accepts."""
+        if not selection.kept:
+            return selection
+        state = selection.fit.state
+        problem = self._problem(state, [k.fault for k in selection.kept])
+        found = settle_bundle(problem, state, EFFORT.steps, LEAST_GAIN)
+        return selection._replace(fit=_fitted(problem, found))
 
     def refitted(self, fit: _Fitted, chosen: Collection[Fault], steps: int = EFFORT.steps) -> _Fitted:
         """Fit poses, sizes and chosen corrections on the same evidence further, in some Gauss-Newton steps at most."""
@@ -281,16 +293,8 @@ class _Search:
         self, problem: RigProblem, state: RigState, chosen: Collection[Fault], steps: int = EFFORT.steps,
         known: ArrowEquations | None = None,
     ) -> _Fitted:  # fmt: skip
-        free = np.zeros(state.corrections.size, np.bool_)
-        for h in chosen:
-            free[h.columns] = True
-        problem = problem.with_free(free.reshape(state.corrections.shape))
-        found = solve_bundle(problem, state, steps, least_gain=LEAST_GAIN, known=known)
-        shared, own = problem.free(found.state, found.equations)
-        every = np.concatenate([np.ones(free.size, np.bool_), shared[free.size :]])
-        with one_blas_thread():
-            gradient, hessian = found.equations.held(every, own).reduced()
-        return _Fitted(problem, found.state, found.equations, hessian, gradient, shared)
+        problem = problem.with_free(_columns(chosen))
+        return _fitted(problem, solve_bundle(problem, state, steps, least_gain=LEAST_GAIN, known=known))
 
     def best(
         self, fit: _Fitted, chosen: Collection[Fault], without: Collection[int]
@@ -344,6 +348,20 @@ class _Search:
             if found.cost - fit.cost < _needed(candidate.fault):
                 kept, fit = others, found
         return _Selection(tuple(kept), fit)
+
+
+def _columns(faults: Collection[Fault]) -> NDArray[np.int64]:
+    """Return the places of faults among the corrections of all cameras."""
+    return np.concatenate([np.zeros(0, np.int64), *(h.columns for h in faults)])
+
+
+def _fitted(problem: RigProblem, found: BundleFit[RigState]) -> _Fitted:
+    shared, own = problem.free(found.state, found.equations)
+    n = found.state.corrections.size
+    every = np.concatenate([np.ones(n, np.bool_), shared[n:]])
+    with one_blas_thread():
+        gradient, hessian = found.equations.held(every, own).reduced()
+    return _Fitted(problem, found.state, found.equations, hessian, gradient, shared)
 
 
 def is_followed(frames: Sequence[ViewedFrame], camera: int, kinds: Collection[str]) -> bool:

@@ -26,7 +26,7 @@ from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.bundle import ArrowEquations
 from tracker.fitting.contour_residuals import ContourResiduals, PieceSums
 from tracker.fitting.gauss_newton import NormalEquations, PosePrior, pressed_against_limit
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, IntArray
 from tracker.geometry.cameras import Camera
 from tracker.geometry.rigid import so3_exp
 from tracker.motion.pose_path import PosePath
@@ -115,10 +115,11 @@ class RigProblem:
         self._n_own = max(p.base.n_dofs for p in parameters)
         """Most degrees of freedom of a person; those that others lack are held."""
 
-    def with_free(self, corrections: NDArray[np.bool_]) -> "RigProblem":
-        """Return the same problem in which some corrections may change, (V, N_CORRECTIONS)."""
+    def with_free(self, columns: IntArray) -> "RigProblem":
+        """Return the same problem in which some corrections may change, by their places among those of all cameras."""
         out = copy(self)
-        out._free_corrections = corrections
+        out._free_corrections = np.zeros(self._sigmas.shape, np.bool_)
+        out._free_corrections.ravel()[columns] = True
         return out
 
     def moved(self, state: RigState, shared: Array, own: Array) -> RigState:

@@ -162,6 +162,41 @@ def solve_bundle(
         return _solve(problem, here, max_iterations, lambda cost: max(tolerance * cost, least_gain), report)
 
 
+def settle_bundle(problem: BundleProblem[S], state: S, max_iterations: int, least_gain: float) -> BundleFit[S]:
+    """Take Gauss-Newton steps to where the gradient vanishes, for a cost that is rough.
+
+    The cost of contours jumps where points change their piece and pieces appear or vanish. Near its minimum no step
+    lowers it, though the gradient leads further. A step is therefore also taken if the next one promises less (natural
+    monotonicity test; Deuflhard 2004, Newton Methods for Nonlinear Problems).
+
+    Args:
+        problem: gives the normal equations.
+        state: initial state.
+        max_iterations: largest number of steps.
+        least_gain: smallest decrease that a step must promise, in units of the cost.
+    """
+    with one_blas_thread():
+        here = BundleFit(state, problem.linearize(state), 1)
+        step, promise = _promising(problem, here)
+        for _ in range(max_iterations):
+            if promise <= least_gain:
+                break
+            trial = problem.moved(here.state, *step)
+            there = BundleFit(trial, problem.linearize(trial), here.evaluations + 1)
+            step, further = _promising(problem, there)
+            if further >= promise and there.cost >= here.cost:
+                break
+            here, promise = there, further
+        return here
+
+
+def _promising(problem: BundleProblem[S], fit: BundleFit[S]) -> tuple[tuple[Array, Array], float]:
+    """Return the next step, and the decrease of the cost that it promises."""
+    equations = fit.equations.held(*problem.free(fit.state, fit.equations))
+    step = equations.step(DAMPING.first)
+    return step, equations.promised(*step, DAMPING.first)
+
+
 def _solve(
     problem: BundleProblem[S], start: BundleFit[S], max_iterations: int, enough: Callable[[float], float],
     report: Callable[[int], None],

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from tracker.fitting.bundle import ArrowEquations, solve_bundle
+from tracker.fitting.bundle import ArrowEquations, settle_bundle, solve_bundle
 from tracker.fitting.gauss_newton import normal_equations
 
 N, GROUPS, M = 4, 6, 3
@@ -46,6 +46,26 @@ def dense(equations):
         H[at, at], H[at, :N], H[:N, at] = equations.own_hessians[k], equations.cross[k], equations.cross[k].T
         g[at] = equations.own_gradients[k]
     return H, g
+
+
+class Rough(Curves):
+    """The same with a cost that jumps up wherever the state moves away from where it was."""
+
+    def __init__(self, jump):
+        super().__init__()
+        self.jump = jump
+
+    def linearize(self, state, below=np.inf):
+        found = super().linearize(state)
+        return found._replace(cost=found.cost + self.jump * (np.abs(state[0]).max() > 0))
+
+
+class Diverging(Curves):
+    """A gradient that points the wrong way, so that each step promises more than the last one."""
+
+    def linearize(self, state, below=np.inf):
+        found = super().linearize(state)
+        return found._replace(gradient=-found.gradient, own_gradients=-found.own_gradients)
 
 
 START = np.zeros(N), np.zeros((GROUPS, M))
@@ -110,3 +130,18 @@ def test_a_report_can_stop_it():
 
     with pytest.raises(KeyboardInterrupt):
         solve_bundle(Curves(1), START, report=stop)
+
+
+def test_a_fit_settles_where_the_gradient_vanishes_though_its_cost_is_rough():
+    smooth, rough = solve_bundle(Curves(), START), Rough(jump=1e3)
+    assert solve_bundle(rough, START).evaluations > 3
+    np.testing.assert_array_equal(solve_bundle(rough, START).state[0], START[0])
+    found = settle_bundle(rough, START, 50, 1e-6)
+    np.testing.assert_allclose(found.state[0], smooth.state[0], atol=1e-2)
+    assert found.cost == pytest.approx(smooth.cost + 1e3, rel=1e-4)
+
+
+def test_a_fit_does_not_settle_where_steps_promise_more_and_more():
+    found = settle_bundle(Diverging(), START, 50, 1e-6)
+    assert found.cost <= Diverging().linearize(START).cost
+    assert found.evaluations == 1
