@@ -20,7 +20,8 @@ from doc_tables import Conditions, add_write_option, check_places, show, table
 
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import N_CORRECTIONS, ROTATION
-from tracker.calibration.diagnosis import Fault, fit_fault
+from tracker.calibration.diagnosis import fit_fault
+from tracker.calibration.fault_search import Fault
 from tracker.evaluation.references import read_joints
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording as OpenRecording

@@ -9,6 +9,7 @@ __all__ = [
     "camera_columns",
     "camera_correction",
     "diagnosis",
+    "fault_search",
     "findings",
     "lens_priors",
     "point_adjustment",

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, corrected, later_s
-from tracker.calibration.diagnosis import Diagnosis, Fault, is_followed
+from tracker.calibration.diagnosis import Diagnosis
+from tracker.calibration.fault_search import Fault, is_followed
 from tracker.calibration.viewed_frames import ViewedFrame
 from tracker.footage.camera_source import LostFrames
 from tracker.geometry.arrays import Array

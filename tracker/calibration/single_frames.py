@@ -7,7 +7,7 @@ import numpy as np
 
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import N_CORRECTIONS
-from tracker.calibration.diagnosis import EFFORT, LEAST_GAIN
+from tracker.calibration.fault_search import EFFORT, LEAST_GAIN
 from tracker.calibration.rig_problem import RigProblem, RigState
 from tracker.calibration.viewed_frames import ViewedFrame, seen_people
 from tracker.fitting.bundle import solve_bundle

@@ -7,7 +7,8 @@ import numpy as np
 
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import KINDS, N_CORRECTIONS, TIME
-from tracker.calibration.diagnosis import Diagnosis, diagnose, glance, prior_sigmas
+from tracker.calibration.diagnosis import Diagnosis, diagnose, glance
+from tracker.calibration.fault_search import prior_sigmas
 from tracker.calibration.findings import CameraFinding, findings, sentence
 from tracker.calibration.point_adjustment import NEWS
 from tracker.calibration.residual_pieces import ResidualPieces, residual_pieces

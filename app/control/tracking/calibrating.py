@@ -17,7 +17,7 @@ from app.state.state import State
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.body.model import PosedBody
 from tracker.calibration.camera_correction import corrected, later_s
-from tracker.calibration.diagnosis import prior_sigmas
+from tracker.calibration.fault_search import prior_sigmas
 from tracker.calibration.single_frames import score_frame
 from tracker.errors import TrackerError
 from tracker.pipeline.calibration_check import (

@@ -6,18 +6,8 @@ from rig_scenes import FPS, NAMES, nothing_seen, person_of, turned, viewed
 
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import DRIFT, KINDS, N_CORRECTIONS, ROTATION, TIME, with_step
-from tracker.calibration.diagnosis import (
-    Diagnosis,
-    Fault,
-    FoundFault,
-    Step,
-    _as_tracked,
-    _Search,
-    diagnose,
-    fit_fault,
-    glance,
-    prior_sigmas,
-)
+from tracker.calibration.diagnosis import Diagnosis, diagnose, fit_fault, glance
+from tracker.calibration.fault_search import Fault, FaultSearch, FoundFault, Step, as_tracked, prior_sigmas
 from tracker.calibration.findings import SEEN_PX, findings, misfit, sentence
 from tracker.formats.model_toml import load_model
 from tracker.motion.pose_path import PosePath
@@ -109,8 +99,8 @@ def test_a_small_rest_of_time_is_named_of_a_corrected_clock_alone():
 def settled():
     """Healthy cameras, of which camera 1 has a clock, by next to nothing: no fault promises anything."""
     frames = [f._replace(ahead_s=(0.0, 1e-9, 0.0, 0.0)) for f in viewed({}, range(3))]
-    search = _Search(frames, [SizeParameters(frames[0].bodies[0].model)], prior_sigmas(FPS))
-    return search, search.fitted(_as_tracked(frames, search._parameters), ())
+    search = FaultSearch(frames, [SizeParameters(frames[0].bodies[0].model)], prior_sigmas(FPS))
+    return search, search.fitted(as_tracked(frames, search._parameters), ())
 
 
 def test_a_corrected_clock_is_tried_again_whatever_it_promises(settled, monkeypatch):

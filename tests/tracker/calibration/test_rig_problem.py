@@ -8,7 +8,7 @@ from rig_scenes import CAMERAS, viewed
 from tracker.acquisition.part_motions import rows_of_pieces
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.calibration.camera_correction import DRIFT, N_CORRECTIONS, ROTATION, TIME, corrected
-from tracker.calibration.diagnosis import prior_sigmas
+from tracker.calibration.fault_search import prior_sigmas
 from tracker.calibration.rig_kernels import N_PART, OF_CAMERA, OF_PART, _camera_motions
 from tracker.calibration.rig_problem import GroupSums, RigProblem, RigState, part_motions, sums_of_pieces
 from tracker.calibration.viewed_frames import seen_people

@@ -5,7 +5,7 @@ import pytest
 from rig_scenes import FPS
 
 from tracker.calibration.camera_correction import N_CORRECTIONS
-from tracker.calibration.diagnosis import prior_sigmas
+from tracker.calibration.fault_search import prior_sigmas
 from tracker.calibration.single_frames import FrameScore, find_change
 from tracker.calibration.viewed_frames import spread_poses
 from tracker.formats.model_toml import load_model
