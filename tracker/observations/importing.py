@@ -1,6 +1,7 @@
 """Import files of other programs: read them, place them at the frames of a session, check them, store them."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -108,7 +109,7 @@ def _scaled(table: PictureTable, size: tuple[int, int], given: tuple[int, int] |
         return table
     points = table.points.copy()
     points[..., :2] = rescaled(points[..., :2], given, size)
-    return PictureTable(table.names, table.numbers, points, None, table.rate, table.notes)
+    return replace(table, points=points, size=None)
 
 
 def _with_confidence(table: PictureTable, confidence: float) -> PictureTable:
@@ -116,7 +117,7 @@ def _with_confidence(table: PictureTable, confidence: float) -> PictureTable:
     points = table.points.copy()
     if not table.has_confidence:
         points[..., 2] = np.where(table.is_found, confidence, 0.0)
-    return PictureTable(table.names, table.numbers, points, table.size, table.rate, table.notes)
+    return replace(table, points=points)
 
 
 def _with_certain_points(table: PictureTable) -> PictureTable:
@@ -127,7 +128,7 @@ def _with_certain_points(table: PictureTable) -> PictureTable:
     points = table.points.copy()
     points[is_certain, 2] = 1.0
     note = f"{is_certain.sum()} points without a confidence, as a person sets them, were taken as certain"
-    return PictureTable(table.names, table.numbers, points, table.size, table.rate, (*table.notes, note))
+    return replace(table, points=points, notes=(*table.notes, note))
 
 
 def _skeleton(
@@ -188,6 +189,8 @@ def _assemble(
     shape = (session.n_frames, len(session.camera_names), most, len(names))
     check_size((*shape, 3), "the key points")
     points_px, confidence = np.full((*shape, 2), np.nan), np.zeros(shape)
+    named = [table.tracks for table in tables.values() if table.tracks is not None]
+    tracks = np.zeros(shape[:3], dtype=np.result_type(np.dtype("<U1"), *named))
     for v, name in enumerate(session.camera_names):
         if name not in tables or tables[name].points.shape[2] != len(names):
             continue
@@ -198,7 +201,10 @@ def _assemble(
         known = tables[name].is_found[inside]
         points_px[at[inside], v, :n] = np.where(known[..., None], points[..., :2], np.nan)
         confidence[at[inside], v, :n] = np.where(known, np.clip(np.nan_to_num(points[..., 2]), 0.0, 1.0), 0.0)
-    return ObservedPoints(names, session.camera_names, points_px, confidence)
+        own = tables[name].tracks
+        if own is not None:
+            tracks[at[inside], v, :n] = own[inside]
+    return ObservedPoints(names, session.camera_names, points_px, confidence, tracks)
 
 
 def _notes(tables: Mapping[str, PictureTable]) -> list[str]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.formats.joint_maps import JointMap
 from tracker.geometry.arrays import Array, IntArray, Mask
@@ -26,6 +27,9 @@ class ObservedPoints:
     """Positions in original pixels, (n_frames, n_views, n_detections, n_points, 2); NaN where absent."""
     confidence: Array
     """Confidence of each point, 0 to 1, (n_frames, n_views, n_detections, n_points); 0 where absent."""
+    tracks: NDArray[np.str_] | None = None
+    """Name that the file of a camera gives each detection, (n_frames, n_views, n_detections); empty without one. It may
+    differ between cameras. None for stored observations."""
 
     def __post_init__(self) -> None:
         n_frames, n_views, n_detections, n_points = self.confidence.shape

@@ -13,7 +13,7 @@ import numpy as np
 
 from tracker.errors import FormatError
 from tracker.formats.keypoints.openpose import numbered_name
-from tracker.formats.keypoints.picture_table import PictureTable, stack_pictures
+from tracker.formats.keypoints.picture_table import PictureTable, stack_pictures, stack_tracks
 from tracker.formats.number_rows import MAX_NAMES
 from tracker.geometry.arrays import Array
 from tracker.text_files import TABLE_BYTES, TextKind, read_json
@@ -50,6 +50,12 @@ class _Annotation(msgspec.Struct):
     keypoints: list[Number] = []
     score: Number | None = None
     segmentation: Any = None
+    track_id: Any = None
+
+    @property
+    def track(self) -> str:
+        """Name of a person who is followed from picture to picture; empty without one."""
+        return str(self.track_id) if isinstance(self.track_id, int | str) else ""
 
 
 class _Dataset(msgspec.Struct):
@@ -150,6 +156,9 @@ def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
     """
     where, found = f"COCO file {path}", read_dataset(path)
     people = _people(found, where)
+    tracks: dict[int, list[str]] = {}
+    for annotation in found.annotations:
+        tracks.setdefault(annotation.image_id, []).append(annotation.track)
     n_points = len(found.names) or max((len(p) for some in people.values() for p in some), default=0)
     if not n_points:
         raise FormatError(f"{where}: expected key points of people, found none; export them")
@@ -161,7 +170,8 @@ def read_coco(path: Path) -> list[tuple[tuple[str, ...], PictureTable]]:
         if len(sizes) > 1:
             raise FormatError(f"{where}: expected images of one size for {labels[0]}, found {sorted(sizes)[:3]}")
         size = next(iter(sizes), None)
-        table = PictureTable(found.names, np.array(numbers, dtype=np.int64), points, size, None, found.notes)
+        names = stack_tracks([tracks.get(images[n].id, []) for n in numbers])
+        table = PictureTable(found.names, np.array(numbers, dtype=np.int64), points, size, None, found.notes, names)
         out.append((labels, table))
     return out
 

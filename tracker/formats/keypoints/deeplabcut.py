@@ -16,7 +16,7 @@ import numpy as np
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, replace_cells
-from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
 from tracker.formats.number_rows import MAX_NAMES, NumberRows, check_size
 from tracker.geometry.arrays import Array, IntArray
 from tracker.text_files import TABLE_BYTES, TextKind, read_lines
@@ -196,7 +196,7 @@ def _table(columns: Sequence[_Column], numbers: IntArray, values: Array, where: 
     points[absent] = (np.nan, np.nan, 0.0)
     if not any(c.coordinate == "likelihood" for c in columns):
         points[~absent, 2] = np.nan
-    return PictureTable(tuple(names), numbers, points)
+    return PictureTable(tuple(names), numbers, points, tracks=stack_tracks([individuals] * len(numbers)))
 
 
 Changes = Mapping[int, Sequence[tuple[int, Array]]]

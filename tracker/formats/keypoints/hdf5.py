@@ -57,7 +57,10 @@ def read_hdf5_apart(path: Path) -> list[tuple[Path, PictureTable]]:
         out = []
         for i, video in enumerate(_answer(path, folder).videos):
             with np.load(folder / f"{i}.npz", allow_pickle=False) as arrays:
-                table = PictureTable(video.names, arrays["numbers"], arrays["points"], notes=video.notes)
+                numbers, points, tracks = arrays["numbers"], arrays["points"], arrays["tracks"]
+            table = PictureTable(
+                video.names, numbers, points, notes=video.notes, tracks=tracks if tracks.size else None
+            )
             out.append((Path(video.video), table))
         return out
 

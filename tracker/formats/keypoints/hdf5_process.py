@@ -115,7 +115,8 @@ def main(path: Path, folder: Path) -> None:
         else:
             found = read_hdf5(path)
         for i, (_, table) in enumerate(found):
-            np.savez(folder / f"{i}.npz", numbers=table.numbers, points=table.points)
+            tracks = np.array([], dtype=np.str_) if table.tracks is None else table.tracks
+            np.savez(folder / f"{i}.npz", numbers=table.numbers, points=table.points, tracks=tracks)
         answer = ReadAnswer(tuple(VideoHead(str(video), table.names, table.notes) for video, table in found))
     except ImportError as error:
         package = {"sleap_io": "sleap-io"}.get(error.name or "", error.name or "sleap-io")

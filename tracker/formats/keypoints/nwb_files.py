@@ -14,7 +14,7 @@ import numpy as np
 
 from tracker.errors import FormatError, Remedy
 from tracker.formats.keypoints.deeplabcut import Changes
-from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array, IntArray
 from tracker.validation import MAX_FRAMES, MAX_NUMBER
@@ -181,7 +181,8 @@ def _table(video: _Video, where: str) -> PictureTable:
     if not (np.abs(points[~absent][:, :2]) <= MAX_NUMBER).all():
         raise FormatError(f"{where}: expected coordinates within {MAX_NUMBER:g}; export it again")
     points[absent] = (np.nan, np.nan, 0.0)
-    return PictureTable(video.names, pictures, points)
+    tracks = stack_tracks([[own[0].parent.name.rpartition("/")[2] for own in video.series]] * len(pictures))
+    return PictureTable(video.names, pictures, points, tracks=tracks)
 
 
 def _set(video: _Video, person: int, node: int, number: int, place: tuple[float, float, float]) -> None:

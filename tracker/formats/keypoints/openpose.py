@@ -15,7 +15,7 @@ import numpy as np
 from tracker.errors import FormatError
 from tracker.formats.exact_text import PIXEL_DECIMALS, exact_text, number_like
 from tracker.formats.json_numbers import Span, json_spans, replace_spans
-from tracker.formats.keypoints.picture_table import PictureTable, stack_pictures
+from tracker.formats.keypoints.picture_table import PictureTable, stack_pictures, stack_tracks
 from tracker.geometry.arrays import Array, IntArray
 from tracker.text_files import TABLE_BYTES, TextKind, read_json
 from tracker.validation import MAX_FRAMES, Number, check
@@ -30,6 +30,13 @@ MAX_PEOPLE = 100
 
 class _Person(msgspec.Struct):
     pose_keypoints_2d: list[Number] = []
+    person_id: Any = None
+
+    @property
+    def track(self) -> str:
+        """Name of a person who is followed from picture to picture; empty without one. OpenPose itself writes -1."""
+        number = self.person_id[0] if isinstance(self.person_id, list) and self.person_id else None
+        return str(number) if isinstance(number, int) and number >= 0 else ""
 
 
 class _Picture(msgspec.Struct):
@@ -54,6 +61,11 @@ def read_openpose(path: Path) -> list[Array]:
     Raises:
         FormatError: the file is malformed, or its numbers are not triples.
     """
+    return [points for points, _ in _read_people(path)]
+
+
+def _read_people(path: Path) -> list[tuple[Array, str]]:
+    """Return the points of the people in a picture, and the track of each; raises as `read_openpose`."""
     where = f"OpenPose file {path}"
     data: Any = read_json(path, _KIND)
     if isinstance(data, Mapping) and "people" not in data:
@@ -68,7 +80,7 @@ def read_openpose(path: Path) -> list[Array]:
             )
         values = np.array(person.pose_keypoints_2d, dtype=np.float64).reshape(-1, 3)
         values[(values[:, :2] == 0).all(axis=1)] = (np.nan, np.nan, 0.0)
-        found.append(values)
+        found.append((values, person.track))
     return found
 
 
@@ -78,17 +90,18 @@ def read_openpose_pictures(paths: Sequence[Path], where: str) -> PictureTable:
     Raises:
         FormatError: a file is malformed, or people have different numbers of points; `where` names the folder.
     """
-    people = [read_openpose(path) for path in paths]
-    sizes = {len(points): path for path, found in zip(paths, people, strict=True) for points in found if len(points)}
+    people = [_read_people(path) for path in paths]
+    sizes = {len(p): path for path, found in zip(paths, people, strict=True) for p, _ in found if len(p)}
     if len(sizes) > 1:
         (n, one), (m, other) = list(sizes.items())[:2]
         raise FormatError(
             f"{where}: expected one skeleton, found {n} points in {one.name} and {m} in {other.name}; import them apart"
         )
-    kept = [[points for points in found if len(points)] for found in people]
-    points = stack_pictures(kept, next(iter(sizes), 0), where)
+    kept = [[(points, track) for points, track in found if len(points)] for found in people]
+    points = stack_pictures([[p for p, _ in found] for found in kept], next(iter(sizes), 0), where)
+    tracks = stack_tracks([[track for _, track in found] for found in kept])
     numbers = [numbered_name(path.name) for path in paths]
-    return PictureTable((), np.array([n for _, n in filter(None, numbers)], dtype=np.int64), points)
+    return PictureTable((), np.array([n for _, n in filter(None, numbers)], dtype=np.int64), points, tracks=tracks)
 
 
 def patch_openpose(data: bytes, changes: Sequence[tuple[int, Array]]) -> bytes:

@@ -1,8 +1,10 @@
 """Key points of people in the pictures of one camera, as a file has them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.formats.number_rows import check_size
 from tracker.geometry.arrays import Array, IntArray, Mask
@@ -25,6 +27,9 @@ class PictureTable:
     """Pictures per second; None if unknown."""
     notes: tuple[str, ...] = ()
     """Sentences on what is odd about the file."""
+    tracks: NDArray[np.str_] | None = None
+    """Name that the file gives each person, (n, n_people), the same in all its pictures; empty for one without a name.
+    None if it names nobody."""
 
     @property
     def is_found(self) -> Mask:
@@ -52,3 +57,10 @@ def stack_pictures(people: list[list[Array]], n_points: int, where: str) -> Arra
         for k, points in enumerate(found):
             row[k] = points
     return out
+
+
+def stack_tracks(names: Sequence[Sequence[str]]) -> NDArray[np.str_] | None:
+    """Stack the names of the people of pictures, as `stack_pictures` stacks their points; None without any name."""
+    most = max([1, *map(len, names)])
+    rows = [[*row, *[""] * (most - len(row))] for row in names]
+    return np.array(rows, dtype=np.str_) if any(map(any, rows)) else None

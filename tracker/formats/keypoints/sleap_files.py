@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tracker.errors import FormatError
-from tracker.formats.keypoints.picture_table import PictureTable
+from tracker.formats.keypoints.picture_table import PictureTable, stack_tracks
 from tracker.formats.number_rows import check_size
 from tracker.validation import MAX_FRAMES, MAX_NUMBER
 
@@ -58,7 +58,8 @@ def _table(labels: Any, video: Any, where: str) -> PictureTable:
     if not (np.abs(points[~absent][:, :2]) <= MAX_NUMBER).all():
         raise FormatError(f"{where}: expected coordinates within {MAX_NUMBER:g}; export it again")
     points[absent] = (np.nan, np.nan, 0.0)
-    return PictureTable(names, numbers, points)
+    tracks = stack_tracks([[i.track.name if i.track is not None else "" for i in instances] for instances in found])
+    return PictureTable(names, numbers, points, tracks=tracks)
 
 
 def _instances(picture: Any) -> list[Any]:
