@@ -19,13 +19,15 @@ from tracker.self_calibration.stature import metres_per_unit, scaled_by
 from tracker.self_calibration.two_views import TwoViews, relate
 
 
-def chain_cameras(seen: SeenJoints, lenses: Sequence[Camera], stature_m: float) -> tuple[tuple[Camera, ...], Gauge]:
+def chain_cameras(
+    seen: SeenJoints, lenses: Sequence[Camera], statures_m: Sequence[float]
+) -> tuple[tuple[Camera, ...], Gauge]:
     """Find the poses of cameras with known lenses, metres, in the world of one of them.
 
     Args:
-        seen: joints of a person.
+        seen: joints of people.
         lenses: the cameras with their lenses.
-        stature_m: of the person, metres.
+        statures_m: of each person, metres; NaN for one who does not count for the scale.
 
     Raises:
         CalibrationError: no two cameras show the person from different sides, or one shows too little of the person.
@@ -35,13 +37,15 @@ def chain_cameras(seen: SeenJoints, lenses: Sequence[Camera], stature_m: float) 
     if not found:
         raise no_common_view()
     best = min(found, key=lambda pair: pair.rotation_sigma)
-    return _completed(seen, lenses, best, stature_m), Gauge(*best.pair)
+    return _completed(seen, lenses, best, statures_m), Gauge(*best.pair)
 
 
-def _completed(seen: SeenJoints, lenses: Sequence[Camera], start: TwoViews, stature_m: float) -> tuple[Camera, ...]:
+def _completed(
+    seen: SeenJoints, lenses: Sequence[Camera], start: TwoViews, statures_m: Sequence[float]
+) -> tuple[Camera, ...]:
     """Add the cameras to a pair, each time the one that sees most of the joints that are known in space."""
     joints = seen.by_joint(start.adjusted.points_world)
-    scale = metres_per_unit(joints, seen.names, stature_m)
+    scale = metres_per_unit(joints, seen.names, statures_m)
     joints = joints * scale
     sigma_px = start.adjusted.sigma_px
     placed = dict(zip(start.pair, scaled_by(start.adjusted.cameras, scale), strict=True))

@@ -18,6 +18,7 @@ from tracker.observations.importing import plan_import
 from tracker.observations.observed import ObservationSet
 from tracker.observations.plans import ImportPlan, MaskPlan
 from tracker.observations.request import ImportRequest
+from tracker.self_calibration.identification import Statures
 from tracker.self_calibration.keypoint_calibration import calibrate_by_person
 from tracker.self_calibration.person_calibration import PersonCalibration
 from tracker.self_calibration.silhouette_calibration import calibrate_by_silhouettes
@@ -30,7 +31,7 @@ _PERSON = "person"
 
 @dataclass(frozen=True)
 class FilmedPerson:
-    """Footage of one person, and key points or masks of the person in it."""
+    """Footage of people, and their key points, or masks of one person."""
 
     keypoints: Path | None
     """File or folder of key points or masks; None for silhouettes that are found in the footage itself."""
@@ -42,8 +43,8 @@ class FilmedPerson:
     """Frame k of all is frame k + offset of a camera."""
     common_frames: bool = False
     """Whether to leave out frames at the end that some cameras lack."""
-    stature_m: float | None = None
-    """Height of the person, metres; None if unknown."""
+    stature_m: Statures = None
+    """Height of the person or of all, or of people by name, metres; None if unknown."""
     lenses: Path | None = None
     """Calibration of which the lenses are taken; None if they are unknown."""
 
@@ -64,7 +65,7 @@ def calibrate_filmed_person(filmed: FilmedPerson, report: Report) -> PersonCalib
         report: receives the progress; it may raise to end the work.
 
     Raises:
-        TrackerError: files cannot be read or do not fit together, or show too little of one person.
+        TrackerError: files cannot be read or do not fit together, or show too little of the people.
     """
     paths = footage_paths(filmed.videos, filmed.camera_paths, filmed.offsets)
     session = _session_of(filmed.keypoints, paths, filmed.offsets, filmed.common_frames)
@@ -75,6 +76,10 @@ def calibrate_filmed_person(filmed: FilmedPerson, report: Report) -> PersonCalib
     if plan is not None and not isinstance(plan, MaskPlan):
         found = _keypoints(plan, filmed.keypoints, blanks)
         return calibrate_by_person(found.observations, cameras, filmed.stature_m, has_lenses, report)
+    if isinstance(filmed.stature_m, Mapping):
+        raise CalibrationError(
+            "expected one height for silhouettes, which have no names, found several; give one height"
+        )
     reading, calibrating = part_of(report, 0.0, 0.5), part_of(report, 0.5, 1.0)
     if plan is None:
         silhouettes = silhouettes_in_footage(session, cameras, reading)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -31,12 +32,26 @@ from tracker.self_calibration.seen_joints import SeenJoints
 from tracker.self_calibration.stature import Upright
 
 
+class Identified(NamedTuple):
+    """People who were recognized in the pictures."""
+
+    names: tuple[str, ...]
+    n_left_out: int = 0
+    """Number of pictures that show people, of whom nobody was used."""
+    n_exchanged: int = 0
+    """Number of times that a file gives a person the name of another."""
+
+
+ONE_PERSON = Identified(("person",))
+"""Somebody without a name."""
+
+
 @dataclass(frozen=True, eq=False)
 class PersonCalibration:
     """Cameras that joints of a person, or points of their silhouettes, have calibrated."""
 
     world: Upright
-    """The cameras in a world with z up, and the joints."""
+    """The cameras in a world with z up, and the joints: a row for each person on each frame."""
     adjusted: AdjustedJoints
     """The adjustment of all frames, in a world of its own."""
     seen: SeenJoints
@@ -55,6 +70,8 @@ class PersonCalibration:
     """Sentences on quantities that the footage does not determine."""
     points: str = "joints"
     """Name of the points in the pictures."""
+    identified: Identified = ONE_PERSON
+    """The people whose points they are."""
 
     def held_out_rms_px(self, camera: int | None = None) -> float:
         """Return the root mean square error on the frames held out, of one camera or all; NaN without joints."""

@@ -1,4 +1,4 @@
-"""Joints of one person in the pictures of all cameras, as observations of free points."""
+"""Joints of people in the pictures of all cameras, as observations of free points."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -8,33 +8,36 @@ import numpy as np
 from tracker.calibration.reprojection import Observations
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.geometry.cameras import Camera
-from tracker.observations.joints import side_pairs, triangulate_observations
+from tracker.observations.joints import side_pairs
 from tracker.observations.observed import ObservationSet
-from tracker.observations.sides import with_sides_exchanged
+from tracker.observations.sides import exchanged_sides, with_sides_exchanged
+from tracker.observations.triangulation import Views
 
 
 @dataclass(frozen=True, eq=False)
 class SeenJoints:
-    """Joints of one person in the pictures of all cameras. Joint j on the k-th frame is point k * n_joints + j."""
+    """Joints of people in the pictures of all cameras. Column j on the k-th frame is point k * n_joints + j."""
 
     names: tuple[str, ...]
-    """Point of the body that each joint is, (N,); empty for one that the body lacks, such as an eye."""
+    """Point of the body that each joint of a person is, (J,); empty for one that the body lacks, such as an eye."""
     px: Array
-    """Original pixels, (F, V, N, 2)."""
+    """Original pixels, (F, V, N, 2). Joint j of person p is column p * J + j of N."""
     is_seen: Mask
     """Whether a camera shows a joint, (F, V, N)."""
+    n_people: int = 1
+    """Number of people."""
 
     @property
     def n_joints(self) -> int:
-        """Number of joints, N."""
-        return len(self.names)
+        """Number of joints of all people, N."""
+        return self.n_people * len(self.names)
 
     def on_frames(self, frames: IntArray | Mask) -> "SeenJoints":
         """Return the joints on some frames."""
         return replace(self, px=self.px[frames], is_seen=self.is_seen[frames])
 
     def with_more(self, others: "SeenJoints") -> "SeenJoints":
-        """Return the joints with others on the same frames."""
+        """Return the joints of a person with others on the same frames."""
         px = np.concatenate([self.px, others.px], axis=2)
         return SeenJoints(self.names + others.names, px, np.concatenate([self.is_seen, others.is_seen], axis=2))
 
@@ -52,32 +55,55 @@ class SeenJoints:
         return out.reshape(len(self.px), self.n_joints, 3)
 
 
-def lone_person(observations: ObservationSet) -> tuple[SeenJoints, int]:
-    """Return the joints of the person in pictures that show nobody else, and the number of the other pictures.
+def own_columns(observations: ObservationSet) -> list[int]:
+    """Return the columns of points that a detector finds itself: a mean of two points is none."""
+    of = observations.counterparts
+    return [i for i, name in enumerate(observations.point_names) if len(of[name]) <= 1]
 
-    A joint counts where its detector holds it for more likely right than wrong.
+
+def joints_of_people(
+    observations: ObservationSet, persons: IntArray, n_people: int, cameras: Sequence[Camera] | None = None
+) -> SeenJoints:
+    """Return the joints of people. A joint counts where its detector holds it for more likely right than wrong.
+
+    Args:
+        observations: key points in pictures.
+        persons: person of each detection, (n_frames, n_views, n_detections); -1 for one of nobody.
+        n_people: number of people.
+        cameras: cameras that are about right, by which left and right are exchanged in pictures that contradict the
+            others; None to leave them.
     """
+    single, of = own_columns(observations), observations.counterparts
+    names = tuple("".join(of[observations.point_names[i]]) for i in single)
+    px, is_seen = [], []
+    for person in range(n_people):
+        own_px, confidence = points_of_person(observations, persons == person)
+        if cameras is not None:
+            own_px, confidence = _with_sides_mended(observations, own_px, confidence, cameras)
+        is_seen.append((confidence > 1 - confidence)[..., single])
+        px.append(np.where(is_seen[-1][..., None], own_px[:, :, single], np.nan))
+    return SeenJoints(names, np.concatenate(px, axis=2), np.concatenate(is_seen, axis=2), n_people)
+
+
+def points_of_person(observations: ObservationSet, is_own: Mask) -> tuple[Array, Array]:
+    """Return the points, (F, V, n_points, 2), and confidence of the marked detections, (F, V, D); 0 without one."""
     points = observations.points
     assert points is not None
-    people = points.is_known.any(axis=-1).sum(axis=-1)
-    # Means of two points are no points of their own.
-    of = observations.counterparts
-    single = [i for i, name in enumerate(observations.point_names) if len(of[name]) <= 1]
-    at = points.is_known.any(axis=-1).argmax(axis=-1)[..., None, None]
-    confidence = np.take_along_axis(points.confidence, at, axis=2)[:, :, 0, single]
-    px = np.take_along_axis(points.points_px, at[..., None], axis=2)[:, :, 0, single]
-    is_seen = (people == 1)[..., None] & (confidence > 1 - confidence)
-    names = tuple("".join(of[observations.point_names[i]]) for i in single)
-    return SeenJoints(names, np.where(is_seen[..., None], px, np.nan), is_seen), int((people > 1).sum())
+    at = is_own.argmax(axis=-1)[..., None, None]
+    own_px = np.take_along_axis(points.points_px, at[..., None], axis=2)[:, :, 0]
+    confidence = np.take_along_axis(points.confidence, at, axis=2)[:, :, 0]
+    return own_px, np.where(is_own.any(axis=-1, keepdims=True), confidence, 0.0)
 
 
-def with_sides_mended(observations: ObservationSet, seen: SeenJoints, cameras: Sequence[Camera]) -> SeenJoints:
-    """Exchange left and right in pictures that contradict the others, by cameras that are about right."""
-    found = triangulate_observations(observations, cameras)
-    values = np.concatenate([seen.px, seen.is_seen[..., None].astype(np.float64)], axis=-1)
-    at = {name: i for i, name in enumerate(seen.names) if name}
-    names = [points[0] if len(points) == 1 else "" for points in observations.counterparts.values()]
-    for group, pairs in enumerate(side_pairs(observations)):
-        own = [(at[names[left]], at[names[right]]) for left, right in pairs]
-        values = with_sides_exchanged(values, own, found.is_exchanged[:, 0, :, group])
-    return replace(seen, px=values[..., :2], is_seen=np.asarray(values[..., 2] > 0))
+def _with_sides_mended(
+    observations: ObservationSet, px: Array, confidence: Array, cameras: Sequence[Camera]
+) -> tuple[Array, Array]:
+    """Exchange left and right of a person in pictures that contradict the others."""
+    views = Views(cameras)
+    values = np.concatenate([px, confidence[..., None]], axis=-1)
+    undistorted = views.undistorted(px)
+    known = np.where(np.isfinite(undistorted).all(axis=-1), confidence, 0.0)
+    for pairs in side_pairs(observations):
+        flags = exchanged_sides(views, np.where(known[..., None] > 0, undistorted, np.nan), known, pairs)
+        values = with_sides_exchanged(values, pairs, flags)
+    return values[..., :2], values[..., 2]

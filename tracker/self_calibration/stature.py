@@ -40,40 +40,61 @@ class Upright(NamedTuple):
     """Points that the floor was found by."""
 
 
-def metres_per_unit(joints: Array, names: Sequence[str], stature_m: float) -> float:
-    """Return the factor from the unit of joints to metres, for a person of a stature in typical proportions.
+def metres_per_unit(joints: Array, names: Sequence[str], statures_m: Sequence[float]) -> float:
+    """Return the factor from the unit of joints to metres, for people of some statures in typical proportions.
 
-    Calves, thighs and trunk are compared with those of a body of this stature, by their median lengths over the frames.
+    It is the geometric mean of those of the people whose segments were all seen.
 
     Args:
-        joints: (F, N, 3), in any unit; NaN where unknown.
-        names: point of the body that each joint is.
-        stature_m: of the person, metres.
+        joints: of all people, one after the other, (F, n_people * J, 3), in any unit; NaN where unknown.
+        names: point of the body that each joint of a person is, (J,).
+        statures_m: of each person, metres; NaN for one who does not count.
 
     Raises:
-        CalibrationError: a segment was not seen.
+        CalibrationError: a segment was seen of nobody.
+    """
+    scales = metres_by_person(joints, names, statures_m)
+    if not np.isfinite(scales).any():
+        raise CalibrationError(
+            "expected the shoulders, hips, knees and ankles of the person in two views, found too few; film the whole "
+            "person, who moves"
+        )
+    return float(np.exp(np.nanmean(np.log(scales))))
+
+
+def metres_by_person(joints: Array, names: Sequence[str], statures_m: Sequence[float]) -> Array:
+    """Return the factor from the unit of joints to metres by each person, (n_people,); NaN where it is not seen.
+
+    Arguments are those of `metres_per_unit`.
+    """
+    own = joints.reshape(len(joints), len(statures_m), len(names), 3)
+    return np.array([_factor(own[:, p], names, s) if np.isfinite(s) else np.nan for p, s in enumerate(statures_m)])
+
+
+def _factor(joints: Array, names: Sequence[str], stature_m: float) -> float:
+    """Return the factor for one person, whose joints are (F, J, 3); NaN where a segment was not seen.
+
+    Calves, thighs and trunk are compared with those of a body of this stature, by their median lengths over the frames.
     """
     body = typical_body(load_model(_BODY, stature_m))
     expected = segment_lengths(body.named_points_world(body.neutral()), _SEGMENTS)
     try:
         found = segment_lengths({name: joints[:, i] for i, name in enumerate(names) if name}, _SEGMENTS)
-    except TrackerError as error:
-        raise CalibrationError(
-            "expected the shoulders, hips, knees and ankles of the person in two views, found too few; film the whole "
-            "person, who moves"
-        ) from error
+    except TrackerError:
+        return np.nan
     return sum(expected.values()) / sum(found.values())
 
 
-def scale_sigma(stature_m: float | None) -> float:
+def scale_sigma(stature_m: float | None, n_people: int = 1) -> float:
     """Return the standard deviation of `metres_per_unit` as a share of it; of a typical adult's stature without one.
 
-    Lengths of people of one stature differ by `SizePriors.length`, each in its own way.
+    Lengths of people of one stature differ by `SizePriors.length`, each in its own way, and statures without knowledge
+    differ from person to person.
     """
     body = load_model(_BODY)
     lengths = np.array([*segment_lengths(body.named_points_world(body.neutral()), _SEGMENTS).values()])
     of_proportions = SizePriors().length * float(np.linalg.norm(lengths) / lengths.sum())
-    return float(np.hypot(of_proportions, STATURE_SIGMA if stature_m is None else 0.0))
+    return float(np.hypot(of_proportions, STATURE_SIGMA if stature_m is None else 0.0) / np.sqrt(n_people))
 
 
 def scaled_by(cameras: Sequence[Camera], factor: float) -> tuple[Camera, ...]:

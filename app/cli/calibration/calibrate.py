@@ -1,4 +1,4 @@
-"""`quadrille calibrate`: calibrate cameras by footage of a board, or of a person."""
+"""`quadrille calibrate`: calibrate cameras by footage of a board, or of people."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from app.cli.arguments import (
+    CommonOrNamed,
     NamedPaths,
     NamedValues,
     Names,
-    OptionalNumber,
     OptionalPath,
     OptionalWhole,
     Paths,
+    finite,
+    parse_common_or_pairs,
     parse_pairs,
 )
 from app.runtime.json_output import format_json
@@ -41,12 +43,13 @@ class CalibrateArguments:
     """.toml file of the board: Caliscope's charuco.toml, anipose's config.toml, or a few lines as in
     docs/calibration.md."""
     people: OptionalPath = None
-    """instead of a board: file or folder of key points or masks of one person, in a format that `quadrille import`
-    reads."""
+    """instead of a board: file or folder of key points of people, or of masks of one person, in a format that
+    `quadrille import` reads. People need names in the files, or one of them is alone for a while."""
     silhouettes: bool = False
     """instead of a board: find silhouettes of one person in the videos, of cameras that stand still."""
-    height: OptionalNumber = None
-    """with --people or --silhouettes: height of the person, metres, which is the scale of the world."""
+    height: CommonOrNamed = ()
+    """with --people or --silhouettes: height of the person or of all people, metres, or NAME=METRES of those whom the
+    files name, which is the scale of the world."""
     lenses: OptionalPath = None
     """with --people or --silhouettes: a calibration of which the lenses are taken; by default focal lengths are
     estimated."""
@@ -74,7 +77,7 @@ class CalibrateArguments:
 
 
 def command(arguments: Annotated[CalibrateArguments, tyro.conf.arg(name="")]) -> None:
-    """Calibrate cameras by footage of a board, or by key points or silhouettes of a person.
+    """Calibrate cameras by footage of a board, by key points of people, or by silhouettes of a person.
 
     The board may be a ChArUco board, also partly visible, or a checkerboard. Ctrl+C stops it and writes nothing.
     """
@@ -116,7 +119,7 @@ def _by_person(arguments: CalibrateArguments, report: "Report") -> "_Calibrated"
         parse_pairs(arguments.camera, "--camera", Path),
         parse_pairs(arguments.offset, "--offset", int),
         arguments.common_frames,
-        arguments.height,
+        parse_common_or_pairs(arguments.height, "--height", finite),
         arguments.lenses,
     )
     found = calibrate_filmed_person(filmed, report)

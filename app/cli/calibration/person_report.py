@@ -23,8 +23,14 @@ def record_of(found: "PersonCalibration") -> dict[str, Any]:
         }
         for i, c in enumerate(found.cameras)
     ]
+    people, seen = found.identified, found.seen
+    by_person = seen.is_seen.reshape(*seen.is_seen.shape[:2], seen.n_people, -1)
+    shared = (by_person.any(axis=3).sum(axis=1) > 1).sum(axis=0)
     return {
-        "frames": len(found.seen.px),
+        "people": [{"name": name, "frames": int(n)} for name, n in zip(people.names, shared, strict=True)],
+        "pictures_left_out": people.n_left_out,
+        "exchanged": people.n_exchanged,
+        "frames": len(seen.px),
         "joints": len(joints),
         "points": found.points,
         "cameras": cameras,
@@ -42,10 +48,14 @@ def record_of(found: "PersonCalibration") -> dict[str, Any]:
 
 def format_record(record: dict[str, Any]) -> str:
     """Return the same for people."""
+    n_people = len(record["people"])
+    whose = "a person" if n_people == 1 else f"{n_people} people"
     lines = [
-        f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['joints']} {record['points']} of a "
-        f"person in {record['frames']} frames"
+        f"wrote {record['out']}: {len(record['cameras'])} cameras from {record['joints']} {record['points']} of "
+        f"{whose} in {record['frames']} frames"
     ]
+    if n_people > 1:
+        lines.append(f"  people: {', '.join('{name} in {frames} frames'.format(**p) for p in record['people'])}")
     width = max(len(c["name"]) for c in record["cameras"])
     for c in record["cameras"]:
         sigma = f" +- {c['focal_sigma_percent']:.1f}%" if c["focal_sigma_percent"] else ", as given"
@@ -56,9 +66,13 @@ def format_record(record: dict[str, Any]) -> str:
         )
     size, (low, high) = " x ".join(f"{side:.1f}" for side in record["volume_m"]), record["interval_mm"]
     lines.append(
-        f"expected error in the volume of the person ({size} m), without that of the scale and of the detector: "
+        f"expected error in the volume of {whose} ({size} m), without that of the scale and of the detector: "
         f"{record['expected_error_mm']:.1f} mm, with 90% between {low:.1f} and {high:.1f} mm"
     )
     lines += [f"note: {note}" for note in record["notes"]]
-    lines.append("the world has z up and its origin on the floor below the person")
+    lines.append(
+        "the world has z up and its origin on the floor below them"
+        if n_people > 1
+        else "the world has z up and its origin on the floor below the person"
+    )
     return "\n".join(lines)

@@ -12,13 +12,14 @@ from tracker.calibration.lens_priors import CALIBRATED
 from tracker.calibration.point_adjustment import PointProblem
 from tracker.calibration.reprojection import Observations, Prior, Rig, column_ends
 from tracker.self_calibration.joint_adjustment import AlikeLenses, Gauge, UnknownLenses, adjust_joints
-from tracker.self_calibration.seen_joints import lone_person
+from tracker.self_calibration.seen_joints import joints_of_people
 
 CAMERAS = rig(3)
 
 
 def seen(sigma_px=0.0, gross=0.0, n_frames=4):
-    return lone_person(observed(CAMERAS, dancing(n_frames), sigma_px, gross))[0]
+    observations = observed(CAMERAS, dancing(n_frames), sigma_px, gross)
+    return joints_of_people(observations, np.zeros((n_frames, len(CAMERAS), 1), dtype=int), 1)
 
 
 @pytest.mark.slow

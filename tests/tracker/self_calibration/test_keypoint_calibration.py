@@ -7,7 +7,7 @@ from filmed_people import FOCAL_PX, NAMES, STATURE_M, blanks, dancing, joint_err
 from tracker.errors import CalibrationError
 from tracker.observations.sides import with_sides_exchanged
 from tracker.self_calibration.keypoint_calibration import calibrate_by_person
-from tracker.self_calibration.seen_joints import lone_person
+from tracker.self_calibration.seen_joints import joints_of_people
 
 SIDES = [(NAMES.index(n), NAMES.index("L" + n[1:])) for n in NAMES if n[0] == "R" and "L" + n[1:] in NAMES]
 
@@ -96,18 +96,18 @@ def test_too_few_frames_are_refused():
 def test_pictures_of_several_people_do_not_count():
     cameras, points = rig(3), dancing(5)
     crowded = observed(cameras, points, crowd=(1,))
-    seen, n_crowded = lone_person(crowded)
-    assert n_crowded == 5
-    assert not seen.is_seen[:, 1].any()
-    assert seen.is_seen[:, 2].any()
-    with pytest.raises(CalibrationError, match=r"one person in camera 'cam1'.*found 0; 5 pictures show several people"):
+    with pytest.raises(
+        CalibrationError,
+        match=r"one person in camera 'cam1'.*found 0; 5 pictures show several people and were left out, because not "
+        "all files name the people; film one person where they see the same place or name the people in the files",
+    ):
         calibrate_by_person(crowded, cameras, STATURE_M)
 
 
 def test_doubtful_joints_and_means_of_joints_do_not_count():
     observations = observed(rig(2, arc=1.2), dancing(3))
     observations.points.confidence[:, 0, 0, 2] = 0.4
-    seen, _ = lone_person(observations)
+    seen = joints_of_people(observations, np.zeros((3, 2, 1), dtype=int), 1)
     assert not seen.is_seen[:, 0, 2].any()
     assert np.isnan(seen.px[:, 0, 2]).all()
     assert seen.is_seen[:, 1, 2].all()

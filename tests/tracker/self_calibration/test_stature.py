@@ -8,7 +8,7 @@ from observed_people import BODY_25
 
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
-from tracker.self_calibration.stature import metres_per_unit, scale_sigma, upright
+from tracker.self_calibration.stature import metres_by_person, metres_per_unit, scale_sigma, upright
 
 POINTS = tuple(BODY_25.counterparts(NAMES)[n][0] for n in NAMES)
 CAMERAS = rigs.cameras(rigs.ring(3))
@@ -17,14 +17,25 @@ CAMERAS = rigs.cameras(rigs.ring(3))
 def test_the_unit_follows_from_the_stature():
     joints = dancing(6)
     joints[0, 3] = np.nan
-    assert metres_per_unit(joints / 7, POINTS, STATURE_M) == pytest.approx(7.0, rel=0.01)
+    assert metres_per_unit(joints / 7, POINTS, [STATURE_M]) == pytest.approx(7.0, rel=0.01)
     with pytest.raises(CalibrationError, match="expected the shoulders, hips, knees and ankles"):
-        metres_per_unit(joints[:, :4], POINTS[:4], STATURE_M)
+        metres_per_unit(joints[:, :4], POINTS[:4], [STATURE_M])
+
+
+def test_the_unit_is_the_mean_of_those_of_all_people_who_count():
+    both = np.concatenate([dancing(6) / 7, dancing(6, seed=1) / 5], axis=1)
+    own = metres_by_person(both, POINTS, [STATURE_M, STATURE_M])
+    np.testing.assert_allclose(own, [7, 5], rtol=0.03)
+    assert metres_per_unit(both, POINTS, [STATURE_M, STATURE_M]) == pytest.approx(np.sqrt(own[0] * own[1]))
+    assert metres_per_unit(both, POINTS, [np.nan, STATURE_M]) == pytest.approx(own[1])
+    both[:, len(POINTS) :] = np.nan
+    assert metres_per_unit(both, POINTS, [STATURE_M, STATURE_M]) == pytest.approx(own[0])
 
 
 def test_a_scale_without_height_is_as_uncertain_as_statures_are():
     assert 0.025 < scale_sigma(1.7) < 0.035  # lengths differ by 5%, and there are three
     assert scale_sigma(None) == pytest.approx(np.hypot(scale_sigma(1.7), 0.062))
+    assert scale_sigma(None, 4) == pytest.approx(scale_sigma(None) / 2)
 
 
 @pytest.mark.parametrize(("without", "floor_by"), [((), "heels and toes"), (("heel", "toe"), "ankles")])
