@@ -1,4 +1,4 @@
-"""Calibrate cameras by a person, without a board: by key points or silhouettes; a chain of cameras, one adjustment.
+"""Calibrate cameras by people, without a board: by key points or silhouettes; a chain of cameras, one adjustment.
 
 Imports `observations`, `calibration`, `boards`, `evidence` and the rooms below. Callers use
 `keypoint_files.calibrate_filmed_person` for footage, `keypoint_calibration.calibrate_by_person` for key points,

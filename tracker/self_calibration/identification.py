@@ -114,7 +114,9 @@ def _recognized(
         seen = joints_of_people(observations, persons, len(names), in_metres)
         identified = Identified(names, _left_out(observations, persons), int(matched.is_exchanged.sum()))
         require_shared(seen, cameras, identified.n_left_out, True)
-        if not is_last:
+        if is_last:
+            _require_recognized(observations, persons)
+        else:
             few = seen.on_frames(_spread(persons))
             first = adjusted_to(first.cameras, few, gauge, lenses)
     return FirstCameras(first.cameras, gauge, seen, statures, identified, _notes(start, identified, statures_m))
@@ -165,6 +167,23 @@ def _require_names(named: IntArray, matched: MatchedPeople, cameras: Sequence[Ca
                 f"expected names that mean one person in all cameras, found {n_off} of {n_named} in camera "
                 f"'{camera.name}' that do not fit the other cameras; correct the tracks, or film one person alone"
             )
+
+
+def _require_recognized(observations: ObservationSet, persons: IntArray) -> None:
+    """Refuse cameras that do not recognize over a quarter of the people, as `_require_names` refuses names.
+
+    Somebody whom one camera alone finds does not count.
+    """
+    points = observations.points
+    assert points is not None
+    counts = points.is_known.any(axis=-1).sum(axis=2)
+    expected = np.minimum(counts, np.sort(counts, axis=1)[:, -2:-1])
+    n_people, n_found = int(expected.sum()), int(np.minimum(expected, (persons >= 0).sum(axis=2)).sum())
+    if 4 * (n_people - n_found) > n_people:
+        raise CalibrationError(
+            f"expected people who fit between the cameras, found {n_people - n_found} of {n_people} in pictures who do "
+            "not; let one person walk through the volume alone for longer, or name the people in all files"
+        )
 
 
 def require_shared(seen: SeenJoints, cameras: Sequence[Camera], n_left_out: int, is_named: bool) -> None:

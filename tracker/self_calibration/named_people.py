@@ -184,7 +184,7 @@ def _cost(pairs: _Pairs, orders: Sequence[_Order]) -> float:
 
 
 def _of_pair(misfits: dict[_Order, float], a: _Order, b: _Order) -> float:
-    """Return the logarithm of the misfit of two cameras by the orders of both; that of the worst if it was not tried."""
+    """Return the logarithm of the misfit of two cameras by the orders of both; of one not tried, that of the worst."""
     order = tuple(a.index(person) if person >= 0 and person in a else -1 for person in b)
     return misfits.get(order, max(misfits.values(), default=0.0))
 

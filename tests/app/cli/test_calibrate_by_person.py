@@ -1,4 +1,4 @@
-"""`quadrille calibrate --people` on key points of a simulated person."""
+"""`quadrille calibrate --people` on key points of simulated people."""
 
 import json
 import shutil
@@ -7,7 +7,9 @@ import cv2
 import numpy as np
 import pytest
 from command_line import assert_refused
+from detected_people import danced, detected
 from filmed_people import FOCAL_PX, NAMES, SIZE, STATURE_M, dancing, observed, rig
+from observed_files import write_deeplabcut
 from observed_people import BODY_25, write_openpose
 
 from tracker.formats.anipose import read_calibration, write_calibration
@@ -30,12 +32,60 @@ def footage(tmp_path_factory):
     rows[:, :, :, at] = np.nan_to_num(np.concatenate([points.points_px, points.confidence[..., None]], axis=-1))
     write_openpose(folder / "keypoints", [c.name for c in CAMERAS], rows)
     write_calibration(folder / "lenses.toml", CAMERAS)
+    write_people(folder)
     return folder
 
 
-def words(footage, out, *more):
+def write_people(folder):
+    """Key points of two people: by name in the layout of DeepLabCut, and in that of OpenPose."""
+    several = detected(CAMERAS, danced(N_FRAMES), tracks=[["animal0", "animal1"]] * len(CAMERAS)).points
+    rows = np.concatenate([several.points_px, several.confidence[..., None]], axis=-1)
+    write_openpose(folder / "crowd", [c.name for c in CAMERAS], np.nan_to_num(rows))
+    for v, camera in enumerate(CAMERAS):
+        named = np.full((N_FRAMES, 2, *rows.shape[3:]), np.nan)
+        for person in range(2):
+            frames, places = np.nonzero(several.tracks[:, v] == f"animal{person}")
+            named[frames, person] = rows[frames, v, places]
+        write_deeplabcut(folder / "named" / camera.name, BODY_25.points, named, "multi")
+
+
+def words(footage, out, *more, files="keypoints"):
     videos = [footage / c.name for c in CAMERAS]
-    return ("calibrate", "--people", footage / "keypoints", "--videos", *videos, "--out", out, *more)
+    return ("calibrate", "--people", footage / files, "--videos", *videos, "--out", out, *more)
+
+
+@pytest.mark.slow
+def test_several_people_are_reported(run, footage, tmp_path):
+    heights = ("--height", f"animal0={STATURE_M}", f"animal1={STATURE_M}", "--lenses", footage / "lenses.toml")
+    status, text, _ = run(*words(footage, tmp_path / "c.toml", *heights, "--json", files="named"))
+    assert status == 0
+    record = json.loads(text)
+    assert [person["name"] for person in record["people"]] == ["animal0", "animal1"]
+    assert all(8 <= person["frames"] <= N_FRAMES for person in record["people"])
+    assert (record["pictures_left_out"], record["exchanged"]) == (0, 0)
+    status, text, _ = run(*words(footage, tmp_path / "d.toml", *heights, files="named"))
+    assert status == 0
+    assert "joints of 2 people in 10 frames\n  people: animal0 in 10 frames, animal1 in 10 frames\n" in text
+    assert "below them" in text
+
+
+def test_wrong_people_are_refused(run, footage, tmp_path):
+    out = tmp_path / "c.toml"
+    assert_refused(
+        run(*words(footage, out, files="crowd")),
+        ["pictures show several people and were left out, because not all files name the people", "film one person"],
+    )
+    assert_refused(
+        run(*words(footage, out, "--height", "eve=1.7", files="named")),
+        ["people whom the files name, found 'eve' and the people animal0, animal1"],
+    )
+    assert_refused(run(*words(footage, out, "--height", "1.7", "1.8", files="named")), ["--height as NAME=VALUE"])
+    videos = [footage / c.name for c in CAMERAS]
+    assert_refused(
+        run("calibrate", "--silhouettes", "--videos", *videos, "--out", out, "--height", "ann=1.7"),
+        ["expected one height for silhouettes"],
+    )
+    assert not out.exists()
 
 
 @pytest.mark.slow

@@ -166,6 +166,17 @@ def test_names_that_mean_nothing_are_left_where_one_person_is_alone():
     assert "the names of the people contradict each other in the cameras and were not used" in found.notes
 
 
+@pytest.mark.slow
+def test_people_whom_first_cameras_do_not_recognize_are_refused():
+    wrong = detected(CAMERAS, danced(24), alone=10)
+    px = wrong.points.points_px
+    px[10:, 2:] = 640 - px[10:, 2:]  # the first cameras do not fit these pictures
+    with pytest.raises(
+        CalibrationError, match=r"people who fit between the cameras, found \d+ of \d+ in pictures who do"
+    ):
+        calibrate_by_person(wrong, CAMERAS, STATURE_M, has_lenses=True)
+
+
 def test_heights_of_others_are_refused():
     with pytest.raises(CalibrationError, match="whom the files name, found 'eve' and the people ann, bob; correct the"):
         calibrate_by_person(detected(CAMERAS, JOINTS, tracks=ANN_BOB), CAMERAS, {"eve": 1.7}, has_lenses=True)
