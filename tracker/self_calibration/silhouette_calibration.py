@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -12,16 +11,17 @@ from tracker.boards.rig_fit import HELD_OUT_EVERY
 from tracker.boards.view_choice import MAX_FRAMES
 from tracker.calibration.point_adjustment import triangulate_all
 from tracker.compute.progress import Report, stages, unreported
+from tracker.compute.quantiles import MAD_TO_SIGMA
 from tracker.compute.sampling import spread_indices
 from tracker.compute.threads import one_blas_thread
 from tracker.errors import CalibrationError
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
 from tracker.geometry.cameras import Camera
+from tracker.self_calibration.frontier_adjustment import adjust_frontier
 from tracker.self_calibration.frontier_points import frontier_points
 from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses
 from tracker.self_calibration.person_calibration import (
     PersonCalibration,
-    adjusted_to,
     held_out_errors,
     lens_notes,
     of_one_size,
@@ -84,12 +84,13 @@ def _calibrated(
     chaining(1.0)
     n_frames = len(seen.hulls_px)
     held_out = np.arange(n_frames)[HELD_OUT_EVERY // 2 :: HELD_OUT_EVERY]
-    before, _ = _refined(placed, seen.on_frames(np.setdiff1d(np.arange(n_frames), held_out)), gauge, lenses)
+    rest = seen.on_frames(np.setdiff1d(np.arange(n_frames), held_out))
+    before, _ = adjust_frontier(placed, rest.hulls_px, gauge, lenses, EFFORT.rounds + 1)
     adjusting(0.5)
-    adjusted, points = _refined(before.cameras, seen, gauge, lenses)
+    adjusted, points = adjust_frontier(before.cameras, seen.hulls_px, gauge, lenses, EFFORT.rounds + 1)
     adjusting(1.0)
     on_them, errors_px = held_out_errors(
-        before.cameras, frontier_points(seen.on_frames(held_out).hulls_px, before.cameras)
+        before.cameras, frontier_points(seen.on_frames(held_out).hulls_px, before.cameras).seen
     )
     checking(1.0)
     found, determined = triangulate_all(adjusted.cameras, seen.standing.observations())
@@ -100,13 +101,15 @@ def _calibrated(
         raise undetermined(len(cameras))
     scale = (DEFAULT_HEIGHT_M if stature_m is None else stature_m) / float(np.median(statures))
     volume = volume_error(adjusted, scale)
+    if not volume.expected_m < DEFAULT_HEIGHT_M:
+        raise undetermined(len(cameras))  # beyond the size of a person, the error is no measure
     require_determined(volume, adjusted, points, scale, "silhouettes")
-    spread = float(np.median(np.abs(statures / np.median(statures) - 1)))
+    spread = MAD_TO_SIGMA * float(np.median(np.abs(statures / np.median(statures) - 1)))
     sigma = float(np.hypot(spread, STATURE_SIGMA if stature_m is None else 0.0))
     world = upright_by_ends(
         scaled_by(adjusted.cameras, scale), scale * ends, scale * points.by_joint(adjusted.points_world)
     )
-    notes = (*scale_notes(stature_m, sigma), *lens_notes(adjusted, has_lenses), _up_note(world.lean_rad))
+    notes = (*scale_notes(stature_m, sigma), *_lens_notes(adjusted, has_lenses), _up_note(world.lean_rad))
     return PersonCalibration(
         world, adjusted, points, held_out, on_them.cameras, errors_px, volume, sigma, notes, "frontier points"
     )
@@ -164,17 +167,12 @@ def _placed(
     return best[0].cameras, best[1]
 
 
-def _refined(
-    cameras: Sequence[Camera], seen: SeenSilhouettes, gauge: Gauge, lenses: UnknownLenses | None
-) -> tuple[AdjustedJoints, SeenJoints]:
-    """Fit cameras to frontier points alone: ends of silhouettes are no points of the body."""
-    failure = partial(undetermined, len(cameras))
-    points = frontier_points(seen.hulls_px, cameras)
-    found = adjusted_to(cameras, points, gauge, lenses, failure)
-    for _ in range(EFFORT.rounds):
-        points = frontier_points(seen.hulls_px, found.cameras)
-        found = adjusted_to(found.cameras, points, gauge, lenses, failure)
-    return found, points
+def _lens_notes(adjusted: AdjustedJoints, has_lenses: bool) -> tuple[str, ...]:
+    """Return sentences on lenses, of which silhouettes show more than joints do."""
+    assumed = (
+        "principal points near the middle, little distortion and one focal length for pictures of one size were assumed"
+    )
+    return () if has_lenses else (assumed, *lens_notes(adjusted, has_lenses)[1:])
 
 
 def _up_note(lean_rad: float) -> str:

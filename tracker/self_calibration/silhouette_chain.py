@@ -103,7 +103,7 @@ def fitted_to_frontier(
     """Fit cameras to crown, feet and frontier points, which are found again some times; None where that fails."""
     found = None
     for _ in range(rounds):
-        joints = seen.standing.with_more(frontier_points(seen.hulls_px, cameras))
+        joints = seen.standing.with_more(frontier_points(seen.hulls_px, cameras).seen)
         observations = joints.observations()
         try:
             found = adjust_joints(cameras, observations, joints.n_joints, gauge, lenses)

@@ -73,12 +73,15 @@ def test_frontier_points_agree_between_true_cameras_alone():
     off = rigid.transform(rigid.so3_exp(np.radians([0.0, 0.0, 3.0])), None)
     wrong = [CAMERAS[0], replace(CAMERAS[1], T_world_camera=CAMERAS[1].T_world_camera @ off), *CAMERAS[2:]]
     assert focal * np.nanmax(plane_angles(hulls, wrong, (0, 1))) > 2
-    seen = frontier_points(hulls, CAMERAS)
+    seen, outward = frontier_points(hulls, CAMERAS)
     assert seen.px.shape == (3, 4, 12, 2)
     # Points of a pair are seen by these two alone, above and below.
     assert seen.is_seen[0, :, 0].tolist() == [True, True, False, False]
     assert np.all(seen.is_seen.sum(axis=1) <= 2)
-    assert abs(seen.px[0, 0, 0, 1] - seen.px[0, 0, 1, 1]) > 50
+    # The upper one is the first; both directions lead out of the silhouette.
+    assert np.all(seen.px[:, 0, 1, 1] - seen.px[:, 0, 0, 1] > 50)
+    assert np.all(outward[:, 0, 0, 1] < -0.5)
+    assert np.all(outward[:, 0, 1, 1] > 0.5)
 
 
 def test_each_camera_finds_the_vertical_and_its_height():
