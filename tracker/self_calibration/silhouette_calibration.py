@@ -16,6 +16,7 @@ from tracker.compute.sampling import spread_indices
 from tracker.compute.threads import one_blas_thread
 from tracker.errors import CalibrationError
 from tracker.formats.model_toml import DEFAULT_HEIGHT_M
+from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
 from tracker.self_calibration.frontier_adjustment import adjust_frontier
 from tracker.self_calibration.frontier_points import frontier_points
@@ -30,7 +31,7 @@ from tracker.self_calibration.person_calibration import (
     undetermined,
     volume_error,
 )
-from tracker.self_calibration.person_silhouettes import Flaw, PersonSilhouette
+from tracker.self_calibration.person_silhouettes import Flaw, PersonSilhouette, UprightRules
 from tracker.self_calibration.seen_joints import SeenJoints
 from tracker.self_calibration.silhouette_chain import EFFORT, SeenSilhouettes, fitted_to_frontier, silhouette_chains
 from tracker.self_calibration.stature import STATURE_SIGMA, scaled_by, upright_by_ends
@@ -104,8 +105,7 @@ def _calibrated(
     if not volume.expected_m < DEFAULT_HEIGHT_M:
         raise undetermined(len(cameras))  # beyond the size of a person, the error is no measure
     require_determined(volume, adjusted, points, scale, "silhouettes")
-    spread = MAD_TO_SIGMA * float(np.median(np.abs(statures / np.median(statures) - 1)))
-    sigma = float(np.hypot(spread, STATURE_SIGMA if stature_m is None else 0.0))
+    sigma = _scale_sigma(statures, stature_m)
     world = upright_by_ends(
         scaled_by(adjusted.cameras, scale), scale * ends, scale * points.by_joint(adjusted.points_world)
     )
@@ -165,6 +165,17 @@ def _placed(
     if best is None:
         raise undetermined(len(cameras))
     return best[0].cameras, best[1]
+
+
+def _scale_sigma(statures: Array, stature_m: float | None) -> float:
+    """Return the standard deviation of the scale as a share of it.
+
+    Statures differ from frame to frame, as the person bends and steps. Both ends of a silhouette lie beside crown and
+    soles besides, alike on all frames: a camera from above sees the tip of the nearer foot.
+    """
+    spread = MAD_TO_SIGMA * float(np.median(np.abs(statures / np.median(statures) - 1)))
+    ends = np.sqrt(2) * UprightRules().end
+    return float(np.linalg.norm([spread, ends, STATURE_SIGMA if stature_m is None else 0.0]))
 
 
 def _lens_notes(adjusted: AdjustedJoints, has_lenses: bool) -> tuple[str, ...]:

@@ -38,6 +38,8 @@ def test_cameras_are_found_from_silhouettes_alone(has_lenses):
     focal = np.array([c.K[0, 0] for c in found.cameras])
     assert np.all(np.abs(focal / FOCAL_PX - 1) < (1e-9 if has_lenses else 0.03))
     assert found.points == "frontier points"
+    assert abs(scale - 1) < 2 * found.scale_sigma
+    assert found.scale_sigma > 0.04  # ends of silhouettes are no points of the body
 
 
 @pytest.mark.parametrize(
