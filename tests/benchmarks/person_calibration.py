@@ -294,7 +294,8 @@ def measure_silhouettes(data: Path, write: Sequence[Path]):
         "one person; only `fast_arms` has a stated height, 1.55 m",
         "nothing, or the lenses of the given calibration",
         "defaults",
-        "bounds of the search of the first turns, and the crown on the axis, on `fast_arms`",
+        "bounds of the search of the first turns, and the crown on the axis, on `fast_arms`; `balance_real` and `walk` "
+        "showed which errors were missing",
         COMMAND,
     )
     cells = {}
