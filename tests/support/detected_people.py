@@ -20,9 +20,9 @@ _OF_TRC = {"Neck": "Neck"} | {
 """Marker of `two_people` for a point of BODY_25."""
 
 
-def acted(scene, n_frames, seed=0, fps=25.0):
+def acted(scene, n_frames, seed=0, fps=25.0, person=""):
     """Joints of the people of a scene, (F, P, 25, 3), metres, NaN for points that bodies lack; heights by name."""
-    cast = cast_of(scene, seed)
+    cast = cast_of(scene, seed, person)
     out = np.full((n_frames, len(cast), len(BODY_25.points), 3), np.nan)
     of = BODY_25.counterparts(BODY_25.points)
     for p, role in enumerate(cast):

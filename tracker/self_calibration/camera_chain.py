@@ -1,4 +1,8 @@
-"""All cameras, one after the other: the pair that its joints determine best, then each by joints known in space."""
+"""All cameras, one after the other: a pair that its joints determine well, then each by joints known in space.
+
+The covariance of a pair holds for the solution that was found, and a wrong one may have a small one. So several pairs
+are followed to the end.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,31 +17,44 @@ from tracker.errors import CalibrationError
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
 from tracker.geometry.cameras import Camera
-from tracker.self_calibration.joint_adjustment import Gauge, adjust_joints, no_common_view
+from tracker.self_calibration.joint_adjustment import Gauge, UnknownLenses, adjust_joints, no_common_view
+from tracker.self_calibration.person_calibration import adjusted_to
+from tracker.self_calibration.rival_cameras import Solution, Solutions, compared
 from tracker.self_calibration.seen_joints import SeenJoints
 from tracker.self_calibration.stature import metres_per_unit, scaled_by
 from tracker.self_calibration.two_views import TwoViews, relate
 
 
 def chain_cameras(
-    seen: SeenJoints, lenses: Sequence[Camera], statures_m: Sequence[float]
-) -> tuple[tuple[Camera, ...], Gauge]:
-    """Find the poses of cameras with known lenses, metres, in the world of one of them.
+    seen: SeenJoints, cameras: Sequence[Camera], statures_m: Sequence[float], lenses: UnknownLenses | None
+) -> Solutions:
+    """Find cameras from nothing, the best ones of several chains.
+
+    As many chains are followed as there are cameras. Cameras that face each other, which joints determine worst, are at
+    most half as many pairs.
 
     Args:
         seen: joints of people.
-        lenses: the cameras with their lenses.
+        cameras: with their lenses, or average ones.
         statures_m: of each person, metres; NaN for one who does not count for the scale.
+        lenses: knowledge of the lenses; None for lenses that stay as they are.
 
     Raises:
         CalibrationError: no two cameras show the person from different sides, or one shows too little of the person.
     """
-    pairs = [relate(seen, (i, j), lenses[i], lenses[j]) for i, j in combinations(range(len(lenses)), 2)]
-    found = [pair for pair in pairs if pair is not None]
+    pairs = [relate(seen, (i, j), cameras[i], cameras[j]) for i, j in combinations(range(len(cameras)), 2)]
+    related = sorted((pair for pair in pairs if pair is not None), key=lambda pair: pair.rotation_sigma)
+    found, failures = list[Solution](), list[Exception]()
+    for pair in related[: len(cameras)]:
+        gauge = Gauge(*pair.pair)
+        try:
+            placed = _completed(seen, cameras, pair, statures_m)
+            found.append(Solution(adjusted_to(placed, seen, gauge, lenses), gauge))
+        except (CalibrationError, np.linalg.LinAlgError) as error:
+            failures.append(error)
     if not found:
-        raise no_common_view()
-    best = min(found, key=lambda pair: pair.rotation_sigma)
-    return _completed(seen, lenses, best, statures_m), Gauge(*best.pair)
+        raise failures[0] if failures else no_common_view()
+    return compared(found, seen, lenses)
 
 
 def _completed(
@@ -61,7 +78,8 @@ def _completed(
             seen.n_joints,
             Gauge(order.index(start.pair[0]), order.index(start.pair[1])),
         )
-        assert adjusted is not None
+        if adjusted is None:
+            raise no_common_view()
         placed = dict(zip(order, adjusted.cameras, strict=True))
         joints, sigma_px = seen.by_joint(adjusted.points_world), adjusted.sigma_px
     return tuple(placed[i] for i in range(len(lenses)))

@@ -19,6 +19,7 @@ from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, Unk
 from tracker.self_calibration.named_people import NamedPeople, people_by_name
 from tracker.self_calibration.people_matching import MatchedPeople, match_across_cameras
 from tracker.self_calibration.person_calibration import Identified, adjusted_to
+from tracker.self_calibration.rival_cameras import Solution
 from tracker.self_calibration.seen_joints import SeenJoints, joints_of_people, own_columns
 from tracker.self_calibration.stature import metres_per_unit, scaled_by
 
@@ -38,6 +39,8 @@ class FirstCameras(NamedTuple):
     """Of each person; NaN for one who does not count for the scale."""
     identified: Identified
     notes: tuple[str, ...]
+    rivals: tuple[Solution, ...]
+    """Other cameras that explain the first joints about as well."""
 
 
 def first_cameras(
@@ -97,13 +100,12 @@ def _recognized(
     require_shared(seen, cameras, _left_out(observations, start.persons), is_named)
     few = seen.on_frames(_spread(start.persons))
     statures = statures_of(names, statures_m, is_named)
-    placed, gauge = chain_cameras(few, cameras, statures)
-    first = adjusted_to(placed, few, gauge, lenses)
+    (first, gauge), rivals = chain_cameras(few, cameras, statures, lenses)
     points = observations.points
     assert points is not None
     if len(names) == 1 and points.is_known.any(axis=-1).sum(axis=2).max() == 1:
         seen = joints_of_people(observations, start.persons, 1, _in_metres(first, few, statures))
-        return FirstCameras(first.cameras, gauge, seen, statures, Identified(names), ())
+        return FirstCameras(first.cameras, gauge, seen, statures, Identified(names), (), rivals)
     known = start.persons if is_named else np.full_like(start.persons, -1)
     for is_last in (False, True):
         in_metres = _in_metres(first, few, statures)
@@ -119,7 +121,8 @@ def _recognized(
         else:
             few = seen.on_frames(_spread(persons))
             first = adjusted_to(first.cameras, few, gauge, lenses)
-    return FirstCameras(first.cameras, gauge, seen, statures, identified, _notes(start, identified, statures_m))
+    notes = _notes(start, identified, statures_m)
+    return FirstCameras(first.cameras, gauge, seen, statures, identified, notes, rivals)
 
 
 def _spread(persons: IntArray) -> IntArray:

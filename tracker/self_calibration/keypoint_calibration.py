@@ -27,6 +27,7 @@ from tracker.self_calibration.person_calibration import (
     scale_notes,
     volume_error,
 )
+from tracker.self_calibration.rival_cameras import Solution, require_one_solution
 from tracker.self_calibration.stature import (
     Upright,
     metres_by_person,
@@ -85,6 +86,7 @@ def _calibrated(
     scale = metres_per_unit(joints, seen.names, statures)
     volume = volume_error(adjusted, scale)
     require_determined(volume, adjusted, seen, scale)
+    require_one_solution(Solution(adjusted, gauge), first.rivals, seen, lenses)
     by_person = scale * joints.reshape(-1, len(seen.names), 3)
     world = upright(scaled_by(adjusted.cameras, scale), by_person, seen.names, float(np.nanmean(statures)))
     scales = metres_by_person(joints, seen.names, statures)
