@@ -45,7 +45,10 @@ from tracker.simulate.people.population import POPULATION
 from tracker.simulate.stage.camera_rig import make_cameras
 
 KINDS = ("recordings", "silhouettes", "simulated", "several", "alone", "simulated silhouettes")
-TABLES = tuple(f"person_calibration {kind}" for kind in KINDS)
+TABLES = (
+    "person_calibration recordings", "person_calibration silhouettes", "person_calibration simulated",
+    "person_calibration several", "person_calibration alone", "person_calibration simulated silhouettes",
+)  # fmt: skip
 MASKS = {"walk": "masks", "fast_arms": "masks", "balance_real": None}
 """Folder of masks; None where the footage shows silhouettes."""
 LENS_NAMES = {False: "unknown lenses", True: "given lenses"}
