@@ -1,12 +1,9 @@
-"""Calibrate cameras by a person and compare: `python tests/benchmarks/person_calibration.py --data DIR`.
+"""Calibrate cameras by people and compare: `python tests/benchmarks/person_calibration.py --data DIR`.
 
-Recordings have key points of a detector (`detector/keypoints`) and a calibration. `walk` and `fast_arms` have exact
-masks, too; silhouettes of `balance_real` are those of the footage against its own median. The found cameras are
-compared with the given ones after the best similarity of all joints, because neither shares a world or a scale.
-Simulated people have noise of 3 px and gross errors (`tests/support/filmed_people.py`). Several people also have
+Recordings have key points of a detector (`detector/keypoints`) and a calibration. The found cameras are compared with
+the given ones after the best similarity of all joints, because neither shares a world or a scale. Simulated people have
+noise of 3 px and gross errors (`tests/support/filmed_people.py`). Several people, and people on one spot, also have
 offsets of each joint, and hide each other (`tests/support/detected_people.py`).
-Simulated people have noise of 3 px and gross errors (`tests/support/filmed_people.py`), or are rendered masks
-(`tests/support/filmed_silhouettes.py`).
 """
 
 import argparse
@@ -25,32 +22,26 @@ from board_rigs import rms_error_m
 from detected_people import acted, detected, filmed_couple
 from doc_tables import Conditions, add_write_option, check_places, show, table
 from filmed_people import aligned, blanks, dancing, observed, rig
-from filmed_silhouettes import EXACT, FilmedSilhouettes, Segmentation, filmed
 
 from tracker.calibration.point_adjustment import triangulate_all
 from tracker.calibration.reprojection import Observations
 from tracker.calibrations.reading import read_cameras
-from tracker.compute.progress import unreported
 from tracker.errors import CalibrationError
 from tracker.geometry import rigid
-from tracker.geometry.arrays import Array
+from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
 from tracker.observations.joints import triangulate_observations
 from tracker.observations.observed import ObservationSet
 from tracker.self_calibration.keypoint_calibration import calibrate_by_person
-from tracker.self_calibration.keypoint_files import FilmedPerson, KeyPoints, calibrate_filmed_person, read_keypoints
+from tracker.self_calibration.keypoint_files import KeyPoints, read_keypoints
 from tracker.self_calibration.person_calibration import PersonCalibration
-from tracker.self_calibration.silhouette_calibration import calibrate_by_silhouettes
-from tracker.simulate.people.population import POPULATION
 from tracker.simulate.stage.camera_rig import make_cameras
 
-KINDS = ("recordings", "silhouettes", "simulated", "several", "alone", "simulated silhouettes")
+KINDS = ("recordings", "simulated", "several", "alone")
 TABLES = (
-    "person_calibration recordings", "person_calibration silhouettes", "person_calibration simulated",
-    "person_calibration several", "person_calibration alone", "person_calibration simulated silhouettes",
+    "person_calibration recordings", "person_calibration simulated", "person_calibration several",
+    "person_calibration alone",
 )  # fmt: skip
-MASKS = {"walk": "masks", "fast_arms": "masks", "balance_real": None}
-"""Folder of masks; None where the footage shows silhouettes."""
 LENS_NAMES = {False: "unknown lenses", True: "given lenses"}
 HEADS = (
     "centres, mm", "rotations, degrees", "focal lengths, %", "joints, median / rms, mm", "expected, mm",
@@ -67,14 +58,6 @@ SCENES_ALONE = ("exercise", "reach_and_cross", "walk_in_place", "leaving")
 PEOPLE_ALONE = ("", "child_10")
 N_SEVERAL, N_ALONE = 60, 20
 """Frames of several people, and of those without names the first ones, on which one of them is alone."""
-FIRST_FILMED_SEED = 9200
-SEGMENTATIONS = {
-    "exact": EXACT,
-    "borders with noise of 1 px, 3 holes": Segmentation(noise_px=1.0, holes=3),
-    "a rim of 1 px": Segmentation(dilation_px=1.0),
-}
-MOTIONS = ("exercise", "dance", "reach_and_cross", "walk_in_place")
-FILMED_FRAMES = 24
 COMMAND = "python tests/benchmarks/person_calibration.py --data DIR --write docs/calibration.md"
 
 
@@ -113,16 +96,8 @@ def keypoint_row(folder: Path, height_m: float | None, has_lenses: bool) -> list
     """Calibrate the cameras of a recording by key points, and return a row of the table."""
     paths, given, keypoints = _recording(folder)
     lenses = [given[name] for name in paths] if has_lenses else keypoints.blanks
-    return _row(folder, calibrate_by_person(keypoints.observations, lenses, height_m, has_lenses), height_m, has_lenses)
-
-
-def silhouette_row(folder: Path, height_m: float | None, has_lenses: bool) -> list[str]:
-    """Calibrate the cameras of a recording by silhouettes, and return a row of the table."""
-    masks = MASKS[folder.name]
-    paths = {p.stem: p for p in sorted(folder.glob("*.mp4"))}
-    lenses = folder / "Calib.toml" if has_lenses else None
-    filmed = FilmedPerson(folder / masks if masks else None, [*paths.values()], stature_m=height_m, lenses=lenses)
-    return _row(folder, calibrate_filmed_person(filmed, unreported), height_m, has_lenses)
+    found = calibrate_by_person(keypoints.observations, lenses, height_m, has_lenses)
+    return recording_row(folder, found, height_m, has_lenses)
 
 
 def _recording(folder: Path) -> tuple[dict[str, Path], dict[str, Camera], KeyPoints]:
@@ -131,7 +106,7 @@ def _recording(folder: Path) -> tuple[dict[str, Path], dict[str, Camera], KeyPoi
     return paths, entries, read_keypoints(folder / "detector/keypoints", paths, {}, common_frames=False)
 
 
-def _row(folder: Path, found: PersonCalibration, height_m: float | None, has_lenses: bool) -> list[str]:
+def recording_row(folder: Path, found: PersonCalibration, height_m: float | None, has_lenses: bool) -> list[str]:
     """Compare found cameras with the given ones, by joints that both triangulate from key points."""
     paths, entries, keypoints = _recording(folder)
     given = [entries[name] for name in paths]
@@ -194,7 +169,7 @@ def several_row(cameras: Sequence[Camera], joints: Array, heights_m, is_named: b
     except CalibrationError as error:
         return [f"refused: {str(error).split(';')[0]}", *[""] * 6]
     true = joints.reshape(-1, 3)[np.isfinite(joints).all(axis=-1).ravel()]
-    off = compared(found.cameras, cameras, reprojected(cameras, found.cameras, true), true)
+    off = compared(found.cameras, cameras, reprojected(cameras, found.cameras, true)[0], true)
     focal = [100 * np.log(a.K[0, 0] / b.K[0, 0]) for a, b in zip(found.cameras, cameras, strict=True)]
     return [
         f"{np.mean(off.centers_mm):.0f} (to {np.max(off.centers_mm):.0f})",
@@ -224,7 +199,7 @@ def alone_row(scene: str, has_lenses: bool) -> list[str]:
             print(scene, person, seed, has_lenses, f"refused: {str(error).split(';')[0]}", flush=True)
             continue
         true = joints.reshape(-1, 3)[np.isfinite(joints).all(axis=-1).ravel()]
-        off = compared(found.cameras, cameras, reprojected(cameras, found.cameras, true), true)
+        off = compared(found.cameras, cameras, reprojected(cameras, found.cameras, true)[0], true)
         joints_mm.append(np.sqrt(np.mean(np.sort(off.joints_mm)[: int(TRIMMED * len(true))] ** 2)))
         expected_mm.append(1000 * found.volume.expected_m)
         n_outside += off.scale * 1000 * found.volume.high_m < joints_mm[-1]
@@ -234,46 +209,11 @@ def alone_row(scene: str, has_lenses: bool) -> list[str]:
     return [f"{refused}", f"{n_reversed}", f"{n_outside}", *errors]
 
 
-def reprojected(cameras: Sequence[Camera], found: Sequence[Camera], points: Array) -> Array:
-    """Project points, (n, 3), by true cameras, and triangulate them by found ones."""
+def reprojected(cameras: Sequence[Camera], found: Sequence[Camera], points: Array) -> tuple[Array, Mask]:
+    """Project points, (n, 3), by true cameras; triangulate them by found ones, and return which are determined, too."""
     px = np.stack([c.project(points) for c in cameras])
     views, numbers = np.indices(px.shape[:2]).reshape(2, -1)
-    return triangulate_all(found, Observations(views, numbers, px.reshape(-1, 2)))[0]
-
-
-class Calibrated(NamedTuple):
-    """A simulated rig that silhouettes have calibrated."""
-
-    true_mm: float
-    ratio: float
-    """True error over the expected one."""
-    is_inside: bool
-    scale: float
-    """Error of the scale, as a share."""
-    scale_sigmas: float
-    """The same in stated standard deviations."""
-
-
-def by_silhouettes(film: FilmedSilhouettes, n_cameras: int, has_lenses: bool) -> Calibrated | None:
-    """Calibrate some cameras by the silhouettes of a simulated person; None where that is refused."""
-    cameras, rows = film.cameras[:n_cameras], [row[:n_cameras] for row in film.rows]
-    lenses = cameras if has_lenses else blanks(cameras)
-    try:
-        found = calibrate_by_silhouettes(rows, lenses, film.height_m, has_lenses)
-    except CalibrationError as error:
-        print(str(error).split(";")[0], flush=True)
-        return None
-    points = film.joints_world.reshape(-1, 3)[::5]
-    px = np.concatenate([c.project(points) for c in cameras])
-    numbers = np.tile(np.arange(len(points)), n_cameras)
-    seen = Observations(np.repeat(np.arange(n_cameras), len(points)), numbers, px)
-    joints, known = triangulate_all(found.cameras, seen)
-    scale, R, t = aligned(joints[known], points[known])
-    errors = np.linalg.norm(scale * joints[known] @ R.T + t - points[known], axis=1)
-    true, volume = float(np.sqrt(np.mean(errors**2))) / scale, found.volume
-    off = 1 / scale - 1
-    is_inside = bool(volume.low_m <= true <= volume.high_m)
-    return Calibrated(1000 * scale * true, true / volume.expected_m, is_inside, off, off / found.scale_sigma)
+    return triangulate_all(found, Observations(views, numbers, px.reshape(-1, 2)))
 
 
 def _scaled(T_world_camera: Array, scale: float) -> Array:
@@ -291,16 +231,12 @@ def main():
     check_places(arguments.write, TABLES)
     if arguments.data is not None and "recordings" in arguments.only:
         measure_recordings(arguments.data, arguments.write)
-    if arguments.data is not None and "silhouettes" in arguments.only:
-        measure_silhouettes(arguments.data, arguments.write)
     if "simulated" in arguments.only:
         measure_simulated(arguments.rigs, arguments.write)
     if "several" in arguments.only:
         measure_several(arguments.data, arguments.write)
     if "alone" in arguments.only:
         measure_alone(arguments.write)
-    if "simulated silhouettes" in arguments.only:
-        measure_simulated_silhouettes(arguments.rigs, arguments.write)
 
 
 def measure_recordings(data: Path, write: Sequence[Path]):
@@ -323,29 +259,6 @@ def measure_recordings(data: Path, write: Sequence[Path]):
     show(write, TABLES[0], conditions, table(HEADS, cells, "recording"))
 
 
-def measure_silhouettes(data: Path, write: Sequence[Path]):
-    """Write the table of silhouettes, after each row: one takes a minute of processor time."""
-    conditions = Conditions(
-        "`walk` (60 frames) and `fast_arms` (50) with exact masks, and `balance_real` (100) with silhouettes against "
-        "its own median; four cameras each",
-        "one person; only `fast_arms` has a stated height, 1.55 m",
-        "nothing, or the lenses of the given calibration",
-        "defaults",
-        "bounds of the search of the first turns, and the crown on the axis, on `fast_arms`; `balance_real` and `walk` "
-        "showed which errors were missing",
-        COMMAND,
-    )
-    cells = {}
-    for lenses in (False, True):
-        for name, height_m in HEIGHTS_M.items():
-            title = f"`{name}`, {LENS_NAMES[lenses]}"
-            try:
-                cells[title] = silhouette_row(data / name, height_m, lenses)
-            except CalibrationError as error:
-                cells[title] = [f"refused: {str(error).split(';')[0]}", *[""] * (len(HEADS) - 1)]
-            show(write, TABLES[1], conditions, table(HEADS, cells, "recording"))
-
-
 def measure_simulated(n_rigs: int, write: Sequence[Path]):
     """Write the table of simulated people."""
     rigs = {
@@ -365,7 +278,7 @@ def measure_simulated(n_rigs: int, write: Sequence[Path]):
         COMMAND,
     )
     heads = ("refused", "true error, median, mm", "true / expected", "within 90%")
-    show(write, TABLES[2], conditions, table(heads, cells, "cameras"))
+    show(write, TABLES[1], conditions, table(heads, cells, "cameras"))
 
 
 def measure_several(data: Path | None, write: Sequence[Path]):
@@ -402,7 +315,7 @@ def measure_several(data: Path | None, write: Sequence[Path]):
         "centres, mm", "focal lengths, %", "joints, median / rms, mm", "expected, mm", "scale, %", "up, degrees",
         "pictures left out",
     )  # fmt: skip
-    show(write, TABLES[3], conditions, table(heads, cells, "people"))
+    show(write, TABLES[2], conditions, table(heads, cells, "people"))
 
 
 def measure_alone(write: Sequence[Path]):
@@ -425,51 +338,7 @@ def measure_alone(write: Sequence[Path]):
         "refused", "a camera off by 90 degrees", "joints above the interval", "joints, rms, median, mm",
         "expected, median, mm",
     )  # fmt: skip
-    show(write, TABLES[4], conditions, table(heads, cells, "scene"))
-
-
-def measure_simulated_silhouettes(n_rigs: int, write: Sequence[Path]):
-    """Write the table of simulated silhouettes, after each person: one takes two minutes of processor time."""
-    exact, noisy, rim = SEGMENTATIONS
-    kinds = [(n, True, s) for n in (4, 3, 2) for s in SEGMENTATIONS if n != 3 or s != rim]
-    kinds += [(4, False, exact), (4, False, noisy), (3, False, exact), (2, False, exact)]
-    results = {kind: list[Calibrated | None]() for kind in kinds}
-    people = [*POPULATION][1:]
-    for i in range(n_rigs):
-        scene, person, seed = MOTIONS[i % len(MOTIONS)], people[(3 * i + 2) % len(people)], FIRST_FILMED_SEED + i
-        found = filmed(person, scene, seed, 4, FILMED_FRAMES, [*SEGMENTATIONS.values()])
-        films = dict(zip(SEGMENTATIONS, found, strict=True))
-        for kind in kinds:
-            results[kind].append(by_silhouettes(films[kind[2]], *kind[:2]))
-            print(person, scene, kind, results[kind][-1], flush=True)
-        cells = {
-            f"{n} cameras, {LENS_NAMES[lenses]}, {masks}": _filmed_cells(results[n, lenses, masks])
-            for n, lenses, masks in kinds
-        }
-        conditions = Conditions(
-            f"{i + 1} simulated people of each kind, {FILMED_FRAMES} frames, walking round in a room with cameras in "
-            "its corners, of seeds from 9200 on; 640x480 px, lenses that distort a little",
-            "rendered people of several builds; their height is given",
-            "nothing, or the true lenses",
-            "defaults",
-            "none on these; other people of seeds from 9100 on showed which errors were missing",
-            COMMAND,
-        )
-        heads = ("refused", "true error, median, mm", "true / expected, median", "within 90%", "scale, %, median",
-                 "scale, standard deviations, rms")  # fmt: skip
-        show(write, TABLES[5], conditions, table(heads, cells, "cameras and masks"))
-
-
-def _filmed_cells(results: Sequence[Calibrated | None]) -> list[str]:
-    found = [r for r in results if r is not None]
-    n_refused = f"{len(results) - len(found)}"
-    if not found:
-        return [n_refused, *["-"] * 5]
-    true_mm, ratios, inside, scales, sigmas = (np.array(column) for column in zip(*found, strict=True))
-    return [n_refused, f"{np.median(true_mm):.2f} (to {true_mm.max():.2f})",
-            f"{np.median(ratios):.2f} ({ratios.min():.2f} to {ratios.max():.2f})", f"{np.mean(inside):.0%}",
-            f"{100 * np.median(scales):+.1f} ({100 * scales.min():+.1f} to {100 * scales.max():+.1f})",
-            f"{np.sqrt(np.mean(sigmas**2)):.1f}"]  # fmt: skip
+    show(write, TABLES[3], conditions, table(heads, cells, "scene"))
 
 
 if __name__ == "__main__":
