@@ -345,13 +345,17 @@ def _result(problem: ReprojectionProblem, rig: Rig) -> RigFit:
     share = problem.common_share(rig)
     information = _information(squares, weights, problem.left) / share
     precision = information * data + prior
-    # The columns have different units.
-    units = 1 / np.sqrt(np.maximum(np.diag(precision), np.finfo(float).tiny))
-    covariance = np.linalg.pinv(precision * np.outer(units, units), hermitian=True) * np.outer(units, units)
+    covariance = inverse(precision)
     at = np.concatenate([start + c for start, c in zip(column_ends(rig.cameras), problem.columns, strict=False)])
     whole = np.zeros(2 * (column_ends(rig.cameras)[-1],))
     whole[np.ix_(at, at)] = covariance
     return RigFit(rig, problem.sigmas_px, whole, errors, weights, share)
+
+
+def inverse(matrix: Array) -> Array:
+    """Invert a positive semidefinite matrix of unknowns with different units."""
+    units = 1 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+    return np.asarray(np.linalg.pinv(matrix * np.outer(units, units), hermitian=True) * np.outer(units, units))
 
 
 def column_ends(cameras: Sequence[Camera]) -> list[int]:

@@ -67,6 +67,11 @@ class CalibrationCheck:
         """Sentences for the user: on cameras that are off, and on what these frames cannot show."""
         return [*self.contradictions, *self.notes]
 
+    def n_lost(self, name: str) -> int:
+        """Return the number of frames that a camera lost within the recording; negative where it doubled some."""
+        lost = self.lost.get(name)
+        return 0 if lost is None else lost.n
+
     def corrections_on(self, frame: int) -> Array:
         """Return the corrections of a frame, (V, N_CORRECTIONS); 0 for cameras that have been off since a later one."""
         is_off = [frame >= self.since.get(c.name, 0) for c in self.cameras]

@@ -14,12 +14,12 @@ import numpy as np
 
 from tracker.calibration.camera_columns import FOCAL, POSE, camera_difference, moved_camera
 from tracker.calibration.lens_priors import UNKNOWN_LENS, prior_sigmas
-from tracker.calibration.reprojection import OUTLIER_SIGMAS, column_ends
+from tracker.calibration.reprojection import OUTLIER_SIGMAS, column_ends, inverse
 from tracker.errors import CalibrationError
 from tracker.geometry.arrays import Array, Mask
 from tracker.geometry.cameras import Camera
 from tracker.images.working_view import working_scale
-from tracker.self_calibration.frontier_equations import BORDER, FrontierEquations, frontier_equations, inverse
+from tracker.self_calibration.frontier_equations import BORDER, FrontierEquations, frontier_equations
 from tracker.self_calibration.frontier_points import FrontierPoints, frontier_points
 from tracker.self_calibration.joint_adjustment import AdjustedJoints, Gauge, UnknownLenses
 from tracker.self_calibration.person_calibration import adjusted_to, undetermined

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.calibration.camera_columns import project_with_columns
-from tracker.calibration.reprojection import column_ends
+from tracker.calibration.reprojection import column_ends, inverse
 from tracker.geometry.arrays import Array, IntArray, Mask
 from tracker.self_calibration.frontier_points import FrontierPoints
 from tracker.self_calibration.joint_adjustment import AdjustedJoints
@@ -110,9 +110,3 @@ def _blocks(
     for i, row in enumerate(rows):
         out[i][i] = out[i][i] + row.swapaxes(1, 2) @ row
     return out
-
-
-def inverse(matrix: Array) -> Array:
-    """Invert a positive semidefinite matrix of unknowns with different units."""
-    units = 1 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
-    return np.asarray(np.linalg.pinv(matrix * np.outer(units, units), hermitian=True) * np.outer(units, units))

@@ -238,7 +238,7 @@ def _notes(start: NamedPeople, identified: Identified, statures_m: Statures) -> 
             f"{identified.n_exchanged} times a file gives a person the name of another, by what other cameras show"
         )
     if identified.n_left_out:
-        out.append(f"{identified.n_left_out} pictures show people who cannot be told apart, and were left out")
+        out.append(f"{identified.n_left_out} pictures show people who cannot be identified, and were left out")
     if len(identified.names) > 1 and isinstance(statures_m, int | float):
         out.append(f"the height was taken for that of each of the {len(identified.names)} people")
     return tuple(out)

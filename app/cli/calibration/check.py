@@ -119,7 +119,6 @@ def _as_json(found: "CalibrationCheck", scores: list[tuple["FrameScore", "FrameS
 def _camera(finding: "CameraFinding", check: "CalibrationCheck") -> dict[str, Any]:
     from tracker.calibration.camera_correction import in_units
 
-    lost = check.lost.get(finding.name)
     return {
         "name": finding.name,
         "misfit_px": finding.misfit_px,
@@ -129,7 +128,7 @@ def _camera(finding: "CameraFinding", check: "CalibrationCheck") -> dict[str, An
         "kind": "+".join(finding.kinds) or None,
         "as_well": list(finding.rivals),
         "since_frame": check.since.get(finding.name),
-        "lost_frames": 0 if lost is None else lost.n,
+        "lost_frames": check.n_lost(finding.name),
     }
 
 

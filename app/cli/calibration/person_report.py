@@ -70,9 +70,5 @@ def format_record(record: dict[str, Any]) -> str:
         f"{record['expected_error_mm']:.1f} mm, with 90% between {low:.1f} and {high:.1f} mm"
     )
     lines += [f"note: {note}" for note in record["notes"]]
-    lines.append(
-        "the world has z up and its origin on the floor below them"
-        if n_people > 1
-        else "the world has z up and its origin on the floor below the person"
-    )
+    lines.append(f"the world has z up and its origin on the floor below {'the person' if n_people == 1 else 'them'}")
     return "\n".join(lines)

@@ -308,10 +308,9 @@ def _camera(found: CameraFinding, check: CalibrationCheck) -> wire.CameraCheck:
     turned, moved, zoomed, shifted, drift = _numbers(found.correction)
     deviations = dict(zip(in_units(found.sigma), _numbers(found.sigma), strict=True))
     rivals = {kind: dict(zip(KINDS, _numbers(c), strict=True))[kind] for kind, c in found.rivals.items()}
-    lost = check.lost.get(found.name)
     return wire.CameraCheck(
         found.name, found.misfit_px, found.misfit_mm, found.kinds, rivals, turned, moved, zoomed[0], shifted[0],
-        drift[0], deviations, check.since.get(found.name), 0 if lost is None else lost.n, found.is_seen,
+        drift[0], deviations, check.since.get(found.name), check.n_lost(found.name), found.is_seen,
     )  # fmt: skip
 
 
