@@ -1,8 +1,9 @@
 """Score poses by colours of body parts, and single limbs by colours and edges; region evidence, learnt over a run.
 
-The room imports `compute`, `geometry`, `body`, `images`, `contours` and `evidence`. Callers use `part_colors.Colors`
-and the `limb_score.LimbScorer` that it makes; `region_learning.learn_regions`, the `region_model.RegionModel` that it
-returns, `region_limb_scorer.RegionLimbScorer` and `region_deficit.elsewhere_nats`.
+The room imports `compute`, `geometry`, `body`, `images`, `contours`, `evidence` and `fitting`. Callers use
+`part_colors.Colors` and the `limb_score.LimbScorer` that it makes; `region_learning.learn_regions`, the
+`region_model.RegionModel` that it returns, `region_limb_scorer.RegionLimbScorer`, `region_residuals.region_residuals`
+and `region_deficit.elsewhere_nats`.
 """
 
 __all__ = [
@@ -14,4 +15,5 @@ __all__ = [
     "region_learning",
     "region_limb_scorer",
     "region_model",
+    "region_residuals",
 ]

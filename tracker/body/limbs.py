@@ -1,5 +1,6 @@
 """The limbs of a body: chains of parts that are assessed and searched together."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -38,6 +39,14 @@ def limbs(model: BodyModel) -> tuple[Limb, ...]:
         if chain != [0] and dofs.any():
             out.append(Limb(model.parts[leaf].name, np.array(chain[::-1]), dofs))
     return tuple(out)
+
+
+def movable(some: Sequence[Limb], active_dofs: NDArray[np.bool_] | None) -> list[Limb]:
+    """Return limbs with their active degrees of freedom alone, (n_dofs,); None: all. Limbs without any are left out."""
+    if active_dofs is None:
+        return list(some)
+    restricted = [limb._replace(dofs=limb.dofs & active_dofs) for limb in some]
+    return [limb for limb in restricted if limb.dofs.any()]
 
 
 def display_name(name: str) -> str:

@@ -11,6 +11,7 @@ __all__ = [
     "bundle",
     "clocked_residuals",
     "consensus",
+    "contour_arrays",
     "contour_residuals",
     "gauss_newton",
     "gauss_newton_compiled",
@@ -22,4 +23,6 @@ __all__ = [
     "observability_reasons",
     "pins",
     "retarget",
+    "segment_matching",
+    "twists",
 ]

@@ -5,6 +5,7 @@ A run of the tracker audits its own poses (`track_session`). This is for poses t
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from tracker.session.locked_dofs import active_dofs, load_locks
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
+from tracker.tracking.estimation.pose_score import covariance_by_contours
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.person_memory import HISTORY_FRAMES
 from tracker.tracking.subjects import Subjects
@@ -118,8 +120,8 @@ def _repaired(
     records: Mapping[int, Mapping[int, PoseRecord]], tracks: Mapping[int, Mapping[int, FrameTracks]], report: Report,
 ) -> Mapping[int, Mapping[int, RepairedPose]]:  # fmt: skip
     """Compare the poses with the colours of the whole run; repair them where the consensus takes their place."""
-    models, frames = [p.model for p in session.people], sorted(tracks)
-    if len(frames) <= HISTORY_FRAMES or not isinstance(plan.settings, EstimationSettings):
+    models, frames, settings = [p.model for p in session.people], sorted(tracks), plan.settings
+    if len(frames) <= HISTORY_FRAMES or not isinstance(settings, EstimationSettings):
         return {}  # A few frames show nothing that is usual.
     others = _others(session, store, plan.people, frames)
     stay = {
@@ -131,7 +133,12 @@ def _repaired(
         k: tuple(map(PosedBody, models, _poses(session, plan.people, in_order, k, others.get(k, {})))) for k in frames
     }
     by_person = {i: {k: tracks[k][i] for k in frames} for i in plan.people}
-    repair = RunRepair(observer, subjects, plan.settings, bodies, by_person, searches=plan.takes_consensus)
+
+    @cache
+    def covariance_of(frame: int, person: int) -> Array:
+        return covariance_by_contours(observer, frame, bodies[frame], person, settings)
+
+    repair = RunRepair(observer, subjects, settings, bodies, by_person, covariance_of if plan.takes_consensus else None)
     found: Mapping[int, Mapping[int, RepairedPose]] = {}
     for step in repair.steps():
         report("comparing with the colours of the run", step.done / step.total)

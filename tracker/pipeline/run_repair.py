@@ -8,7 +8,7 @@ searched first. A limb that is found is tried on the frames before and after, so
 
 from bisect import bisect
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from tracker.appearance.part_colors import Colors, PartColors
 from tracker.appearance.region_deficit import elsewhere_nats, worst_parts, worst_views
 from tracker.appearance.region_learning import LearningFrame, learn_regions, learning_frames
-from tracker.appearance.region_model import RegionModel
+from tracker.appearance.region_model import RegionFrame, RegionModel
 from tracker.body.limbs import Limb, display_name, limbs
 from tracker.body.model import PosedBody
 from tracker.body.searches import Search
@@ -33,6 +33,7 @@ from tracker.tracking.estimation.limb_repair import (
     Repair,
     better_limbs,
     limbs_to_search,
+    refined_by_regions,
 )
 from tracker.tracking.estimation.pose_paths import select_alternatives
 from tracker.tracking.estimation.pose_score import common_evidence
@@ -77,7 +78,7 @@ class RunRepair:
 
     def __init__(
         self, observer: Observer, subjects: Subjects, settings: EstimationSettings, bodies: Mapping[int, Bodies],
-        tracks: Mapping[int, Mapping[int, FrameTracks]], searches: bool = True,
+        tracks: Mapping[int, Mapping[int, FrameTracks]], covariance_of: Callable[[int, int], Array] | None = None,
     ) -> None:  # fmt: skip
         """Prepare; nothing is computed yet.
 
@@ -87,11 +88,13 @@ class RunRepair:
             settings: of the tracker.
             bodies: all people by frame, in the poses that are compared.
             tracks: by person and frame, their poses by tracks without a view each.
-            searches: whether poses are repaired; else they stay, and are compared only.
+            covariance_of: gives the covariance of the pose of a person on a frame, by frame and person, (n_dofs,
+                n_dofs). Without it the poses stay, and are compared only.
         """
-        self._searches = searches
+        self._covariance_of = covariance_of
         self._observer, self._subjects, self._settings = observer, subjects, settings
         self._bodies, self._tracks = dict(bodies), tracks
+        self._learning: dict[int, tuple[ViewEvidence, ...]] = {}
         self._frames = sorted(bodies)
         self._first = np.cumsum([0, *(len(limbs(m)) for m in subjects.models)])
         self._found: dict[tuple[int, int], Repair] = {}
@@ -99,43 +102,56 @@ class RunRepair:
 
     def steps(self) -> Iterator[RepairStep]:
         """Do the work. A caller that stops asking leaves it undone."""
-        n, first, changed = len(self._frames), 0, list[int]()
+        n, first, changed = len(self._frames), 0, self._frames
         while True:
-            learnt, before = self._chosen(), dict(self._bodies)
-            known, scores = self._learn(learnt), dict[int, Array]()
+            self._observe(changed)
+            known, scores, before = self._learn(), dict[int, Array](), dict(self._bodies)
             for k in self._frames:
-                scores[k] = self._score(known, k, learnt.pop(k, None))
-                yield RepairStep(first + len(scores), first + 2 * n)
-            if not self._searches:
+                scores[k] = known.score(self._regions(known, k), self._bodies[k]).nats
+                yield RepairStep(first + len(scores), first + 3 * n)
+            if self._covariance_of is None:
                 break
             for done in self._repair(known, self._elsewhere(scores)[0]):
-                yield RepairStep(first + n + min(done, n), first + 2 * n)
+                yield RepairStep(first + n + min(done, n), first + 3 * n)
             self._select_alternatives()
             changed = [k for k in self._frames if self._bodies[k] is not before[k]]
             if not changed or first == 2 * n * (_MAX_TRIES - 1):
                 break
             first += 2 * n
-        for k in changed:
-            scores[k] = self._score(known, k)
-        yield RepairStep(first + 2 * n, first + 2 * n, self._results(scores))
+        if self._covariance_of is not None:
+            self._observe(changed)
+            for done, k in enumerate(self._frames):
+                scores[k] = self._refine(known, k, self._covariance_of)
+                yield RepairStep(first + 2 * n + done, first + 3 * n)
+        yield RepairStep(first + 3 * n, first + 3 * n, self._results(scores))
 
     def _colors_at(self, frame: int) -> tuple[ViewEvidence, ...]:
         cameras = self._observer.working_cameras
         where = regions(cameras, self._bodies[frame])
         return self._observer.evidence(frame, where, edges=EdgeSettings(foreground=False))
 
-    def _chosen(self) -> dict[int, tuple[ViewEvidence, ...]]:
-        """Return the evidence of the frames to learn from."""
-        return {k: self._colors_at(k) for k in learning_frames(self._frames)}
+    def _observe(self, changed: Sequence[int]) -> None:
+        """Compute the evidence of frames to learn from, where the poses have changed."""
+        for k in learning_frames(self._frames):
+            if k in changed:
+                self._learning[k] = self._colors_at(k)
 
-    def _learn(self, chosen: Mapping[int, tuple[ViewEvidence, ...]]) -> RegionModel:
-        frames = [LearningFrame(views, self._bodies[k]) for k, views in chosen.items()]
+    def _learn(self) -> RegionModel:
+        frames = [LearningFrame(views, self._bodies[k]) for k, views in self._learning.items()]
         return learn_regions(frames, self._observer.working_cameras, self._observer.empty_scenes())
 
-    def _score(self, known: RegionModel, frame: int, views: tuple[ViewEvidence, ...] | None = None) -> Array:
-        """Return the evidence of each part in each view, (V, P), nats."""
-        bodies = self._bodies[frame]
-        return known.score(known.frame(views or self._colors_at(frame), bodies), bodies).nats
+    def _regions(self, known: RegionModel, frame: int) -> RegionFrame:
+        return known.frame(self._learning.get(frame) or self._colors_at(frame), self._bodies[frame])
+
+    def _refine(self, known: RegionModel, frame: int, covariance_of: Callable[[int, int], Array]) -> Array:
+        """Refine the poses on a frame by region evidence; return that of each part in each view, (V, P), nats."""
+        bodies, regions = self._bodies[frame], self._regions(known, frame)
+        for i in self._free(frame):
+            own = covariance_of(frame, i), self._subjects.active_dofs[i]
+            pose = refined_by_regions(known, regions, bodies, i, *own)
+            bodies = with_body(bodies, i, PosedBody(bodies[i].model, pose))
+        self._bodies[frame] = bodies
+        return known.score(regions, bodies).nats
 
     def _elsewhere(self, scores: Mapping[int, Array]) -> tuple[dict[int, Array], IntArray]:
         """Return how much likelier each limb of all people is elsewhere on each frame, (n_limbs,), nats, and the part
@@ -220,7 +236,7 @@ class RunRepair:
         model = bodies[person].model
         guesses = [bodies, *(with_body(bodies, person, PosedBody(model, pose)) for pose in others)]
         views = common_evidence(self._observer, frame, guesses, self._settings)
-        evidence = FrameEvidence(views, known, known.frame(views, bodies), colors)
+        evidence = FrameEvidence(views, known, known.frame(views, bodies), colors, self._subjects.active_dofs[person])
         found = better_limbs(evidence, bodies, person, self._settings, search, others, apart)
         self._found[frame, person] = found
         taken = (entry for entry in self._traces.get((frame, person), ()) if entry.taken)

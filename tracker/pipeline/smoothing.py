@@ -73,6 +73,10 @@ class TrackedRows:
         """Add the poses between two keyframes by the pass that was not selected."""
         self._other_poses |= {frame: (other.between, pose) for frame, pose in other.poses.items()}
 
+    def covariance(self, frame: int, n_dofs: int) -> Array:
+        """Return the covariance of the tracked pose of a frame, (n_dofs, n_dofs)."""
+        return _unpacked(self._covariances[frame], n_dofs)
+
     @property
     def is_compared(self) -> bool:
         """Whether other tracks of the same frames are known, with which the poses have a consensus."""
@@ -251,7 +255,7 @@ class TrackedRows:
             model,
             np.array(at) / fps,
             np.array([keyframes[f] if f in keyframes else rows[f].values for f in at]),
-            np.array([np.zeros((n, n)) if f in keyframes else _unpacked(self._covariances[f], n) for f in at]),
+            np.array([np.zeros((n, n)) if f in keyframes else self.covariance(f, n) for f in at]),
             np.array([f in keyframes for f in at]),
             np.array([m if f in self.tracks else m | m.any() for f, m in zip(at, measured, strict=True)]),
         )

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
+from tracker.geometry.arrays import Array
 from tracker.pipeline.calibration_check import contradiction
 from tracker.pipeline.posed_recording import PosedRecording
 from tracker.pipeline.run_repair import RepairStep, RunRepair
@@ -283,7 +284,11 @@ class TrackSession:
             moving = velocities(k) if any(self.observer.ahead_frames(k)) else [None] * len(subjects.models)
             bodies[k] = tuple(map(PosedBody, subjects.models, known[k], moving))
         tracks = {i: rows.tracks for i, rows in self._rows.items()}
-        yield from RunRepair(self.observer, subjects, settings, bodies, tracks).steps()
+
+        def covariance_of(frame: int, person: int) -> Array:
+            return self._rows[person].covariance(frame, subjects.models[person].n_dofs)
+
+        yield from RunRepair(self.observer, subjects, settings, bodies, tracks, covariance_of).steps()
 
     def smoothing(self) -> Iterator[SmoothedRows]:
         """Take the consensus of all tracks, smooth it and assess it, as a single step: as a whole or not at all."""

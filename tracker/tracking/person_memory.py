@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import Colors, PartColors
-from tracker.body.limbs import Limb, limbs
+from tracker.body.limbs import Limb, limbs, movable
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.geometry.arrays import Array
@@ -54,9 +54,7 @@ class PersonMemory:
             searches_around: whether the surroundings of a pose may be searched.
         """
         self.model, self.active_dofs, self.alone = model, active_dofs, alone
-        active = np.ones(model.n_dofs, dtype=bool) if active_dofs is None else active_dofs
-        restricted = [limb._replace(dofs=limb.dofs & active) for limb in limbs(model)]
-        self.limbs = [limb for limb in restricted if limb.dofs.any()]
+        self.limbs = movable(limbs(model), active_dofs)
         """Limbs that may be searched, with their active degrees of freedom."""
         self.history = list(np.atleast_2d(np.array(start)))
         """The last poses, the last one last, (n_values,) each."""

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bodies import ARM, with_center
@@ -6,7 +8,15 @@ from hypothesis import strategies as st
 from staging import at, posed, shaken, solid
 
 from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton import PointTargets, PosePrior, covariance, fit_to_points, normal_equations, solve
+from tracker.fitting.gauss_newton import (
+    GaussianPrior,
+    PointTargets,
+    PosePrior,
+    covariance,
+    fit_to_points,
+    normal_equations,
+    solve,
+)
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.formats.model_toml import load_model
 from tracker.geometry import rigid
@@ -36,13 +46,16 @@ def off(model, values, targets):
 def block_of(kind, model, values, rng):
     if kind == "prior":
         return PosePrior(shaken(model, values, rng, 0.02, 0.2), rng.uniform(0.5, 3.0, model.n_dofs))
+    if kind == "correlated prior":
+        root = rng.normal(0, 1 / model.n_dofs, (model.n_dofs, model.n_dofs))
+        return GaussianPrior(shaken(model, values, rng, 0.02, 0.2), root @ root.T)
     points = rng.integers(0, len(model.point_names), 9)
     targets = model.points_world(values)[points] + rng.normal(0, 0.1, (9, 3))
     return PointTargets(points, targets, rng.uniform(0.5, 3.0, 9))
 
 
 @pytest.mark.parametrize("model", [GAVRILA, load_model("gavrila34"), ARM], ids=lambda m: m.name)
-@pytest.mark.parametrize("kind", ["points", "prior"])
+@pytest.mark.parametrize("kind", ["points", "prior", "correlated prior"])
 @pytest.mark.parametrize("seed", range(3))
 def test_blocks_against_finite_differences(kind, model, seed):
     """Balls: a prior's derivative is exact at its own pose, and off by half the angle between them, here 1%."""
@@ -58,12 +71,12 @@ def test_blocks_against_finite_differences(kind, model, seed):
     h = 1e-5
     sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
     gradient = np.array([a.cost - b.cost for a, b in sides]) / (2 * h)
-    np.testing.assert_allclose(found.gradient, gradient, atol=(0.02 if model is ARM and kind == "prior" else 1e-7))
+    np.testing.assert_allclose(found.gradient, gradient, atol=(0.02 if model is ARM and kind != "points" else 1e-7))
     # Where nothing is left over, Gauss-Newton's second derivative is the second derivative.
     if kind == "points":
         block = PointTargets(block.points, model.points_world(values)[block.points], block.weights)
     else:
-        block = PosePrior(values, block.weights)
+        block = replace(block, pose=values)
     sides = [(normal(h * e), normal(-h * e)) for e in np.eye(model.n_dofs)]
     hessian = np.array([a.gradient - b.gradient for a, b in sides]) / (2 * h)
     np.testing.assert_allclose(block.linearize(model, values, model.kinematics(values)).hessian, hessian, atol=1e-6)

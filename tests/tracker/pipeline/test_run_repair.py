@@ -8,6 +8,7 @@ from region_scenes import CAMERAS, N_FRAMES, Walk, limb_of
 from staging import SUIT
 
 from tracker.body.limbs import limbs
+from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.fitting.hypothesis import SAME_POSE_M, Hypothesis
 from tracker.pipeline import run_repair
@@ -41,16 +42,21 @@ def walk(gavrila):
     return Walk(gavrila, SUIT)
 
 
-def repaired(walk, keyframes=()):
-    """The steps of a repair whose tracks agree with one another on the wrong leg."""
+def repaired(walk, keyframes=(), deviation=0.01, active=None):
+    """The steps of a repair whose tracks agree with one another on the wrong leg.
+
+    `deviation` is the standard deviation of the tracked poses, rad and metres; None to compare them only.
+    """
     n_limbs = len(limbs(walk.model))
     tracks = {
         k: FrameTracks(np.array([b.values] * 3), np.ones((3, n_limbs)), ("A", "B", "C"))
         for k, (b,) in enumerate(walk.tracked)
     }
-    subjects = Subjects.of([walk.model], keyframes={k: {0: walk.tracked[k][0].values} for k in keyframes})
+    stay = {k: {0: walk.tracked[k][0].values} for k in keyframes}
+    subjects = Subjects.of([walk.model], None, [active], stay)
     bodies = {k: tuple(b) for k, b in enumerate(walk.tracked)}
-    return list(RunRepair(Filmed(walk), subjects, TrackSettings(), bodies, {0: tracks}).steps())
+    known = None if deviation is None else lambda frame, person: deviation**2 * np.eye(walk.model.n_dofs)
+    return list(RunRepair(Filmed(walk), subjects, TrackSettings(), bodies, {0: tracks}, known).steps())
 
 
 def off_m(walk, k, pose):
@@ -75,7 +81,7 @@ def test_a_leg_is_found_that_all_tracks_have_elsewhere(walk):
             assert not trust[:, leg].any()  # all tracks are refuted, in the leg alone
             assert trust.sum() == trust.size - len(trust)
         else:
-            assert np.array_equal(pose, walk.tracked[k][0].values)
+            assert np.abs(walk.model.points_world(pose) - walk.tracked[k][0].points_world).max() < 0.01  # metres
             assert trust.all()
 
 
@@ -106,3 +112,36 @@ def test_a_keyframe_stays_and_is_doubted(walk):
     assert np.array_equal(found[frame].pose, walk.tracked[frame][0].values)
     assert found[frame].elsewhere[leg] > 10
     assert found[frame].against[leg].startswith("right calf elsewhere in ")
+
+
+@pytest.mark.slow
+def test_poses_that_are_compared_only_stay(walk):
+    found = repaired(walk, deviation=None)[-1].found[0]
+    assert all(np.array_equal(found[k].pose, body.values) for k, (body,) in enumerate(walk.tracked))
+
+
+@pytest.mark.slow
+def test_poses_are_refined_by_the_colors_of_the_run(walk, monkeypatch):
+    rng, model = np.random.default_rng(2), walk.model
+    steps = rng.normal(0, np.where(model.dof_is_length, 0.01, 0.02), (N_FRAMES, model.n_dofs))
+    off = [
+        [PosedBody(model, model.clip(model.retract(true.values, s)))]
+        for (true,), s in zip(walk.true, steps, strict=True)
+    ]
+    monkeypatch.setattr(walk, "tracked", off)
+    found = repaired(walk, deviation=0.02)[-1].found[0]
+    poses = [b.values for (b,) in off], [found[k].pose for k in range(N_FRAMES)]
+    before, after = (
+        np.mean([np.abs(model.points_world(p) - t.points_world).mean() for p, (t,) in zip(own, walk.true, strict=True)])
+        for own in poses
+    )
+    assert after < 0.7 * before
+
+
+@pytest.mark.slow
+def test_a_locked_leg_is_not_moved(walk):
+    dofs = limb_of(walk.model, "right_calf").dofs
+    found = repaired(walk, active=~dofs)[-1].found[0]
+    values = walk.model.dof_value[dofs]
+    for k, (body,) in enumerate(walk.tracked):
+        assert np.array_equal(found[k].pose[values], body.values[values])

@@ -9,15 +9,18 @@ from dataclasses import dataclass, field, fields
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import PartColors
 from tracker.appearance.region_limb_scorer import RegionLimbScorer
 from tracker.appearance.region_model import RegionFrame, RegionModel
-from tracker.body.limbs import Limb, limbs
+from tracker.appearance.region_residuals import region_residuals
+from tracker.body.limbs import Limb, limbs, movable
 from tracker.body.model import BodyModel, PosedBody
 from tracker.body.searches import Search
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE
+from tracker.fitting.gauss_newton import GaussianPrior, solve
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.geometry.arrays import Array
@@ -41,6 +44,8 @@ class FrameEvidence(NamedTuple):
     """Region evidence of the frame."""
     part_colors: PartColors | None = None
     """Colours of the person's parts, which rank proposals; None where they are unknown."""
+    active_dofs: NDArray[np.bool_] | None = None
+    """Degrees of freedom of the person that may move, (n_dofs,); None: all."""
 
 
 class Repair(NamedTuple):
@@ -130,11 +135,13 @@ def better_limbs(
         tried: limbs that are only tried where others have them.
     """
     model, tracked = bodies[person].model, bodies[person].values
-    plain = scorer_without_prediction(evidence.views, bodies, person, settings, evidence.part_colors)
+    searched, tried = (movable(some, evidence.active_dofs) for some in (searched, tried))
+    at = evidence.views, bodies, person, settings
+    plain = scorer_without_prediction(*at, evidence.part_colors, evidence.active_dofs)
     scorer = _with_regions(plain, evidence, bodies, person)
     fit = solver_of(model)(model, tracked, scorer.blocks, scorer.active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
     start = scorer.scored(model, fit)
-    unproposed = [x for x in tried if all(x is not s for s in searched)]
+    unproposed = [x for x in tried if x.name not in [s.name for s in searched]]
     best, *rest = search_limbs(model, searched, start, others, scorer, unproposed)
     gain = start.cost - best.cost
     is_better = gain > MIN_GAIN_NATS
@@ -142,6 +149,28 @@ def better_limbs(
     if is_better:
         return Repair(best.pose, best.cost, gain, tuple(rest), entry)
     return Repair(tracked, start.cost, gain, (best, *rest), entry)
+
+
+def refined_by_regions(
+    known: RegionModel, regions: RegionFrame, bodies: Bodies, person: int, covariance: Array,
+    active_dofs: NDArray[np.bool_] | None = None,
+) -> Array:  # fmt: skip
+    """Return the likeliest pose of a person, (n_values,), by what is known of it and by region evidence.
+
+    Args:
+        known: appearance of the people and places of the run.
+        regions: region evidence of the frame.
+        bodies: all people as tracked by contours; the others stay.
+        person: index of the person.
+        covariance: of the tracked pose, (n_dofs, n_dofs).
+        active_dofs: degrees of freedom that may move, (n_dofs,); None: all.
+    """
+    model, start = bodies[person].model, bodies[person].values
+    blocks = [
+        GaussianPrior(start, np.asarray(np.linalg.inv(covariance), dtype=np.float64)),
+        region_residuals(known, regions, bodies, person),
+    ]
+    return solve(model, start, blocks, active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE).pose
 
 
 def _with_regions(
