@@ -16,13 +16,13 @@ from app.state.reason import RankedPose, Reason
 from app.state.state import State
 from tracker.appearance.background_density import MIN_SEEN
 from tracker.appearance.region_learning import learning_frames
-from tracker.body.limbs import limb_display_name
+from tracker.body.limbs import limb_display_name, movable
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
-from tracker.tracking.estimation.alternative_poses import alternative_poses, limbs_in_doubt
+from tracker.tracking.estimation.alternative_poses import Tried, alternative_poses, limbs_in_doubt
 from tracker.tracking.estimation.frame_problem import Bodies
 from tracker.tracking.estimation.part_evidence import RunEvidence, contradiction, learn_run, read_frame
 
@@ -169,14 +169,16 @@ class Reasons:
     def _with_alternatives(self, state: State, run: RunEvidence, people: tuple[int, ...], found: Reason) -> Reason:
         """Return a reason with the stored alternatives of its pose, and those that a search of limbs in doubt finds."""
         shown, model = state.people[found.person], state.models[found.person]
-        searched = () if shown.status == "good" else limbs_in_doubt(model, found.table)
+        active = self._session_state.active_dofs(found.person)
+        searched = [] if shown.status == "good" else movable(limbs_in_doubt(model, found.table), active)
         if not shown.alternatives and not searched:
             return replace(found, alternatives=())
         names = tuple(limb_display_name(x.name) for x in searched)
         self._report(f"searching the {' and the '.join(names)}" if names else "comparing alternatives", 0.0)
         others = alternative_poses(
             run.known, self._session_state.frames.observer, state.frame, _bodies(state, people),
-            people.index(found.person), state.settings, shown.alternatives, searched, self._around(state),
+            people.index(found.person), state.settings,
+            Tried(shown.alternatives, searched, self._around(state), active),
         )  # fmt: skip
         present = PosedBody(model, found.values)
         ranked = tuple(

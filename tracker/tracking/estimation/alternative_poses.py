@@ -1,8 +1,10 @@
 """Find poses of a person that are about as good as a given one, or better, and compare them in nats."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.appearance.region_model import RegionModel
 from tracker.body.limbs import Limb, limbs
@@ -22,9 +24,22 @@ def limbs_in_doubt(model: BodyModel, table: PartTable) -> list[Limb]:
     return limbs_to_search(model, np.array([table.elsewhere[limb.parts].max() for limb in limbs(model)]))
 
 
+class Tried(NamedTuple):
+    """The poses of a person in which alternatives are sought."""
+
+    stored: Sequence[Array]
+    """Known alternatives, (n_values,) each."""
+    limbs: Sequence[Limb] = ()
+    """Limbs to search for more."""
+    around: Sequence[Array] = ()
+    """Poses whose limbs are tried as they are, such as those of the frames around, (n_values,) each."""
+    active_dofs: NDArray[np.bool_] | None = None
+    """Degrees of freedom that may move, (n_dofs,); None: all. Stored poses stay as they are."""
+
+
 def alternative_poses(
     known: RegionModel, observer: Observer, frame: int, bodies: Bodies, person: int, settings: EstimationSettings,
-    stored: Sequence[Array], searched: Sequence[Limb] = (), around: Sequence[Array] = (),
+    tried: Tried,
 ) -> list[Hypothesis]:  # fmt: skip
     """Return poses within `MIN_GAIN_NATS` of the best, with a limb elsewhere than in the present pose, cheapest first.
 
@@ -37,17 +52,15 @@ def alternative_poses(
         bodies: all people in their present poses.
         person: index of the person.
         settings: of the tracker.
-        stored: known alternatives, (n_values,) each.
-        searched: limbs to search for more.
-        around: poses whose limbs are tried as they are, such as those of the frames around, (n_values,) each.
+        tried: poses and limbs of the person.
     """
     model, present = bodies[person].model, bodies[person]
-    everywhere = [bodies, *(with_body(bodies, person, PosedBody(model, p)) for p in (*stored, *around))]
+    everywhere = [bodies, *(with_body(bodies, person, PosedBody(model, p)) for p in (*tried.stored, *tried.around))]
     views = common_evidence(observer, frame, everywhere, settings)
-    evidence = FrameEvidence(views, known, known.frame(views, bodies))
-    found = list(stored)
-    if searched:
-        repair = better_limbs(evidence, bodies, person, settings, searched, around)
+    evidence = FrameEvidence(views, known, known.frame(views, bodies), None, tried.active_dofs)
+    found = list(tried.stored)
+    if tried.limbs:
+        repair = better_limbs(evidence, bodies, person, settings, tried.limbs, tried.around)
         found += [repair.pose, *(other.pose for other in repair.alternatives)]
     poses = [present.values, *found]
     scorer = scorer_without_prediction(views, bodies, person, settings)

@@ -93,6 +93,20 @@ def test_a_numbered_alternative_is_taken_assessed_and_undone_at_once(doubted):
     assert doubted.state.people[0].status == "lost"
 
 
+@pytest.mark.parametrize(
+    ("joints", "searched"), [(("left_shoulder",), ("left arm",)), (("left_shoulder", "left_elbow"), ())]
+)
+def test_locked_joints_are_not_searched(doubted, joints, searched):
+    model, wrong = doubted.models[0], doubted.state.poses[0]
+    stored = doubted.state.people[0].alternatives
+    locked = [i for i, name in enumerate(model.dof_names) if name.partition(".")[0] in joints]
+    doubted.dof_locks.set(0, locked, True)
+    found, values = explained(doubted), model.dof_value[locked]
+    assert found.searched == searched
+    new = [o.values for o in found.alternatives if not any(np.array_equal(o.values, s) for s in stored)]
+    assert all(np.array_equal(pose[values], wrong[values]) for pose in new)
+
+
 def test_a_pose_that_is_edited_meanwhile_keeps_its_edit(doubted):
     doubted.alternatives.take_alternative(0, WRONG_FRAME)
     drag(doubted, "left_wrist", (9.0, 0.0))
