@@ -8,8 +8,8 @@ from app.bench.sample_frames import BenchFrame, pose_at
 from tracker.evidence.observer import Observer
 from tracker.footage.recording import Recording
 from tracker.pipeline.methods import make_tracker
-from tracker.pipeline.track_session import Leg, RunChange, TrackSession
-from tracker.pipeline.tracked_changes import StoredPerson
+from tracker.pipeline.track_session import Leg, TrackSession
+from tracker.pipeline.tracked_changes import RunChange, StoredPerson
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.tracker import TrackingRun

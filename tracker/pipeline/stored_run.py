@@ -18,9 +18,10 @@ from tracker.geometry.ground_plane import floor_plane
 from tracker.pipeline.keypoint_evidence import read_points, stored_seen_bodies, with_keypoints
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.smoothing import TrackedRows, resumed_rows
-from tracker.pipeline.track_session import Leg, StoreWriter, TrackSession, outward
+from tracker.pipeline.track_session import Leg, TrackSession, outward
 from tracker.pipeline.tracked_changes import (
     StoredPerson,
+    StoreWriter,
     keyframes_of,
     poses_to_replace,
     recorded_method,

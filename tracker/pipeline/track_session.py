@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from tracker.body.model import PosedBody
 from tracker.evidence.observer import Observer
@@ -12,8 +12,7 @@ from tracker.pipeline.calibration_check import contradiction
 from tracker.pipeline.posed_recording import PosedRecording
 from tracker.pipeline.run_repair import RepairStep, RunRepair
 from tracker.pipeline.smoothing import TrackedRows
-from tracker.pipeline.tracked_changes import StoredPerson, tracked_changes
-from tracker.store.annotation_store import AnnotationStore
+from tracker.pipeline.tracked_changes import PoseWriter, RunChange, StoredPerson, tracked_changes
 from tracker.store.records import AssessmentChange, PoseChange
 from tracker.tracking.confidence import Status, status_named
 from tracker.tracking.estimate import BackwardStep, NormalMatrix, PoseEstimate, TrackedFrame
@@ -54,63 +53,6 @@ class CameraStep(NamedTuple):
 Step = PoseEstimate | BackwardStep | AuditStep | RepairStep | SmoothedRows | CameraStep
 """A step of a run: a tracked frame of the first pass, a visit to a frame of the second, a frame of the audit or of the
 repair, all smoothed poses, or a camera that is off."""
-
-
-RunChange = PoseChange | AssessmentChange
-"""A change by a run: a pose, or what is known about a keyframe."""
-
-
-class PoseWriter(Protocol):
-    """Stores the poses of a run."""
-
-    def write(self, label: str, changes: Sequence[RunChange], edit: int | None) -> int | None:
-        """Write poses, but leave keyframes as they are, and assessments.
-
-        Args:
-            label: of the entry of the history.
-            changes: at least one.
-            edit: the result of the last call; None at the first.
-
-        Returns:
-            The entry of the history that further poses of the run are added to.
-        """
-
-
-class StoreWriter:
-    """Writes the poses of a run to a store at once."""
-
-    def __init__(self, store: AnnotationStore, views: Sequence[int | None] = ()) -> None:
-        """Write to a store that is open.
-
-        Args:
-            store: annotations of the session.
-            views: for each camera of the session its index among those that are tracked with; empty for all.
-        """
-        self._store, self._views = store, views
-        self._n_used = sum(v is not None for v in views)
-
-    def write(self, label: str, changes: Sequence[RunChange], edit: int | None) -> int:
-        """See `PoseWriter.write`.
-
-        Raises:
-            SessionError: the store cannot be written.
-        """
-        if self._n_used < len(self._views):
-            changes = [self._with_all_views(change) for change in changes]
-        if edit is None:
-            return self._store.commit(label, changes, by_program=True).edit
-        self._store.amend(edit, changes, by_program=True)
-        return edit
-
-    def _with_all_views(self, change: RunChange) -> RunChange:
-        """Return a row whose costs by view are those of all cameras; a row that was read from the store has them."""
-        if isinstance(change, AssessmentChange):
-            return change
-        pose = change.pose
-        if pose is None or len(pose.view_costs_px) != self._n_used:
-            return change
-        costs = tuple(None if v is None else pose.view_costs_px[v] for v in self._views)
-        return replace(change, pose=replace(pose, view_costs_px=costs))
 
 
 class Leg(NamedTuple):

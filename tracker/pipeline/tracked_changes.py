@@ -1,9 +1,9 @@
-"""Convert pose estimates to rows of the store, and stored keyframes to input of a tracker."""
+"""Convert pose estimates to rows of the store, write them, and read stored keyframes as input of a tracker."""
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict
-from typing import Any, NamedTuple
+from dataclasses import asdict, replace
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from tracker.geometry.arrays import Array
 from tracker.session.session import Person
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.calibration_log import present_revision, revisions_of_poses
-from tracker.store.records import Alternative, PoseChange, PoseRecord
+from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
 from tracker.tracking.confidence import PoseQuality
 from tracker.tracking.estimate import PoseEstimate
 from tracker.tracking.subjects import Keyframes
@@ -20,6 +20,63 @@ from tracker.tracking.tracker import TrackerSettings
 
 _FIRST_METHOD = "chamfer"
 """The method of settings that name none: they are older than any other method."""
+
+
+RunChange = PoseChange | AssessmentChange
+"""A change by a run: a pose, or what is known about a keyframe."""
+
+
+class PoseWriter(Protocol):
+    """Stores the poses of a run."""
+
+    def write(self, label: str, changes: Sequence[RunChange], edit: int | None) -> int | None:
+        """Write poses, but leave keyframes as they are, and assessments.
+
+        Args:
+            label: of the entry of the history.
+            changes: at least one.
+            edit: the result of the last call; None at the first.
+
+        Returns:
+            The entry of the history that further poses of the run are added to.
+        """
+
+
+class StoreWriter:
+    """Writes the poses of a run to a store at once."""
+
+    def __init__(self, store: AnnotationStore, views: Sequence[int | None] = ()) -> None:
+        """Write to a store that is open.
+
+        Args:
+            store: annotations of the session.
+            views: for each camera of the session its index among those that are tracked with; empty for all.
+        """
+        self._store, self._views = store, views
+        self._n_used = sum(v is not None for v in views)
+
+    def write(self, label: str, changes: Sequence[RunChange], edit: int | None) -> int:
+        """See `PoseWriter.write`.
+
+        Raises:
+            SessionError: the store cannot be written.
+        """
+        if self._n_used < len(self._views):
+            changes = [self._with_all_views(change) for change in changes]
+        if edit is None:
+            return self._store.commit(label, changes, by_program=True).edit
+        self._store.amend(edit, changes, by_program=True)
+        return edit
+
+    def _with_all_views(self, change: RunChange) -> RunChange:
+        """Return a row whose costs by view are those of all cameras; a row that was read from the store has them."""
+        if isinstance(change, AssessmentChange):
+            return change
+        pose = change.pose
+        if pose is None or len(pose.view_costs_px) != self._n_used:
+            return change
+        costs = tuple(None if v is None else pose.view_costs_px[v] for v in self._views)
+        return replace(change, pose=replace(pose, view_costs_px=costs))
 
 
 class StoredPerson(NamedTuple):

@@ -19,8 +19,8 @@ from tracker.errors import Remedy, TrackerError
 from tracker.evidence.observer import Observer
 from tracker.geometry.ground_plane import GroundPlane, floor_plane
 from tracker.pipeline.methods import make_tracker
-from tracker.pipeline.track_session import Leg, RunChange, Step, TrackSession, outward
-from tracker.pipeline.tracked_changes import StoredPerson
+from tracker.pipeline.track_session import Leg, Step, TrackSession, outward
+from tracker.pipeline.tracked_changes import RunChange, StoredPerson
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import PoseEstimate, TrackedFrame
 from tracker.tracking.subjects import Subjects
