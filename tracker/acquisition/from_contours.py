@@ -29,7 +29,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.gauss_newton import PointTargets
+from tracker.fitting.gauss_newton import OTHER_BODY_M, PointTargets
 from tracker.fitting.pins import PinBlock
 from tracker.fitting.retarget import retarget_pose
 from tracker.images.static_edges import StaticEdgeModel
@@ -158,10 +158,22 @@ def acquire_from_contours(
         for views, s, p in zip(observed, sighted, found.poses, strict=True)
     ]
     report("done", 1.0)
+    are_given = any(k in placed for k in frames)
     return Acquisition(
-        found.body, tuple(frames), found.poses, float(np.mean(before)), float(np.mean(after)), parameters, found,
-        voxels=by_voxels, joints_are_given=any(k in placed for k in frames), before=present,
+        _with_sigmas(found, are_given), tuple(frames), found.poses, float(np.mean(before)), float(np.mean(after)),
+        parameters, found, voxels=by_voxels, joints_are_given=are_given, before=present,
     )  # fmt: skip
+
+
+def _with_sigmas(fit: SizeFit, joints_are_given: bool) -> BodyModel:
+    """Return the fitted body with the standard deviations of its points.
+
+    Contours show the flesh. Without known joints, those of a person also lie elsewhere in it.
+    """
+    if fit.point_sigmas_m is None:
+        return fit.body
+    sigmas_m = np.hypot(fit.point_sigmas_m, 0.0 if joints_are_given else OTHER_BODY_M)
+    return replace(fit.body, point_sigmas=tuple((sigmas_m / fit.body.height_m).tolist()))
 
 
 def moving(observer: Observer, bodies: Mapping[int, tuple[PosedBody, ...]]) -> Mapping[int, tuple[PosedBody, ...]]:

@@ -20,7 +20,7 @@ from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.geometry.arrays import Array, IntArray
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.stored_poses import StoredPose
-from tracker.tracking.pose_errors import SHARED_M
+from tracker.tracking.pose_errors import point_covariances
 from tracker.tracking.run_confidence import LOST_FROM
 
 TRUNK = "trunk"
@@ -47,6 +47,8 @@ class ExpectedErrors:
     """Index of the unit of each joint, (J,)."""
     joints: tuple[str, ...]
     """Names of the joints, (J,)."""
+    shared: Array
+    """Variance along an axis of the error that all frames share, (J,), m^2."""
 
     @cached_property
     def variances(self) -> Array:
@@ -72,7 +74,7 @@ class ExpectedErrors:
         """
         steps = np.diff(self.frames) == 1
         pairs = steps & ~self.keyframes[1:] & ~self.keyframes[:-1]
-        logs = np.log(np.maximum(self.errors_m, SHARED_M))
+        logs = np.log(np.maximum(self.errors_m, np.sqrt(self.shared)))
         logs = logs - logs[~self.keyframes].mean(axis=0) if not self.keyframes.all() else logs * 0
         before, after = logs[:-1][pairs], logs[1:][pairs]
         scale = np.sqrt(np.sum(before**2) * np.sum(after**2))
@@ -91,7 +93,7 @@ class ExpectedErrors:
         of_units = [spread[:, self.unit_of == u].sum(axis=1) for u in range(len(self.units))]
         r = self.persistence
         longer = min(float(n_frames), (1 + r) / (1 - r))
-        shared = of_length * SHARED_M**2 / n_joints
+        shared = of_length * self.shared.mean() / n_joints
         return float(longer * np.sum(np.square(of_units)) / (n_frames * n_joints) ** 2 + shared)
 
 
@@ -125,7 +127,8 @@ def expected_errors(
     joints, names, unit_of, limb_of = joint_units(model)
     columns = [model.point_names.index(n) for n in joints]
     assessed = [p.record.errors[columns] for p in alike.values() if p.record.errors is not None]
-    usual = np.median(assessed, axis=0) if assessed else np.tile(SHARED_M**2 * np.eye(3), (len(columns), 1, 1))
+    shared = point_covariances(model)[columns]
+    usual = np.median(assessed, axis=0) if assessed else shared
     covariances, lost = np.empty((len(alike), len(columns), 3, 3)), np.zeros((len(alike), len(columns)))
     for t, (frame, pose) in enumerate(alike.items()):
         record = pose.record
@@ -142,6 +145,7 @@ def expected_errors(
         names,
         unit_of,
         joints,
+        shared[:, 0, 0],
     )
 
 

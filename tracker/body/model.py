@@ -44,6 +44,9 @@ class BodyModel:
     """In the order of the joints that move them."""
     landmarks: tuple[Landmark, ...]
     search_groups: tuple[SearchGroup, ...]
+    point_sigmas: tuple[float, ...] = ()
+    """Standard deviation along each axis with which the sizes determine each of `point_names`, fractions of the height;
+    empty where that is not known."""
 
     def with_height(self, height_m: float) -> "BodyModel":
         """Return the same proportions at another body height."""

@@ -21,7 +21,7 @@ from tracker.pipeline.chain import Sink
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import Session
 from tracker.store.stored_poses import StoredPose
-from tracker.tracking.pose_errors import SHARED_M
+from tracker.tracking.pose_errors import point_covariances
 from tracker.tracking.tracker import TrackerSettings
 from tracker.tracking.view_tracks import left_out
 
@@ -185,7 +185,9 @@ def _steps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:
 def _usual_errors(tracked: Mapping[int, StoredPose]) -> Array:
     """Return the median covariance of the points, (n_points, 3, 3), m^2, for the start, which has not been assessed."""
     known = [t.record.errors for t in tracked.values() if t.record.errors is not None]
-    return np.median(known, axis=0) if known else SHARED_M**2 * np.eye(3)[None]
+    if known or not tracked:
+        return np.median(known, axis=0) if known else np.zeros((1, 3, 3))
+    return point_covariances(next(iter(tracked.values())).body.model)
 
 
 def _verdict(own: StoredPose, usual: Array, limb: str, names: Sequence[str], steps: Array) -> LimbVerdict:

@@ -47,7 +47,7 @@ def assessed_by_tracks(
         features: of its limbs, as above; None where they are not known.
         repaired: how well it agrees with the colours of the run; None where that is not known.
     """
-    errors = point_covariances(found.covariances)
+    errors = point_covariances(model, found.covariances)
     # For each limb the view without which it is farthest away.
     of_limbs = [found.distances_m[:, np.isin(model.point_parts, x.parts)].max(axis=1) for x in limbs(model)]
     reasons = [f" without {tracks.without[int(distances.argmax())]}" for distances in of_limbs]

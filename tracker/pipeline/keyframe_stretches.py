@@ -75,7 +75,7 @@ def with_seam(model: BodyModel, pose: PoseRecord, seam: Seam) -> PoseRecord:
         seam: of the two passes on its frame.
     """
     by_seam = np.einsum("pi,pj->pij", seam.steps_m, seam.steps_m) / 2
-    errors = point_covariances(by_seam) if pose.errors is None else pose.errors + by_seam
+    errors = point_covariances(model, by_seam) if pose.errors is None else pose.errors + by_seam
     odds, lengths_mm = limb_odds(model, errors), seam.lengths_mm
     status, lost = classify_limbs(odds), probabilities(odds[:, 1])
     remark, before = pose.remark, status_named(pose.status)

@@ -1,20 +1,18 @@
 """Errors of joints from how far tracks without a view each lie apart, and the status of a pose from them.
 
 The error of a point is normal. Its covariance is the mean square of the steps to the tracks without a view, and what
-all views share: sizes of the body, and where its joints lie in the flesh. Both were measured on simulated people by
-`tests/benchmarks/joint_errors.py`: a joint whose tracks lie 20, 40 and 80 mm apart is off by as much.
+all views share: with which standard deviation the sizes determine the point. On simulated people, a joint whose tracks
+lie 20, 40 and 80 mm apart is off by as much (`tests/benchmarks/joint_errors.py`).
 """
 
 import numpy as np
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
+from tracker.fitting.gauss_newton import OTHER_BODY_M
 from tracker.geometry.arrays import Array
 from tracker.tracking.run_confidence import RUN_MODEL
 
-SHARED_M = 0.006
-"""Standard deviation along each axis of the error that all views share, metres. Of the joints of 13 simulated people,
-88% lie in their 90% ellipsoids (`tests/benchmarks/joint_errors.py`); with half as much 55%, with twice as much 99%."""
 SELDOM_NATS = 10.0
 """How much likelier the colours of the run must find a limb elsewhere until it is off as likely as not, nats. Of 1,000
 simulated limbs in their place, none had more; of 20 that were put elsewhere, all had
@@ -23,9 +21,25 @@ OFF_M = 0.10
 """A limb is off where one of its joints is farther from its true place, metres."""
 
 
-def point_covariances(steps: Array) -> Array:
-    """Return the covariances of points by the mean squares of the steps to other tracks, (..., 3, 3) each, m^2."""
-    return np.asarray(steps + SHARED_M**2 * np.eye(3))
+def shared_sigmas_m(model: BodyModel) -> Array:
+    """Return the standard deviation along each axis of the error of each point that all views share, (n_points,), m.
+
+    It is that of the sizes. Of sizes that are nobody's own nothing is known but how far joints of people lie from those
+    of a typical body.
+    """
+    if not model.point_sigmas:
+        return np.full(len(model.point_names), OTHER_BODY_M)
+    return model.height_m * np.array(model.point_sigmas)
+
+
+def point_covariances(model: BodyModel, steps: Array | float = 0.0) -> Array:
+    """Return the covariances of the points of a body, (n_points, 3, 3), m^2.
+
+    Args:
+        model: the body.
+        steps: mean squares of the steps to other tracks, likewise.
+    """
+    return np.asarray(steps + shared_sigmas_m(model)[:, None, None] ** 2 * np.eye(3))
 
 
 def limb_odds(model: BodyModel, covariances: Array) -> Array:

@@ -1,11 +1,14 @@
 """Errors of joints, and the status that follows from them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tracker.body.limbs import limbs
+from tracker.fitting.gauss_newton import OTHER_BODY_M
 from tracker.tracking.confidence import classify_limbs
-from tracker.tracking.pose_errors import SHARED_M, beyond, limb_odds, point_covariances
+from tracker.tracking.pose_errors import beyond, limb_odds, point_covariances
 
 
 @pytest.mark.parametrize(("sigma", "radius"), [(0.02, 0.03), (0.05, 0.1), (0.1, 0.1)])
@@ -22,7 +25,7 @@ def test_the_limb_whose_tracks_lie_apart_is_doubted_then_lost(gavrila):
     for apart_m in (0.03, 0.08, 0.2):
         steps = np.zeros((len(gavrila.point_names), 3, 3))
         steps[wrist] = np.diag([apart_m**2, 0, 0])
-        odds = limb_odds(gavrila, point_covariances(steps))
+        odds = limb_odds(gavrila, point_covariances(gavrila, steps))
         statuses.append(classify_limbs(odds))
         assert odds[:, 1].argmax() == arm
         assert np.all(odds[:, 1] < odds[:, 0])
@@ -30,5 +33,9 @@ def test_the_limb_whose_tracks_lie_apart_is_doubted_then_lost(gavrila):
 
 
 def test_tracks_that_agree_leave_the_error_that_they_share(gavrila):
-    errors = point_covariances(np.zeros((4, 3, 3)))
-    np.testing.assert_allclose(np.sqrt(np.diagonal(errors, axis1=1, axis2=2)), SHARED_M)
+    """That of sizes that were fitted, or of a body that is nobody's own."""
+    sigmas = np.linspace(0.002, 0.01, len(gavrila.point_names))
+    acquired = replace(gavrila, point_sigmas=tuple(sigmas.tolist()))
+    for model, sigmas_m in ((gavrila, OTHER_BODY_M), (acquired, sigmas * gavrila.height_m)):
+        found = np.sqrt(np.diagonal(point_covariances(model), axis1=1, axis2=2))
+        np.testing.assert_allclose(found, np.broadcast_to(sigmas_m, len(sigmas))[:, None] * np.ones(3))
