@@ -19,22 +19,15 @@ from typing import NamedTuple
 import numpy as np
 from acquisition import RECORDED, quadrille
 from doc_tables import Conditions, add_write_option, check_places, show, table
-from scipy.special import logit
 from scipy.stats import chi2, rankdata
 
-from tracker.body.limbs import limbs
 from tracker.evaluation.references import read_joints
 from tracker.formats.joint_maps import LIMB_JOINTS
 from tracker.session.assemble import DEFAULT_MODEL
 from tracker.session.session import load_session
 from tracker.store.stored_poses import read_stored_poses
-from tracker.tracking.confidence import OFF_ODDS
-from tracker.tracking.pose_errors import SHARED_M, beyond
-from tracker.tracking.run_confidence import RUN_MODEL
 
 OFF_MM = 100.0
-SHARED_ERRORS_M = np.arange(0.002, 0.03, 0.0005)
-"""Errors that all views share, along each axis, of which one is chosen."""
 GROUPS = (
     "simulated, one person", "simulated, two people", "recordings, one person", "recordings, two people",
     "found from nothing",
@@ -45,17 +38,12 @@ CONDITIONS = Conditions(
     body=f"`{DEFAULT_MODEL}`, acquired; after `@nothing` of people who were found",
     start="pose fitted to the reference joints of frame 0; after `@nothing` the one that was found",
     settings="defaults, without the audit → with it",
-    chosen="rules of tracking (recordings), the 6 mm that all views share and the 10 nats of the colours (simulated "
-    "people), the threshold of 5% and the median over the tracks",
+    chosen="rules of tracking (recordings), the 10 nats of the colours (simulated people), the threshold of 5%, the "
+    "median over the tracks, and the 15 mm by which joints lie elsewhere in people without known ones (recordings)",
     command="python tests/benchmarks/joint_errors.py SESSIONS --data DIR --scenes DIR --write docs/accuracy.md "
     "docs/measurements.md",
 )
-TABLES = ("joint_errors sums", "joint_errors left out", "joint_errors")
-LEFT_OUT = CONDITIONS._replace(
-    settings="with the audit; statuses as they are → by the shared error that covers 90% of the joints of all other "
-    "recordings",
-    chosen="rules of tracking (recordings), the 10 nats of the colours (simulated people), the threshold of 5%",
-)
+TABLES = ("joint_errors sums", "joint_errors")
 HEADS = (
     "frames", "mean error, mm", "off", "area", "flagged", "flagged, yet fine", "good, yet off", "covered",
     "processor time",
@@ -71,33 +59,8 @@ class Assessed(NamedTuple):
     """Rank of the frames: the largest probability that a limb is lost, (T,)."""
     flagged: np.ndarray
     """Whether a frame is not good, (T,)."""
-    steps: np.ndarray
-    """Errors of the joints that have an ellipsoid, (n, 3), metres."""
-    ellipsoids: np.ndarray
-    """Covariances of these joints, (n, 3, 3), m^2."""
-    widest: np.ndarray
-    """Largest variance along an axis of a point of each limb, (T, n_limbs), m^2; 0 without errors."""
-    by_colors: np.ndarray
-    """Log odds that each limb is off, where the colours give more than the errors, (T, n_limbs), else -inf."""
-
-    @property
-    def covered(self) -> np.ndarray:
-        """Whether each joint lies in its 90% ellipsoid, (n,)."""
-        return self.covered_by(SHARED_M)
-
-    def covered_by(self, shared_m: float) -> np.ndarray:
-        """Return `covered` for another error that all views share."""
-        own = self.ellipsoids + (shared_m**2 - SHARED_M**2) * np.eye(3)
-        return np.einsum("ni,nij,nj->n", self.steps, np.linalg.inv(own), self.steps) < chi2.ppf(0.9, 3)
-
-    def flagged_by(self, shared_m: float) -> np.ndarray:
-        """Return `flagged` for another error that all views share."""
-
-        def by_limbs(variances: np.ndarray) -> np.ndarray:
-            return np.maximum(odds_of(variances), self.by_colors).max(axis=1) > OFF_ODDS
-
-        otherwise = self.flagged & ~by_limbs(self.widest)  # poses in doubt because others are about as good
-        return otherwise | by_limbs(self.widest + shared_m**2 - SHARED_M**2)
+    covered: np.ndarray
+    """Whether a joint lies in its 90% ellipsoid, (n,); empty without errors."""
 
     @property
     def off(self) -> np.ndarray:
@@ -160,30 +123,19 @@ def assessed(folder: Path, person: int, reference: Path) -> Assessed:
     of_file, of_body = [joints.names.index(n) for n in names], [who.model.point_names.index(n) for n in names]
     frames = [k for k, s in sorted(stored.items()) if k in known and not s.record.keyframe]
     steps = np.array([stored[k].body.joint_centers_world[of_body] - known[k][of_file] for k in frames])
-    records = [stored[k].record for k in frames]
-    # Frames without errors, and all of a run without an audit, have ellipsoids without an extent.
-    none = np.zeros((len(who.model.point_names), 3, 3))
-    errors = np.array([none if r.errors is None else r.errors for r in records])
-    has_ellipsoid = np.isfinite(steps[..., 0]) & errors[:, of_body].any(axis=(2, 3))
-    sigmas2, limb_parts = np.trace(errors, axis1=2, axis2=3) / 3, [x.parts for x in limbs(who.model)]
-    widest = np.array([sigmas2[:, np.isin(who.model.point_parts, parts)].max(axis=1) for parts in limb_parts]).T
-    lost = np.clip([r.limbs_lost for r in records], 1e-12, 1 - 1e-12)
-    odds = logit(lost) - (RUN_MODEL.lost - RUN_MODEL.off)
+    errors = [stored[k].record.errors for k in frames]
+    covered = [
+        np.einsum("ni,nij,nj->n", e, np.linalg.inv(own[of_body]), e) < chi2.ppf(0.9, 3)
+        for e, own in zip(steps, errors, strict=True)
+        if own is not None
+    ]
+    is_known = np.isfinite(steps[..., 0])
     return Assessed(
         1000 * np.linalg.norm(steps, axis=-1),
-        lost.max(axis=1),
-        np.array([r.status != "good" for r in records]),
-        steps[has_ellipsoid],
-        errors[:, of_body][has_ellipsoid],
-        widest,
-        np.where(odds > odds_of(widest) + 1e-3, odds, -np.inf),
+        np.array([max(stored[k].record.limbs_lost, default=0.0) for k in frames]),
+        np.array([stored[k].record.status != "good" for k in frames]),
+        np.concatenate([c[i] for c, i in zip(covered, is_known, strict=False)]) if covered else np.zeros(0),
     )
-
-
-def odds_of(sigmas2: np.ndarray) -> np.ndarray:
-    """Return the log odds that joints of given variances along an axis, m^2, are off."""
-    with np.errstate(divide="ignore"):
-        return np.asarray(logit(beyond(OFF_MM / 1000, np.sqrt(sigmas2))))
 
 
 def measured(folder: Path, references: Sequence[Path]) -> Iterator[Compared]:
@@ -208,25 +160,10 @@ def pooled(name: str, found: Sequence[Compared]) -> Compared:
     def together(runs: Sequence[Assessed]) -> Assessed:
         n = max(r.errors_mm.shape[1] for r in runs)
         errors = [np.pad(r.errors_mm, ((0, 0), (0, n - r.errors_mm.shape[1])), constant_values=np.nan) for r in runs]
-        return Assessed(np.concatenate(errors), *(np.concatenate(a) for a in list(zip(*runs, strict=True))[1:]))
+        return Assessed(np.concatenate(errors), *(np.concatenate([r[i] for r in runs]) for i in (1, 2, 3)))
 
     plain, audited = together([c.plain for c in found]), together([c.audited for c in found])
     return Compared(name, plain, audited, float(np.mean([c.cost for c in found])))
-
-
-def left_out(found: Sequence[Compared]) -> list[Compared]:
-    """Return audited runs whose statuses follow from the error that all views share by the other recordings alone."""
-    out = []
-    for c in found:
-        others = [x.audited for x in found if x.session != c.session]
-        shared_m = min(
-            SHARED_ERRORS_M, key=lambda m: abs(np.concatenate([a.covered_by(m) for a in others]).mean() - 0.9)
-        )
-        own = c.audited
-        ellipsoids = own.ellipsoids + (shared_m**2 - SHARED_M**2) * np.eye(3)
-        print(f"{c.name}: {1000 * shared_m:.1f} mm by the others")
-        out.append(c._replace(plain=own, audited=own._replace(flagged=own.flagged_by(shared_m), ellipsoids=ellipsoids)))
-    return out
 
 
 def groups(found: Sequence[Compared], names: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
@@ -271,9 +208,7 @@ def main() -> None:
             names[group_of(compared.session, len(known))].append(compared.session)
             print(f"{compared.name}: {' | '.join(compared.cells)}", flush=True)
     show(given.write, TABLES[0], CONDITIONS, table(HEADS, groups(found, names), "people"))
-    rows = {title: cells[:-1] for title, cells in groups(left_out(found), names).items()}
-    show(given.write, TABLES[1], LEFT_OUT, table(HEADS[:-1], rows, "people"))
-    show(given.write, TABLES[2], CONDITIONS, table(HEADS, {c.name: c.cells for c in found}, "session"), True)
+    show(given.write, TABLES[1], CONDITIONS, table(HEADS, {c.name: c.cells for c in found}, "session"), True)
 
 
 if __name__ == "__main__":
