@@ -6,17 +6,19 @@ import numpy as np
 import pytest
 from staging import cameras_around, own_evidence, posed, shaken
 
+from tracker.acquisition import from_contours
 from tracker.acquisition.frame_choice import choose_frames
 from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
 from tracker.acquisition.size_fit import Round, SightedPerson, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.acquisition.size_report import acquired_segments, joint_swings, size_changes, unobservable_joints
-from tracker.body.dimensions import PartDimensions, dimensions_of, stature_m, with_dimensions
+from tracker.body.dimensions import PartDimensions, dimensions_of, stature_m, with_dimensions, with_height_of_stature
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.fitting.gauss_newton import PointTargets
+from tracker.fitting.gauss_newton import OTHER_BODY_M, PointTargets, PosePrior, solve
 from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import load_model
+from tracker.tracking.pose_errors import shared_sigmas_m
 
 CAMERAS = cameras_around(4)
 
@@ -122,6 +124,40 @@ def test_what_is_not_seen_stays_as_uncertain_as_before():
     found = fit_sizes_to_contours(parameters, nothing, SizeFitSettings())
     np.testing.assert_allclose(found.sizes, 0, atol=1e-6)
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), parameters.sigmas, rtol=1e-6)
+
+
+def test_points_are_as_uncertain_as_the_sizes_leave_them():
+    """Drawn bodies, whose poses are fitted to the same joints again."""
+    model, kinds = load_model("gavrila22", 1.7), ("height", "build", "length", "girth", "joint")
+    parameters = SizeParameters(model)
+    frames = [f._replace(views=()) for f in sighted(model, model, range(2), 0.0, 0.0, placed=True)]
+    settings = SizeFitSettings(rounds=(Round(kinds, 1.0, 0),))
+    found = fit_sizes_to_contours(parameters, frames, settings)
+    rng, share, places = np.random.default_rng(0), 0.1, []
+    sigma = np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
+    for sizes in rng.multivariate_normal(np.zeros(len(parameters.names)), share**2 * found.covariance, 150):
+        body = parameters.body(sizes)
+        blocks = [(f.pose, [f.placed, PosePrior(f.pose, 1 / sigma), PosePrior.of_spreads(model)]) for f in frames]
+        places.append([body.points_world(solve(body, *of_frame).pose) for of_frame in blocks])
+    expected = np.sqrt(np.var(places, axis=0).mean(axis=(0, 2))) / share
+    np.testing.assert_allclose(found.point_sigmas_m, expected, rtol=0.2)
+    assert found.point_sigmas_m.max() > 1.5 * found.point_sigmas_m.min()
+
+
+@pytest.mark.slow
+def test_a_body_keeps_how_far_its_points_are_known(acquisition):
+    """Without known joints, those of a person may also lie elsewhere in the flesh."""
+    body, own_m = acquisition.body, acquisition.fit.point_sigmas_m
+    np.testing.assert_allclose(shared_sigmas_m(body), np.hypot(own_m, OTHER_BODY_M))
+    assert 0.001 < own_m.min() < own_m.max() < 0.05
+    with_joints = from_contours._with_sigmas(acquisition.fit, joints_are_given=True)
+    np.testing.assert_allclose(shared_sigmas_m(with_joints), own_m)
+    sizes = dimensions_of(with_joints)
+    longer = {n: p._replace(length_m=1.3 * p.length_m) if "calf" in n else p for n, p in sizes.parts.items()}
+    grown = with_dimensions(with_joints, sizes._replace(parts=longer))
+    restated = with_height_of_stature(grown, load_model("gavrila34"))
+    assert restated.height_m > 1.05 * grown.height_m
+    np.testing.assert_allclose(shared_sigmas_m(restated), own_m)
 
 
 @pytest.mark.slow

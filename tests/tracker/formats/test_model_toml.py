@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bodies import BALLS
@@ -247,6 +249,27 @@ def test_a_model_without_joint_centers_is_written_as_before():
     model = parse_model(SMALL, "x")
     assert not model.center_offsets.any()
     assert "center_" not in format_model(model)
+
+
+def test_sigmas_of_points_are_read_and_written():
+    model = parse_model(SMALL, "x")
+    assert model.point_sigmas == ()
+    assert "sigma" not in format_model(model)
+    known = replace(model, point_sigmas=tuple(0.001 * i for i in range(len(model.point_names))))
+    back = parse_model(format_model(known), "y")
+    assert (back.point_sigmas, back.joints) == (known.point_sigmas, known.joints)
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("arm = 0.01", "expected a sigma of each joint and landmark, but see '.*'; give all or none"),
+        ("arm = -0.01", "expected a number >= 0.0 as .sigmas., found .*-0.01"),
+    ],
+)
+def test_sigmas_of_some_points_alone_are_refused(line, expected):
+    with pytest.raises(ModelError, match=expected):
+        parse_model(f"{SMALL}\n[sigmas]\n{line}\n", "x")
 
 
 @pytest.mark.parametrize("key", ["position = [0, 0, -0.1]", 'child = "arm"'])
