@@ -176,7 +176,9 @@ def fit_sizes_to_contours(
         n_evaluations += found.evaluations
         if step is settings.rounds[-1]:
             covariance = _covariance(found.equations, parameters.sigmas, settings.frame_correlation)
-            point_sigmas_m = _point_sigmas(parameters, state, found.equations, covariance)
+            tracked = [f._replace(placed=None, seen=None) for f in people]
+            response = _Problem(parameters, tracked, settings, step).linearize(state)
+            point_sigmas_m = _point_sigmas(parameters, state, response, covariance)
     sizes, poses = state
     body = with_height_of_stature(parameters.body(sizes), parameters.base)
     return SizeFit(sizes, body, tuple(poses), cost, covariance, n_evaluations, point_sigmas_m)
@@ -207,7 +209,13 @@ def _covariance(equations: ArrowEquations, sigmas: Array, correlation: float) ->
 def _point_sigmas(parameters: SizeParameters, state: _State, equations: ArrowEquations, covariance: Array) -> Array:
     """Return with which standard deviation along each axis sizes determine the points of the body, (n_points,), metres.
 
-    A pose gives way to other sizes, as far as its frame allows: the own unknowns are those at which the cost is least.
+    A pose gives way to other sizes, as far as contours allow: the own unknowns are those at which their cost is least.
+
+    Args:
+        parameters: the sizes.
+        state: at the minimum.
+        equations: by the contours alone, because no other frame has known joints.
+        covariance: of the sizes, (n_sizes, n_sizes).
     """
     body, by_sizes, n = parameters.body(state.sizes), parameters.derivatives(state.sizes), len(state.sizes)
     points, variances = np.arange(len(body.point_names)), []
