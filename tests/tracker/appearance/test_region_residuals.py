@@ -119,7 +119,7 @@ def test_views_of_other_times_see_people_there(run):
 
 
 def with_somebody(run):
-    """What is learnt of two people who are dressed alike."""
+    """The appearance of two people who are dressed alike."""
     tables = RegionTables(*(np.concatenate([t, t], axis=1) for t in run.known.tables))
     return replace(run.known, models=(run.model, run.model), tables=tables)
 
