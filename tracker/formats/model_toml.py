@@ -342,7 +342,11 @@ def _search_groups(model: BodyModel, groups: Sequence[_GroupRow], where: str) ->
 
 
 def _point_sigmas(model: BodyModel, sigmas: Mapping[str, float], where: str) -> tuple[float, ...]:
-    """Return the standard deviations of all points in their order; none without any."""
+    """Return the standard deviations of all points in their order; none without any.
+
+    Raises:
+        ModelError: they are those of other points.
+    """
     if sigmas and sigmas.keys() != set(model.point_names):
         odd = min(sigmas.keys() ^ set(model.point_names))
         raise ModelError(f"{where}: expected a sigma of each joint and landmark, but see '{odd}'; give all or none")

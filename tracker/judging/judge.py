@@ -182,18 +182,17 @@ def _steps(imported: BodyPoints, own: StoredPose, frame: int) -> Array:
     return imported.joints_world[frame] - own.body.joint_centers_world[points]
 
 
-def _usual_errors(tracked: Mapping[int, StoredPose]) -> Array:
-    """Return the median covariance of the points, (n_points, 3, 3), m^2, for the start, which has not been assessed."""
+def _usual_errors(tracked: Mapping[int, StoredPose]) -> Array | None:
+    """Return the median covariance of the points, (n_points, 3, 3), m^2, for the start, which has not been assessed;
+    None where nothing has been."""
     known = [t.record.errors for t in tracked.values() if t.record.errors is not None]
-    if known or not tracked:
-        return np.median(known, axis=0) if known else np.zeros((1, 3, 3))
-    return point_covariances(next(iter(tracked.values())).body.model)
+    return np.median(known, axis=0) if known else None
 
 
-def _verdict(own: StoredPose, usual: Array, limb: str, names: Sequence[str], steps: Array) -> LimbVerdict:
+def _verdict(own: StoredPose, usual: Array | None, limb: str, names: Sequence[str], steps: Array) -> LimbVerdict:
     points = [own.body.model.point_names.index(n) for n in names]
-    errors = usual if own.record.errors is None else own.record.errors
-    errors = np.broadcast_to(errors, (len(own.body.model.point_names), 3, 3))[points]
+    known = usual if own.record.errors is None else own.record.errors
+    errors = (point_covariances(own.body.model) if known is None else known)[points]
     off = with_doubt(probability_beyond(steps, errors), np.array(_lost(own, limb)))
     distances = np.linalg.norm(steps, axis=1)
     return LimbVerdict(float(off.max()), float(distances.max()), "", names[int(distances.argmax())])
