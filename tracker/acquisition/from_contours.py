@@ -29,7 +29,7 @@ from tracker.errors import TrackerError
 from tracker.evidence.observer import Observer
 from tracker.evidence.silhouettes import SilhouetteFinder
 from tracker.evidence.view_evidence import ViewEvidence
-from tracker.fitting.gauss_newton import OTHER_BODY_M, PointTargets
+from tracker.fitting.gauss_newton import PointTargets
 from tracker.fitting.pins import PinBlock
 from tracker.fitting.retarget import retarget_pose
 from tracker.images.static_edges import StaticEdgeModel
@@ -38,6 +38,7 @@ from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.estimation.forward_pass import update_static_edges
 from tracker.tracking.estimation.frame_problem import FrameProblem, PersonPrior
 from tracker.tracking.estimation.settings import chamfer_cost
+from tracker.tracking.pose_errors import acquired_sigma_m
 from tracker.tracking.view_regions import read_views, visible_pieces_px
 
 SizeMethod = Literal["contours", "voxels"]
@@ -160,20 +161,10 @@ def acquire_from_contours(
     report("done", 1.0)
     are_given = any(k in placed for k in frames)
     return Acquisition(
-        _with_sigmas(found, are_given), tuple(frames), found.poses, float(np.mean(before)), float(np.mean(after)),
-        parameters, found, voxels=by_voxels, joints_are_given=are_given, before=present,
+        replace(found.body, joint_sigma_m=acquired_sigma_m(are_given)), tuple(frames), found.poses,
+        float(np.mean(before)), float(np.mean(after)), parameters, found, voxels=by_voxels, joints_are_given=are_given,
+        before=present,
     )  # fmt: skip
-
-
-def _with_sigmas(fit: SizeFit, joints_are_given: bool) -> BodyModel:
-    """Return the fitted body with the standard deviations of its points.
-
-    Contours show the flesh. Without known joints, those of a person also lie elsewhere in it.
-    """
-    if fit.point_sigmas_m is None:
-        return fit.body
-    sigmas_m = np.hypot(fit.point_sigmas_m, 0.0 if joints_are_given else OTHER_BODY_M)
-    return replace(fit.body, point_sigmas=tuple((sigmas_m / fit.body.height_m).tolist()))
 
 
 def moving(observer: Observer, bodies: Mapping[int, tuple[PosedBody, ...]]) -> Mapping[int, tuple[PosedBody, ...]]:

@@ -128,9 +128,6 @@ class SizeFit(NamedTuple):
     """Of the sizes, (n_sizes, n_sizes), whatever the poses are."""
     n_evaluations: int = 0
     """Number of evaluations of the residuals of all frames."""
-    point_sigmas_m: Array | None = None
-    """Standard deviation along each axis with which the sizes determine each point of the body, (n_points,), metres;
-    None without a fit to contours."""
 
 
 class _State(NamedTuple):
@@ -162,7 +159,7 @@ def fit_sizes_to_contours(
     if start is None:
         start = SizeStart(np.zeros(n), np.diag(parameters.sigmas**2), {})
     state, covariance = _State(start.sizes, [start.poses.get(f.frame, f.pose) for f in frames]), start.covariance
-    cost, n_evaluations, point_sigmas_m = np.nan, 0, None
+    cost, n_evaluations = np.nan, 0
     planned, done = sum(step.iterations for step in settings.rounds), 0
     for step in settings.rounds:
         body = parameters.body(state.sizes)
@@ -176,12 +173,9 @@ def fit_sizes_to_contours(
         n_evaluations += found.evaluations
         if step is settings.rounds[-1]:
             covariance = _covariance(found.equations, parameters.sigmas, settings.frame_correlation)
-            tracked = [f._replace(placed=None, seen=None) for f in people]
-            response = _Problem(parameters, tracked, settings, step).linearize(state)
-            point_sigmas_m = _point_sigmas(parameters, state, response, covariance)
     sizes, poses = state
     body = with_height_of_stature(parameters.body(sizes), parameters.base)
-    return SizeFit(sizes, body, tuple(poses), cost, covariance, n_evaluations, point_sigmas_m)
+    return SizeFit(sizes, body, tuple(poses), cost, covariance, n_evaluations)
 
 
 def _report_iteration(report: Callable[[float], None], done: int, planned: int, iteration: int) -> None:
@@ -204,26 +198,6 @@ def _covariance(equations: ArrowEquations, sigmas: Array, correlation: float) ->
     of_frames = equations.reduced()[1] - precision
     design_effect = 1 + (len(equations.cross) - 1) * correlation
     return np.asarray(np.linalg.inv(precision + of_frames / design_effect), dtype=np.float64)
-
-
-def _point_sigmas(parameters: SizeParameters, state: _State, equations: ArrowEquations, covariance: Array) -> Array:
-    """Return with which standard deviation along each axis sizes determine the points of the body, (n_points,), metres.
-
-    A pose gives way to other sizes, as far as contours allow: the own unknowns are those at which their cost is least.
-
-    Args:
-        parameters: the sizes.
-        state: at the minimum.
-        equations: by the contours alone, because no other frame has known joints.
-        covariance: of the sizes, (n_sizes, n_sizes).
-    """
-    body, by_sizes, n = parameters.body(state.sizes), parameters.derivatives(state.sizes), len(state.sizes)
-    points, variances = np.arange(len(body.point_names)), []
-    for pose, H, cross in zip(state.poses, equations.own_hessians, equations.cross, strict=True):
-        rows = _points_by_unknowns(points, body, body.kinematics(pose), by_sizes)
-        J = rows[..., :n] - rows[..., n:] @ np.linalg.solve(H, cross)
-        variances.append(np.einsum("pin,nm,pim->p", J, covariance, J) / 3)
-    return np.sqrt(np.mean(variances, axis=0))
 
 
 class _Resized(NamedTuple):

@@ -159,7 +159,6 @@ def with_height_of_stature(model: BodyModel, like: BodyModel) -> BodyModel:
             replace(m, position=unchanged(m.position), center_offset=unchanged(m.center_offset))
             for m in model.landmarks
         ),
-        point_sigmas=tuple(by * s for s in model.point_sigmas),
     )
 
 

@@ -44,9 +44,9 @@ class BodyModel:
     """In the order of the joints that move them."""
     landmarks: tuple[Landmark, ...]
     search_groups: tuple[SearchGroup, ...]
-    point_sigmas: tuple[float, ...] = ()
-    """Standard deviation along each axis with which the sizes determine each of `point_names`, fractions of the height;
-    empty where that is not known."""
+    joint_sigma_m: float | None = None
+    """Standard deviation along each axis with which a person's sizes determine the joints, metres; None where the sizes
+    are nobody's own."""
 
     def with_height(self, height_m: float) -> "BodyModel":
         """Return the same proportions at another body height."""

@@ -7,7 +7,7 @@ none. See `tracker/body/models/gavrila22.toml` for an example.
 import fnmatch
 import os
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from importlib import resources
@@ -142,9 +142,9 @@ class _ModelFile(_Row):
     parts: Annotated[list[_PartRow], Meta(min_length=1, max_length=128, description="1 to 128 parts")]
     version: int = VERSION
     height_m: _Height = DEFAULT_HEIGHT_M
+    joint_sigma_m: Annotated[float, Meta(ge=0, le=1, description="0 to 1 metre")] | None = None
     landmarks: Annotated[list[_LandmarkRow], Meta(max_length=256, description="at most 256 landmarks")] = []
     search: Annotated[list[_GroupRow], Meta(max_length=32, description="at most 32 search groups")] = []
-    sigmas: dict[str, Annotated[float, Meta(ge=0, le=1, description="a fraction of the height")]] = {}
 
 
 def _check_center(offset: Sequence[float], source: str) -> None:
@@ -206,8 +206,7 @@ def parse_model(text: str, source: str, height_m: float | None = None) -> BodyMo
     for what, names in (("joint and landmark", model.point_names), ("degree of freedom", model.dof_names)):
         if doubles := _doubles(names):
             raise ModelError(f"{where}: expected each {what} once, found '{min(doubles)}' twice; rename one")
-    sigmas = _point_sigmas(model, row.sigmas, where)
-    return replace(model, search_groups=_search_groups(model, row.search, where), point_sigmas=sigmas)
+    return replace(model, search_groups=_search_groups(model, row.search, where), joint_sigma_m=row.joint_sigma_m)
 
 
 def format_model(model: BodyModel) -> str:
@@ -241,19 +240,19 @@ def format_model(model: BodyModel) -> str:
         {"name": m.name, "part": m.part, "position": list(m.position)} | _center_row(m) for m in model.landmarks
     ]
     search = [{"name": g.name, "dofs": list(g.dofs)} for g in model.search_groups]
-    # Only where they are known, so that older programs read other files.
-    sigmas = {"sigmas": dict(zip(model.point_names, model.point_sigmas, strict=True))} if model.point_sigmas else {}
+    # Only where it is known, so that older programs read other files.
+    sigma = {} if model.joint_sigma_m is None else {"joint_sigma_m": model.joint_sigma_m}
     return tomli_w.dumps(
         {
             "version": VERSION,
             "name": model.name,
             "height_m": model.height_m,
+            **sigma,
             "search": search,
             "joints": joints,
             "landmarks": landmarks,
             "parts": parts,
         }
-        | sigmas
     )
 
 
@@ -339,18 +338,6 @@ def _search_groups(model: BodyModel, groups: Sequence[_GroupRow], where: str) ->
             raise ModelError(f"{where}: search group '{group.name}' names '{min(doubles)}' twice; leave one out")
         out.append(SearchGroup(group.name, tuple(dofs)))
     return tuple(out)
-
-
-def _point_sigmas(model: BodyModel, sigmas: Mapping[str, float], where: str) -> tuple[float, ...]:
-    """Return the standard deviations of all points in their order; none without any.
-
-    Raises:
-        ModelError: they are those of other points.
-    """
-    if sigmas and sigmas.keys() != set(model.point_names):
-        odd = min(sigmas.keys() ^ set(model.point_names))
-        raise ModelError(f"{where}: expected a sigma of each joint and landmark, but see '{odd}'; give all or none")
-    return tuple(sigmas[name] for name in model.point_names if sigmas)
 
 
 def has_preset_sizes(model: BodyModel) -> bool:

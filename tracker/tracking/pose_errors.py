@@ -1,8 +1,8 @@
 """Errors of joints from how far tracks without a view each lie apart, and the status of a pose from them.
 
 The error of a point is normal. Its covariance is the mean square of the steps to the tracks without a view, and what
-all views share: with which standard deviation the sizes determine the point. On simulated people, a joint whose tracks
-lie 20, 40 and 80 mm apart is off by as much (`tests/benchmarks/joint_errors.py`).
+all views share: sizes of the body, and where its joints lie in the flesh. Both were measured on simulated people by
+`tests/benchmarks/joint_errors.py`: a joint whose tracks lie 20, 40 and 80 mm apart is off by as much.
 """
 
 import numpy as np
@@ -13,6 +13,10 @@ from tracker.fitting.gauss_newton import OTHER_BODY_M
 from tracker.geometry.arrays import Array
 from tracker.tracking.run_confidence import RUN_MODEL
 
+SHARED_M = 0.006
+"""Standard deviation along each axis with which sizes acquired from known joints determine the joints, metres. Of those
+of 13 simulated people, 88% lie in their 90% ellipsoids (`tests/benchmarks/joint_errors.py`); with half as much 55%,
+with twice as much 99%. The covariance of the sizes says 5 to 8 mm (docs/decisions.md)."""
 SELDOM_NATS = 10.0
 """How much likelier the colours of the run must find a limb elsewhere until it is off as likely as not, nats. Of 1,000
 simulated limbs in their place, none had more; of 20 that were put elsewhere, all had
@@ -21,15 +25,12 @@ OFF_M = 0.10
 """A limb is off where one of its joints is farther from its true place, metres."""
 
 
-def shared_sigmas_m(model: BodyModel) -> Array:
-    """Return the standard deviation along each axis of the error of each point that all views share, (n_points,), m.
+def acquired_sigma_m(joints_are_given: bool) -> float:
+    """Return `BodyModel.joint_sigma_m` of an acquired body, metres.
 
-    It is that of the sizes. Of sizes that are nobody's own nothing is known but how far joints of people lie from those
-    of a typical body.
+    Contours show the flesh. Without known joints, those of a person also lie elsewhere in it.
     """
-    if not model.point_sigmas:
-        return np.full(len(model.point_names), OTHER_BODY_M)
-    return model.height_m * np.array(model.point_sigmas)
+    return SHARED_M if joints_are_given else float(np.hypot(SHARED_M, OTHER_BODY_M))
 
 
 def point_covariances(model: BodyModel, steps: Array | float = 0.0) -> Array:
@@ -39,7 +40,8 @@ def point_covariances(model: BodyModel, steps: Array | float = 0.0) -> Array:
         model: the body.
         steps: mean squares of the steps to other tracks, likewise.
     """
-    return np.asarray(steps + shared_sigmas_m(model)[:, None, None] ** 2 * np.eye(3))
+    shared_m = OTHER_BODY_M if model.joint_sigma_m is None else model.joint_sigma_m
+    return np.asarray(steps + np.tile(shared_m**2 * np.eye(3), (len(model.point_names), 1, 1)))
 
 
 def limb_odds(model: BodyModel, covariances: Array) -> Array:

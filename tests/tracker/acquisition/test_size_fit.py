@@ -6,20 +6,18 @@ import numpy as np
 import pytest
 from staging import cameras_around, own_evidence, posed, shaken
 
-from tracker.acquisition import from_contours
 from tracker.acquisition.frame_choice import choose_frames
 from tracker.acquisition.from_contours import AcquisitionSettings, acquire_from_contours
 from tracker.acquisition.size_fit import Round, SightedPerson, SizeFitSettings, fit_sizes_to_contours
 from tracker.acquisition.size_parameters import SizeParameters
 from tracker.acquisition.size_report import acquired_segments, joint_swings, size_changes, unobservable_joints
-from tracker.body.dimensions import PartDimensions, dimensions_of, stature_m, with_dimensions, with_height_of_stature
+from tracker.body.dimensions import PartDimensions, dimensions_of, stature_m, with_dimensions
 from tracker.body.model import PosedBody
 from tracker.errors import TrackerError
-from tracker.fitting.contour_residuals import ContourResiduals
-from tracker.fitting.gauss_newton import OTHER_BODY_M, PointTargets, PosePrior, solve
+from tracker.fitting.gauss_newton import OTHER_BODY_M, PointTargets
 from tracker.fitting.retarget import retarget_pose
 from tracker.formats.model_toml import load_model
-from tracker.tracking.pose_errors import shared_sigmas_m
+from tracker.tracking.pose_errors import acquired_sigma_m
 
 CAMERAS = cameras_around(4)
 
@@ -128,43 +126,6 @@ def test_what_is_not_seen_stays_as_uncertain_as_before():
 
 
 @pytest.mark.slow
-def test_points_are_as_uncertain_as_the_sizes_leave_them():
-    """Drawn bodies, whose poses are fitted to the contours again: without the joints that gave the sizes."""
-    model, kinds = load_model("gavrila22", 1.7), ("height", "build", "length", "girth", "joint")
-    parameters, settings = SizeParameters(model), SizeFitSettings(rounds=(Round(kinds, 1.0, 0),))
-    frames = sighted(model, model, range(2), 0.0, 0.0, placed=True)
-    found = fit_sizes_to_contours(parameters, frames, settings)
-    rng, share, places = np.random.default_rng(0), 0.3, []
-    usual = PosePrior.of_spreads(model)
-    trust = 1 / np.where(model.dof_is_length, settings.trust_m, settings.trust_rad)
-    for sizes in rng.multivariate_normal(np.zeros(len(parameters.names)), share**2 * found.covariance, 60):
-        body = parameters.body(sizes)
-        of_frames = [
-            [ContourResiduals(f.views, [PosedBody(body, f.pose)]), PosePrior(f.pose, trust), usual] for f in frames
-        ]
-        fits = [solve(body, f.pose, blocks) for f, blocks in zip(frames, of_frames, strict=True)]
-        places.append([body.points_world(fit.pose) for fit in fits])
-    expected = np.sqrt(np.var(places, axis=0).mean(axis=(0, 2))) / share
-    np.testing.assert_allclose(found.point_sigmas_m, expected, rtol=0.2)
-
-
-@pytest.mark.slow
-def test_a_body_keeps_how_far_its_points_are_known(acquisition):
-    """Without known joints, those of a person may also lie elsewhere in the flesh."""
-    body, own_m = acquisition.body, acquisition.fit.point_sigmas_m
-    np.testing.assert_allclose(shared_sigmas_m(body), np.hypot(own_m, OTHER_BODY_M))
-    assert 0.001 < own_m.min() < own_m.max() < 0.05
-    with_joints = from_contours._with_sigmas(acquisition.fit, joints_are_given=True)
-    np.testing.assert_allclose(shared_sigmas_m(with_joints), own_m)
-    sizes = dimensions_of(with_joints)
-    longer = {n: p._replace(length_m=1.3 * p.length_m) if "calf" in n else p for n, p in sizes.parts.items()}
-    grown = with_dimensions(with_joints, sizes._replace(parts=longer))
-    restated = with_height_of_stature(grown, load_model("gavrila34"))
-    assert restated.height_m > 1.05 * grown.height_m
-    np.testing.assert_allclose(shared_sigmas_m(restated), own_m)
-
-
-@pytest.mark.slow
 def test_only_the_kinds_of_a_round_change():
     person, model = other_body(), load_model("gavrila22", 1.7)
     parameters = SizeParameters(model)
@@ -226,6 +187,12 @@ def acquisition():
 def test_an_acquisition_fits_better_than_the_body_before(acquisition):
     assert len(acquisition.frames) == len(acquisition.poses) == 3
     assert acquisition.cost_after_px < 0.7 * acquisition.cost_before_px
+
+
+@pytest.mark.slow
+def test_a_body_says_how_well_its_joints_are_known(acquisition):
+    """Those of a person whose joints are not known may lie elsewhere in the flesh."""
+    assert acquisition.body.joint_sigma_m == pytest.approx(np.hypot(acquired_sigma_m(True), OTHER_BODY_M))
 
 
 @pytest.mark.slow

@@ -251,25 +251,13 @@ def test_a_model_without_joint_centers_is_written_as_before():
     assert "center_" not in format_model(model)
 
 
-def test_sigmas_of_points_are_read_and_written():
+def test_how_well_joints_are_known_is_read_and_written():
     model = parse_model(SMALL, "x")
-    assert model.point_sigmas == ()
+    assert model.joint_sigma_m is None
     assert "sigma" not in format_model(model)
-    known = replace(model, point_sigmas=tuple(0.001 * i for i in range(len(model.point_names))))
-    back = parse_model(format_model(known), "y")
-    assert (back.point_sigmas, back.joints) == (known.point_sigmas, known.joints)
-
-
-@pytest.mark.parametrize(
-    ("line", "expected"),
-    [
-        ("arm = 0.01", "expected a sigma of each joint and landmark, but see '.*'; give all or none"),
-        ("arm = -0.01", "expected a number >= 0.0 as .sigmas., found .*-0.01"),
-    ],
-)
-def test_sigmas_of_some_points_alone_are_refused(line, expected):
-    with pytest.raises(ModelError, match=expected):
-        parse_model(f"{SMALL}\n[sigmas]\n{line}\n", "x")
+    assert parse_model(format_model(replace(model, joint_sigma_m=0.006)), "y").joint_sigma_m == 0.006
+    with pytest.raises(ModelError, match=r"joint_sigma_m.*found -0.01"):
+        parse_model(f"joint_sigma_m = -0.01\n{SMALL}", "z")
 
 
 @pytest.mark.parametrize("key", ["position = [0, 0, -0.1]", 'child = "arm"'])

@@ -34,8 +34,8 @@ def test_the_limb_whose_tracks_lie_apart_is_doubted_then_lost(gavrila):
 
 def test_tracks_that_agree_leave_the_error_that_they_share(gavrila):
     """That of sizes that were fitted, or of a body that is nobody's own."""
-    sigmas = np.linspace(0.002, 0.01, len(gavrila.point_names))
-    acquired = replace(gavrila, point_sigmas=tuple(sigmas.tolist()))
-    for model, sigmas_m in ((gavrila, OTHER_BODY_M), (acquired, sigmas * gavrila.height_m)):
-        found = np.sqrt(np.diagonal(point_covariances(model), axis1=1, axis2=2))
-        np.testing.assert_allclose(found, np.broadcast_to(sigmas_m, len(sigmas))[:, None] * np.ones(3))
+    acquired = replace(gavrila, joint_sigma_m=0.004)
+    for model, sigma_m in ((gavrila, OTHER_BODY_M), (acquired, 0.004)):
+        errors = point_covariances(model)
+        assert errors.shape == (len(model.point_names), 3, 3)
+        np.testing.assert_allclose(errors, np.broadcast_to(sigma_m**2 * np.eye(3), errors.shape))
