@@ -34,7 +34,7 @@ GROUPS = (
 )  # fmt: skip
 CONDITIONS = Conditions(
     footage="recordings, and simulated people of another shape than the fitted body, in a furnished room with noise; "
-    "four cameras with backgrounds. People with a 2 dance or exercise at 15 to 25 frames/s",
+    "four cameras with backgrounds",
     body=f"`{DEFAULT_MODEL}`, acquired; after `@nothing` of people who were found",
     start="pose fitted to the reference joints of frame 0; after `@nothing` the one that was found",
     settings="defaults, without the audit → with it",
