@@ -26,9 +26,10 @@ from tracker.contours.pieces import PIECE_PX, place_parts
 from tracker.contours.surfaces import surfaces_of
 from tracker.fitting.clocked_residuals import SummedBlocks, at_time
 from tracker.fitting.contour_arrays import Scratch, scratch_buffer
+from tracker.fitting.contour_residuals import equations_of_twists
 from tracker.fitting.gauss_newton import NormalEquations, ResidualBlock
 from tracker.fitting.segment_matching import pack_visible
-from tracker.fitting.twists import add_twists, twists_to_dofs
+from tracker.fitting.twists import add_twists
 from tracker.geometry.arrays import Array, FloatArray
 
 _PIECE_CELLS = PIECE_PX / CELL_PX
@@ -60,16 +61,11 @@ class _RegionResiduals:
     def linearize(self, model: BodyModel, pose: Array, kinematics: Kinematics) -> NormalEquations:
         """See `ResidualBlock`. The cost is the negative evidence for all people, nats."""
         own = parts_of([b.model for b in self.bodies], self.person)
-        Ts = part_poses(self.bodies).copy()
+        Ts = part_poses(self.bodies)
         Ts[own] = kinematics.Ts_world_part
         M, b = np.zeros((len(Ts), 6, 6)), np.zeros((len(Ts), 6))
         nats = sum(self._add(view, Ts, own, M, b) for view in self.views)
-        gradient, hessian = np.empty(model.n_dofs), np.empty((model.n_dofs, model.n_dofs))
-        twists_to_dofs(
-            M[own], b[own], kinematics.axes_world, kinematics.origins_world, model.dof_is_length, model.dof_joint,
-            model.tree.parents, model.moves, gradient, hessian,
-        )  # fmt: skip
-        return NormalEquations(-nats, gradient, hessian)
+        return equations_of_twists(model, kinematics, -nats, M[own], b[own])
 
     def _add(self, view: _View, Ts: Array, own: slice, M: Array, b: Array) -> float:
         """Add the normal equations of the person's parts in a view; return the evidence for all parts, nats."""

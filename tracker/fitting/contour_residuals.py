@@ -269,12 +269,7 @@ class ContourResiduals:
         """See `ResidualBlock`."""
         term, own = self.term(model), self._own
         cost = self._accumulate(kinematics)
-        gradient, hessian = np.empty(model.n_dofs), np.empty((model.n_dofs, model.n_dofs))
-        twists_to_dofs(
-            term.sums.M[own], term.sums.b[own], kinematics.axes_world, kinematics.origins_world, model.dof_is_length,
-            model.dof_joint, model.tree.parents, model.moves, gradient, hessian,
-        )  # fmt: skip
-        return NormalEquations(cost, gradient, hessian)
+        return equations_of_twists(model, kinematics, cost, term.sums.M[own], term.sums.b[own])
 
     def costs(self, candidates: Array) -> Array:
         """Return the costs alone of many poses, (C, n_values) to (C,)."""
@@ -295,6 +290,24 @@ class ContourResiduals:
     def _accumulate(self, kinematics: Kinematics, with_jacobian: bool = True) -> float:
         self._term.Ts[self._own] = kinematics.Ts_world_part
         return accumulate_normal_equations(self._term, with_jacobian)
+
+
+def equations_of_twists(model: BodyModel, kinematics: Kinematics, cost: float, M: Array, b: Array) -> NormalEquations:
+    """Return normal equations by the degrees of freedom from those by the parts' twists; see `twists_to_dofs`.
+
+    Args:
+        model: the body.
+        kinematics: of the pose.
+        cost: of the pose.
+        M: normal matrix of each part's twist, upper triangles, (n_parts, 6, 6).
+        b: gradient by each part's twist, (n_parts, 6).
+    """
+    gradient, hessian = np.empty(model.n_dofs), np.empty((model.n_dofs, model.n_dofs))
+    twists_to_dofs(
+        M, b, kinematics.axes_world, kinematics.origins_world, model.dof_is_length, model.dof_joint,
+        model.tree.parents, model.moves, gradient, hessian,
+    )  # fmt: skip
+    return NormalEquations(cost, gradient, hessian)
 
 
 @njit(nogil=True, cache=True)

@@ -5,7 +5,6 @@ A run of the tracker audits its own poses (`track_session`). This is for poses t
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 
@@ -134,7 +133,6 @@ def _repaired(
     }
     by_person = {i: {k: tracks[k][i] for k in frames} for i in plan.people}
 
-    @cache
     def covariance_of(frame: int, person: int) -> Array:
         return covariance_by_contours(observer, frame, bodies[frame], person, settings)
 
