@@ -82,6 +82,7 @@ export function annotationSection(context, review, visits) {
   };
   tasks.filter.addEventListener("change", showHere);
   showAll();
+  let marked = review.here.person; // whose task the list marks
 
   return {
     id: "annotation",
@@ -94,8 +95,10 @@ export function annotationSection(context, review, visits) {
     askReason,
     /** @param {Set<keyof import("../model/store.js").Facts>} changed */
     update(changed) {
+      const { person } = review.here;
       if (changed.has("annotation") || changed.has("session")) showAll();
-      else if (LISTED_FROM.some((fact) => changed.has(fact))) tasks.show();
+      else if (person !== marked || LISTED_FROM.some((fact) => changed.has(fact))) tasks.show();
+      marked = person;
       if (changed.has("target") || changed.has("state")) {
         showHere();
         comments.showPlace();

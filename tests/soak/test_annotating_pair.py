@@ -5,7 +5,6 @@ denser plans, up to every frame, and then with poses that the reviewer picks to 
 `QUADRILLE_SOAK=1 python -m pytest -m slow tests/soak/test_annotating_pair.py`.
 """
 
-import asyncio
 import json
 import os
 import subprocess
@@ -161,12 +160,28 @@ async def opened(browser, address, errors):
         await context.close()
 
 
-async def at_task(page):
-    """Frame and person of the page, once it shows them."""
-    await shows(page, "quadrille.state.overlay?.frame === quadrille.state.shown?.frame", 30)
-    await asyncio.sleep(0.3)
-    await shows(page, "quadrille.state.overlay?.frame === quadrille.state.target", 30)
-    return await page.evaluate("[quadrille.state.state.frame, quadrille.state.state.person]")
+POSE_SHOWN = "[quadrille.state.state.frame, quadrille.state.state.person]"
+
+
+async def at_task(page, left=None):
+    """Frame and person of the listed task that the page shows, once it has left another pose where that is given."""
+    await shows(
+        page,
+        f"document.querySelector('.plan-tasks [aria-current]') && '{left or ''}' !== {POSE_SHOWN}.join() "
+        "&& quadrille.state.overlay?.frame === quadrille.state.state.frame "
+        "&& quadrille.state.shown?.frame === quadrille.state.state.frame",
+        30,
+    )
+    return await page.evaluate(POSE_SHOWN)
+
+
+async def next_task(page):
+    """Go to the next listed task; return its frame and person."""
+    n = await page.locator(".plan-tasks button").count()
+    is_listed = await page.locator(".plan-tasks [aria-current]").count()
+    left = ",".join(map(str, await page.evaluate(POSE_SHOWN)))
+    await page.keyboard.press("Alt+t")
+    return await at_task(page, None if is_listed and n == 1 else left)
 
 
 async def plan(page, every):
@@ -205,8 +220,7 @@ async def annotate(eye, kinds):
     """Go through the listed tasks and correct what is seen to be off."""
     for kind in kinds:
         for _ in range(await listed(eye.page, kind)):
-            await eye.page.keyboard.press("Alt+t")
-            frame, person = await at_task(eye.page)
+            frame, person = await next_task(eye.page)
             state, comment = await state_at(eye.page, frame, person)
             seen = await eye.off_px(frame, person)
             told = comment.removesuffix(IS_OFF).replace(" ", "_") if state == "rejected" else None
@@ -223,13 +237,24 @@ async def annotate(eye, kinds):
             await shows(eye.page, "quadrille.state.state.saved", 30)
 
 
+async def up_to_date(page, folder):
+    """Wait until a page shows the tasks of the store: those that another page has done arrive a little later."""
+    tasks = quadrille("tasks", folder, "--json")["tasks"]
+    stored = {f"{t['frame']},{PEOPLE.index(t['person'])}": t["state"] for t in tasks}
+    await shows(
+        page,
+        "quadrille.state.annotation.tasks.every((task) => "
+        f"({json.dumps(stored)})[`${{task.frame}},${{task.person}}`] === task.state)",
+        30,
+    )
+
+
 async def review(eye):
     """Accept poses, or reject them with the joint that is off. Returns the number of verdicts."""
     n = await listed(eye.page, "review")
-    if n:
-        await eye.page.keyboard.press("Alt+t")
-    for left in range(n, 0, -1):  # after a verdict the page goes to the next one by itself
-        frame, person = await at_task(eye.page)
+    task = await next_task(eye.page) if n else None
+    for left in range(n, 0, -1):
+        frame, person = task
         off = await eye.off_px(frame, person)
         worst = max(off, key=lambda joint: worst_px(off[joint]))
         if worst_px(off[worst]) <= REJECTED_PX:
@@ -239,10 +264,8 @@ async def review(eye):
             await eye.page.keyboard.type(worst.replace("_", " ") + IS_OFF)
             await eye.page.keyboard.press("Enter")
         await shows(eye.page, f"document.querySelectorAll('.plan-tasks button').length === {left - 1}", 30)
-        if left > 1:  # the same frame, perhaps, and another person
-            await shows(
-                eye.page, f"[quadrille.state.state.frame, quadrille.state.state.person].join() !== '{frame},{person}'"
-            )
+        if left > 1:  # the page goes to the next one by itself
+            task = await at_task(eye.page, f"{frame},{person}")
     return n
 
 
@@ -251,8 +274,7 @@ async def look_again(eye, n, rng):
     await listed(eye.page, "all")
     for _ in range(n):
         for _ in range(rng.integers(1, 9)):
-            await eye.page.keyboard.press("Alt+t")
-        frame, person = await at_task(eye.page)
+            frame, person = await next_task(eye.page)
         await eye.page.keyboard.press("Alt+r")
         await eye.page.keyboard.type(LOOK_AGAIN.replace("_", " "))
         await eye.page.keyboard.press("Enter")
@@ -277,12 +299,14 @@ async def exported(page, person, to):
     return read_trc(to)
 
 
-async def to_and_fro(anna, rita):
+async def to_and_fro(anna, rita, folder):
     """Correct and review until no pose is left, a few times at most. Returns how often."""
     n = 0
     while n < 4:
         n += 1
+        await up_to_date(anna.page, folder)
         await annotate(anna, ("open",))
+        await up_to_date(rita.page, folder)
         if not await review(rita):
             break
     return n
@@ -313,12 +337,12 @@ async def test_a_pair_makes_a_verified_dataset(folder, truths, tmp_path, cases, 
                 await one.keyboard.press("Alt+u")
             for every in EVERY:
                 await plan(page, every)
-                rounds += await to_and_fro(anna, rita)
+                rounds += await to_and_fro(anna, rita, folder)
                 if time.monotonic() - begin > seconds:
                     break
             while time.monotonic() - begin < seconds - LAST_ROUND_S:
                 await look_again(rita, 12, rng)
-                rounds += await to_and_fro(anna, rita)
+                rounds += await to_and_fro(anna, rita, folder)
             counter = await page.evaluate(COUNTER)
             files = {p: await exported(page, p, tmp_path / f"{p}.trc") for p in PEOPLE}
     finally:

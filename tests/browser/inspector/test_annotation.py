@@ -79,6 +79,15 @@ async def test_tasks_are_counted_filtered_and_gone_through_by_a_key(page, endpoi
     assert "31.3" in await section.locator(".plan-speed").text_content()
 
 
+@pytest.mark.endpoint(n_people=2)
+async def test_the_list_marks_the_task_of_the_active_person(page, endpoint, section):
+    await opened(page, endpoint, PLAN | {"tasks": [task(4, "draft"), task(4, "draft") | {"person": 1}]})
+    marked = section.locator(".plan-tasks [aria-current]")
+    for person in (0, 1, 0):
+        await page.keyboard.press("Alt+t")
+        await marked.get_by_text(f"person {person}").wait_for()
+
+
 async def test_a_reviewer_accepts_and_rejects_pose_by_pose(page, endpoint, section):
     await opened(page, endpoint)
     await section.get_by_label("Tasks to list").select_option("review")
