@@ -6,6 +6,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
+from tracker.motion.shortest_step import nearest_equivalent, shortest_step
 
 
 def mean_pose(model: BodyModel, poses: Sequence[Array]) -> Array:
@@ -23,14 +24,12 @@ def mean_pose(model: BodyModel, poses: Sequence[Array]) -> Array:
         step = pose_steps(model, poses, mean).mean(axis=0)
         mean = model.retract(mean, step)
         if float(np.abs(step).max()) < 1e-9:  # rad and metres; the steps shrink quadratically
-            return mean
+            return nearest_equivalent(model, mean, mean)
 
 
 def pose_steps(model: BodyModel, poses: Sequence[Array], start: Array) -> Array:
     """Return the steps from one pose to others in the degrees of freedom, angles the shorter way round, (k, n_dofs)."""
-    steps = np.array([model.difference(pose, start) for pose in poses])
-    wrapped = np.arctan2(np.sin(steps), np.cos(steps))
-    return np.where(model.dof_is_length, steps, wrapped)
+    return np.array([shortest_step(model, pose, start) for pose in poses])
 
 
 def mean_points(points: Array) -> Array:

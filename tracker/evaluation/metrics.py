@@ -14,6 +14,7 @@ from tracker.formats.joint_maps import JOINTS, LIMB_JOINTS
 from tracker.formats.trc import MarkerTable
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.motion.shortest_step import shortest_step
 
 LOST_M = 0.15
 """A frame with a limb joint off by more is lost, metres."""
@@ -332,7 +333,7 @@ def _part_errors(estimated: Motion, true: Motion, parts: Sequence[str], frame: i
 def _dof_errors(estimated: Motion, true: Motion, frames: Sequence[int]) -> dict[str, float]:
     """Return the mean absolute error of each angle by degree of freedom, the shorter way round, degrees."""
     model = true.model
-    steps = np.array([model.difference(estimated.poses[f], true.poses[f]) for f in frames])
+    steps = np.array([shortest_step(model, estimated.poses[f], true.poses[f]) for f in frames])
     mean = np.degrees(np.abs(np.arctan2(np.sin(steps), np.cos(steps))).mean(axis=0))
     return {n: float(mean[i]) for i, n in enumerate(model.dof_names) if not model.dof_is_length[i]}
 

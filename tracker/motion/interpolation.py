@@ -1,8 +1,8 @@
 """Interpolate between two poses: angles the shorter way, ball joints and the root by the shortest rotation.
 
-An angle with limits is interpolated linearly, which stays within the limits. An unlimited angle goes the shorter way
-round. The three angles of a root that rotates freely are not interpolated one by one: the root rotates about one fixed
-axis (spherical linear interpolation, K. Shoemake 1985), and its angles are computed from the rotation.
+An angle goes the shortest way, linearly; of the two sets of angles of a shoulder the nearer one counts. The three
+angles of a root that rotates freely are not interpolated one by one: the root rotates about one fixed axis (spherical
+linear interpolation, K. Shoemake 1985), and its angles are computed from the rotation.
 """
 
 import warnings
@@ -13,6 +13,7 @@ from tracker.body.model import BodyModel
 from tracker.body.parts import Joint
 from tracker.geometry import rigid
 from tracker.geometry.arrays import Array
+from tracker.motion.shortest_step import middle_angle_sum, nearest_equivalent, shortest_step
 
 
 def interpolate_pose(model: BodyModel, start: Array, end: Array, shares: Array) -> Array:
@@ -28,12 +29,10 @@ def interpolate_pose(model: BodyModel, start: Array, end: Array, shares: Array) 
         Poses within the joints' limits, (n, n_values). Unlimited angles continue from `start` without a jump.
     """
     shares = np.asarray(shares, dtype=np.float64)
-    step = model.difference(end, start)
-    winds = ~model.dof_is_length & np.all(np.isinf(model.limits), axis=1) & _is_angle(model)
-    step[winds] = _wrapped(step[winds])
-    values = model.retract(start, shares[:, None] * step)
+    values = model.retract(start, shares[:, None] * shortest_step(model, end, start))
+    values = nearest_equivalent(model, values, values)  # within the limits
     for i, joint in enumerate(model.joints):
-        if joint.free and joint.kind == "revolute" and _reaches_all_rotations(joint):
+        if joint.free and middle_angle_sum(joint) is not None:
             at = model.dof_value[(model.dof_joint == i) & ~model.dof_is_length]
             values[:, at] = _slerp_angles(joint, np.asarray(start)[at], np.asarray(end)[at], shares)
     return model.clip(values)
@@ -59,21 +58,3 @@ def _rotation(joint: Joint, angles: Array) -> Array:
     """Return the rotation of a joint of three axes, (3, 3)."""
     first, second, third = (rigid.so3_exp(np.array(a.direction) * v) for a, v in zip(joint.axes, angles, strict=True))
     return first @ second @ third
-
-
-def _reaches_all_rotations(joint: Joint) -> bool:
-    """Return whether a joint has three axes, each orthogonal to the one before: it reaches every orientation."""
-    if len(joint.axes) != 3:
-        return False
-    first, second, third = (np.array(a.direction) for a in joint.axes)
-    return bool(abs(first @ second) < 1e-9 and abs(second @ third) < 1e-9)
-
-
-def _is_angle(model: BodyModel) -> np.ndarray:
-    """Return whether each degree of freedom is an angle that is a value itself, not of a ball joint, (n_dofs,)."""
-    return np.array([model.joints[i].kind == "revolute" for i in model.dof_joint])
-
-
-def _wrapped(angles: Array) -> Array:
-    """Wrap angles to half a turn around 0."""
-    return (angles + np.pi) % (2 * np.pi) - np.pi

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
-from tracker.motion.prediction import unwrapped
+from tracker.motion.shortest_step import shortest_step
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class PosePath:
         for direction in (-1, 1):
             k = frame + direction
             while k in poses and abs(k - frame) <= fps:
-                steps[k - frame] = unwrapped(model, model.difference(poses[k], poses[frame]))
+                steps[k - frame] = shortest_step(model, poses[k], poses[frame])
                 k += direction
         return cls(steps, fps)
 

@@ -8,6 +8,7 @@ import numpy as np
 from tracker.body.model import BodyModel
 from tracker.errors import TrackerError
 from tracker.geometry.arrays import Array
+from tracker.motion.shortest_step import shortest_step
 
 MAX_ORDER = 2
 """Highest degree of a motion model: GD96 Sect. 4.2 predicts with constant acceleration."""
@@ -41,8 +42,8 @@ class PredictSettings:
 def predict(model: BodyModel, past: Sequence[Array], settings: PredictSettings) -> Array:
     """Extrapolate the past poses by one frame.
 
-    The polynomial is fitted to steps from the last pose, in the degrees of freedom. Unlimited angles are unwrapped
-    first, so that a rotation continues through half a turn. With too few poses for the order, the order is reduced.
+    The polynomial is fitted to the shortest steps from the last pose, so that a rotation continues through half a
+    turn. With too few poses for the order, the order is reduced.
 
     Args:
         model: the body.
@@ -57,15 +58,9 @@ def predict(model: BodyModel, past: Sequence[Array], settings: PredictSettings) 
     order = 0 if short else min(settings.order, len(recent) - 1)
     if order == 0:
         return model.clip(last)
-    steps = np.array([unwrapped(model, model.difference(p, last)) for p in recent])
+    steps = np.array([shortest_step(model, p, last) for p in recent])
     times = np.arange(1.0 - len(recent), 1.0)
     coefficients = np.linalg.lstsq(np.vander(times, order + 1), steps, rcond=None)[0]
     step = coefficients.sum(axis=0)  # the polynomial at time 1
     bound = np.where(model.dof_is_length, settings.bound_m, settings.bound_rad)
     return model.clip(model.retract(last, np.clip(step, -bound, bound)))
-
-
-def unwrapped(model: BodyModel, step: Array) -> Array:
-    """Wrap the unlimited angles of a step (n_dofs,) to half a turn around 0."""
-    winds = ~model.dof_is_length & np.isinf(model.limits).all(axis=1)
-    return np.where(winds, np.remainder(step + np.pi, 2 * np.pi) - np.pi, step)

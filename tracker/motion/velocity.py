@@ -6,7 +6,7 @@ import numpy as np
 
 from tracker.body.model import BodyModel
 from tracker.geometry.arrays import Array
-from tracker.motion.prediction import unwrapped
+from tracker.motion.shortest_step import shortest_step
 
 
 def velocity(model: BodyModel, poses: Mapping[int, Array], frame: int) -> Array | None:
@@ -22,12 +22,8 @@ def velocity(model: BodyModel, poses: Mapping[int, Array], frame: int) -> Array 
     """
     known = {i: poses[frame + i] for i in range(-2, 3) if frame + i in poses}
     if len(known) == 5:
-        return np.asarray(sum(_difference(model, known[i + 1], known[i - 1]) for i in (-1, 0, 1)) / 6)
+        return np.asarray(sum(shortest_step(model, known[i + 1], known[i - 1]) for i in (-1, 0, 1)) / 6)
     before, after = (-1 if -1 in known else 0), (1 if 1 in known else 0)
     if 0 not in known or before == after:
         return None
-    return _difference(model, known[after], known[before]) / (after - before)
-
-
-def _difference(model: BodyModel, to: Array, start: Array) -> Array:
-    return unwrapped(model, model.difference(to, start))
+    return shortest_step(model, known[after], known[before]) / (after - before)

@@ -14,7 +14,7 @@ from tracker.fitting.interpenetration import SelfPenetration
 from tracker.fitting.keypoints import KeypointBlock
 from tracker.formats.model_toml import format_model
 from tracker.geometry.cameras import Camera
-from tracker.motion.smoothing import PoseTrack, smooth_poses
+from tracker.motion.smoothing import PoseTrack, acceleration_density, smooth_poses
 from tracker.observations.body_points import BodyPoints
 from tracker.pipeline.keypoint_evidence import read_points
 from tracker.session.session import Session
@@ -112,7 +112,8 @@ def keypoint_poses(
         np.array([covariance(model, fits[k]) for k in frames]), np.zeros(len(frames), np.bool_),
         np.ones((len(frames), n), np.bool_),
     )  # fmt: skip
-    return {k: PosedBody(model, pose) for k, pose in zip(frames, smooth_poses(track), strict=True)}
+    poses = smooth_poses(track, acceleration_density(track))
+    return {k: PosedBody(model, pose) for k, pose in zip(frames, poses, strict=True)}
 
 
 def _fit(body: PosedBody, seen: PersonKeypoints, frame: int, cameras: Sequence[Camera]) -> Fit:

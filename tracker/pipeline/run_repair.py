@@ -24,6 +24,7 @@ from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.evidence.observer import Observer
 from tracker.evidence.view_evidence import EdgeSettings, ViewEvidence
+from tracker.fitting.gauss_newton import covariance
 from tracker.fitting.hypothesis import CLEAR_NATS, SAME_POSE_M, Hypothesis, distance_m, limbs_elsewhere
 from tracker.geometry.arrays import Array, IntArray
 from tracker.tracking.estimation.frame_problem import Bodies, with_body
@@ -36,7 +37,7 @@ from tracker.tracking.estimation.limb_repair import (
     refined_by_regions,
 )
 from tracker.tracking.estimation.pose_paths import select_alternatives
-from tracker.tracking.estimation.pose_score import common_evidence
+from tracker.tracking.estimation.pose_score import common_evidence, covariance_by_contours
 from tracker.tracking.estimation.settings import EstimationSettings
 from tracker.tracking.subjects import Subjects
 from tracker.tracking.view_regions import regions
@@ -61,6 +62,8 @@ class RepairedPose(NamedTuple):
     """For each limb, the part and the view that speak most against it, for people to read."""
     trace: tuple[Search, ...] = ()
     """The searches of the repair: those that were taken, and the last one."""
+    covariance: Array | None = None
+    """Of the pose, (n_dofs, n_dofs), rad and metres; None where it stayed as tracked."""
 
 
 class RepairStep(NamedTuple):
@@ -99,6 +102,8 @@ class RunRepair:
         self._first = np.cumsum([0, *(len(limbs(m)) for m in subjects.models)])
         self._found: dict[tuple[int, int], Repair] = {}
         self._traces: dict[tuple[int, int], tuple[Search, ...]] = {}
+        self._covariances: dict[tuple[int, int], Array] = {}
+        self._moved = set[tuple[int, int]]()
 
     def steps(self) -> Iterator[RepairStep]:
         """Do the work. A caller that stops asking leaves it undone."""
@@ -147,9 +152,12 @@ class RunRepair:
         """Refine the poses on a frame by region evidence; return that of each part in each view, (V, P), nats."""
         bodies, regions = self._bodies[frame], self._regions(known, frame)
         for i in self._free(frame):
-            own = covariance_of(frame, i), self._subjects.active_dofs[i]
-            pose = refined_by_regions(known, regions, bodies, i, *own)
-            bodies = with_body(bodies, i, PosedBody(bodies[i].model, pose))
+            before = covariance_of(frame, i)
+            if (frame, i) in self._moved:
+                before = covariance_by_contours(self._observer, frame, bodies, i, self._settings)
+            fit = refined_by_regions(known, regions, bodies, i, before, self._subjects.active_dofs[i])
+            bodies = with_body(bodies, i, PosedBody(bodies[i].model, fit.pose))
+            self._covariances[frame, i] = covariance(bodies[i].model, fit)
         self._bodies[frame] = bodies
         return known.score(regions, bodies).nats
 
@@ -242,6 +250,7 @@ class RunRepair:
         taken = (entry for entry in self._traces.get((frame, person), ()) if entry.taken)
         self._traces[frame, person] = (*taken, found.entry)
         if found.is_better:
+            self._moved.add((frame, person))
             self._bodies[frame] = with_body(bodies, person, PosedBody(model, found.pose))
         return found.is_better
 
@@ -252,6 +261,7 @@ class RunRepair:
             selected = select_alternatives(frames, MIN_GAIN_NATS)
             for k, found, chosen in zip(self._frames, frames, selected, strict=True):
                 if chosen:
+                    self._moved.add((k, i))
                     best, *others = found[chosen], *found[:chosen], *found[chosen + 1 :]
                     self._bodies[k] = with_body(self._bodies[k], i, best.body)
                     likely = tuple(h for h in others if h.cost < best.cost + CLEAR_NATS)
@@ -276,8 +286,10 @@ class RunRepair:
             own = slice(self._first[i], self._first[i + 1])
             for k, tracks in of_person.items():
                 trust, pose = self._trusted(k, i, tracks), self._bodies[k][i].values
-                trace = self._traces.get((k, i), ())
-                out[i][k] = RepairedPose(pose, trust, elsewhere[k][own], tuple(against[k][own]), trace)
+                known = elsewhere[k][own], tuple(against[k][own])
+                out[i][k] = RepairedPose(
+                    pose, trust, *known, self._traces.get((k, i), ()), self._covariances.get((k, i))
+                )
         return out
 
     def _trusted(self, frame: int, person: int, tracks: FrameTracks) -> NDArray[np.bool_]:

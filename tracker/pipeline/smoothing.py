@@ -17,7 +17,8 @@ from tracker.fitting.consensus import Consensus, agreement, consensus
 from tracker.fitting.gauss_newton import with_locked_dofs
 from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
-from tracker.motion.smoothing import PoseTrack, smooth_poses
+from tracker.motion.shortest_step import nearest_equivalent
+from tracker.motion.smoothing import PoseTrack, acceleration_density, smooth_poses
 from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks, assessed_keyframe, with_repair
 from tracker.pipeline.keyframe_stretches import Seam, seam_of, with_seam
 from tracker.pipeline.run_repair import RepairedPose
@@ -163,6 +164,12 @@ class TrackedRows:
         )
         return [change for change in found if change is not None]
 
+    def _final_covariance(self, frame: int, n_dofs: int) -> Array:
+        """Return the covariance of the pose of a frame, after its repair if there is one, (n_dofs, n_dofs)."""
+        repaired = self._repaired.get(frame)
+        known = None if repaired is None else repaired.covariance
+        return self.covariance(frame, n_dofs) if known is None else known
+
     def consensus(self, model: BodyModel, frame: int, active: NDArray[np.bool_] | None) -> Consensus:
         """Return the consensus of the tracked pose of a frame and of those by tracks without a view each.
 
@@ -238,10 +245,11 @@ class TrackedRows:
     def smoothed(self, subjects: Subjects, person: int, fps: float) -> tuple[list[PoseChange], dict[int, Array]]:
         """Return the rows with smoothed poses, in the order of time, and the poses with doubted limbs by motion alone.
 
-        Everything else stays. A limb that is lost by the tracks without a view each is not a measurement. One that its
-        own frame alone calls lost is: most of these are right, and the steps to their motion before and after tell more
-        about them. Nothing of a lost frame is a measurement if no limb is known to be lost. Locked degrees of freedom
-        keep their values. The arguments are those of `finished`.
+        Everything else stays. A repaired pose is a measurement. Of others, a limb that is lost by the tracks without a
+        view each is none. One that its own frame alone calls lost is: most of these are right, and the steps to their
+        motion before and after, in which fast motion is not kept, tell more about them. Nothing of a lost frame is a
+        measurement if no limb is known to be lost. Locked degrees of freedom keep their values. The arguments are those
+        of `finished`.
         """
         model, active = subjects.models[person], subjects.active_dofs[person]
         keyframes = {f: of_people[person] for f, of_people in subjects.keyframes.items() if person in of_people}
@@ -250,22 +258,26 @@ class TrackedRows:
             return [], {}
         at = sorted({*rows, *keyframes})
         n = model.n_dofs
-        measured = np.array([np.ones(n, dtype=bool) if f in keyframes else _measured(model, rows[f]) for f in at])
+        exact = keyframes.keys() | self._repaired.keys()
+        measured = np.array([np.ones(n, dtype=bool) if f in exact else _measured(model, rows[f]) for f in at])
         track = PoseTrack(
             model,
             np.array(at) / fps,
             np.array([keyframes[f] if f in keyframes else rows[f].values for f in at]),
-            np.array([np.zeros((n, n)) if f in keyframes else self.covariance(f, n) for f in at]),
+            np.array([np.zeros((n, n)) if f in keyframes else self._final_covariance(f, n) for f in at]),
             np.array([f in keyframes for f in at]),
             np.array([m if f in self.tracks else m | m.any() for f, m in zip(at, measured, strict=True)]),
         )
-        found = smooth_poses(track)
-        by_motion = found if (track.trusted == measured).all() else smooth_poses(replace(track, trusted=measured))
-        out = []
+        without_doubts = replace(track, trusted=measured)
+        density = acceleration_density(without_doubts)
+        found, by_motion = smooth_poses(track, density), smooth_poses(without_doubts, density, kept_hz=0.0)
+        out, before = [], found[0]
         for frame, pose in zip(at, found, strict=True):
             if frame in rows:
-                values = with_locked_dofs(model, pose, rows[frame].values, active)
+                near = nearest_equivalent(model, pose, before, active)
+                values = with_locked_dofs(model, near, rows[frame].values, active)
                 out.append(replace(self._changes[frame], pose=replace(rows[frame], values=values)))
+            before = values if frame in rows else pose
         return out, dict(zip(at, by_motion, strict=True))
 
 

@@ -68,7 +68,7 @@ def test_a_displaced_pose_comes_back(run):
     for seed in range(4):
         bodies = (PosedBody(model, displaced(run, seed)),)
         before.append(off_m(run, bodies[0].values))
-        after.append(off_m(run, refined_by_regions(run.known, regions, bodies, 0, covariance)))
+        after.append(off_m(run, refined_by_regions(run.known, regions, bodies, 0, covariance).pose))
     assert np.mean(before) > 0.03 > 2 * np.mean(after)
 
 
@@ -77,7 +77,7 @@ def test_locked_degrees_of_freedom_stay(run):
     active = np.arange(model.n_dofs) % 3 > 0
     bodies = (PosedBody(model, displaced(run, 0)),)
     covariance = np.diag(np.where(model.dof_is_length, *STEPS) ** 2)
-    found = refined_by_regions(run.known, regions, bodies, 0, covariance, active)
+    found = refined_by_regions(run.known, regions, bodies, 0, covariance, active).pose
     assert np.array_equal(found[model.dof_value[~active]], bodies[0].values[model.dof_value[~active]])
     assert not np.allclose(found, bodies[0].values)
 

@@ -29,8 +29,8 @@ def root_rotation(model, values):
 
 def test_the_ends_are_the_poses_themselves(model):
     rng = np.random.default_rng(3)
-    for _ in range(20):
-        start, end = random_pose(model, rng), random_pose(model, rng)
+    for spread in np.linspace(0.6, 2.0, 20):
+        start, end = random_pose(model, rng, spread), random_pose(model, rng, spread)
         found = interpolate_pose(model, start, end, SHARES)
         np.testing.assert_allclose(model.points_world(found[0]), model.points_world(start), atol=1e-9)
         np.testing.assert_allclose(model.points_world(found[-1]), model.points_world(end), atol=1e-9)
@@ -38,12 +38,14 @@ def test_the_ends_are_the_poses_themselves(model):
 
 def test_limbs_go_straight_and_stay_within_limits(model):
     rng = np.random.default_rng(4)
-    start, end = random_pose(model, rng, 2.0), random_pose(model, rng, 2.0)
+    start, end = random_pose(model, rng), random_pose(model, rng)
     found = interpolate_pose(model, start, end, SHARES)
     limbs = model.dof_value[model.dof_joint > 0]
     straight = start[limbs] + SHARES[:, None] * (end - start)[limbs]
     np.testing.assert_allclose(found[:, limbs], straight, atol=1e-12)
-    np.testing.assert_array_equal(found, model.clip(found))
+    far = interpolate_pose(model, random_pose(model, rng, 2.0), random_pose(model, rng, 2.0), SHARES)
+    for poses in (found, far):
+        np.testing.assert_array_equal(poses, model.clip(poses))
 
 
 def test_the_root_turns_about_one_axis_at_one_speed(model):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from tracker.errors import TrackerError
 from tracker.formats.model_toml import load_model, parse_model
 from tracker.geometry import rigid
-from tracker.motion.prediction import PredictSettings, predict, unwrapped
+from tracker.motion.prediction import PredictSettings, predict
 
 GAVRILA = load_model("gavrila22")
 BALL_MODEL = parse_model(BALLS, "balls")
@@ -104,17 +104,6 @@ def test_a_turn_through_half_a_circle_goes_on(order, way):
     found = predict(GAVRILA, list(poses[:3]), PredictSettings(order, 3))
     assert np.remainder(found[twist] - poses[3, twist] + np.pi, 2 * np.pi) - np.pi == pytest.approx(0, abs=1e-9)
     np.testing.assert_allclose(np.delete(found, twist), np.delete(poses[3], twist), atol=1e-12)
-
-
-def test_only_angles_that_may_wind_are_unwrapped():
-    step = np.full(GAVRILA.n_dofs, 4.0)
-    winds = FREE & ~GAVRILA.dof_is_length
-    assert 0 < winds.sum() < 6
-    np.testing.assert_allclose(unwrapped(GAVRILA, step), np.where(winds, 4.0 - 2 * np.pi, 4.0))
-    np.testing.assert_allclose(unwrapped(GAVRILA, -step), np.where(winds, 2 * np.pi - 4.0, -4.0))
-    # What is within half a turn stays.
-    near = np.linspace(-3, 3, GAVRILA.n_dofs)
-    np.testing.assert_allclose(unwrapped(GAVRILA, near), near, atol=1e-12)
 
 
 @pytest.mark.parametrize("order", [1, 2])

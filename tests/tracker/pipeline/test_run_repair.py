@@ -42,6 +42,16 @@ def walk(gavrila):
     return Walk(gavrila, SUIT)
 
 
+@pytest.fixture(autouse=True)
+def contours(monkeypatch):
+    """The frames have no edges. Contours would say as much about poses that were found as about tracked ones."""
+
+    def known(observer, frame, bodies, person, settings):
+        return 0.01**2 * np.eye(bodies[person].model.n_dofs)
+
+    monkeypatch.setattr(run_repair, "covariance_by_contours", known)
+
+
 def repaired(walk, keyframes=(), deviation=0.01, active=None):
     """The steps of a repair whose tracks agree with one another on the wrong leg.
 
@@ -73,7 +83,7 @@ def test_a_leg_is_found_that_all_tracks_have_elsewhere(walk):
     found = last.found[0]
     assert sorted(found) == list(range(N_FRAMES))
     for k, is_wrong in enumerate(walk.wrong):
-        pose, trust, elsewhere, against, _ = found[k]
+        pose, trust, elsewhere, against, *_ = found[k]
         assert elsewhere[leg] < 5
         assert len(against) == len(elsewhere)
         if is_wrong:
@@ -99,7 +109,7 @@ def test_a_leg_is_taken_that_only_all_frames_together_speak_for(walk, monkeypatc
     found = repaired(walk)[-1].found[0]
     leg = [x.name for x in limbs(walk.model)].index("right_calf")
     for k in np.flatnonzero(walk.wrong):
-        assert np.array_equal(found[k].pose, walk.true[k][0].values)
+        assert off_m(walk, k, found[k].pose) < 0.02 < off_m(walk, k, walk.tracked[k][0].values) / 2
         assert [entry.taken for entry in found[k].trace] == [True, False]
         assert not found[k].trust[:, leg].any()
 

@@ -11,7 +11,8 @@ from tracker.evidence.view_evidence import ACCEPTED_SHARE, ViewEvidence
 from tracker.geometry.arrays import Array, FloatArray
 from tracker.geometry.cameras import Region
 from tracker.images.static_edges import StaticEdgeModel
-from tracker.motion.prediction import PredictSettings, unwrapped
+from tracker.motion.prediction import PredictSettings
+from tracker.motion.shortest_step import shortest_step
 from tracker.search.chamfer_cost import ChamferCost
 from tracker.tracking.confidence import Status
 from tracker.tracking.estimate import AlternativePose, PoseEstimate
@@ -235,8 +236,7 @@ def _moving(run: TrackingRun, memories: Sequence[PersonMemory], bodies: Bodies, 
     for memory, body, velocity in zip(memories, bodies, known, strict=True):
         memory.step_frames = None if velocity is not None else (second - first) or 1
         if memory.step_frames is not None:
-            step = body.model.difference(body.values, memory.history[-1])
-            velocity = unwrapped(body.model, step) / memory.step_frames
+            velocity = shortest_step(body.model, body.values, memory.history[-1]) / memory.step_frames
         out.append(PosedBody(body.model, body.values, velocity))
     return tuple(out)
 

@@ -24,7 +24,8 @@ from tracker.fitting.hypothesis import SETTLED_M, Hypothesis, distance_m
 from tracker.fitting.interpenetration import BodyPenetration
 from tracker.fitting.keypoints import keypoint_blocks
 from tracker.geometry.arrays import Array
-from tracker.motion.prediction import PredictSettings, unwrapped
+from tracker.motion.prediction import PredictSettings
+from tracker.motion.shortest_step import shortest_step
 from tracker.tracking.confidence import PoseQuality
 from tracker.tracking.estimation.settings import (
     MAX_ITERATIONS,
@@ -63,7 +64,7 @@ class PersonPrior(NamedTuple):
         if self.velocity is None or self.step_frames is None:
             return PosedBody(self.model, pose, self.velocity)
         bound = np.where(self.model.dof_is_length, settings.bound_m, settings.bound_rad)
-        change = unwrapped(self.model, self.model.difference(pose, self.predicted)) / self.step_frames
+        change = shortest_step(self.model, pose, self.predicted) / self.step_frames
         return PosedBody(self.model, pose, np.clip(self.velocity + change, -bound, bound))
 
 

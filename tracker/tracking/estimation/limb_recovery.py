@@ -22,6 +22,7 @@ from tracker.fitting.contour_residuals import MIN_DECREASE
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import BEAM_NATS, CLEAR_NATS, SAME_POSE_M, Hypothesis, apart, distinct
 from tracker.geometry.arrays import Array, IntArray
+from tracker.motion.shortest_step import nearest_equivalent
 from tracker.search.even_points import even_points
 from tracker.tracking.estimation.pose_score import PoseScorer
 from tracker.tracking.estimation.settings import MAX_ITERATIONS, TOLERANCE, RecoverSettings
@@ -113,6 +114,8 @@ def _search_limb(
     if len(beam) > 1:
         poses = np.array([*poses, *(_with_limb(model, k.pose, pose, limb) for k in beam[1:] for pose in poses)])
         poses = poses[np.argsort(of_limb.costs(poses), kind="stable")[: scorer.settings.n_limb_refined]]
+    # Both sets of angles of a shoulder have the same prior then.
+    poses = nearest_equivalent(model, poses, beam[0].pose, scorer.active_dofs)
     tried = [x for x in of_limb.each(limb_only, poses) if x.cost < beam[0].cost + BEAM_NATS]
     return scorer.each(whole_body, [x.pose for x in distinct(tried, scorer.settings.beam_width)])
 

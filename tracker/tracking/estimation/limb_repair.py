@@ -20,7 +20,7 @@ from tracker.body.model import BodyModel, PosedBody
 from tracker.body.searches import Search
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import MIN_DECREASE
-from tracker.fitting.gauss_newton import GaussianPrior, solve
+from tracker.fitting.gauss_newton import Fit, GaussianPrior, solve
 from tracker.fitting.gauss_newton_compiled import solver_of
 from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.geometry.arrays import Array
@@ -154,8 +154,8 @@ def better_limbs(
 def refined_by_regions(
     known: RegionModel, regions: RegionFrame, bodies: Bodies, person: int, covariance: Array,
     active_dofs: NDArray[np.bool_] | None = None,
-) -> Array:  # fmt: skip
-    """Return the likeliest pose of a person, (n_values,), by what is known of it and by region evidence.
+) -> Fit:  # fmt: skip
+    """Fit the likeliest pose of a person by what is known of it and by region evidence.
 
     Args:
         known: appearance of the people and places of the run.
@@ -170,7 +170,7 @@ def refined_by_regions(
         GaussianPrior(start, np.asarray(np.linalg.inv(covariance), dtype=np.float64)),
         region_residuals(known, regions, bodies, person),
     ]
-    return solve(model, start, blocks, active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE).pose
+    return solve(model, start, blocks, active_dofs, MAX_ITERATIONS, TOLERANCE, MIN_DECREASE)
 
 
 def _with_regions(
