@@ -6,13 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from tracker.body.limbs import limbs
-from tracker.body.model import BodyModel
+from tracker.body.model import BodyModel, PosedBody
 from tracker.fitting.consensus import Consensus, agreement
+from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.pipeline.run_repair import RepairedPose
-from tracker.store.records import AssessmentChange, PoseRecord
-from tracker.tracking.confidence import classify_limbs, is_uncertainty, probabilities, uncertain, worst
-from tracker.tracking.pose_errors import elsewhere_odds, limb_odds, point_covariances
+from tracker.store.records import Alternative, AssessmentChange, PoseChange, PoseRecord
+from tracker.tracking.confidence import classify_limbs, probabilities, worst
+from tracker.tracking.pose_errors import alternative_odds, elsewhere_odds, limb_odds, point_covariances
+from tracker.tracking.remarks import may_be_elsewhere, uncertain, without_uncertainty
 from tracker.tracking.run_confidence import log_odds
 from tracker.tracking.view_tracks import FrameTracks
 
@@ -43,9 +45,10 @@ def assessed_by_tracks(
         pose: the pose.
         found: how far the tracks lie from it.
         tracks: the tracks.
-        is_ambiguous: whether other poses are about as good.
+        is_ambiguous: whether other poses are about as good, by the tracker.
         features: of its limbs, as above; None where they are not known.
-        repaired: how well it agrees with the colours of the run; None where that is not known.
+        repaired: how well it agrees with the colours of the run, and other poses by contours and colours together,
+            which take the place of those of the tracker; None where that is not known.
     """
     errors = point_covariances(model, found.covariances)
     # For each limb the view without which it is farthest away.
@@ -57,16 +60,36 @@ def assessed_by_tracks(
         for i in np.flatnonzero(by_colors[:, 0] > odds[:, 0]):
             reasons[i] = f": {repaired.against[i]}"
         odds = np.maximum(odds, by_colors)
+        if repaired.alternatives is not None:
+            is_ambiguous, by_others = False, alternative_odds(model, pose.values, repaired.alternatives)
+            for i in np.flatnonzero(by_others[:, 0] > odds[:, 0]):
+                reasons[i] = ": another place is about as likely"
+            odds = np.maximum(odds, by_others)
     elif features is not None and not tracks.has_history:
         odds = np.maximum(odds, log_odds(features))
     return _classified(model, replace(pose, errors=errors), odds, reasons, is_ambiguous)
 
 
-def with_repair(pose: PoseRecord, repaired: RepairedPose) -> PoseRecord:
-    """Return a pose with the searches of the repair in place of those of an earlier one."""
-    if not repaired.trace:
+def with_repair(model: BodyModel, pose: PoseRecord, repaired: RepairedPose) -> PoseRecord:
+    """Return a pose with the searches of the repair in place of those of an earlier one, and with its alternatives in
+    the remark in place of the tracker's."""
+    if repaired.trace:
+        pose = replace(pose, trace=(*(x for x in pose.trace or () if x.kind != "repair"), *repaired.trace))
+    if repaired.alternatives is None:
         return pose
-    return replace(pose, trace=(*(x for x in pose.trace or () if x.kind != "repair"), *repaired.trace))
+    remarks = without_uncertainty(pose.remark, alternatives=True)
+    moved = {n for h in repaired.alternatives for n in limbs_elsewhere(PosedBody(model, repaired.pose), h.body)}
+    if repaired.alternatives:
+        remarks.append(may_be_elsewhere([x.name for x in limbs(model) if x.name in moved]))
+    return replace(pose, remark=", ".join(remarks))
+
+
+def with_alternatives(change: PoseChange, repaired: RepairedPose) -> PoseChange:
+    """Return a row with the alternatives of its repair in place of those of the tracker, if they were compared."""
+    if repaired.alternatives is None or change.pose is None:
+        return change
+    revision = change.pose.model_revision
+    return replace(change, alternatives=tuple(Alternative(h.pose, revision) for h in repaired.alternatives))
 
 
 def assessed_keyframe(
@@ -103,7 +126,7 @@ def _classified(
     status = classify_limbs(odds)
     if is_ambiguous:
         status = worst([status, "doubtful"])
-    remarks, worst_limb = [r for r in pose.remark.split(", ") if r and not is_uncertainty(r)], int(odds[:, 1].argmax())
+    remarks, worst_limb = without_uncertainty(pose.remark), int(odds[:, 1].argmax())
     if status != "good" and (reasons[worst_limb] or not remarks):
         remarks = [uncertain(limbs(model)[worst_limb].name, reasons[worst_limb]), *remarks]
     lost = tuple(map(float, probabilities(odds[:, 1])))

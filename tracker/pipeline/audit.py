@@ -15,7 +15,7 @@ from tracker.evidence.observer import Observer
 from tracker.fitting.consensus import agreement, consensus
 from tracker.geometry.arrays import Array
 from tracker.geometry.ground_plane import floor_plane
-from tracker.pipeline.assessed_poses import assessed_by_tracks, assessed_keyframe, with_repair
+from tracker.pipeline.assessed_poses import assessed_by_tracks, assessed_keyframe, with_alternatives, with_repair
 from tracker.pipeline.methods import make_tracker
 from tracker.pipeline.run_repair import RepairedPose, RunRepair
 from tracker.pipeline.track_session import outward
@@ -136,7 +136,14 @@ def _repaired(
     def covariance_of(frame: int, person: int) -> Array:
         return covariance_by_contours(observer, frame, bodies[frame], person, settings)
 
-    repair = RunRepair(observer, subjects, settings, bodies, by_person, covariance_of if plan.takes_consensus else None)
+    known = {
+        (k, i): [a.values for a in store.alternatives(session.people[i].name, k) if len(a.values) == len(own[k].values)]
+        for i, own in records.items()
+        for k in frames
+    }
+    repair = RunRepair(
+        observer, subjects, settings, bodies, by_person, covariance_of if plan.takes_consensus else None, known
+    )
     found: Mapping[int, Mapping[int, RepairedPose]] = {}
     for step in repair.steps():
         report("comparing with the colours of the run", step.done / step.total)
@@ -153,13 +160,13 @@ def _row(
     name, model = session.people[person].name, session.people[person].model
     if record.keyframe:
         return assessed_keyframe(model, name, frame, record, tracks, repaired)
-    trust = tracks.trust
+    trust, change = tracks.trust, PoseChange(name, frame, record, tuple(store.alternatives(name, frame)))
     if repaired is not None:
-        record, trust = with_repair(replace(record, values=repaired.pose), repaired), trust * repaired.trust
+        record, trust = with_repair(model, replace(record, values=repaired.pose), repaired), trust * repaired.trust
+        change = with_alternatives(change, repaired)
     found = agreement(model, record.values, tracks.poses, trust)
-    alternatives = tuple(store.alternatives(name, frame))
-    assessed = assessed_by_tracks(model, record, found, tracks, len(alternatives) > 0, None, repaired)
-    return PoseChange(name, frame, assessed, alternatives)
+    is_ambiguous = len(change.alternatives) > 0
+    return replace(change, pose=assessed_by_tracks(model, record, found, tracks, is_ambiguous, None, repaired))
 
 
 def _tracks(

@@ -20,8 +20,9 @@ from tracker.geometry.arrays import Array
 from tracker.session.session import Session
 from tracker.store.annotation_store import AnnotationStore
 from tracker.store.records import BETWEEN, SEAM, PoseRecord
-from tracker.tracking.confidence import classify_limbs, is_uncertainty, probabilities, status_named, uncertain, worst
+from tracker.tracking.confidence import classify_limbs, probabilities, status_named, worst
 from tracker.tracking.pose_errors import limb_odds, point_covariances
+from tracker.tracking.remarks import uncertain, without_uncertainty
 
 _POSES = "keyframe_poses"
 """Key of a pose's settings: checksums of the poses of the two keyframes."""
@@ -84,8 +85,7 @@ def with_seam(model: BodyModel, pose: PoseRecord, seam: Seam) -> PoseRecord:
         apart_mm = lengths_mm[np.isin(model.point_parts, limb.parts)].max()
         first, last = seam.between
         reason = f": tracked from frames {first} and {last}, it lies {apart_mm:.0f} mm apart"
-        others = [r for r in remark.split(", ") if r and not is_uncertainty(r)]
-        remark = ", ".join([uncertain(limb.name, reason), *others])
+        remark = ", ".join([uncertain(limb.name, reason), *without_uncertainty(remark)])
     known = pose.limbs_lost or (0.0,) * len(lost)
     return replace(
         pose,

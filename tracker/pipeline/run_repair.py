@@ -9,6 +9,7 @@ searched first. A limb that is found is tried on the frames before and after, so
 from bisect import bisect
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
@@ -64,6 +65,9 @@ class RepairedPose(NamedTuple):
     """The searches of the repair: those that were taken, and the last one."""
     covariance: Array | None = None
     """Of the pose, (n_dofs, n_dofs), rad and metres; None where it stayed as tracked."""
+    alternatives: tuple[Hypothesis, ...] | None = None
+    """Other poses with a limb elsewhere that are about as good by contours and colours together. Their costs are
+    relative to that of the pose, nats. None where none were compared."""
 
 
 class RepairStep(NamedTuple):
@@ -82,6 +86,7 @@ class RunRepair:
     def __init__(
         self, observer: Observer, subjects: Subjects, settings: EstimationSettings, bodies: Mapping[int, Bodies],
         tracks: Mapping[int, Mapping[int, FrameTracks]], covariance_of: Callable[[int, int], Array] | None = None,
+        alternatives: Mapping[tuple[int, int], Sequence[Array]] | None = None,
     ) -> None:  # fmt: skip
         """Prepare; nothing is computed yet.
 
@@ -93,7 +98,9 @@ class RunRepair:
             tracks: by person and frame, their poses by tracks without a view each.
             covariance_of: gives the covariance of the pose of a person on a frame, by frame and person, (n_dofs,
                 n_dofs). Without it the poses stay, and are compared only.
+            alternatives: other poses that the tracker found about as good, by frame and person, (n_values,) each.
         """
+        self._alternatives = alternatives or {}
         self._covariance_of = covariance_of
         self._observer, self._subjects, self._settings = observer, subjects, settings
         self._bodies, self._tracks = dict(bodies), tracks
@@ -222,10 +229,11 @@ class RunRepair:
         return [Colors(views, bodies, i).learn() for i in range(len(bodies))]
 
     def _other_poses(self, frame: int, person: int) -> list[Array]:
-        """Return the poses of a person by the tracks, and on the frames around."""
+        """Return the poses of a person by the tracks and searches, and on the frames around."""
         tracks = self._tracks[person].get(frame)
         return [
             *([] if tracks is None else tracks.poses),
+            *self._alternatives.get((frame, person), ()),
             *(self._bodies[k][person].values for k in self._around(frame)),
         ]
 
@@ -288,9 +296,17 @@ class RunRepair:
                 trust, pose = self._trusted(k, i, tracks), self._bodies[k][i].values
                 known = elsewhere[k][own], tuple(against[k][own])
                 out[i][k] = RepairedPose(
-                    pose, trust, *known, self._traces.get((k, i), ()), self._covariances.get((k, i))
+                    pose, trust, *known, self._traces.get((k, i), ()), self._covariances.get((k, i)), self._rivals(k, i)
                 )
         return out
+
+    def _rivals(self, frame: int, person: int) -> tuple[Hypothesis, ...] | None:
+        """Return the poses of a person that are about as good as the one on a frame, with a limb elsewhere."""
+        body, examined = self._bodies[frame][person], self._found.get((frame, person))
+        if self._covariance_of is None:
+            return None
+        others = () if examined is None else (replace(h, cost=h.cost - examined.cost) for h in examined.alternatives)
+        return tuple(h for h in others if h.cost < CLEAR_NATS and distance_m(h.body, body) > SAME_POSE_M)
 
     def _trusted(self, frame: int, person: int, tracks: FrameTracks) -> NDArray[np.bool_]:
         """Return where the tracks may have the limbs: where the pose has them, or one that is about as good."""

@@ -19,7 +19,13 @@ from tracker.fitting.hypothesis import limbs_elsewhere
 from tracker.geometry.arrays import Array
 from tracker.motion.shortest_step import nearest_equivalent
 from tracker.motion.smoothing import PoseTrack, acceleration_density, smooth_poses
-from tracker.pipeline.assessed_poses import assessed_by_features, assessed_by_tracks, assessed_keyframe, with_repair
+from tracker.pipeline.assessed_poses import (
+    assessed_by_features,
+    assessed_by_tracks,
+    assessed_keyframe,
+    with_alternatives,
+    with_repair,
+)
 from tracker.pipeline.keyframe_stretches import Seam, seam_of, with_seam
 from tracker.pipeline.run_repair import RepairedPose
 from tracker.store.records import AssessmentChange, PoseChange, PoseRecord
@@ -109,8 +115,8 @@ class TrackedRows:
     def finished(self, subjects: Subjects, person: int, fps: float, smooth: bool = True) -> list[PoseChange]:
         """Return the rows with consensus poses, smoothed, and their final statuses, in the order of time.
 
-        Costs and alternatives stay those of the tracked pose, and so does the status of a pose whose limbs were not
-        assessed.
+        Costs stay those of the tracked pose, and so does the status of a pose whose limbs were not assessed.
+        Alternatives stay where the repair has not compared them.
 
         Args:
             subjects: of the run; keyframes are exact.
@@ -136,7 +142,8 @@ class TrackedRows:
             if frame in agreed and frame not in self._unseen:
                 tracks, own = self.tracks[frame], features.get(frame)
                 if frame in self._repaired:
-                    pose = with_repair(pose, self._repaired[frame])
+                    pose = with_repair(model, pose, self._repaired[frame])
+                    change = with_alternatives(change, self._repaired[frame])
                 pose = assessed_by_tracks(
                     model, pose, agreed[frame], tracks, is_ambiguous, own, self._repaired.get(frame)
                 )
@@ -271,13 +278,14 @@ class TrackedRows:
         without_doubts = replace(track, trusted=measured)
         density = acceleration_density(without_doubts)
         found, by_motion = smooth_poses(track, density), smooth_poses(without_doubts, density, kept_hz=0.0)
-        out, before = [], found[0]
+        out, here = [], found[0]
         for frame, pose in zip(at, found, strict=True):
             if frame in rows:
-                near = nearest_equivalent(model, pose, before, active)
-                values = with_locked_dofs(model, near, rows[frame].values, active)
-                out.append(replace(self._changes[frame], pose=replace(rows[frame], values=values)))
-            before = values if frame in rows else pose
+                near = nearest_equivalent(model, pose, here, active)
+                here = with_locked_dofs(model, near, rows[frame].values, active)
+                out.append(replace(self._changes[frame], pose=replace(rows[frame], values=here)))
+            else:
+                here = pose
         return out, dict(zip(at, by_motion, strict=True))
 
 

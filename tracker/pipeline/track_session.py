@@ -230,7 +230,8 @@ class TrackSession:
         def covariance_of(frame: int, person: int) -> Array:
             return self._rows[person].covariance(frame, subjects.models[person].n_dofs)
 
-        yield from RunRepair(self.observer, subjects, settings, bodies, tracks, covariance_of).steps()
+        others = {(k, i): poses for k in frames for i, poses in enumerate(self.tracked[k].alternatives)}
+        yield from RunRepair(self.observer, subjects, settings, bodies, tracks, covariance_of, others).steps()
 
     def smoothing(self) -> Iterator[SmoothedRows]:
         """Take the consensus of all tracks, smooth it and assess it, as a single step: as a whole or not at all."""

@@ -11,6 +11,7 @@ __all__ = [
     "method",
     "person_memory",
     "pose_errors",
+    "remarks",
     "run_confidence",
     "subjects",
     "tracker",

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.appearance.part_colors import MIN_SAMPLES, ColorScore, PartColors
-from tracker.body.limbs import Limb, limb_display_name, limbs
+from tracker.body.limbs import Limb, limbs
 from tracker.body.model import BodyModel, PosedBody
 from tracker.evidence.view_evidence import ViewEvidence
 from tracker.fitting.contour_residuals import PartCosts
 from tracker.fitting.gauss_newton import Fit, covariance
 from tracker.geometry.arrays import Array, IntArray
 from tracker.images.silhouette_contour import MIN_TRUST
+from tracker.tracking.remarks import uncertain
 from tracker.tracking.view_regions import px_per_m
 
 Status = Literal["good", "doubtful", "lost"]
@@ -35,8 +36,6 @@ NEXT_TO_NOTHING = 0.005
 """Added to a feature before its logarithm, body heights or outlier distances, so that smaller ones hardly count."""
 _HEAD = "head"
 """Name of the limb that looks different from each side."""
-_UNCERTAIN = " uncertain"
-"""Word of the reason against a pose of which a limb may be off."""
 _LIMIT_RAD = 0.05
 """An angle is at its limit where it is nearer, rad."""
 
@@ -384,16 +383,6 @@ def reason(found: PoseQuality) -> str:
     if found.forward > _LOST_FORWARD:
         return "no edges near the body"
     return uncertain(found.limbs[int(found.log_odds.argmax())].name)
-
-
-def uncertain(limb: str, reason: str = "") -> str:
-    """Return the remark that the limb of a name may be off, with the reason, such as ` without LEFT`."""
-    return f"{limb_display_name(limb)}{_UNCERTAIN}{reason}"
-
-
-def is_uncertainty(reason: str) -> bool:
-    """Return whether a reason is that a limb may be off."""
-    return _UNCERTAIN in reason
 
 
 def status_named(name: str) -> Status:

@@ -5,11 +5,14 @@ all views share: sizes of the body, and where its joints lie in the flesh. Both 
 `tests/benchmarks/joint_errors.py`: a joint whose tracks lie 20, 40 and 80 mm apart is off by as much.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import OTHER_BODY_M
+from tracker.fitting.hypothesis import Hypothesis
 from tracker.geometry.arrays import Array
 from tracker.tracking.run_confidence import RUN_MODEL
 
@@ -65,6 +68,25 @@ def elsewhere_odds(nats: Array) -> Array:
         nats: how much likelier each limb is elsewhere, (n_limbs,); see `region_deficit.elsewhere_nats`.
     """
     return np.asarray((nats - SELDOM_NATS)[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
+
+
+def alternative_odds(model: BodyModel, pose: Array, alternatives: Sequence[Hypothesis]) -> Array:
+    """Return the log odds that each limb is off and lost, (n_limbs, 2), by other poses on the same evidence.
+
+    A limb is as likely elsewhere as all poses together that have it there. It is at most as likely elsewhere as not:
+    poses that are clearly better have been taken.
+
+    Args:
+        model: the body.
+        pose: the pose, (n_values,).
+        alternatives: the other poses. Their costs are relative to that of the pose, nats.
+    """
+    points, odds = model.points_world(pose), np.full(len(limbs(model)), -np.inf)
+    for other in alternatives:
+        gaps = np.linalg.norm(other.body.points_world - points, axis=1)
+        is_off = [gaps[np.isin(model.point_parts, limb.parts)].max() > OFF_M for limb in limbs(model)]
+        odds = np.where(is_off, np.logaddexp(odds, -other.cost), odds)
+    return np.asarray(np.minimum(odds, 0.0)[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
 
 
 def beyond(radius_m: float, sigma_m: Array) -> Array:

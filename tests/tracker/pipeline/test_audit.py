@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 
 from tracker.body.limbs import limbs
+from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.fitting.consensus import agreement
+from tracker.fitting.hypothesis import Hypothesis
 from tracker.formats.model_toml import format_model, load_model
 from tracker.pipeline import track_session
-from tracker.pipeline.assessed_poses import assessed_by_tracks, with_repair
+from tracker.pipeline.assessed_poses import assessed_by_tracks, with_alternatives, with_repair
 from tracker.pipeline.methods import METHODS
 from tracker.pipeline.run_repair import RepairedPose, RepairStep, RunRepair
 from tracker.pipeline.stored_run import TrackPlan, stored_run
 from tracker.pipeline.track_session import AuditStep
 from tracker.session.session import load_session
 from tracker.store.annotation_store import AnnotationStore
-from tracker.store.records import PoseChange, PoseRecord
+from tracker.store.records import Alternative, PoseChange, PoseRecord
 from tracker.tracking.chamfer.method import CHAMFER
 from tracker.tracking.chamfer.settings import TrackSettings
 from tracker.tracking.confidence import LimbFeatures, PoseQuality
@@ -196,9 +198,10 @@ def test_the_searches_of_the_repair_follow_those_of_the_tracker_and_replace_thos
     pose, n = model.neutral(), len(limbs(model))
     repaired = RepairedPose(pose, np.ones((3, n), np.bool_), np.zeros(n), ("",) * n, (later,))
     for trace, expected in (((first, earlier), (first, later)), ((), (later,)), (None, (later,))):
-        assert with_repair(PoseRecord(pose, ("tracked",) * len(pose), 1, trace=trace), repaired).trace == expected
+        record = PoseRecord(pose, ("tracked",) * len(pose), 1, trace=trace)
+        assert with_repair(model, record, repaired).trace == expected
     unknown = PoseRecord(pose, ("tracked",) * len(pose), 1)
-    assert with_repair(unknown, repaired._replace(trace=())).trace is None
+    assert with_repair(model, unknown, repaired._replace(trace=())).trace is None
 
 
 def test_the_searches_of_a_run_are_stored(session, store, audited, monkeypatch):
@@ -274,3 +277,33 @@ def test_near_the_start_features_count_where_the_colors_of_the_run_are_unknown(h
     assessed = assessed_by_tracks(model, record, found, tracks, False, features, repaired)
     assert assessed.status == status
     assert assessed.remark.endswith(": hand elsewhere in A") is (repaired is not None and status != "good")
+
+
+def test_poses_that_the_repair_found_about_as_good_take_the_place_of_those_of_the_tracker():
+    model = load_model("gavrila22")
+    pose, n = model.neutral(), len(limbs(model))
+    other = pose.copy()
+    other[model.value_names.index("left_shoulder.elevation")] += 1.0
+    tracks = FrameTracks(np.array([pose] * 3), np.ones((3, n)), ("a", "b", "c"))
+    noted, back = "right leg may be elsewhere", "tracked back from frame 9"
+    record = PoseRecord(pose, ("tracked",) * len(pose), 7, remark=f"{noted}, {back}")
+    change = PoseChange("person", 4, record, (Alternative(pose + 0.3, 7),))
+    agreed = agreement(model, pose, tracks.poses, tracks.trust)
+    unknown = RepairedPose(pose, np.ones((3, n), np.bool_), np.full(n, -5.0), ("",) * n)
+    rivals = (Hypothesis(PosedBody(model, other), cost=0.5),)
+    for repaired, status, remarks, poses in (
+        (unknown, "doubtful", [noted, back], [pose + 0.3]),
+        (unknown._replace(alternatives=()), "good", [back], []),
+        (
+            unknown._replace(alternatives=rivals), "doubtful",
+            ["left arm uncertain: another place is about as likely", back, "left arm may be elsewhere"], [other],
+        ),
+    ):  # fmt: skip
+        kept = with_alternatives(change, repaired)
+        assert [a.values.tolist() for a in kept.alternatives] == [p.tolist() for p in poses]
+        assert {a.model_revision for a in kept.alternatives} <= {7}
+        is_ambiguous = len(kept.alternatives) > 0
+        known = with_repair(model, record, repaired)
+        assessed = assessed_by_tracks(model, known, agreed, tracks, is_ambiguous, None, repaired)
+        assert assessed.status == status
+        assert [r for r in assessed.remark.split(", ") if r != "left arm uncertain: "] == remarks

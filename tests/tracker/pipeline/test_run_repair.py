@@ -52,11 +52,13 @@ def contours(monkeypatch):
     monkeypatch.setattr(run_repair, "covariance_by_contours", known)
 
 
-def repaired(walk, keyframes=(), deviation=0.01, active=None):
+def repaired(walk, keyframes=(), deviation=0.01, active=None, alternatives=None):
     """The steps of a repair whose tracks agree with one another on the wrong leg.
 
     `deviation` is the standard deviation of the tracked poses, rad and metres; None to compare them only.
+    `alternatives` are poses by frame that the tracker found about as good.
     """
+    others = {(k, 0): [pose] for k, pose in (alternatives or {}).items()}
     n_limbs = len(limbs(walk.model))
     tracks = {
         k: FrameTracks(np.array([b.values] * 3), np.ones((3, n_limbs)), ("A", "B", "C"))
@@ -66,7 +68,7 @@ def repaired(walk, keyframes=(), deviation=0.01, active=None):
     subjects = Subjects.of([walk.model], None, [active], stay)
     bodies = {k: tuple(b) for k, b in enumerate(walk.tracked)}
     known = None if deviation is None else lambda frame, person: deviation**2 * np.eye(walk.model.n_dofs)
-    return list(RunRepair(Filmed(walk), subjects, TrackSettings(), bodies, {0: tracks}, known).steps())
+    return list(RunRepair(Filmed(walk), subjects, TrackSettings(), bodies, {0: tracks}, known, others).steps())
 
 
 def off_m(walk, k, pose):
@@ -155,3 +157,30 @@ def test_a_locked_leg_is_not_moved(walk):
     values = walk.model.dof_value[dofs]
     for k, (body,) in enumerate(walk.tracked):
         assert np.array_equal(found[k].pose[values], body.values[values])
+
+
+def test_alternatives_of_the_tracker_are_compared_again(walk, monkeypatch):
+    """On frames where tracks agree and colours contradict nothing, they alone are a reason to look."""
+    fine = np.flatnonzero(~np.array(walk.wrong))
+    wrong = [walk.tracked[k][0].values for k in np.flatnonzero(walk.wrong)[:2]]
+    asked = {}
+
+    def compared(evidence, bodies, person, settings, searched, others, tried):
+        k = next(k for k, views in enumerate(walk.views) if views is evidence.views)
+        asked[k] = [x.name for x in tried], others
+        same, other = bodies[0], PosedBody(walk.model, wrong[0])
+        found = Hypothesis(other, "repair", 11.5), Hypothesis(other, "repair", 14.0), Hypothesis(same, "repair", 10.0)
+        entry = Search.of("repair", ("right_calf",), 10.0, 11.5, False)
+        return Repair(same.values, 10.0, 0.0, found if k in fine[:2] else (), entry)
+
+    monkeypatch.setattr(run_repair, "better_limbs", compared)
+    monkeypatch.setattr(run_repair, "select_alternatives", lambda frames, gain: [0] * len(frames))
+    found = repaired(walk, alternatives=dict(zip(fine[:2], wrong, strict=True)))[-1].found[0]
+    for k, pose in zip(fine[:2], wrong, strict=True):
+        tried, others = asked[k]
+        assert "right_calf" in tried
+        assert any(np.array_equal(pose, other) for other in others)
+        (rival,) = found[k].alternatives  # neither the same pose, nor one that is clearly worse
+        assert rival.cost == pytest.approx(1.5)
+    assert all(found[k].alternatives == () for k in fine[2:])
+    assert repaired(walk, deviation=None)[-1].found[0][fine[0]].alternatives is None

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tracker.body.limbs import limb_display_name, limbs
+from tracker.body.limbs import limbs
 from tracker.body.model import PosedBody
 from tracker.body.searches import Search
 from tracker.fitting.contour_residuals import PartCosts
@@ -16,6 +16,7 @@ from tracker.tracking import confidence
 from tracker.tracking.confidence import PoseQuality, Status, worst
 from tracker.tracking.estimate import NormalMatrix
 from tracker.tracking.estimation.frame_problem import Assessment, Bodies, FrameProblem, PersonFit
+from tracker.tracking.remarks import may_be_elsewhere
 
 
 class PersonEstimate(NamedTuple):
@@ -102,10 +103,10 @@ def finalize(problem: FrameProblem, person: int, bodies: Bodies, found: PersonFi
     if not found.alternatives:
         return out
     moved = {limb for other in found.alternatives for limb in limbs_elsewhere(found.body, other.body)}
-    names = [limb_display_name(x.name) for x in limbs(model) if x.name in moved]
+    names = [x.name for x in limbs(model) if x.name in moved]
     poses = tuple(b.values for b in bodies)
     return out.in_doubt(
-        f"{' and '.join(names) or 'body'} may be elsewhere",
+        may_be_elsewhere(names),
         [(*poses[:person], other.pose, *poses[person + 1 :]) for other in found.alternatives],
     )
 
