@@ -56,7 +56,7 @@ def assessed_by_tracks(
     reasons = [f" without {tracks.without[int(distances.argmax())]}" for distances in of_limbs]
     odds = limb_odds(model, errors)
     if repaired is not None:
-        by_colors = elsewhere_odds(repaired.elsewhere)
+        by_colors = elsewhere_odds(repaired.elsewhere, [x.name in repaired.searched for x in limbs(model)])
         for i in np.flatnonzero(by_colors[:, 0] > odds[:, 0]):
             reasons[i] = f": {repaired.against[i]}"
         odds = np.maximum(odds, by_colors)

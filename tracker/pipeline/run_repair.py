@@ -68,6 +68,8 @@ class RepairedPose(NamedTuple):
     alternatives: tuple[Hypothesis, ...] | None = None
     """Other poses with a limb elsewhere that are about as good by contours and colours together. Their costs are
     relative to that of the pose, nats. None where none were compared."""
+    searched: tuple[str, ...] = ()
+    """Names of the limbs for which a search has proposed places all over, and has left them where they are."""
 
 
 class RepairStep(NamedTuple):
@@ -111,6 +113,7 @@ class RunRepair:
         self._traces: dict[tuple[int, int], tuple[Search, ...]] = {}
         self._covariances: dict[tuple[int, int], Array] = {}
         self._moved = set[tuple[int, int]]()
+        self._searched: dict[tuple[int, int], tuple[str, ...]] = {}
 
     def steps(self) -> Iterator[RepairStep]:
         """Do the work. A caller that stops asking leaves it undone."""
@@ -257,6 +260,8 @@ class RunRepair:
         self._found[frame, person] = found
         taken = (entry for entry in self._traces.get((frame, person), ()) if entry.taken)
         self._traces[frame, person] = (*taken, found.entry)
+        if search or found.is_better:
+            self._searched[frame, person] = tuple(limb.name for limb in search)
         if found.is_better:
             self._moved.add((frame, person))
             self._bodies[frame] = with_body(bodies, person, PosedBody(model, found.pose))
@@ -296,8 +301,9 @@ class RunRepair:
                 trust, pose = self._trusted(k, i, tracks), self._bodies[k][i].values
                 known = elsewhere[k][own], tuple(against[k][own])
                 out[i][k] = RepairedPose(
-                    pose, trust, *known, self._traces.get((k, i), ()), self._covariances.get((k, i)), self._rivals(k, i)
-                )
+                    pose, trust, *known, self._traces.get((k, i), ()), self._covariances.get((k, i)),
+                    self._rivals(k, i), self._searched.get((k, i), ()),
+                )  # fmt: skip
         return out
 
     def _rivals(self, frame: int, person: int) -> tuple[Hypothesis, ...] | None:

@@ -12,7 +12,7 @@ import numpy as np
 from tracker.body.limbs import limbs
 from tracker.body.model import BodyModel
 from tracker.fitting.gauss_newton import OTHER_BODY_M
-from tracker.fitting.hypothesis import Hypothesis
+from tracker.fitting.hypothesis import CLEAR_NATS, Hypothesis
 from tracker.geometry.arrays import Array
 from tracker.tracking.run_confidence import RUN_MODEL
 
@@ -21,8 +21,8 @@ SHARED_M = 0.006
 of 13 simulated people, 88% lie in their 90% ellipsoids (`tests/benchmarks/joint_errors.py`); with half as much 55%,
 with twice as much 99%. The covariance of the sizes says 5 to 8 mm (docs/decisions.md)."""
 SELDOM_NATS = 10.0
-"""How much likelier the colours of the run must find a limb elsewhere until it is off as likely as not, nats. Of 1,000
-simulated limbs in their place, none had more; of 20 that were put elsewhere, all had
+"""How much likelier the colours of the run must find a limb elsewhere until it is off as likely as not, nats. Of 3,354
+limbs of twelve simulated people in their place, 0.2% had more; of 83 that were put elsewhere by more than 20 cm, 88%
 (`tests/benchmarks/region_evidence.py --displaced`)."""
 OFF_M = 0.10
 """A limb is off where one of its joints is farther from its true place, metres."""
@@ -61,13 +61,18 @@ def limb_odds(model: BodyModel, covariances: Array) -> Array:
     return np.asarray(logit(beyond(OFF_M, worst))[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
 
 
-def elsewhere_odds(nats: Array) -> Array:
+def elsewhere_odds(nats: Array, is_searched: Sequence[bool]) -> Array:
     """Return the log odds that each limb is off and lost, (n_limbs, 2), by the colours of the run.
+
+    A limb may look unusual because something hides it. A search that has compared its place with others on that frame,
+    and knows none within `CLEAR_NATS`, speaks against the colours by as much.
 
     Args:
         nats: how much likelier each limb is elsewhere, (n_limbs,); see `region_deficit.elsewhere_nats`.
+        is_searched: whether a search has left each limb where it is, (n_limbs,).
     """
-    return np.asarray((nats - SELDOM_NATS)[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
+    odds = nats - SELDOM_NATS - np.where(is_searched, CLEAR_NATS, 0.0)
+    return np.asarray(odds[:, None] + (0.0, RUN_MODEL.lost - RUN_MODEL.off))
 
 
 def alternative_odds(model: BodyModel, pose: Array, alternatives: Sequence[Hypothesis]) -> Array:

@@ -279,6 +279,23 @@ def test_near_the_start_features_count_where_the_colors_of_the_run_are_unknown(h
     assert assessed.remark.endswith(": hand elsewhere in A") is (repaired is not None and status != "good")
 
 
+@pytest.mark.parametrize(
+    ("nats", "searched", "status"), [(8.0, False, "doubtful"), (8.0, True, "good"), (11.0, True, "doubtful")]
+)
+def test_colors_count_less_against_a_limb_that_was_searched(nats, searched, status):
+    model = load_model("gavrila22")
+    pose, names = model.neutral(), [x.name for x in limbs(model)]
+    n = len(names)
+    tracks = FrameTracks(np.array([pose] * 3), np.ones((3, n)), ("a", "b", "c"))
+    found = agreement(model, pose, tracks.poses, tracks.trust)
+    repaired = RepairedPose(
+        pose, np.ones((3, n), np.bool_), np.array([nats, *[-5.0] * (n - 1)]), ("hand elsewhere in A",) * n,
+        alternatives=(), searched=(names[0],) if searched else (),
+    )  # fmt: skip
+    record = PoseRecord(pose, ("tracked",) * len(pose), 1)
+    assert assessed_by_tracks(model, record, found, tracks, False, None, repaired).status == status
+
+
 def test_poses_that_the_repair_found_about_as_good_take_the_place_of_those_of_the_tracker():
     model = load_model("gavrila22")
     pose, n = model.neutral(), len(limbs(model))
