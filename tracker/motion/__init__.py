@@ -1,8 +1,8 @@
 """Poses over time, without images: prediction, interpolation, smoothing, inconsistent frames, the floor.
 
 Imports `geometry` and `body`. Callers use `prediction.predict`, `interpolation.interpolate_pose`,
-`smoothing.smooth_poses`, `consistency.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet` and
-`keyframe_doubts`.
+`smoothing.smooth_poses`, `shortest_step`, `consistency.inconsistent_frames`, `pose_path.PosePath`, `floor_from_feet`
+and `keyframe_doubts`.
 """
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "keyframe_doubts",
     "pose_path",
     "prediction",
+    "shortest_step",
     "smoothing",
     "velocity",
 ]

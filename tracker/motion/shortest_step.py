@@ -16,9 +16,6 @@ from tracker.body.model import BodyModel
 from tracker.body.parts import Joint
 from tracker.geometry.arrays import Array, IntArray
 
-_ROUNDING = 1e-9
-"""Error of rounding of an angle, rad, and of a cosine."""
-
 
 class _EulerJoint(NamedTuple):
     """A joint whose rotations have two sets of angles each."""
@@ -94,7 +91,7 @@ def nearest_equivalent(
         near, own = reference[..., joint.values], out[..., joint.values]
         low, high = joint.limits.T
         other = joint.other(own, np.where(np.isnan(joint.centers), near, joint.centers))
-        own_fits, other_fits = (((x >= low - _ROUNDING) & (x <= high + _ROUNDING)).all(axis=-1) for x in (own, other))
+        own_fits, other_fits = (np.isclose(x, np.clip(x, low, high)).all(axis=-1) for x in (own, other))
         is_nearer = ((other - near) ** 2).sum(axis=-1) < ((own - near) ** 2).sum(axis=-1)
         is_other = (other_fits & (is_nearer | ~own_fits))[..., None]
         out[..., joint.values] = np.where(is_other, np.clip(other, low, high), own)
@@ -133,6 +130,6 @@ def middle_angle_sum(joint: Joint) -> float | None:
     if joint.kind != "revolute" or len(joint.axes) != 3:
         return None
     first, second, third = (np.array(a.direction) for a in joint.axes)
-    if max(abs(first @ second), abs(second @ third)) > _ROUNDING:
+    if not np.allclose([first @ second, second @ third], 0):
         return None
     return float(-2 * np.arctan2(second @ np.cross(first, third), first @ third))
