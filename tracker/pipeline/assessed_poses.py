@@ -63,7 +63,7 @@ def assessed_by_tracks(
         if repaired.alternatives is not None:
             is_ambiguous, by_others = False, alternative_odds(model, pose.values, repaired.alternatives)
             for i in np.flatnonzero(by_others[:, 0] > odds[:, 0]):
-                reasons[i] = ": another place is about as likely"
+                reasons[i] = ""  # the remark of `with_repair` says so
             odds = np.maximum(odds, by_others)
     elif features is not None and not tracks.has_history:
         odds = np.maximum(odds, log_odds(features))
